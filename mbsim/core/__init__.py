@@ -1,0 +1,1 @@
+"""Leaf helpers: the compile policy, rotations, blends, registries, units."""

@@ -1,0 +1,18 @@
+"""Array types for the fields of NamedTuple groups: the dimension is part of the name.
+
+The groups (`system/arrays.py`) annotate their fields with these; `core.address`
+reads the annotation to rebuild a group in compiled code. All are C-contiguous.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+F1 = Annotated[npt.NDArray[np.float64], "float64", 1]
+F2 = Annotated[npt.NDArray[np.float64], "float64", 2]
+F3 = Annotated[npt.NDArray[np.float64], "float64", 3]
+I1 = Annotated[npt.NDArray[np.int64], "int64", 1]
+I2 = Annotated[npt.NDArray[np.int64], "int64", 2]

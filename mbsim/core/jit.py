@@ -1,0 +1,156 @@
+"""The one compile policy: what is compiled, where it is kept, when it is stale.
+
+Two ways into compiled code, and only these:
+
+* `function(f)`: a Numba dispatcher, for the few functions that Python calls;
+* `address(f, signature)`: a C function behind an address, for everything that a
+  scene chooses (laws, pairs) and for what an integrator calls without knowing it.
+
+Everything these call is a plain function marked `jitable`. The result is cached
+on disk under a digest of *all* project files that the function can reach through
+imports: Numba's own check sees only the file of the function itself, and would go
+on using an edited helper's old code.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import re
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.caching import CacheImpl, _CacheLocator
+from numba.extending import intrinsic, register_jitable
+
+from mbsim.core.jitable import take_marked
+
+PACKAGE = Path(__file__).resolve().parent.parent
+_IMPORT = re.compile(r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(.+)|import\s+(mbsim[\w.]*))", re.M)
+
+#: Seconds spent compiling in this process, and the hook that is told before the first compilation.
+compile_seconds = 0.0
+on_first_compile: Callable[[], None] | None = None
+
+
+def cache_root() -> Path:
+    """Return the folder of compiled code: $MBSIM_CACHE_DIR, or the user's cache folder."""
+    named = os.environ.get("MBSIM_CACHE_DIR")
+    if named:
+        return Path(named)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library/Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mbsim"
+
+
+@functools.lru_cache(maxsize=None)
+def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Return the digest of a file and the project files that it imports."""
+    text = path.read_bytes()
+    found = []
+    for module, names, plain in _IMPORT.findall(text.decode("utf-8")):
+        parts = (module or plain).split(".")[1:]
+        candidates = [parts] + [[*parts, name] for name in re.findall(r"\w+", names)]
+        for candidate in candidates:
+            file = PACKAGE.joinpath(*candidate).with_suffix(".py") if candidate else None
+            if file is not None and file.is_file():
+                found.append(file)
+    return hashlib.sha256(text).digest(), tuple(found)
+
+
+def source_digest(files: list[Path]) -> str:
+    """Return a digest of `files` and of every project file they reach through imports."""
+    reached: dict[Path, bytes] = {}
+    waiting = [file.resolve() for file in files]
+    while waiting:
+        file = waiting.pop()
+        if file not in reached:
+            reached[file], imported = _imports(file)
+            waiting.extend(imported)
+    # names too: a file that moves changes what its callers mean
+    lines = sorted(file.name.encode() + digest for file, digest in reached.items())
+    return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
+
+
+class _ContentLocator(_CacheLocator):
+    """Numba's cache for functions of this project, in a folder named by content."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def get_cache_path(self) -> str:
+        return str(self._path)
+
+    def get_source_stamp(self) -> str:
+        return "content"  # the folder's name already says it
+
+    def get_disambiguator(self) -> str:
+        return ""
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ContentLocator | None:
+        root = cache_root()
+        file = Path(py_file).resolve()
+        if PACKAGE not in file.parents and root.resolve() not in file.parents:
+            return None
+        # an adapter closes over the law it adapts: that law's file counts as well
+        cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
+        files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
+        locator = cls(root / numba.__version__ / source_digest([file, *files]))
+        try:
+            locator.ensure_cache_path()
+        except OSError:
+            return None
+        return locator
+
+
+if _ContentLocator not in CacheImpl._locator_classes:
+    CacheImpl._locator_classes.insert(0, _ContentLocator)
+
+
+def _register() -> None:
+    """Tell Numba of the functions marked since the last compilation."""
+    for function in take_marked():
+        register_jitable(error_model="numpy")(function)
+
+
+def _timed(work: Callable[[], Any], stats: Callable[[], bool]) -> Any:
+    """Run `work`; if it compiled rather than loaded, say so once and count the time."""
+    global compile_seconds, on_first_compile
+    if stats() and on_first_compile is not None:
+        tell, on_first_compile = on_first_compile, None
+        tell()
+    began = time.perf_counter()
+    result = work()
+    compile_seconds += time.perf_counter() - began
+    return result
+
+
+def function(py_func: Callable[..., Any], signature: Any = None) -> Callable[..., Any]:
+    """Return `py_func` compiled (loaded from the cache where it is there)."""
+    _register()
+    dispatcher = numba.njit(cache=True, error_model="numpy")(py_func)
+    return dispatcher
+
+
+_kept: list[Any] = []
+
+
+def address(py_func: Callable[..., Any], signature: Any) -> int:
+    """Return the address of `py_func` compiled as a C function; it lives as long as the process."""
+    _register()
+    compiled = numba.cfunc(signature, cache=True, error_model="numpy")(py_func)
+    _kept.append(compiled)
+    return int(compiled.address)

@@ -1,0 +1,45 @@
+"""Named entries that live one in a file: a file registers itself by being imported."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+Entry = TypeVar("Entry")
+
+
+class Registry(Generic[Entry]):
+    """Entries by name, found in the modules of one package, read at the first question."""
+
+    def __init__(self, package: str) -> None:
+        self._package = package
+        self._entries: dict[str, Entry] = {}
+        self._loaded = False
+
+    def put(self, name: str, entry: Entry) -> None:
+        """Add `entry`; a name taken twice is a programming error."""
+        if name in self._entries:
+            raise ValueError(f"{name} is registered twice in {self._package}")
+        self._entries[name] = entry
+
+    def _load(self) -> None:
+        """Import every module of the package, so that each registers itself."""
+        if not self._loaded:
+            self._loaded = True
+            package = importlib.import_module(self._package)
+            for module in pkgutil.iter_modules(package.__path__):
+                importlib.import_module(f"{self._package}.{module.name}")
+
+    def __getitem__(self, name: str) -> Entry:
+        self._load()
+        return self._entries[name]
+
+    def __contains__(self, name: str) -> bool:
+        self._load()
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        self._load()
+        return iter(sorted(self._entries))

@@ -1,0 +1,144 @@
+"""Vectors as 3-tuples, unit quaternions (w first) as 4-tuples, rotation matrices as arrays.
+
+Tuples keep compiled code free of allocation and read like the formulas.
+`rotate(R, a)` is R a, `unrotate(R, a)` is R' a.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+
+
+@jitable
+def add(a, b):
+    """Return a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@jitable
+def sub(a, b):
+    """Return a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@jitable
+def scale(s, a):
+    """Return s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@jitable
+def dot(a, b):
+    """Return a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jitable
+def cross(a, b):
+    """Return a x b."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@jitable
+def norm(a):
+    """Return |a|."""
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@jitable
+def vector(array):
+    """Return the first three numbers of an array as a tuple."""
+    return (array[0], array[1], array[2])
+
+
+@jitable
+def rotate(R, a):
+    """Return R a for a 3x3 array."""
+    return (
+        R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2],
+        R[1, 0] * a[0] + R[1, 1] * a[1] + R[1, 2] * a[2],
+        R[2, 0] * a[0] + R[2, 1] * a[1] + R[2, 2] * a[2],
+    )
+
+
+@jitable
+def unrotate(R, a):
+    """Return R' a for a 3x3 array."""
+    return (
+        R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
+        R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
+        R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2],
+    )
+
+
+@jitable
+def matrix_from_quaternion(q, R):
+    """Write the rotation of quaternion q (array or tuple, any length but 0) into R."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    # dividing by |q|^2 makes R orthonormal for the stages, whose q is not quite unit
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    R[0, 0] = 1.0 - s * (y * y + z * z)
+    R[0, 1] = s * (x * y - w * z)
+    R[0, 2] = s * (x * z + w * y)
+    R[1, 0] = s * (x * y + w * z)
+    R[1, 1] = 1.0 - s * (x * x + z * z)
+    R[1, 2] = s * (y * z - w * x)
+    R[2, 0] = s * (x * z - w * y)
+    R[2, 1] = s * (y * z + w * x)
+    R[2, 2] = 1.0 - s * (x * x + y * y)
+
+
+@jitable
+def twist_about(q, q0, n):
+    """Return the angle by which the rotation from q0 to q turns about the unit vector n.
+
+    The relative rotation in the global frame is r = q q0*; its twist about n is
+    2 atan2(r_vec . n, r_w).
+    """
+    w = q[0] * q0[0] + q[1] * q0[1] + q[2] * q0[2] + q[3] * q0[3]
+    x = -q[0] * q0[1] + q[1] * q0[0] - q[2] * q0[3] + q[3] * q0[2]
+    y = -q[0] * q0[2] + q[1] * q0[3] + q[2] * q0[0] - q[3] * q0[1]
+    z = -q[0] * q0[3] - q[1] * q0[2] + q[2] * q0[1] + q[3] * q0[0]
+    s = x * n[0] + y * n[1] + z * n[2]
+    if w < 0.0:
+        s, w = -s, -w
+    return 2.0 * math.atan2(s, w)
+
+
+@jitable
+def turn_with_normal(t, n0, n):
+    """Return the tangent t at unit normal n0 carried to unit normal n by the shortest rotation."""
+    # R = I + [c]x + [c]x^2 / (1 + n0.n), c = n0 x n
+    c = cross(n0, n)
+    k = 1.0 / (1.0 + dot(n0, n)) if dot(n0, n) > -0.999999 else 0.0
+    ct = cross(c, t)
+    turned = add(t, add(ct, scale(k, cross(c, ct))))
+    # rounding must not let the frame drift out of the tangent plane
+    turned = sub(turned, scale(dot(turned, n), n))
+    length = norm(turned)
+    if length < 1e-12:
+        return any_tangent(n)
+    return scale(1.0 / length, turned)
+
+
+@jitable
+def spin(t, n, angle):
+    """Return the tangent t turned by `angle` about the unit normal n."""
+    c, s = math.cos(angle), math.sin(angle)
+    return add(scale(c, t), scale(s, cross(n, t)))
+
+
+@jitable
+def any_tangent(n):
+    """Return some unit vector at right angles to n."""
+    if abs(n[0]) < 0.6:
+        t = (0.0, n[2], -n[1])
+    else:
+        t = (-n[2], 0.0, n[0])
+    return scale(1.0 / norm(t), t)

@@ -1,0 +1,1 @@
+"""The equations of motion: from (t, y) to y', in stages."""

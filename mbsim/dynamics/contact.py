@@ -1,0 +1,203 @@
+"""What pushes where shapes touch: the incident marker, the two laws, the wrench on both bodies.
+
+At the contact point p, n the unit normal from J into I, v the velocity of I's material
+point relative to J's:
+
+    depth rate = -v.n        slip = v - (v.n) n        spin = (w_I - w_J).n
+    F_on_I = N n + Fx tx + Fy ty       T_on_I = (p - x_I) x F + Mx tx + My ty + Tz n
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import (
+    add,
+    any_tangent,
+    cross,
+    dot,
+    rotate,
+    scale,
+    spin,
+    sub,
+    turn_with_normal,
+    twist_about,
+    unrotate,
+    vector,
+)
+from mbsim.dynamics.kinematics import position
+from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, NORMAL_CALLS, PYTHON_CALLS
+
+# columns of `Work.slot`
+DEPTH, RATE, NORMAL, SLIP = range(4)
+FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
+SLOT_COLUMNS = 12
+
+
+@jitable
+def velocity_at(scene, y, b, p):
+    """Return the velocity of body b's material point at p."""
+    arm = sub(p, position(scene, y, b))
+    return add(vector(scene.work.v[b]), cross(vector(scene.work.w[b]), arm))
+
+
+@jitable
+def trial_quaternion(scene, y, b):
+    """Return the quaternion of body b at the trial point."""
+    if b == len(scene.bodies.mass):
+        return (1.0, 0.0, 0.0, 0.0)
+    at = BODY_SIZE * b + 3
+    return (y[at], y[at + 1], y[at + 2], y[at + 3])
+
+
+@jitable
+def birth_tangent(scene, graphic_i, n):
+    """Return the x-axis of a new incident marker: I's marker x-axis (or y) projected on the plane."""
+    R = scene.work.R[scene.graphics.body[graphic_i]]
+    S = scene.graphics.marker_R[graphic_i]
+    x = rotate(R, (S[0, 0], S[1, 0], S[2, 0]))
+    if abs(dot(x, n)) > 0.9:
+        x = rotate(R, (S[0, 1], S[1, 1], S[2, 1]))
+    x = sub(x, scale(dot(x, n), n))
+    return scale(1.0 / math.sqrt(dot(x, x)), x)
+
+
+@jitable
+def tangent(scene, y, s, graphic_i, bi, bj, n):
+    """Return the x-axis of the incident marker of slot s at the trial point.
+
+    Since the committed state it has turned with the normal by the shortest rotation and about
+    the normal by the mean of both bodies' turns; a new incident gets its axes by birth.
+    """
+    state = scene.state
+    if scene.contacts.framed[scene.slots.contact[s]] == 0:
+        # the law is the same in every tangent frame
+        return any_tangent(n)
+    if state.touching[s] == 0:
+        return birth_tangent(scene, graphic_i, n)
+    t = turn_with_normal(vector(state.t[s]), vector(state.n[s]), n)
+    angle = 0.5 * (
+        twist_about(trial_quaternion(scene, y, bi), state.q[bi], n)
+        + twist_about(trial_quaternion(scene, y, bj), state.q[bj], n)
+    )
+    return spin(t, n, angle)
+
+
+@jitable
+def in_marker(scene, y, g, p):
+    """Return point p from the origin of graphic g's reference marker, in that marker's axes."""
+    b = scene.graphics.body[g]
+    in_body = unrotate(scene.work.R[b], sub(p, position(scene, y, b)))
+    return unrotate(scene.graphics.marker_R[g], sub(in_body, vector(scene.graphics.marker_p[g])))
+
+
+@jitable
+def sides(scene, s):
+    """Return the graphics of a slot in the contact's order: I, J."""
+    pair = scene.slots.pair[s]
+    i, j = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
+    if scene.pairs.swapped[pair] == 1:
+        return j, i
+    return i, j
+
+
+@jitable
+def add_wrench(scene, y, b, p, force, torque):
+    """Add a force at p and a torque to body b."""
+    arm = sub(p, position(scene, y, b))
+    moment = add(cross(arm, force), torque)
+    for k in range(3):
+        scene.work.force[b, k] += force[k]
+        scene.work.torque[b, k] += moment[k]
+
+
+@jitable
+def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
+    """Call the friction law of contact c for slot s into `law_out`; return its code."""
+    contacts, work = scene.contacts, scene.work
+    given = work.law_in
+    at = scene.slots.x[s]
+    given[0] = t
+    given[1] = h
+    for k in range(3):
+        given[2 + k] = y[at + k] if at >= 0 else 0.0
+        given[13 + k] = loci[k]
+        given[16 + k] = locj[k]
+    given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
+    given[8], given[9] = spin_rates[0], spin_rates[1]
+    given[10] = normal
+    given[11] = 0.0
+    given[12] = 0.0
+    scene.log.counters[FRICTION_CALLS] += 1
+    scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
+    return call_int(
+        contacts.friction_law[c],
+        (contacts.id[c], given, contacts.friction_par[c], work.law_out),
+    )
+
+
+@jitable
+def add_contact(scene, t, h, y, dy, s):
+    """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
+    contacts, work = scene.contacts, scene.work
+    c = scene.slots.contact[s]
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    point = work.points[s]
+    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+
+    # how the surfaces move at p
+    v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
+    w = sub(vector(work.w[bi]), vector(work.w[bj]))
+    rate = -dot(v, n)
+    tx = tangent(scene, y, s, gi, bi, bj, n)
+    ty = cross(n, tx)
+    slip = (dot(v, tx), dot(v, ty))
+    spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
+
+    # normal force; out: force, force at rate 0, stored energy
+    out = work.law_out
+    scene.log.counters[NORMAL_CALLS] += 1
+    code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    if code != 0:
+        return code
+    normal, elastic, stored = out[0], out[1], out[2]
+    lost = (normal - elastic) * rate
+
+    force = scale(normal, n)
+    torque = (0.0, 0.0, 0.0)
+    if contacts.friction_law[c] != 0:
+        if contacts.framed[c] == 1:
+            loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
+            locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
+        else:
+            loci, locj = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal)
+        if code != 0:
+            return code
+        fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
+        force = add(force, add(scale(fx, tx), scale(fy, ty)))
+        torque = add(scale(mx, tx), add(scale(my, ty), scale(tz, n)))
+        lost -= fx * slip[0] + fy * slip[1]
+        lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
+    add_wrench(scene, y, bi, p, force, torque)
+    add_wrench(scene, y, bj, p, scale(-1.0, force), scale(-1.0, torque))
+
+    # X of the incident follows the slip
+    at = scene.slots.x[s]
+    if at >= 0:
+        dy[at], dy[at + 1], dy[at + 2] = slip[0], slip[1], spin_rates[2]
+    dy[len(dy) - 1] += lost
+
+    # what recorder, log and commit want to know
+    row = work.slot[s]
+    row[DEPTH], row[RATE], row[NORMAL] = depth, rate, normal
+    row[SLIP] = math.hypot(slip[0], slip[1])
+    for k in range(3):
+        work.t[s, k] = tx[k]
+        row[FORCE + k] = force[k]
+        row[TORQUE + k] = torque[k]
+    row[STORED], row[LOST] = stored, lost
+    return 0

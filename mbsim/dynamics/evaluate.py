@@ -1,0 +1,92 @@
+"""The pipeline, the file to read first: y' = f(t, y) in stages, each one call."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
+from mbsim.dynamics.contact import add_contact
+from mbsim.dynamics.detection import find_contacts
+from mbsim.dynamics.kinematics import place_bodies
+from mbsim.system.arrays import BODY_SIZE
+
+NOT_FINITE = 3  # beside the codes of laws.abi
+
+
+@jitable
+def add_gravity(scene):
+    """Start the forces of every body with its weight."""
+    bodies, work, g = scene.bodies, scene.work, scene.world.gravity
+    for b in range(len(bodies.mass) + 1):
+        mass = bodies.mass[b] if b < len(bodies.mass) else 0.0
+        for k in range(3):
+            work.force[b, k] = mass * g[k]
+            work.torque[b, k] = 0.0
+
+
+@jitable
+def add_contacts(scene, t, h, y, dy):
+    """Add the forces of every touching slot; return 0 or a law's code."""
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
+        dy[k] = 0.0
+    for s in range(len(scene.slots.pair)):
+        if scene.work.touching[s] == 1:
+            code = add_contact(scene, t, h, y, dy, s)
+            if code != 0:
+                scene.work.trouble[1] = scene.slots.contact[s]
+                scene.work.trouble[3] = s
+                return code
+    return 0
+
+
+@jitable
+def accelerate(scene, y, dy):
+    """Fill y' of every body: x' = v, q' = q (0, w)/2, m v' = F, I w' = T - w x I w in cg axes."""
+    bodies, work = scene.bodies, scene.work
+    total = 0.0
+    for b in range(len(bodies.mass)):
+        at = BODY_SIZE * b
+        w = (y[at + 10], y[at + 11], y[at + 12])
+        qw, qx, qy, qz = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        dy[at + 3] = 0.5 * (-qx * w[0] - qy * w[1] - qz * w[2])
+        dy[at + 4] = 0.5 * (qw * w[0] + qy * w[2] - qz * w[1])
+        dy[at + 5] = 0.5 * (qw * w[1] + qz * w[0] - qx * w[2])
+        dy[at + 6] = 0.5 * (qw * w[2] + qx * w[1] - qy * w[0])
+
+        torque = unrotate(work.R[b], vector(work.torque[b]))
+        gyroscopic = cross(w, rotate(bodies.inertia[b], w))
+        alpha = rotate(bodies.inverse[b], sub(torque, gyroscopic))
+        alpha_global = rotate(work.R[b], alpha)
+        for k in range(3):
+            a = work.force[b, k] / bodies.mass[b]
+            dy[at + k] = y[at + 7 + k]
+            dy[at + 7 + k] = a
+            dy[at + 10 + k] = alpha[k]
+            work.accel[b, k] = a
+            work.accel[b, 3 + k] = alpha_global[k]
+            total += a + alpha[k]
+    return total
+
+
+@jitable
+def evaluate(scene, t, h, y, dy):
+    """Fill dy = f(t, y), `h` after the committed state; return 0 or why it cannot be."""
+    # where things are
+    place_bodies(scene, y)
+
+    # who touches whom
+    code = find_contacts(scene, y)
+    if code != 0:
+        return code
+
+    # what pushes
+    add_gravity(scene)
+    code = add_contacts(scene, t, h, y, dy)
+    if code != 0:
+        return code
+
+    # what follows
+    if not math.isfinite(accelerate(scene, y, dy)):
+        return NOT_FINITE
+    return 0

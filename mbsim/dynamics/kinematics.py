@@ -1,0 +1,43 @@
+"""Where bodies and shapes are, and how they move."""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import matrix_from_quaternion, rotate
+from mbsim.system.arrays import BODY_SIZE
+
+
+@jitable
+def place_bodies(scene, y):
+    """Fill R, v and w (global) of every moving body from y; the ground's rows stay as made."""
+    work = scene.work
+    for b in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * b
+        matrix_from_quaternion(y[at + 3 : at + 7], work.R[b])
+        w = rotate(work.R[b], (y[at + 10], y[at + 11], y[at + 12]))
+        for k in range(3):
+            work.v[b, k] = y[at + 7 + k]
+            work.w[b, k] = w[k]
+
+
+@jitable
+def position(scene, y, b):
+    """Return the cg position of body b; ground's is the global origin."""
+    if b == len(scene.bodies.mass):
+        return (0.0, 0.0, 0.0)
+    at = BODY_SIZE * b
+    return (y[at], y[at + 1], y[at + 2])
+
+
+@jitable
+def place_graphic(scene, y, g):
+    """Fill the frame (centre, rotation by rows) of graphic g."""
+    graphics, frame = scene.graphics, scene.work.frames[g]
+    b = graphics.body[g]
+    R, S = scene.work.R[b], graphics.R[g]
+    x = position(scene, y, b)
+    c = rotate(R, (graphics.p[g, 0], graphics.p[g, 1], graphics.p[g, 2]))
+    for r in range(3):
+        frame[r] = x[r] + c[r]
+        for k in range(3):
+            frame[3 + 3 * r + k] = R[r, 0] * S[0, k] + R[r, 1] * S[1, k] + R[r, 2] * S[2, k]

@@ -1,0 +1,61 @@
+"""The registry of closed-form pairs, and their contract.
+
+A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count`` of plain
+arrays:
+
+* `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
+* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing;
+* `points` (slots, 7), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
+  candidate), contact point (midpoint of the two surface points), unit normal from J into I.
+
+It fills every one of its `slots` rows and returns their number, or `NOT_MINE` where the
+closed form does not hold for this pose: the pair then goes through FCL. A slot's identity
+over time is its row (a corner of a box keeps its row).
+The largest depth, where negative, is a lower bound of the distance of the two shapes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from mbsim.core.jitable import jitable
+from mbsim.core.registry import Registry
+
+NOT_MINE = -1
+
+
+class Pair(NamedTuple):
+    """A closed-form pair of shapes in this order, with its number of candidate points."""
+
+    name: str
+    points: Callable[..., int]
+    slots: int
+
+
+PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
+
+
+def pair(shape_i: str, shape_j: str, slots: int) -> Any:
+    """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
+
+    def register(points: Callable[..., int]) -> Callable[..., int]:
+        name = f"{shape_i}-{shape_j}"
+        PAIRS.put(name, Pair(name, jitable(points), slots))
+        return points
+
+    return register
+
+
+@jitable
+def put_point(row, depth, p, n):
+    """Write one candidate into a row of `points`."""
+    row[0] = depth
+    row[1], row[2], row[3] = p[0], p[1], p[2]
+    row[4], row[5], row[6] = n[0], n[1], n[2]
+
+
+@jitable
+def axis(frame, k):
+    """Return axis k (column k of the rotation) of a frame."""
+    return (frame[3 + k], frame[6 + k], frame[9 + k])

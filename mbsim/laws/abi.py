@@ -1,0 +1,99 @@
+"""The one internal signature of laws, and the adapters that put a law behind an address.
+
+Normal law      int64 f(double depth, double rate, const double *par, double out[3])
+                out: force [F], force at rate 0 [F], stored energy [F L]
+Friction law    int64 f(int64 id, const double in[FRICTION_INPUTS], const double *par, double out[5])
+                in: the fields of `FrictionInput` in order; out: Fx, Fy, Mx, My, Tz on I
+
+`id` is the Force_Contact's. The result is 0, or a code that stops the run: 1 says that an
+interpreted user function raised (the guard in `plugins` holds the exception), 2 that a
+compiled one did. Results that are not finite are found by the caller, for every law alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import carray, types
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from mbsim.core import jit
+from mbsim.core.jitable import jitable
+from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
+
+FRICTION_INPUTS = 19
+RAISED_INTERPRETED = 1
+RAISED_COMPILED = 2
+
+_PTR = types.CPointer(types.float64)
+NORMAL_SIGNATURE = types.int64(types.float64, types.float64, _PTR, _PTR)
+FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
+
+
+@jitable
+def friction_input(a):
+    """Return the `FrictionInput` that lies in the 19 numbers of array `a`."""
+    return FrictionInput(
+        a[0],
+        a[1],
+        (a[2], a[3], a[4]),
+        (a[5], a[6], a[7]),
+        (a[8], a[9]),
+        a[10],
+        a[11],
+        a[12],
+        (a[13], a[14], a[15]),
+        (a[16], a[17], a[18]),
+    )
+
+
+def _adapt_normal(force: Callable[..., Any], energy: Callable[..., Any], count: int) -> Any:
+    """Return `force` and `energy` of `count` parameters as one C function."""
+
+    def entry(depth, rate, par, out):
+        values = to_fixed_tuple(carray(par, (count,)), count)
+        result = carray(out, (3,))
+        result[0] = force(depth, rate, *values)
+        result[1] = force(depth, 0.0, *values)
+        result[2] = energy(depth, *values)
+        return 0
+
+    return entry
+
+
+def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
+    """Return `force` of `count` parameters as a C function."""
+
+    def entry(element, inputs, par, out):
+        values = to_fixed_tuple(carray(par, (count,)), count)
+        result = carray(out, (5,))
+        given = friction_input(carray(inputs, (19,)))
+        fx, fy, mx, my, tz = force(given, *values)
+        result[0] = fx
+        result[1] = fy
+        result[2] = mx
+        result[3] = my
+        result[4] = tz
+        return 0
+
+    return entry
+
+
+def normal_address(law: NormalLaw) -> int:
+    """Return the address of a normal law behind `NORMAL_SIGNATURE`."""
+    entry = _adapt_normal(law.force, law.energy, len(law.parameters))
+    return jit.address(entry, NORMAL_SIGNATURE)
+
+
+def friction_address(law: FrictionLaw) -> int:
+    """Return the address of a friction law behind `FRICTION_SIGNATURE`."""
+    return jit.address(_adapt_friction(law.force, len(law.parameters)), FRICTION_SIGNATURE)
+
+
+def parameters(law: NormalLaw | FrictionLaw, contact: Any) -> np.ndarray[Any, Any]:
+    """Return the law's parameters as the contact element gives them, shape (n,)."""
+    values = [getattr(contact, name) for name in law.parameters]
+    # IMPACT without damping needs no dmax; 1 keeps its STEP defined and unused
+    return np.array([1.0 if value is None else value for value in values], dtype=np.float64)

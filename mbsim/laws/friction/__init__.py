@@ -1,0 +1,1 @@
+"""Friction laws: from slip velocity and normal force to the friction force."""

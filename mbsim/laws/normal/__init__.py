@@ -1,0 +1,1 @@
+"""Normal laws: from depth and its rate to the normal force."""

@@ -1,0 +1,1 @@
+"""What a deck says, checked and placed; knows nothing of XML."""

@@ -1,0 +1,201 @@
+"""What a deck says, as frozen dataclasses in the deck's own words and units.
+
+Every element carries its `Source` (file and line), so that a fault found late,
+in the geometry or in a running solver, can still be shown in the user's deck.
+Nothing here is converted, placed or checked; see `placement` and `checks`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an element stands: deck file and line."""
+
+    file: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Units:
+    """Names of the model's units and the factor that makes F = m a hold in them.
+
+    `mass_scale` [-] multiplies every mass and inertia of the deck: 1 for N, m, kg, s,
+    1e-3 for N, mm, kg, s (1 kg mm/s^2 = 1e-3 N).
+    """
+
+    force: str = "NEWTON"
+    mass: str = "KILOGRAM"
+    length: str = "METER"
+    time: str = "SECOND"
+    mass_scale: float = 1.0
+    length_m: float = 1.0  # one length unit in metres
+    time_s: float = 1.0  # one time unit in seconds
+
+
+@dataclass(frozen=True)
+class Body:
+    """Body_Rigid. Velocities count only where their flag is true."""
+
+    id: int
+    label: str = ""
+    is_ground: bool = False
+    mass: float | None = None
+    inertia: tuple[float, float, float, float, float, float] | None = None  # xx yy zz xy yz xz
+    cg_id: int | None = None
+    im_id: int | None = None
+    lprf_id: int | None = None
+    v_ic: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    w_ic: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    vm_id: int | None = None
+    wm_id: int | None = None
+    density: float | None = None  # ours, [mass/L^3]; used only where mass is absent
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Marker:
+    """Reference_Marker: position and axes (columns of `R`) in its parent frame."""
+
+    id: int
+    label: str = ""
+    body_id: int = 0
+    rm_id: int | None = None
+    pos: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    R: Array = field(default_factory=lambda: np.eye(3))
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Graphic:
+    """Post_Graphic. `shape` is SPHERE, ELLIPSOID, BOX, CYLINDER, PLANE or MESH.
+
+    `size` is (radius,) for a sphere, semi-axes for an ellipsoid, edge lengths for a
+    box, (radius, length) for a cylinder, empty for a plane and a mesh.
+    `offset` is the shape's centre in the marker's frame: a box from its corner
+    and a cylinder (whose marker is the centre of its base) have one.
+    A plane is the half-space z <= 0 of its marker; a mesh has vertices and faces.
+    """
+
+    id: int
+    label: str = ""
+    type: str = "SPHERE"  # the deck's own type, e.g. BoxDefinedFromCorner
+    shape: str = "SPHERE"
+    marker_id: int = 0
+    size: tuple[float, ...] = ()
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    vertices: Array | None = None  # (n, 3)
+    faces: npt.NDArray[np.int64] | None = None  # (m, 3), zero-based
+    mesh_file: str = ""
+    is_material_inside: bool = True
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Subroutine:
+    """A user subroutine as the deck names it: USER(...) values, function, file."""
+
+    par: tuple[float, ...] = ()
+    fnc_name: str = ""
+    dll_name: str = ""
+    script_name: str = ""  # absolute path, or empty where --plugin must give it
+    interpreter: str = ""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Force_Contact, every documented attribute; `cnf_type` and `cff_type` are canonical."""
+
+    id: int
+    label: str = ""
+    i_graphics_id: tuple[int, ...] = ()
+    j_graphics_id: tuple[int, ...] = ()
+    ignore_penetration_larger_than: float | None = None
+    contact_points: str = "POINTS"
+    cnf_type: str = "IMPACT"
+    stiffness: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    dmax: float | None = None
+    cff_type: str = "COULOMB_OFF"
+    mu_static: float = 0.0
+    mu_dynamic: float = 0.0
+    stiction_trans_vel: float = 1e-3
+    friction_trans_vel: float = 1e-3
+    cff: Subroutine = Subroutine()
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Force_Gravity [L/T^2] in the global frame."""
+
+    g: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Transient:
+    """Param_Transient; None where the deck says nothing."""
+
+    integrator_type: str | None = None
+    integr_tol: float | None = None
+    h_max: float | None = None
+    h_min: float | None = None
+    h0_max: float | None = None
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`."""
+
+    analysis_type: str = "TRANSIENT"
+    start_time: float = 0.0
+    end_time: float = 0.0
+    print_interval: float = 0.0
+    transient: Transient | None = None  # a Param_Transient that stood before it in <Command>
+    gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Request:
+    """Post_Request of type MARKER_DISPLACEMENT, MARKER_VELOCITY or MARKER_ACCELERATION."""
+
+    id: int
+    type: str
+    label: str = ""
+    comment: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int | None = None
+    ref_marker_id: int | None = None
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Model:
+    """A whole deck. Dictionaries are keyed by id, in the order of the deck."""
+
+    name: str
+    file: str
+    sha256: str
+    units: Units
+    bodies: dict[int, Body]
+    markers: dict[int, Marker]
+    graphics: dict[int, Graphic]
+    contacts: dict[int, Contact]
+    gravity: Gravity = Gravity()
+    transient: Transient = Transient()
+    simulations: tuple[Simulation, ...] = ()
+    requests: dict[int, Request] = field(default_factory=dict)
+    compatibility: str = ""
+    notes: tuple[str, ...] = ()  # statements accepted and not acted on, for the log
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,196 @@
+"""Body_Rigid, Reference_Marker and Param_Unit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.model import elements as el
+from mbsim.model.frames import orthonormalise, rotation_313
+from mbsim.reader import units
+from mbsim.reader.keywords import spellings
+from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, TEXT, keyword
+from mbsim.reader.statement import Entry, Spec, Statement
+
+_INERTIAS = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_yz", "inertia_xz")
+_VELOCITIES = tuple(f"{kind}_ic_{axis}" for kind in "vw" for axis in "xyz")
+_COSINES = tuple(f"a{row}{column}" for row in range(3) for column in range(3))
+_ANGLES = ("psi", "theta", "phi")
+_POSITIONS = ("pos_x", "pos_y", "pos_z")
+
+_COSINE_LIMIT = 1e-4  # |R'R - 1| beyond which cosines are no rotation at all
+_COSINE_WARN = 1e-9
+
+
+def _build_units(entry: Entry) -> None:
+    """Set the draft's units, once."""
+    if entry.draft.units is not None:
+        entry.fault("a second Param_Unit; a model has one")
+        return
+    by_name = {key: entry.get(f"{key}_unit") for key in ("force", "mass", "length", "time")}
+    factor = entry.get("mass_mult_factor")
+    if factor is not None and any(by_name.values()):
+        entry.fault("give unit names or mass_mult_factor, not both", "mass_mult_factor")
+    chosen = {key: name for key, name in by_name.items() if name is not None}
+    entry.draft.units = units.make_units(**chosen, mass_mult_factor=factor)
+
+
+def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
+    """Return the initial velocity; a value whose flag is not TRUE counts as zero."""
+    parts = []
+    for axis in "xyz":
+        name = f"{kind}_ic_{axis}"
+        value = entry.get(name, 0.0)
+        if value != 0.0 and not entry.get(f"{name}_flag", False):
+            entry.warn(f"ignored, because {name}_flag is not TRUE", name)
+            value = 0.0
+        parts.append(value)
+    if any(parts) and entry.get("isground", False):
+        entry.warn(f"{kind}_ic is ignored: the ground does not move")
+    return (parts[0], parts[1], parts[2])
+
+
+def _inertia(entry: Entry) -> tuple[float, float, float, float, float, float] | None:
+    """Return the six inertias, or None where the deck gives none; products default to 0."""
+    if not any(entry.given(name) for name in _INERTIAS):
+        return None
+    for name in _INERTIAS[:3]:
+        if not entry.given(name):
+            entry.fault(f"{name}: missing; give inertia_xx, inertia_yy and inertia_zz together")
+    values = [entry.get(name, 0.0) for name in _INERTIAS]
+    return (values[0], values[1], values[2], values[3], values[4], values[5])
+
+
+def _build_body(entry: Entry) -> None:
+    """Add a body."""
+    body = el.Body(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        is_ground=entry.get("isground", False),
+        mass=entry.get("mass"),
+        inertia=_inertia(entry),
+        cg_id=entry.get("cg_id"),
+        im_id=entry.get("im_id"),
+        lprf_id=entry.get("lprf_id"),
+        v_ic=_velocity(entry, "v"),
+        w_ic=_velocity(entry, "w"),
+        vm_id=entry.get("vm_id"),
+        wm_id=entry.get("wm_id"),
+        density=entry.get("density"),
+        source=entry.source,
+    )
+    if body.density is not None and body.mass is not None:
+        entry.note("has no effect where mass is given", "density")
+    entry.register(entry.draft.bodies, body)
+
+
+def _from_cosines(entry: Entry) -> el.Array:
+    """Return the rotation that the direction cosines mean, made orthonormal."""
+    identity = np.eye(3)
+    given = [
+        [entry.get(f"a{row}{column}", identity[row, column]) for column in range(3)]
+        for row in range(3)
+    ]
+    matrix = np.array(given, dtype=np.float64)
+    R, error = orthonormalise(matrix)
+    quoted = " ".join(f"{name}={entry.get(name):g}" for name in _COSINES if entry.given(name))
+    if error > _COSINE_LIMIT or np.linalg.det(matrix) < 0.0:
+        why = "left-handed" if error <= _COSINE_LIMIT else f"|R'R - 1| = {error:.3g}"
+        entry.fault(
+            f"cosines {quoted} are no rotation ({why}); columns a00 a10 a20, a01 a11 a21, "
+            f"a02 a12 a22 must be right-handed unit axes with |R'R - 1| < {_COSINE_LIMIT:g}"
+        )
+        return identity
+    if error > _COSINE_WARN:
+        entry.warn(f"cosines are off a rotation by {error:.1e} and were made orthonormal")
+    return R
+
+
+def _orientation(entry: Entry) -> el.Array:
+    """Return the marker's axes as columns, from cosines or from 3-1-3 angles."""
+    cosines = [name for name in _COSINES if entry.given(name)]
+    angles = [name for name in _ANGLES if entry.given(name)]
+    if cosines and angles:
+        both = f"{', '.join(cosines)} and {', '.join(angles)}"
+        entry.fault(f"give direction cosines or angles, not both ({both})")
+        return np.eye(3)
+    if cosines:
+        if any(entry.get(name) is None for name in cosines):
+            return np.eye(3)
+        return _from_cosines(entry)
+    if not angles:
+        return np.eye(3)
+    for name in angles:
+        if abs(entry.get(name, 0.0)) > 2.0 * math.pi:
+            entry.warn("more than a full turn; angles are in radians", name)
+    return rotation_313(*(entry.get(name, 0.0) for name in _ANGLES))
+
+
+def _build_marker(entry: Entry) -> None:
+    """Add a marker."""
+    x, y, z = (entry.get(name, 0.0) for name in _POSITIONS)
+    marker = el.Marker(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        body_id=entry.get("body_id", 0),
+        rm_id=entry.get("rm_id"),
+        pos=(x, y, z),
+        R=_orientation(entry),
+        source=entry.source,
+    )
+    entry.register(entry.draft.markers, marker)
+
+
+PARAM_UNIT = Statement(
+    "Param_Unit",
+    {
+        "force_unit": Spec(keyword(units.names(units.FORCE))),
+        "mass_unit": Spec(keyword(units.names(units.MASS))),
+        "length_unit": Spec(keyword(units.names(units.LENGTH))),
+        "time_unit": Spec(keyword(units.names(units.TIME))),
+        "mass_mult_factor": Spec(POSITIVE),
+    },
+    _build_units,
+)
+
+BODY_RIGID = Statement(
+    "Body_Rigid",
+    {
+        "id": Spec(ID, required=True),
+        "label": Spec(TEXT),
+        "isground": Spec(FLAG),
+        "cg_id": Spec(ID),
+        "im_id": Spec(ID),
+        "lprf_id": Spec(ID),
+        "mass": Spec(POSITIVE),
+        # ours: mass and inertia from the body's graphics where mass is not given
+        "density": Spec(POSITIVE),
+        **{name: Spec(REAL) for name in _INERTIAS},
+        **{name: Spec(REAL) for name in _VELOCITIES},
+        **{f"{name}_flag": Spec(FLAG) for name in _VELOCITIES},
+        "vm_id": Spec(ID),
+        "wm_id": Spec(ID),
+    },
+    _build_body,
+)
+
+_NOT_BUILT = "is documented but not built yet"
+REFERENCE_MARKER = Statement(
+    "Reference_Marker",
+    {
+        "id": Spec(ID, required=True),
+        "label": Spec(TEXT),
+        "body_id": Spec(ID, required=True),
+        "body_type": Spec(keyword(spellings(RIGIDBODY=""), spellings(FLEXBODY="", POINTBODY=""))),
+        "rm_id": Spec(ID),
+        "node_id": Spec(ID, refused=_NOT_BUILT),
+        **{name: Spec(REAL) for name in (*_POSITIONS, *_COSINES, *_ANGLES)},
+        "usrsub_param_string": Spec(refused=_NOT_BUILT),
+        "usrsub_fnc_name": Spec(refused=_NOT_BUILT),
+        "usrsub_dll_name": Spec(refused=_NOT_BUILT),
+        "script_name": Spec(refused=_NOT_BUILT),
+        "interpreter": Spec(refused=_NOT_BUILT),
+    },
+    _build_marker,
+)

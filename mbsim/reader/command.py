@@ -1,0 +1,197 @@
+"""Simulate, Param_Transient, Force_Gravity and Stop: what runs, with what, in which order."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+from mbsim.model import elements as el
+from mbsim.reader.keywords import ANALYSIS_NOT_BUILT, ANALYSIS_TYPES
+from mbsim.reader.kinds import (
+    COUNT,
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    REAL_NO_EXPRESSION,
+    TEXT,
+    keyword,
+)
+from mbsim.reader.statement import Entry, Spec, Statement
+
+_MAX_ROWS = 1e8  # more output rows than this is a slip of the pen, and no disk holds them
+_OUTPUTS = ("num_steps", "print_interval")
+
+
+def _build_gravity(entry: Entry) -> None:
+    """Set the model's gravity, or in <Command> the one from the next Simulate on."""
+    draft = entry.draft
+    in_command = entry.draft.in_command
+    # in <Command> the statement modifies: a component not given keeps its value
+    before = (draft.command_gravity or draft.gravity) if in_command else None
+    start = before.g if before else (0.0, 0.0, 0.0)
+    x, y, z = (entry.get(f"grav_{a}", start[k]) for k, a in enumerate("xyz"))
+    gravity = el.Gravity((x, y, z), entry.source)
+    if in_command:
+        draft.command_gravity = gravity
+    elif draft.gravity is not None:
+        entry.fault(f"a second Force_Gravity; the first is on line {draft.gravity.source.line}")
+    else:
+        draft.gravity = gravity
+
+
+def _build_transient(entry: Entry) -> None:
+    """Set the model's integration parameters, or those from the next Simulate on."""
+    draft = entry.draft
+    given = {
+        field.name: entry.get(field.name)
+        for field in fields(el.Transient)
+        if field.name != "source" and entry.get(field.name) is not None
+    }
+    if "integrator_type" in given:
+        given["integrator_type"] = given["integrator_type"].upper()
+    transient = el.Transient(**given, source=entry.source)
+    for low, high in (("h_min", "h_max"), ("h_min", "h0_max")):
+        a, b = getattr(transient, low), getattr(transient, high)
+        if a is not None and b is not None and a > b:
+            entry.fault(f"must not be larger than {high} ({b:g})", low)
+    if not draft.in_command:
+        if draft.transient is not None:
+            line = draft.transient.source.line
+            entry.fault(f"a second Param_Transient; the first is on line {line}")
+        draft.transient = transient
+    elif draft.command_transient is None:
+        draft.command_transient = transient
+    else:
+        draft.command_transient = replace(draft.command_transient, **given, source=entry.source)
+
+
+def _times(entry: Entry) -> tuple[float, float] | None:
+    """Return start and end of a Simulate, None with a fault where they make no interval."""
+    earlier = entry.draft.simulations
+    start = earlier[-1].end_time if earlier else 0.0
+    if entry.get("start_time") is not None:
+        if earlier and entry.get("start_time") != start:
+            entry.fault(
+                f"a later Simulate starts where the one before ended, at {start:g}", "start_time"
+            )
+            return None
+        start = entry.get("start_time")
+    if entry.given("end_time") == entry.given("duration"):
+        what = "give one, not both" if entry.given("duration") else "missing; one is needed"
+        entry.fault(f"end_time or duration: {what}")
+        return None
+    end, duration = entry.get("end_time"), entry.get("duration")
+    if end is None and duration is None:
+        return None
+    if end is None:
+        end = start + duration
+    if not end > start:
+        entry.fault(f"must be larger than the start, {start:g}", "end_time")
+        return None
+    return start, end
+
+
+def _build_simulate(entry: Entry) -> None:
+    """Add one simulation."""
+    draft = entry.draft
+    if not entry.given("analysis_type"):
+        entry.note("not given; taken as TRANSIENT", "analysis_type")
+    times = _times(entry)
+    outputs = [name for name in _OUTPUTS if entry.given(name)]
+    refused = [name for name in ("print_increment", "print_array_id") if entry.given(name)]
+    if len(outputs) + len(refused) != 1:
+        what = f"both of {', '.join(outputs + refused)}" if outputs or refused else "none"
+        entry.fault(f"exactly one of num_steps and print_interval is needed; {what} given")
+        return
+    if times is None or refused or entry.get(outputs[0]) is None:
+        return
+    start, end = times
+    interval = entry.get("print_interval")
+    if interval is None:
+        interval = (end - start) / entry.get("num_steps")
+    if not interval * _MAX_ROWS > end - start:
+        rows = f"more than {_MAX_ROWS:.0e} output rows from {start:g} to {end:g}"
+        entry.fault(f"gives {rows}", outputs[0])
+        return
+    simulation = el.Simulation(
+        analysis_type=entry.get("analysis_type", "TRANSIENT"),
+        start_time=start,
+        end_time=end,
+        print_interval=interval,
+        transient=draft.command_transient,
+        gravity=draft.command_gravity,
+        source=entry.source,
+    )
+    draft.simulations.append(simulation)
+
+
+def _build_stop(entry: Entry) -> None:
+    """Remember where the commands end."""
+    entry.draft.stop_line = entry.node.line
+
+
+_NO_EFFECT = "has no effect in mbsim's integrators"
+_UNUSED = {
+    "vel_tol_factor": POSITIVE,
+    "rel_abs_tol_ratio": POSITIVE,
+    "max_order": COUNT,
+    "dae_alg_tol_factor": POSITIVE,
+    "dae_index": COUNT,
+    "dae_constr_tol": POSITIVE,
+    "dae_corrector_maxit": COUNT,
+    "dae_corrector_minit": NOT_NEGATIVE,
+    "dae_vel_ctrl": TEXT,
+    "dae_jacob_eval": NOT_NEGATIVE,
+    "dae_eval_expiry": NOT_NEGATIVE,
+    "dae_jacob_init": NOT_NEGATIVE,
+    "dae_interpolation": FLAG,
+    "newmark_beta": REAL,
+    "newmark_gamma": REAL,
+    "hht_alpha": REAL,
+}
+PARAM_TRANSIENT = Statement(
+    "Param_Transient",
+    {
+        "integrator_type": Spec(TEXT),
+        "integr_tol": Spec(POSITIVE),
+        "h_max": Spec(POSITIVE),
+        "h_min": Spec(POSITIVE),
+        "h0_max": Spec(POSITIVE),
+        **{name: Spec(kind, note=_NO_EFFECT) for name, kind in _UNUSED.items()},
+    },
+    _build_transient,
+    in_command=True,
+)
+FORCE_GRAVITY = Statement(
+    "Force_Gravity",
+    {
+        "id": Spec(ID),
+        "label": Spec(TEXT),
+        **{f"grav_{axis}": Spec(REAL_NO_EXPRESSION) for axis in "xyz"},
+    },
+    _build_gravity,
+    in_command=True,
+)
+_NOT_BUILT = "is documented but not built yet; use print_interval or num_steps"
+SIMULATE = Statement(
+    "Simulate",
+    {
+        "analysis_type": Spec(keyword(ANALYSIS_TYPES, ANALYSIS_NOT_BUILT)),
+        "label": Spec(TEXT),
+        "start_time": Spec(REAL),
+        "end_time": Spec(REAL),
+        "duration": Spec(POSITIVE),
+        "num_steps": Spec(COUNT, alias="num_step"),
+        "print_interval": Spec(POSITIVE),
+        "print_increment": Spec(TEXT, refused=_NOT_BUILT),
+        "print_array_id": Spec(TEXT, refused=_NOT_BUILT),
+        "restart_array_id": Spec(TEXT, refused="is documented but not built yet"),
+    },
+    _build_simulate,
+    in_model=False,
+    in_command=True,
+)
+STOP = Statement(
+    "Stop", {}, _build_stop, in_model=False, in_command=True, note="the deck ends here"
+)

@@ -1,0 +1,227 @@
+"""Force_Contact: every documented attribute; what is not built is refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mbsim.model import elements as el
+from mbsim.reader.keywords import (
+    CFF_TYPES,
+    CNF_NOT_BUILT,
+    CNF_TYPES,
+    MASTER_SURFACES,
+    spellings,
+)
+from mbsim.reader.kinds import (
+    COUNT,
+    FLAG,
+    ID,
+    IDS,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    TEXT,
+    USER,
+    keyword,
+)
+from mbsim.reader.statement import Entry, Spec, Statement
+
+_DEFAULT_SPEED = 1e-3  # documented, in model units whatever these are
+
+# which attributes a law reads; the others of the family have no effect and get a note
+_CNF_USES = {
+    "IMPACT": {"stiffness", "exponent", "damping", "dmax"},
+}
+_CNF_ALL = {
+    *_CNF_USES["IMPACT"],
+    *("penalty", "restitution_coef", "normal_trans_vel"),
+    *("i_elastic_modulus", "j_elastic_modulus", "i_layer_depth", "j_layer_depth"),
+    *("cnf_param_string", "cnf_fnc_name", "cnf_dll_name"),
+}
+_SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
+_CFF_USES: dict[str, set[str]] = {
+    "COULOMB_ON": {"mu_static", "mu_dynamic", *_SPEEDS},
+    "COULOMB_DYNAMICONLY": {"mu_dynamic", "friction_trans_vel"},
+    "COULOMB_OFF": set(),
+    "USERCFF": {
+        *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
+        *("script_name", "interpreter"),
+    },
+}
+_CFF_ALL = set().union(*_CFF_USES.values())
+
+
+def _build_contact(entry: Entry) -> None:
+    """Add a contact."""
+    for side in "ij":
+        _check_count(entry, side)
+    cnf_type = entry.get("cnf_type", "IMPACT")
+    cff_type = entry.get("cff_type", "COULOMB_OFF")
+    if entry.get("cnf_type") is not None:
+        _note_unused(entry, f"cnf_type {cnf_type}", _CNF_ALL - _CNF_USES[cnf_type])
+    if entry.get("cff_type") is not None or not entry.given("cff_type"):
+        _note_unused(entry, f"cff_type {cff_type}", _CFF_ALL - _CFF_USES[cff_type])
+    if entry.get("cnf_type") == "IMPACT":
+        _check_impact(entry)
+    if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
+        _check_coulomb(entry, cff_type)
+
+    contact = el.Contact(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        i_graphics_id=entry.get("i_graphics_id", ()),
+        j_graphics_id=entry.get("j_graphics_id", ()),
+        ignore_penetration_larger_than=entry.get("ignore_penetration_larger_than"),
+        contact_points=entry.get("contact_points", "POINTS"),
+        cnf_type=cnf_type,
+        stiffness=entry.get("stiffness", 0.0),
+        exponent=entry.get("exponent", 1.5),
+        damping=entry.get("damping", 0.0),
+        dmax=entry.get("dmax"),
+        cff_type=cff_type,
+        mu_static=entry.get("mu_static", 0.0),
+        mu_dynamic=entry.get("mu_dynamic", 0.0),
+        stiction_trans_vel=entry.get("stiction_trans_vel", _DEFAULT_SPEED),
+        friction_trans_vel=entry.get("friction_trans_vel", _DEFAULT_SPEED),
+        cff=_subroutine(entry) if cff_type == "USERCFF" else el.Subroutine(),
+        source=entry.source,
+    )
+    entry.register(entry.draft.contacts, contact)
+
+
+def _check_count(entry: Entry, side: str) -> None:
+    """Compare num_i_graphics with the ids given; an absent count is taken from them."""
+    count, ids = entry.get(f"num_{side}_graphics"), entry.get(f"{side}_graphics_id")
+    if count is not None and ids is not None and count != len(ids):
+        message = f"{side}_graphics_id names {len(ids)}; the two must agree"
+        entry.fault(message, f"num_{side}_graphics")
+
+
+def _note_unused(entry: Entry, law: str, names: set[str]) -> None:
+    """Note the attributes of other laws, which the chosen law does not read."""
+    for name in entry.statement.attributes:
+        if name in names and entry.given(name):
+            entry.note(f"has no effect with {law}", name)
+
+
+def _check_impact(entry: Entry) -> None:
+    """Check what IMPACT needs: a depth of full damping wherever there is damping."""
+    if entry.get("damping", 0.0) > 0.0 and not entry.given("dmax"):
+        entry.fault(
+            "dmax: missing; IMPACT with damping > 0 needs dmax > 0, the depth of full damping"
+        )
+    if entry.get("stiffness", 0.0) == 0.0 and (
+        not entry.given("stiffness") or entry.get("stiffness") is not None
+    ):
+        entry.warn("stiffness is 0: the contact has no spring and holds nothing apart")
+    if entry.get("exponent", 1.5) < 1.0:
+        entry.warn("below 1 the stiffness is infinite at touch", "exponent")
+
+
+def _check_coulomb(entry: Entry, cff_type: str) -> None:
+    """Check friction coefficients and transition velocities against each other."""
+    uses = [name for name in _SPEEDS if name in _CFF_USES[cff_type]]
+    units = entry.draft.units
+    for name in uses:
+        if not entry.given(name) and units and units.length_m != units.time_s:
+            entry.warn(
+                f"{name}: not given; the default 1e-3 is in model units "
+                f"({units.length}/{units.time}), here {1e-3 * units.length_m / units.time_s:g} m/s"
+            )
+    if cff_type != "COULOMB_ON":
+        return
+    vs, vd = (entry.get(name, _DEFAULT_SPEED) for name in _SPEEDS)
+    known = all(entry.get(name) is not None or not entry.given(name) for name in _SPEEDS)
+    if known and vd < vs:
+        given = "friction_trans_vel" if entry.given("friction_trans_vel") else "stiction_trans_vel"
+        entry.fault(
+            f"friction_trans_vel ({vd:g}) must not be less than stiction_trans_vel ({vs:g}); "
+            "each defaults to 1e-3",
+            given,
+        )
+    mu_static, mu_dynamic = entry.get("mu_static", 0.0), entry.get("mu_dynamic", 0.0)
+    if mu_dynamic > mu_static:
+        entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
+
+
+def _subroutine(entry: Entry) -> el.Subroutine:
+    """Return the user friction subroutine as the deck names it."""
+    dll = entry.get("cff_dll_name", "NULL")
+    if dll.upper() not in ("", "NULL"):
+        entry.fault('shared libraries are not built yet; "NULL" names no file', "cff_dll_name")
+    script = entry.get("script_name", "")
+    if script:
+        path = Path(script.replace("\\", "/"))
+        path = path if path.is_absolute() else entry.draft.directory / path
+        script = str(path.resolve())
+        if not path.is_file():
+            entry.fault("no such file (the path is relative to the deck)", "script_name")
+    if not entry.given("cff_fnc_name"):
+        entry.note("not given; taken as CFFSUB", "cff_fnc_name")
+    return el.Subroutine(
+        par=entry.get("cff_param_string", ()),
+        fnc_name=entry.get("cff_fnc_name", "CFFSUB"),
+        dll_name="",
+        script_name=script,
+        interpreter=entry.get("interpreter", "PYTHON"),
+    )
+
+
+_NOT_BUILT = "is documented but not built yet"
+_SEARCH = "steers MotionSolve's own contact search and has no effect here"
+_POST = "contact post-processing subroutines are not called"
+FORCE_CONTACT = Statement(
+    "Force_Contact",
+    {
+        "id": Spec(ID, required=True),
+        "label": Spec(TEXT),
+        "full_label": Spec(TEXT),
+        "num_i_graphics": Spec(COUNT),
+        "i_graphics_id": Spec(IDS, required=True),
+        "num_j_graphics": Spec(COUNT),
+        "j_graphics_id": Spec(IDS, required=True),
+        "i_flexbody_id": Spec(ID, refused=_NOT_BUILT),
+        "i_flip_flex": Spec(FLAG, refused=_NOT_BUILT, harmless="FALSE"),
+        "j_flexbody_id": Spec(ID, refused=_NOT_BUILT),
+        "j_flip_flex": Spec(FLAG, refused=_NOT_BUILT, harmless="FALSE"),
+        "ignore_penetration_larger_than": Spec(POSITIVE),
+        "master_surface": Spec(keyword(MASTER_SURFACES), note=_SEARCH, harmless="AUTO"),
+        "enable_node_mode": Spec(FLAG, note=_SEARCH, harmless="FALSE"),
+        "enable_analytical": Spec(FLAG, note=_SEARCH),
+        "contact_stability_2d": Spec(REAL, refused=_NOT_BUILT),
+        # ours: one force a contact point, or one a connected region
+        "contact_points": Spec(keyword(spellings(POINTS=""), spellings(REGION=""))),
+        "cnf_type": Spec(keyword(CNF_TYPES, CNF_NOT_BUILT), required=True),
+        "stiffness": Spec(NOT_NEGATIVE),
+        "exponent": Spec(POSITIVE),
+        "damping": Spec(NOT_NEGATIVE),
+        "dmax": Spec(POSITIVE),
+        "penalty": Spec(NOT_NEGATIVE),
+        "restitution_coef": Spec(NOT_NEGATIVE, alias="restitution_coeff"),
+        "normal_trans_vel": Spec(POSITIVE),
+        "i_elastic_modulus": Spec(NOT_NEGATIVE),
+        "j_elastic_modulus": Spec(NOT_NEGATIVE),
+        "i_layer_depth": Spec(POSITIVE),
+        "j_layer_depth": Spec(POSITIVE),
+        "cnf_param_string": Spec(USER),
+        "cnf_fnc_name": Spec(TEXT),
+        "cnf_dll_name": Spec(TEXT),
+        "cff_type": Spec(keyword(CFF_TYPES)),
+        "mu_static": Spec(NOT_NEGATIVE),
+        "mu_dynamic": Spec(NOT_NEGATIVE),
+        "stiction_trans_vel": Spec(POSITIVE),
+        "friction_trans_vel": Spec(POSITIVE),
+        "cff_param_string": Spec(USER),
+        "cff_fnc_name": Spec(TEXT),
+        "cff_dll_name": Spec(TEXT),
+        "cff_language": Spec(TEXT, refused="shared libraries are not built yet"),
+        "script_name": Spec(TEXT),
+        "interpreter": Spec(keyword(spellings(PYTHON=""), spellings(MATLAB=""))),
+        "cpost_param_string": Spec(TEXT, note=_POST),
+        "cpost_fnc_name": Spec(TEXT, note=_POST),
+        "cpost_dll_name": Spec(TEXT, note=_POST),
+        "cpost_script_name": Spec(TEXT, note=_POST),
+        "cpost_interpreter": Spec(TEXT, note=_POST),
+    },
+    _build_contact,
+)

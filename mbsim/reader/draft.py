@@ -1,0 +1,63 @@
+"""A model while it is being read: what is known so far, and every fault found on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mbsim.errors import Fault
+from mbsim.model import elements as el
+
+
+@dataclass
+class Draft:
+    """Elements by id and the findings; `broken` holds (statement, id) with a fault of their own.
+
+    A broken element still counts as existing, so that one fault is not reported again
+    by everything that refers to it.
+    """
+
+    file: str
+    directory: Path
+    units: el.Units | None = None
+    bodies: dict[int, el.Body] = field(default_factory=dict)
+    markers: dict[int, el.Marker] = field(default_factory=dict)
+    graphics: dict[int, el.Graphic] = field(default_factory=dict)
+    contacts: dict[int, el.Contact] = field(default_factory=dict)
+    requests: dict[int, el.Request] = field(default_factory=dict)
+    display_graphics: dict[int, str] = field(default_factory=dict)
+    gravity: el.Gravity | None = None
+    transient: el.Transient | None = None
+    simulations: list[el.Simulation] = field(default_factory=list)
+    compatibility: str = ""
+    in_command: bool = False  # the section being read
+
+    # what the statements of <Command> read so far have set for the next Simulate
+    command_gravity: el.Gravity | None = None
+    command_transient: el.Transient | None = None
+    stop_line: int = 0
+
+    faults: list[Fault] = field(default_factory=list)
+    broken: set[tuple[str, int]] = field(default_factory=set)
+    warnings: list[str] = field(default_factory=list)
+    note_lines: dict[str, list[int]] = field(default_factory=dict)
+
+    def fault(self, line: int, element: str, message: str) -> None:
+        """Add one fault."""
+        self.faults.append(Fault(self.file, line, element, message))
+
+    def warn(self, line: int, element: str, message: str) -> None:
+        """Add one warning, worded like a fault."""
+        self.warnings.append(str(Fault(self.file, line, element, message)))
+
+    def note(self, line: int, message: str) -> None:
+        """Add what is accepted and not acted on; equal notes are joined into one."""
+        self.note_lines.setdefault(message, []).append(line)
+
+    def notes(self) -> tuple[str, ...]:
+        """Return the notes, each once, with the first lines on which it applies."""
+        joined = []
+        for message, lines in self.note_lines.items():
+            more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
+            joined.append(f"{self.file}:{lines[0]}{more}: {message}")
+        return tuple(joined)

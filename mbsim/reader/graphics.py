@@ -1,0 +1,236 @@
+"""Post_Graphic: the solids that contacts act on; other graphics are pictures only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from mbsim.errors import ModelError
+from mbsim.model import elements as el
+from mbsim.model.mesh import load_mesh, merge_vertices
+from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
+from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, REAL_NO_EXPRESSION, TEXT, keyword
+from mbsim.reader.parse import Node
+from mbsim.reader.statement import Entry, Spec, Statement
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One built type: our shape, the attributes that may name its marker, sizes and extras.
+
+    `offset` is the shape's centre in its marker's frame, as multiples of the sizes.
+    """
+
+    type: str
+    shape: str
+    markers: tuple[str, ...]
+    sizes: tuple[str, ...] = ()
+    extras: tuple[str, ...] = ()
+    offset: tuple[tuple[float, ...], ...] = ()
+
+
+_LENGTHS = ("length_x", "length_y", "length_z")
+_BOUNDS = ("xmin", "xmax", "ymin", "ymax")
+_HALF = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5))
+SHAPES = (
+    Shape("Sphere", "SPHERE", ("center_marker_id",), ("radius",)),
+    # the scales are taken as semi-axes
+    Shape("Ellipsoid", "ELLIPSOID", ("center_marker_id",), ("x_scale", "y_scale", "z_scale")),
+    Shape("BoxDefinedFromCorner", "BOX", ("corner_marker_id",), _LENGTHS, offset=_HALF),
+    Shape("BoxDefinedFromCenter", "BOX", ("center_marker_id",), _LENGTHS),
+    # the marker is the centre of the base circle; the axis is +z
+    Shape(
+        "Cylinder",
+        "CYLINDER",
+        ("center_marker_id",),
+        ("radius", "length"),
+        ("ends_type",),
+        ((0.0, 0.0), (0.0, 0.0), (0.0, 0.5)),
+    ),
+    Shape("Plane", "PLANE", ("rm_id", "center_marker_id"), (), _BOUNDS),
+    Shape("TriaMesh", "MESH", ("rm_id",), (), ("file",)),
+)
+_BY_TYPE = {fold(shape.type): shape for shape in SHAPES}
+
+# documented, not contact shapes here: kept as pictures, refused where a contact names them
+DISPLAY_TYPES = (
+    "Frustum Parasolid SPDP Outline Arc Circle LineMesh ParamCurve ParamSurface DeformCurve "
+    "DeformSurface Point UserGra"
+).split()
+_DISPLAY = {fold(name): name for name in DISPLAY_TYPES}
+
+
+def _is_display(node: Node) -> bool:
+    """Return whether the node is of a type that is only a picture."""
+    type = node.find("type")
+    return type is not None and fold(type.value) in _DISPLAY
+
+
+def _build_display(entry: Entry) -> None:
+    """Remember the id of a graphic that is only a picture."""
+    found = entry.node.find("type")
+    name = _DISPLAY[fold(found.value)] if found else ""
+    try:
+        id = ID.parse(found_id.value.strip()) if (found_id := entry.node.find("id")) else None
+    except ValueError:
+        id = None
+    if id is None:
+        entry.fault(f"id: must be {ID.allowed}")
+    elif id in entry.draft.display_graphics:
+        entry.fault(f'id="{id}": id already used; ids are unique per statement')
+    else:
+        entry.draft.display_graphics[id] = name
+        entry.note(f"type {name} is not built as a contact shape and is a picture only")
+
+
+def _build_graphic(entry: Entry) -> None:
+    """Add a graphic of a built type."""
+    if _is_display(entry.node):
+        _build_display(entry)
+        return
+    shape = _BY_TYPE.get(fold(entry.get("type", "")))
+    if shape is None:
+        if entry.get("type") is not None:
+            names = [known.type for known in SHAPES]
+            close = nearest(entry.get("type"), (*names, *DISPLAY_TYPES))
+            entry.fault(f"must be one of {', '.join(names)}{close}", "type")
+        return
+    _check_attributes(entry, shape)
+    marker_id = _marker_id(entry, shape)
+    size = tuple(entry.get(name, 1.0) for name in shape.sizes)
+    offset = [sum(f * s for f, s in zip(row, size, strict=True)) for row in shape.offset]
+    vertices, faces, file = _mesh(entry) if shape.shape == "MESH" else (None, None, "")
+
+    id = entry.get("id")
+    if id in entry.draft.display_graphics:
+        entry.fault("id already used; ids are unique per statement", "id")
+        return
+    graphic = el.Graphic(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        type=shape.type,
+        shape=shape.shape,
+        marker_id=marker_id,
+        size=size,
+        offset=(offset[0], offset[1], offset[2]) if offset else (0.0, 0.0, 0.0),
+        vertices=vertices,
+        faces=faces,
+        mesh_file=file,
+        is_material_inside=entry.get("is_material_inside", True),
+        source=entry.source,
+    )
+    entry.register(entry.draft.graphics, graphic)
+
+
+def _check_attributes(entry: Entry, shape: Shape) -> None:
+    """Refuse attributes of other types and missing sizes; note what has no effect."""
+    own = {*_COMMON, *shape.markers, *shape.sizes, *shape.extras}
+    for name in entry.statement.attributes:
+        if entry.given(name) and name not in own:
+            allowed = ", ".join((*shape.markers, *shape.sizes, *shape.extras))
+            entry.fault(f"type {shape.type} has no such attribute; it has {allowed}", name)
+    for name in shape.sizes:
+        if not entry.given(name):
+            entry.fault(f"{name}: missing; must be {POSITIVE.allowed} for type {shape.type}")
+    for name in _BOUNDS:
+        if entry.given(name) and shape.shape == "PLANE":
+            entry.note("contact uses the whole plane, the half-space z <= 0", name)
+    if entry.get("ends_type", "CLOSED") != "CLOSED":
+        entry.note("contact takes the cylinder as closed at both ends", "ends_type")
+
+
+def _marker_id(entry: Entry, shape: Shape) -> int:
+    """Return the marker that carries the shape, 0 where the deck gives none or two."""
+    given = [name for name in shape.markers if entry.given(name)]
+    if len(given) == 1:
+        return int(entry.get(given[0], 0))
+    names = " or ".join(shape.markers)
+    what = "missing" if not given else "give only one"
+    entry.fault(f"{names}: {what}; type {shape.type} needs the id of its marker")
+    return 0
+
+
+def _mesh(entry: Entry) -> tuple[el.Array | None, npt.NDArray[np.int64] | None, str]:
+    """Return vertices, faces and file of a TriaMesh, from its file or its child elements."""
+    children = {child.key: child for child in entry.node.children}
+    if entry.given("file") == bool(children):
+        both = "not both" if children else "one is needed"
+        entry.fault(f'TriaMesh: file="..." or <Nodes> and <Faces>: {both}')
+        return None, None, ""
+    if not children:
+        path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
+        try:
+            vertices, faces = load_mesh(path)
+        except ModelError as error:
+            entry.fault(str(error), "file")
+            return None, None, ""
+        return vertices, faces, str(path)
+
+    if set(children) != {"nodes", "faces"} or len(entry.node.children) != 2:
+        entry.fault("TriaMesh: needs one <Nodes> and one <Faces>")
+        return None, None, ""
+    nodes = _numbers(entry, children["nodes"], "numbers")
+    indices = _numbers(entry, children["faces"], "zero-based vertex indices")
+    if nodes is None or indices is None:
+        return None, None, ""
+    bad = (indices != np.floor(indices)) | (indices < 0) | (indices >= len(nodes))
+    if bad.any():
+        message = f"<Faces>: {indices[bad][0]:g} is no index of {len(nodes)} nodes (from 0)"
+        entry.draft.fault(children["faces"].line, entry.label, message)
+        return None, None, ""
+    vertices, faces = merge_vertices(nodes, indices.astype(np.int64))
+    return vertices, faces, ""
+
+
+def _numbers(entry: Entry, node: Node, what: str) -> el.Array | None:
+    """Return the text of <Nodes> or <Faces> as rows of three, None with a fault."""
+    words = node.text.replace(",", " ").split()
+    message = ""
+    values = np.zeros(0)
+    if "_" in node.text:
+        message = "'_' is not part of a number"
+    else:
+        try:
+            values = np.array(words, dtype=np.float64)
+        except ValueError as error:
+            message = str(error)
+    if not message and (len(values) == 0 or len(values) % 3):
+        message = f"{len(values)} values; must be {what}, three to a row"
+    if not message and not (np.abs(values) < 1e40).all():
+        message = "values must be finite and below 1e40"
+    if message:
+        entry.draft.fault(node.line, entry.label, f"<{node.tag}>: {message}")
+        return None
+    return values.reshape(-1, 3)
+
+
+_PICTURE = "pictures are not written"
+_COMMON = {
+    "id": Spec(ID, required=True),
+    "type": Spec(TEXT, required=True),
+    "label": Spec(TEXT),
+    "color": Spec(TEXT, note=_PICTURE),
+    "hidden": Spec(FLAG, note=_PICTURE),
+    "refinement_level": Spec(REAL, note="closed forms and meshes are used as they are"),
+    "is_material_inside": Spec(FLAG),
+}
+POST_GRAPHIC = Statement(
+    "Post_Graphic",
+    {
+        **_COMMON,
+        "center_marker_id": Spec(ID),
+        "corner_marker_id": Spec(ID),
+        "rm_id": Spec(ID),
+        "radius": Spec(POSITIVE),
+        "length": Spec(POSITIVE),
+        **{name: Spec(POSITIVE) for name in (*_LENGTHS, "x_scale", "y_scale", "z_scale")},
+        **{name: Spec(REAL_NO_EXPRESSION) for name in _BOUNDS},
+        "ends_type": Spec(keyword(ENDS_TYPES)),
+        "file": Spec(TEXT),
+    },
+    _build_graphic,
+    children=("Nodes", "Faces"),
+    any_attribute=_is_display,
+)

@@ -1,0 +1,53 @@
+"""Names and keyword spellings: matched without case and `_`, nearest known name suggested."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+def fold(name: str) -> str:
+    """Return `name` without case, `_` and outer blanks, the form in which names are compared."""
+    return name.strip().replace("_", "").lower()
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean X?`` with the known name most like `name`, or an empty string."""
+    by_fold = {fold(word): word for word in known}
+    close = difflib.get_close_matches(fold(name), by_fold, n=1, cutoff=0.6)
+    return f"; did you mean {by_fold[close[0]]}?" if close else ""
+
+
+def spellings(**canonical: str) -> dict[str, str]:
+    """Return folded spelling -> canonical keyword, from ``KEYWORD="other spellings"``."""
+    table = {}
+    for keyword, others in canonical.items():
+        for word in (keyword, *others.split()):
+            table[fold(word)] = keyword
+    return table
+
+
+# one keyword, many documented forms; the canonical one is the key
+CNF_TYPES = spellings(IMPACT="")
+CNF_NOT_BUILT = spellings(POISSON="", VOLUME="", USERCNF="USER", HUNT_CROSSLEY="", HERTZ="")
+CFF_TYPES = spellings(
+    COULOMB_ON="ON",
+    COULOMB_OFF="OFF",
+    COULOMB_DYNAMICONLY="DYNAMICONLY DYNAMICSONLY COULOMB_DYNAMICSONLY",
+    USERCFF="",
+)
+MASTER_SURFACES = spellings(I="", J="", I_AND_J="", AUTO="")
+ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")
+
+REQUEST_TYPES = spellings(
+    MARKER_DISPLACEMENT="DISPLACEMENT",
+    MARKER_VELOCITY="VELOCITY",
+    MARKER_ACCELERATION="ACCELERATION",
+)
+REQUEST_NOT_BUILT = spellings(MARKER_FORCE="FORCE", ELEMENTAL_FORCE="", EXPRESSION="", USERSUB="")
+
+ANALYSIS_TYPES = spellings(TRANSIENT="")
+ANALYSIS_NOT_BUILT = spellings(STATIC="", LINEAR="", ASSEMBLY="") | {
+    "frequency response": "FREQUENCY_RESPONSE",
+    "frequencyresponse": "FREQUENCY_RESPONSE",
+}

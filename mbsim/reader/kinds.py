@@ -1,0 +1,149 @@
+"""What an attribute's text may be: one `Kind` for each sort of value in a deck."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mbsim.reader.keywords import fold, nearest
+
+_REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+
+# products of five such numbers (density times length^5) still fit a double
+LARGEST_REAL = 1e40
+LARGEST_ID = 2**31 - 1
+
+
+class BadValueError(ValueError):
+    """A value that its attribute does not allow; the message says what is wrong."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`allowed` completes "must be ..."; `parse` returns the value or raises BadValueError."""
+
+    allowed: str
+    parse: Callable[[str], Any]
+
+
+def parse_real(text: str) -> float:
+    """Return a finite number as the deck may write it: ``5``, ``500.``, ``.5``, ``1.0E5``."""
+    if not _REAL.fullmatch(text):
+        raise BadValueError
+    value = float(text)
+    if not math.isfinite(value) or abs(value) > LARGEST_REAL:
+        raise BadValueError(f"is larger than {LARGEST_REAL:g}, the limit of a number")
+    return value
+
+
+def parse_integer(text: str) -> int:
+    """Return a whole number."""
+    if not _INTEGER.fullmatch(text):
+        raise BadValueError
+    return int(text)
+
+
+def real(allowed: str = "a number", *, above: float = -math.inf, least: float = -math.inf) -> Kind:
+    """Return the kind of numbers > `above` and >= `least`."""
+
+    def parse(text: str) -> float:
+        value = parse_real(text)
+        if not (value > above and value >= least):
+            raise BadValueError
+        return value
+
+    return Kind(allowed, parse)
+
+
+def _parse_expression(text: str) -> float:
+    """Return a number; anything else may be an expression, which is not built."""
+    if re.search(r"[A-Za-z]{2,}|[*/()]", text) and fold(text) not in ("nan", "inf", "-inf"):
+        raise BadValueError("is not a number; expressions are documented but not built yet")
+    return parse_real(text)
+
+
+def _parse_id(text: str) -> int:
+    """Return a positive id that fits a 32-bit integer, as user subroutines take it."""
+    value = parse_integer(text)
+    if not 0 < value <= LARGEST_ID:
+        raise BadValueError
+    return value
+
+
+def _parse_count(text: str) -> int:
+    value = parse_integer(text)
+    if value < 1:
+        raise BadValueError
+    return value
+
+
+def _parse_ids(text: str) -> tuple[int, ...]:
+    """Return ids separated by blanks or commas."""
+    words = text.replace(",", " ").split()
+    if not words:
+        raise BadValueError
+    ids = tuple(_parse_id(word) for word in words)
+    seen: set[int] = set()
+    for id in ids:
+        if id in seen:
+            raise BadValueError(f"names id {id} twice")
+        seen.add(id)
+    return ids
+
+
+def _parse_flag(text: str) -> bool:
+    value = {"true": True, "false": False}.get(text.lower())
+    if value is None:
+        raise BadValueError
+    return value
+
+
+def _parse_user(text: str) -> tuple[float, ...]:
+    """Return the numbers of ``USER(1, 2.5, ...)``."""
+    call = re.fullmatch(r"USER\s*\((.*)\)", text, re.IGNORECASE | re.DOTALL)
+    if call is None:
+        raise BadValueError
+    inside = call.group(1).strip()
+    if not inside:
+        return ()
+    values = []
+    for word in inside.split(","):
+        try:
+            values.append(parse_real(word.strip()))
+        except BadValueError as error:
+            raise BadValueError(f"value {word.strip()!r} {str(error) or 'is no number'}") from None
+    return tuple(values)
+
+
+def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = None) -> Kind:
+    """Return the kind of keywords; both tables are folded spelling -> canonical keyword."""
+    canonical = list(dict.fromkeys(allowed.values()))
+
+    def parse(text: str) -> str:
+        word = fold(text)
+        if word in allowed:
+            return allowed[word]
+        if not_built and word in not_built:
+            built = ", ".join(canonical)
+            raise BadValueError(f"{not_built[word]} is not built yet; built: {built}")
+        close = nearest(text, (*canonical, *(not_built or {}).values()))
+        raise BadValueError(f"must be one of {', '.join(canonical)}{close}")
+
+    return Kind(f"one of {', '.join(canonical)}", parse)
+
+
+REAL = real()
+POSITIVE = real("a number > 0", above=0.0)
+NOT_NEGATIVE = real("a number >= 0", least=0.0)
+REAL_NO_EXPRESSION = Kind("a number", _parse_expression)
+INTEGER = Kind("a whole number", parse_integer)
+COUNT = Kind("a whole number > 0", _parse_count)
+ID = Kind(f"a positive integer up to {LARGEST_ID}", _parse_id)
+IDS = Kind("positive integer ids, separated by blanks or commas", _parse_ids)
+FLAG = Kind("TRUE or FALSE", _parse_flag)
+TEXT = Kind("text", str)
+USER = Kind("USER(number, number, ...)", _parse_user)

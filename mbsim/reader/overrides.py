@@ -1,0 +1,92 @@
+"""`--set Force_Contact[1].mu_static=0.3`: attributes changed in the tree, before any check."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from mbsim.errors import ModelError
+from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.parse import Attribute, Node
+from mbsim.reader.statements import known_attributes
+
+_FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
+_MOST_LISTED = 12
+
+
+def apply_overrides(sections: Sequence[Node], overrides: Sequence[str]) -> None:
+    """Change attributes of the statements in `sections`.
+
+    Parameters
+    ----------
+    sections : sequence of Node
+        The deck's <Model> and <Command> parts.
+    overrides : sequence of str
+        ``Element[id].attribute=value``, names matched without case and `_`. A statement
+        without ids is named by its place among those of its name, ``Simulate[2]``, or by
+        its name alone where there is one.
+
+    Raises
+    ------
+    ModelError
+        If the form is wrong, or the element, its id or the attribute is not there; the
+        message says what is.
+    """
+    for text in overrides:
+        match = _FORM.fullmatch(text)
+        if match is None:
+            raise ModelError(f"--set {text}: must be Element[id].attribute=value")
+        element, index, attribute, value = match.groups()
+        try:
+            node = _find(sections, element, index)
+            _set(node, attribute, value.strip(), f"--set {text}")
+        except LookupError as error:
+            raise ModelError(f"--set {text}: {error.args[0]}") from None
+
+
+def _statements(sections: Sequence[Node]) -> Iterator[Node]:
+    for section in sections:
+        yield section
+        yield from section.children
+
+
+def _find(sections: Sequence[Node], element: str, index: str | None) -> Node:
+    """Return the one statement that a selector names, LookupError otherwise."""
+    named = [node for node in _statements(sections) if node.key == fold(element)]
+    if not named:
+        tags = sorted({node.tag for node in _statements(sections)})
+        close = nearest(element, tags)
+        raise LookupError(f"no {element} in the deck; it has {', '.join(tags)}{close}")
+    tag = named[0].tag
+    if index is None:
+        if len(named) == 1:
+            return named[0]
+        raise LookupError(f"{len(named)} of {tag}; name one of {_choices(named)}")
+    for place, node in enumerate(named, start=1):
+        id = node.find("id")
+        if index == (id.value.strip() if id else str(place)):
+            return node
+    raise LookupError(f"no {tag}[{index}] in the deck; it has {_choices(named)}")
+
+
+def _choices(nodes: list[Node]) -> str:
+    """Return what stands in the brackets of each selector, shortened."""
+    ids = [node.find("id") for node in nodes]
+    names = [f"[{id.value if id else k}]" for k, id in enumerate(ids, start=1)]
+    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    return " ".join(names[:_MOST_LISTED]) + more
+
+
+def _set(node: Node, name: str, value: str, origin: str) -> None:
+    """Set or add an attribute; one that the statement does not have is a LookupError."""
+    known = known_attributes(node)
+    found = node.find(name)
+    if found is not None:
+        found.value, found.origin = value, origin
+        return
+    if known is not None and fold(name) not in {fold(word) for word in known}:
+        close = nearest(name, known)
+        raise LookupError(
+            f"{node.tag} has no attribute {name}{close or '; known: ' + ', '.join(known)}"
+        )
+    node.attributes.append(Attribute(name, value, node.line, origin))

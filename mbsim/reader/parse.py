@@ -1,0 +1,185 @@
+"""A deck's bytes to a plain tree of `Node`s, with the line of every element and attribute.
+
+Only safe XML passes: no DOCTYPE, so no entities and no files or network behind them, and
+bounded size and depth. lxml gives one line a tag (that of its end), so lines are found
+by a second scan of the text, which is known to be well formed by then.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from mbsim.errors import DeckError, Fault, ModelError
+from mbsim.reader.keywords import fold
+
+MAX_BYTES = 64 * 2**20
+MAX_DEPTH = 32
+
+# decoded here and not by libxml2, so that the scan for DOCTYPE sees what the parser sees
+_ENCODINGS = {
+    "utf-8": "utf-8",
+    "utf8": "utf-8",
+    "us-ascii": "ascii",
+    "ascii": "ascii",
+    "iso-8859-1": "latin-1",
+    "latin-1": "latin-1",
+    "iso-8859-15": "iso-8859-15",
+    "windows-1252": "cp1252",
+    "utf-16": "utf-16",
+}
+_DECLARATION = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)[\"']")
+_BEFORE_ROOT = re.compile(r"(?:\s+|<!--.*?-->|<\?.*?\?>)*", re.DOTALL)
+_TAG = re.compile(
+    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)((?:[^>\"']|\"[^\"]*\"|'[^']*')*)>",
+    re.DOTALL,
+)
+_ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+_SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}"
+
+
+@dataclass
+class Attribute:
+    """One attribute as written; `origin` names the --set option that gave the value."""
+
+    name: str
+    value: str
+    line: int
+    origin: str = ""
+
+
+@dataclass
+class Node:
+    """One element: `tag` as written, attributes in order, `text` without that of its children."""
+
+    tag: str
+    line: int
+    attributes: list[Attribute] = field(default_factory=list)
+    text: str = ""
+    children: list[Node] = field(default_factory=list)
+
+    @property
+    def key(self) -> str:
+        """Return the tag in the form in which tags are compared."""
+        return fold(self.tag)
+
+    def find(self, name: str) -> Attribute | None:
+        """Return the attribute of that name, in any spelling, or None."""
+        return next((a for a in self.attributes if fold(a.name) == fold(name)), None)
+
+
+def parse(data: bytes, file: str) -> Node:
+    """Return the root of the deck `data`.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole deck.
+    file : str
+        The deck's name for messages.
+
+    Raises
+    ------
+    ModelError
+        If the deck is larger than `MAX_BYTES`.
+    DeckError
+        If it is not readable text or well-formed XML, has a DOCTYPE, or is nested too deeply.
+    """
+    if len(data) > MAX_BYTES:
+        raise ModelError(f"{file}: larger than {MAX_BYTES // 2**20} MiB, the limit of a deck")
+    text = _decode(data, file)
+    start = _BEFORE_ROOT.match(text)
+    if start and text.startswith("<!DOCTYPE", start.end()):
+        line = text.count("\n", 0, start.end()) + 1
+        raise _refused(file, line, "a DOCTYPE is not accepted: decks have no DTD and no entities")
+
+    parser = etree.XMLParser(
+        encoding="utf-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        dtd_validation=False,
+        attribute_defaults=False,
+        huge_tree=False,
+    )
+    try:
+        root = etree.fromstring(text.encode("utf-8"), parser)
+    except etree.XMLSyntaxError as error:
+        reason = re.sub(r", line \d+, column \d+.*$", "", error.msg or "no element found")
+        raise _refused(file, error.lineno or 1, f"not well-formed XML: {reason}") from None
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise _refused(file, 1, "a DOCTYPE is not accepted: decks have no DTD and no entities")
+    return _to_nodes(root, text, file)
+
+
+def _refused(file: str, line: int, message: str) -> DeckError:
+    """Return the one-fault error of a deck that cannot be parsed at all."""
+    return DeckError([Fault(file, line, "", message)])
+
+
+def _decode(data: bytes, file: str) -> str:
+    """Return the deck as text; the encoding is that of its byte order mark or declaration."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        name = "utf-16"
+    else:
+        declared = _DECLARATION.match(data.removeprefix(b"\xef\xbb\xbf"))
+        name = declared.group(1).decode("ascii", "replace") if declared else "utf-8"
+    codec = _ENCODINGS.get(name.lower())
+    if codec is None:
+        allowed = "UTF-8, UTF-16, US-ASCII, ISO-8859-1, ISO-8859-15 or Windows-1252"
+        raise _refused(file, 1, f'encoding="{name}": must be {allowed}')
+    try:
+        text = data.decode("utf-8-sig" if codec == "utf-8" else codec)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise _refused(file, line, f"not {name.upper()} text: {error.reason}") from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise _refused(file, line, "not a text file: it holds a NUL character")
+    return text
+
+
+def _to_nodes(root: etree._Element, text: str, file: str) -> Node:
+    """Return the tree of `root` as `Node`s, walking without recursion."""
+    lines = _tag_lines(text)
+    nodes: dict[etree._Element, Node] = {}
+    depth: dict[etree._Element, int] = {}
+    for element in root.iter("*"):
+        line, attribute_lines = next(lines)
+        parent = element.getparent()
+        depth[element] = depth[parent] + 1 if parent is not None else 1
+        if depth[element] > MAX_DEPTH:
+            raise _refused(file, line, f"elements nested more than {MAX_DEPTH} deep")
+
+        node = Node(etree.QName(element).localname, line)
+        for name, value in element.attrib.items():
+            if str(name).startswith(_SCHEMA):
+                continue
+            local = etree.QName(str(name)).localname
+            node.attributes.append(Attribute(local, str(value), attribute_lines.get(local, line)))
+        pieces = [element.text, *(child.tail for child in element)]
+        node.text = "".join(piece for piece in pieces if piece).strip()
+        nodes[element] = node
+        if parent is not None:
+            nodes[parent].children.append(node)
+    return nodes[root]
+
+
+def _tag_lines(text: str) -> Iterator[tuple[int, dict[str, int]]]:
+    """Yield the line of each start tag, in document order, and of its attributes by local name."""
+    breaks = [match.start() for match in re.finditer("\n", text)]
+    for tag in _TAG.finditer(text):
+        if tag.group(1) is None:
+            continue
+        line = bisect_right(breaks, tag.start()) + 1
+        attributes = {}
+        if "\n" in tag.group(2):
+            for match in _ATTRIBUTE.finditer(tag.group(2)):
+                position = tag.start(2) + match.start()
+                name = match.group(1).rpartition(":")[2]
+                attributes[name] = bisect_right(breaks, position) + 1
+        yield line, attributes

@@ -1,0 +1,99 @@
+"""Every statement the reader knows, and how the two sections of a deck are gone through."""
+
+from __future__ import annotations
+
+from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
+from mbsim.reader.command import FORCE_GRAVITY, PARAM_TRANSIENT, SIMULATE, STOP
+from mbsim.reader.contact import FORCE_CONTACT
+from mbsim.reader.draft import Draft
+from mbsim.reader.graphics import POST_GRAPHIC
+from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.parse import Node
+from mbsim.reader.requests import POST_REQUEST
+from mbsim.reader.statement import Statement
+
+
+def _everything(node: Node) -> bool:
+    return True
+
+
+def _output_only(name: str, what: str) -> Statement:
+    """Return a statement that cannot change motion, so that its attributes are not looked at."""
+    return Statement(name, in_command=True, note=what, any_attribute=_everything)
+
+
+STATEMENTS = (
+    PARAM_UNIT,
+    BODY_RIGID,
+    REFERENCE_MARKER,
+    POST_GRAPHIC,
+    FORCE_CONTACT,
+    FORCE_GRAVITY,
+    PARAM_TRANSIENT,
+    POST_REQUEST,
+    SIMULATE,
+    STOP,
+    _output_only("ResOutput", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
+    _output_only("H3DOutput", "no H3D file is written"),
+    _output_only("Messaging", "the log is mbsim's own; it sets nothing"),
+)
+BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
+
+# documented statements (or members of documented families) that would change the motion
+NOT_BUILT = (
+    "Activate Body_Flexible Body_Point Constraint_Coupler Constraint_CVCV Constraint_Gear "
+    "Constraint_General Constraint_Joint Constraint_Jprim Constraint_PTCV Constraint_PTdCV "
+    "Constraint_PTSF Constraint_UserConstr Control_Diff Control_FMU Control_PlantInput "
+    "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
+    "Force_Beam Force_Bushing Force_Field Force_JointFriction Force_MultiPoint Force_Penalty "
+    "Force_Scalar_TwoBody Force_SpringDamper Force_StateEqn Force_TwoBody Force_Vector_OneBody "
+    "Force_Vector_TwoBody Load_Command Load_Model Motion_Joint Motion_Marker Param_Linear "
+    "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
+    "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
+    "Reference_ParamSurface Reference_Spline Reference_String Reference_Variable Save "
+    "Sensor_Event Sensor_Proximity UserProgramControl"
+).split()
+_NOT_BUILT = {fold(name): name for name in NOT_BUILT}
+
+
+def known_attributes(node: Node) -> list[str] | None:
+    """Return the attributes that an element of this tag may have, None where that is open."""
+    statement = BY_KEY.get(node.key)
+    if statement is None or statement.any_attribute(node):
+        return None
+    return [*statement.attributes, *(s.alias for s in statement.attributes.values() if s.alias)]
+
+
+def read_section(section: Node, draft: Draft) -> None:
+    """Read all statements of one <Model> or <Command> into the draft, in the order of the deck.
+
+    Param_Unit goes first wherever it stands, because warnings depend on it.
+    """
+    draft.in_command = section.key == "command"
+    if section.text:
+        draft.fault(section.line, section.tag, f"text {section.text[:40]!r} between statements")
+    for node in sorted(section.children, key=lambda node: node.key != "paramunit"):
+        _read_statement(section, node, draft)
+
+
+def _read_statement(section: Node, node: Node, draft: Draft) -> None:
+    """Read one statement, or refuse it by name."""
+    id = node.find("id")
+    label = node.tag + (f"[{id.value.strip()[:40]}]" if id else "")
+    statement = BY_KEY.get(node.key)
+    if statement is None:
+        if node.key in _NOT_BUILT:
+            message = f"{_NOT_BUILT[node.key]} is documented but not built yet"
+        else:
+            known = [statement.name for statement in STATEMENTS] + NOT_BUILT
+            message = f"unknown statement <{node.tag}>{nearest(node.tag, known)}"
+        draft.fault(node.line, label, message)
+    elif not (statement.in_command if draft.in_command else statement.in_model):
+        where = "<Model>" if draft.in_command else "<Command>"
+        also = "; changing an element between simulations is not built yet"
+        what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
+        draft.fault(node.line, label, what)
+    else:
+        if draft.stop_line and statement in (SIMULATE, PARAM_TRANSIENT, FORCE_GRAVITY):
+            draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
+        statement.read(node, draft)

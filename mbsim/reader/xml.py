@@ -1,0 +1,139 @@
+"""`read_model`: a deck in MotionSolve's XML form, read, checked and returned as a `Model`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+
+from mbsim.errors import DeckError, ModelError
+from mbsim.model import elements as el
+from mbsim.model.checks import Known, check_model
+from mbsim.reader.draft import Draft
+from mbsim.reader.keywords import fold
+from mbsim.reader.overrides import apply_overrides
+from mbsim.reader.parse import MAX_BYTES, Node, parse
+from mbsim.reader.statements import read_section
+
+_COMPATIBILITY = "MOTIONSOLVE"
+_SECTIONS = ("model", "command")
+
+
+def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.Model:
+    """Return the model that a deck describes, with everything about it checked.
+
+    Parameters
+    ----------
+    path : path-like
+        The deck, an XML file with <Model> and <Command> parts under any root.
+    overrides : sequence of str, optional
+        ``Element[id].attribute=value``, set in the deck before it is read.
+
+    Returns
+    -------
+    Model
+        In the deck's own units. `notes` lists what was accepted and has no effect,
+        `warnings` what is allowed and looks wrong.
+
+    Raises
+    ------
+    DeckError
+        All faults of the deck at once, each with file and line.
+    ModelError
+        If the file cannot be read, or an override names what is not there.
+    """
+    deck = Path(path)
+    data = _read_bytes(deck)
+    root = parse(data, str(path))
+    draft = Draft(str(path), deck.absolute().parent)
+    sections = list(_find_sections(root, draft))
+    apply_overrides(sections, overrides)
+
+    # the model first, wherever it stands: commands refer to it
+    for section in sorted(sections, key=lambda section: section.key != "model"):
+        _check_section(section, draft)
+        read_section(section, draft)
+    if not any(section.key == "model" for section in sections) and not draft.faults:
+        draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
+
+    model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
+    known = Known(frozenset(draft.broken), draft.display_graphics)
+    faults, warnings = check_model(model, known)
+    if draft.faults or faults:
+        raise DeckError([*draft.faults, *faults])
+    draft.warnings.extend(warnings)
+    return _to_model(draft, deck, model.sha256)
+
+
+def _read_bytes(path: Path) -> bytes:
+    """Return the deck's bytes; whatever prevents it becomes one line."""
+    try:
+        if path.is_dir():
+            raise ModelError(f"{path}: is a directory, not a deck")
+        if path.exists() and not path.is_file():
+            raise ModelError(f"{path}: is not a regular file")
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ModelError(f"{str(path)!r}: is no file name: {error}") from None
+
+
+def _find_sections(node: Node, draft: Draft) -> Iterator[Node]:
+    """Yield every <Model> and <Command>; what is neither, nor holds one, is refused."""
+    if node.key in _SECTIONS:
+        yield node
+        return
+    for child in node.children:
+        if child.key in _SECTIONS or _holds_section(child):
+            yield from _find_sections(child, draft)
+        else:
+            draft.fault(
+                child.line, child.tag, f"<{child.tag}> stands outside <Model> and <Command>"
+            )
+    if node.text:
+        draft.fault(node.line, node.tag, f"text {node.text[:40]!r} outside <Model> and <Command>")
+
+
+def _holds_section(node: Node) -> bool:
+    return any(child.key in _SECTIONS or _holds_section(child) for child in node.children)
+
+
+def _check_section(section: Node, draft: Draft) -> None:
+    """Read the attributes of <Model> and <Command> themselves."""
+    for attribute in section.attributes:
+        name = fold(attribute.name)
+        if section.key == "model" and name == "compatibility":
+            if fold(attribute.value) != fold(_COMPATIBILITY):
+                message = f'compatibility="{attribute.value}": must be {_COMPATIBILITY}'
+                draft.fault(attribute.line, section.tag, message)
+            draft.compatibility = _COMPATIBILITY
+        elif name not in ("id", "label", "name"):
+            known = (
+                "compatibility, id, label, name" if section.key == "model" else "id, label, name"
+            )
+            message = f'{attribute.name}="{attribute.value}": unknown attribute; known: {known}'
+            draft.fault(attribute.line, section.tag, message)
+
+
+def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
+    """Return the draft as a model."""
+    return el.Model(
+        name=deck.stem,
+        file=draft.file,
+        sha256=sha256,
+        units=draft.units or el.Units(),
+        bodies=draft.bodies,
+        markers=draft.markers,
+        graphics=draft.graphics,
+        contacts=draft.contacts,
+        gravity=draft.gravity or el.Gravity(),
+        transient=draft.transient or el.Transient(),
+        simulations=tuple(draft.simulations),
+        requests=draft.requests,
+        compatibility=draft.compatibility,
+        notes=draft.notes(),
+        warnings=tuple(draft.warnings),
+    )

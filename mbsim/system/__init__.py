@@ -1,0 +1,1 @@
+"""From Model to constant arrays (`Scene`), saved state (`State`) and scratch (`Work`)."""
