@@ -80,7 +80,8 @@ def place(model: Model) -> Placement:
     Raises
     ------
     DeckError
-        If a marker has no place (its parents form a ring or do not exist), or a moving body lacks or contradicts its mass properties.
+        If a marker has no place (its parents form a ring or do not exist), or a moving body
+        lacks or contradicts its mass properties.
         `read_model` has checked both; this is for models made or changed by hand.
     """
     frames = marker_frames(model)

@@ -149,7 +149,7 @@ def _to_nodes(root: etree._Element, text: str, file: str) -> Node:
     nodes: dict[etree._Element, Node] = {}
     depth: dict[etree._Element, int] = {}
     for element in root.iter("*"):
-        line, attribute_lines = next(lines)
+        line, attribute_lines = next(lines, (0, {}))
         parent = element.getparent()
         depth[element] = depth[parent] + 1 if parent is not None else 1
         if depth[element] > MAX_DEPTH:

@@ -26,10 +26,9 @@ BODY_SIZE = 13
     APPROACH,  # closing speed of the last touch
     REBOUND,  # separation speed over closing speed, of the first impact that left again
     TOUCHES,
-    LOST_NORMAL,  # unused by the compiled loop; see results
     PEAK_FORCE_TIME,
-) = range(9)
-LOG_COLUMNS = 9
+) = range(8)
+LOG_COLUMNS = 8
 
 # entries of `Log.counters`
 NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS = range(6)
@@ -58,6 +57,7 @@ class Graphics(NamedTuple):
     R: F3  # (ng, 3, 3) shape axes to cg axes
     size: F2  # (ng, 3) see geometry.catalog
     reach: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
+    half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)

@@ -1,0 +1,115 @@
+"""The mechanism as a `Problem`: its hooks behind addresses, all given one packed `Scene`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray
+
+from mbsim.core import jit
+from mbsim.core.address import pack, unpack
+from mbsim.dynamics.evaluate import NOT_FINITE, evaluate
+from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
+from mbsim.dynamics.output import blame, events_nearly_full, scaled_error, write_row
+from mbsim.integrators.problem import BY_CHECK, BY_ERROR, HOOK, Problem
+from mbsim.system.arrays import BODY_SIZE, Scene
+
+PAUSE_FOR_EVENTS = 2.0
+
+
+def _rhs(context, t, h, a, b):
+    """f(t, y)."""
+    scene = unpack(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    scene.work.trouble[2] = code
+    return float(code)
+
+
+def _project(context, t, h, a, b):
+    """Quaternions back to unit length."""
+    scene = unpack(context, Scene)
+    y = carray(a, (scene.rows.y.shape[1],))
+    for body in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * body + 3
+        length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
+        for k in range(4):
+            y[at + k] /= length
+    return 0.0
+
+
+def _norm(context, t, h, a, b):
+    """The scaled local error."""
+    scene = unpack(context, Scene)
+    n = scene.rows.y.shape[1]
+    return scaled_error(scene, carray(a, (n,)), carray(b, (n,)))
+
+
+def _check(context, t, h, a, b):
+    """The guard of first penetration."""
+    scene = unpack(context, Scene)
+    return first_depth(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
+
+
+def _commit(context, t, h, a, b):
+    """The incident table, events and peaks; bit 1: y changed, bit 2: empty the events first."""
+    scene = unpack(context, Scene)
+    changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
+    return float(changed) + (PAUSE_FOR_EVENTS if events_nearly_full(scene) else 0.0)
+
+
+def _look(context, t, h, a, b):
+    """Peaks at an inner point of a step."""
+    scene = unpack(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    if code == 0:
+        watch_peaks(scene, t)
+    return float(code)
+
+
+def _inner(context, t, h, a, b):
+    """Where in the step a contact turned from closing to opening."""
+    return reversal(unpack(context, Scene), h)
+
+
+def _limit(context, t, h, a, b):
+    """The step that lets nothing pass through anything."""
+    scene = unpack(context, Scene)
+    return longest_step(scene, carray(a, (scene.rows.y.shape[1],)))
+
+
+def _output(context, t, h, a, b):
+    """A row of results at an interpolated, projected state."""
+    scene = unpack(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    if code != 0:
+        scene.work.trouble[2] = code
+        return -float(code)
+    return 1.0 if write_row(scene, t, carray(a, (n,))) else 0.0
+
+
+def _reject(context, t, h, a, b):
+    """Count a rejected step by reason and contact."""
+    scene = unpack(context, Scene)
+    reason = int(h)
+    contact = scene.work.trouble[1] if reason == BY_CHECK else blame(scene)
+    row = contact if contact >= 0 else len(scene.contacts.id)
+    scene.work.trouble[1] = contact
+    scene.log.rejections[row, reason] += 1
+    return 0.0
+
+
+_HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
+
+
+def mechanism(scene: Scene) -> tuple[Problem, np.ndarray]:
+    """Return the mechanism as a `Problem`, and the table that must live as long as it is used."""
+    table = pack(scene)
+    addresses = [jit.address(hook, HOOK) for hook in _HOOKS]
+    return Problem(int(table.ctypes.data), *addresses), table
+
+
+__all__ = ["BY_ERROR", "NOT_FINITE", "PAUSE_FOR_EVENTS", "mechanism"]

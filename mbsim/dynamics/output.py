@@ -1,0 +1,144 @@
+"""One output row: the state, and the forces and accelerations that follow from it."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, dot, rotate, sub, vector
+from mbsim.dynamics.contact import DEPTH, FORCE, SLIP, STORED, TORQUE, sides
+from mbsim.dynamics.kinematics import position
+from mbsim.system.arrays import BODY_SIZE, CONTACT_COLUMNS
+
+
+@jitable
+def fill_energy(scene, y, row):
+    """Write kinetic, potential (gravity and contact springs) and dissipated energy."""
+    bodies = scene.bodies
+    kinetic, potential = 0.0, 0.0
+    for b in range(len(bodies.mass)):
+        at = BODY_SIZE * b
+        v = (y[at + 7], y[at + 8], y[at + 9])
+        w = (y[at + 10], y[at + 11], y[at + 12])
+        kinetic += 0.5 * (bodies.mass[b] * dot(v, v) + dot(w, rotate(bodies.inertia[b], w)))
+        potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
+    for s in range(len(scene.slots.pair)):
+        if scene.work.touching[s] == 1:
+            potential += scene.work.slot[s, STORED]
+    row[0], row[1], row[2] = kinetic, potential, y[len(y) - 1]
+
+
+@jitable
+def fill_contacts(scene, y, row):
+    """Write net force, net torque about I's cg, deepest depth, fastest slip, incidents, area."""
+    work = scene.work
+    for k in range(len(row)):
+        row[k] = 0.0
+    for s in range(len(scene.slots.pair)):
+        if work.touching[s] == 0:
+            continue
+        at = CONTACT_COLUMNS * scene.slots.contact[s]
+        values, point = work.slot[s], work.points[s]
+        gi, gj = sides(scene, s)
+        force = vector(values[FORCE : FORCE + 3])
+        arm = sub((point[1], point[2], point[3]), position(scene, y, scene.graphics.body[gi]))
+        moment = cross(arm, force)
+        for k in range(3):
+            row[at + k] += force[k]
+            row[at + 3 + k] += moment[k] + values[TORQUE + k]
+        row[at + 6] = max(row[at + 6], values[DEPTH])
+        row[at + 7] = max(row[at + 7], values[SLIP])
+        row[at + 8] += 1.0
+
+
+@jitable
+def fill_incidents(scene, y):
+    """Append the incident table of this row: slot, p, n, t, X, depth; return their number."""
+    rows, work = scene.rows, scene.work
+    first = rows.used[1]
+    k = first
+    for s in range(len(scene.slots.pair)):
+        if work.touching[s] == 0 or k >= len(rows.incidents):
+            continue
+        row = rows.incidents[k]
+        at = scene.slots.x[s]
+        row[0] = s
+        for j in range(3):
+            row[1 + j] = work.points[s, 1 + j]
+            row[4 + j] = work.points[s, 4 + j]
+            row[7 + j] = work.t[s, j]
+            row[10 + j] = y[at + j] if at >= 0 else 0.0
+        row[13] = work.slot[s, DEPTH]
+        k += 1
+    rows.used[1] = k
+    return k - first
+
+
+@jitable
+def write_row(scene, t, y):
+    """Append the row of (t, y), evaluated just before; return whether the table is now full."""
+    rows, work = scene.rows, scene.work
+    k = rows.used[0]
+    rows.time[k] = t
+    for j in range(len(y)):
+        rows.y[k, j] = y[j]
+    for b in range(len(scene.bodies.mass)):
+        for j in range(6):
+            rows.accel[k, 6 * b + j] = work.accel[b, j]
+    fill_contacts(scene, y, rows.contact[k])
+    fill_energy(scene, y, rows.energy[k])
+    rows.incident_count[k] = fill_incidents(scene, y)
+    rows.used[0] = k + 1
+    return k + 1 >= len(rows.time)
+
+
+@jitable
+def events_nearly_full(scene):
+    """Return whether another step could overflow the table of events."""
+    return scene.rows.used[2] + 2 * len(scene.slots.pair) > len(scene.rows.events)
+
+
+@jitable
+def scaled_error(scene, e, y):
+    """Return the largest over bodies of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and X/L of incidents.
+
+    Detection that is exact only to a given noise makes forces uncertain; what the noise of a
+    step can do to a velocity is not chased. The worst body is left in `trouble[0]`.
+    """
+    length, speed = scene.world.scale[0], scene.world.scale[1]
+    largest, worst = 0.0, -1
+    for b in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * b
+        dx = e[at] ** 2 + e[at + 1] ** 2 + e[at + 2] ** 2
+        dq = e[at + 3] ** 2 + e[at + 4] ** 2 + e[at + 5] ** 2 + e[at + 6] ** 2
+        dv = e[at + 7] ** 2 + e[at + 8] ** 2 + e[at + 9] ** 2
+        dw = e[at + 10] ** 2 + e[at + 11] ** 2 + e[at + 12] ** 2
+        # |dtheta| = 2 |dq| for a unit quaternion
+        square = max(
+            max(dx / (length * length), 4.0 * dq),
+            max(dv / (speed * speed), dw * (length / speed) ** 2),
+        )
+        if not square <= largest:
+            largest, worst = square, b
+    for s in range(len(scene.slots.pair)):
+        at = scene.slots.x[s]
+        if at >= 0:
+            square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
+            largest = max(largest, max(square, e[at + 2] ** 2))
+    scene.work.trouble[0] = worst
+    return math.sqrt(largest)
+
+
+@jitable
+def blame(scene):
+    """Return the contact that presses hardest on the body with the worst error, -1 for none."""
+    worst, hardest, contact = scene.work.trouble[0], 0.0, -1
+    for s in range(len(scene.slots.pair)):
+        if scene.work.touching[s] == 1:
+            gi, gj = sides(scene, s)
+            of_body = scene.graphics.body[gi] == worst or scene.graphics.body[gj] == worst
+            force = vector(scene.work.slot[s, FORCE : FORCE + 3])
+            size = dot(force, force)
+            if of_body and size >= hardest:
+                hardest, contact = size, scene.slots.contact[s]
+    return contact

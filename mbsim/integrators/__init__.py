@@ -1,0 +1,1 @@
+"""Methods for y' = f(t, y); they know a `Problem`, no bodies."""

@@ -1,0 +1,45 @@
+"""Step control shared by the one-step methods: first step, next step, why to stop."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+
+SAFETY = 0.9
+SHRINK = 0.2
+GROW = 5.0
+
+
+@jitable
+def next_factor(error, before, order, rejected):
+    """Return the factor from this step to the next, for error / tol now and in the step before.
+
+    PI control with exponents 0.7/k and 0.4/k, k = order of the error's step power: the
+    memory of the last error keeps the step from thrashing at a stability limit.
+    Source: K. Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533.
+    """
+    if error == 0.0:
+        return GROW
+    if rejected:
+        return max(SHRINK, SAFETY * error ** (-1.0 / order))
+    factor = SAFETY * error ** (-0.7 / order) * max(before, 1e-4) ** (0.4 / order)
+    return min(GROW, max(SHRINK, factor))
+
+
+@jitable
+def smallest_step(t, t_end, h_min):
+    """Return the step below which time itself does not advance cleanly, or the deck's h_min."""
+    return max(h_min, 16.0 * 2.2e-16 * max(abs(t), 1e-3 * abs(t_end)))
+
+
+@jitable
+def starting_step(rate, curvature, tol, order, span):
+    """Return a first step from |f| and |f'| in the scaled norm [1/T], [1/T^2].
+
+    Hairer, Norsett and Wanner, Solving ODEs I, section II.4, with y of size one.
+    """
+    largest = max(rate, math.sqrt(curvature))
+    if largest <= 1e-15 / span:
+        return span
+    return min(span, (0.01 * tol) ** (1.0 / order) / largest)

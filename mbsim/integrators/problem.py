@@ -1,0 +1,52 @@
+"""What an integrator sees: hooks behind addresses, all with one signature.
+
+    double hook(int64 context, double t, double h, double *a, double *b)
+
+A mechanism (`dynamics.hooks`) and a scalar test equation (the tests) look the same, and a
+method is compiled once for all. Codes are 0 for success.
+
+| hook   | a, b                        | returns                                              |
+|--------|-----------------------------|------------------------------------------------------|
+| rhs    | y, f (out)                  | code; f = f(t, y), h after the last committed point   |
+| project| y (in and out), -           | code; y back onto its manifold                        |
+| norm   | local error, y              | largest error over its scale, dimensionless           |
+| check  | y new, -                    | 1, or the part of the step to take instead            |
+| commit | y (in and out), f           | 1 if y changed so that f must be evaluated again      |
+| look   | y at an inner point, -      | code; called where `commit` before asked for it       |
+| inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
+| limit  | y, f                        | longest step that may be tried                        |
+| output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
+| reject | -, -   (h: reason)          | 0; told of every rejected step                        |
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import types
+
+_PTR = types.CPointer(types.float64)
+HOOK = types.float64(types.int64, types.float64, types.float64, _PTR, _PTR)
+
+
+class Problem(NamedTuple):
+    """Addresses of the hooks, and the context that each is given."""
+
+    context: int
+    rhs: int
+    project: int
+    norm: int
+    check: int
+    commit: int
+    look: int
+    inner: int
+    limit: int
+    output: int
+    reject: int
+
+
+# what `advance` returns
+DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL = range(5)
+
+# reasons given to `reject`
+BY_ERROR, BY_CHECK, BY_NOT_FINITE = range(3)
