@@ -60,12 +60,12 @@ class Method(NamedTuple):
     trial: F1  # (n,)
     error: F1  # (n,)
     dense: F2  # (5, n) polynomial of the last accepted step
-    memory: F1  # (8,) see the names below
+    memory: F1  # (9,) see the names below
     counts: I1  # (8,) see the names below
 
 
 # memory
-TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
+TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST, LAST_TIME, LAST_STEP = range(9)
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 
@@ -73,7 +73,7 @@ STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 def make(y0: np.ndarray, t0: float) -> Method:
     """Return the method at rest at (t0, y0)."""
     n = len(y0)
-    memory = np.zeros(8)
+    memory = np.zeros(9)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
     memory[H_SMALLEST] = math.inf
@@ -186,14 +186,15 @@ def first_step(p, m, t, span, tol):
 
 
 @jitable
-def outputs(p, m, t, h, times):
-    """Write a row for every output time within the accepted step; return 0 or what stopped it."""
-    t_new = t + h
+def outputs(p, m, times):
+    """Write a row for every output time within the last step; return 0 or what stopped it."""
+    t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
+    t_new = m.memory[TIME]
     while m.counts[NEXT_OUTPUT] < len(times):
         when = times[m.counts[NEXT_OUTPUT]]
         if when > t_new:
             return 0.0
-        interpolate(m, (when - t) / h, m.trial)
+        interpolate(m, min(1.0, (when - t) / h), m.trial)
         call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
         m.counts[OUTPUTS] += 1
         m.counts[NEXT_OUTPUT] += 1
@@ -220,6 +221,7 @@ def accept(p, m, t, h):
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[6, i]
+    m.memory[LAST_TIME], m.memory[LAST_STEP] = t, h
     m.memory[TIME] = t + h
     m.counts[STEPS] += 1
     if asked >= 0.0:
@@ -257,6 +259,12 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
     if code != 0.0:
         m.counts[CODE] = int(code)
         return FAILED
+    # rows of the last step that found the table full
+    if m.memory[LAST_STEP] > 0.0:
+        full = outputs(p, m, times)
+        if full != 0.0:
+            m.counts[CODE] = int(-full)
+            return ROWS_FULL if full > 0.0 else FAILED
     stop_at = m.counts[EVALUATIONS] + budget
     rejected = False
     while m.memory[TIME] < t_end:
@@ -316,7 +324,7 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
         if word < 0.0:
             m.counts[CODE] = int(-word)
             return FAILED
-        full = outputs(p, m, t, h, times)
+        full = outputs(p, m, times)
         if full < 0.0:
             m.counts[CODE] = int(-full)
             return FAILED

@@ -1,0 +1,23 @@
+"""User subroutines: a script named by the user, run, compiled where it can be, and guarded.
+
+`load_friction` turns the USERCFF of a contact into a C function behind the friction
+signature of `laws.abi`; `raise_failure` and `reproduce` turn its failure codes into a
+`PluginError` that shows the user's own lines. Read `loader` first.
+"""
+
+from mbsim.plugins.diagnose import diagnose, lint
+from mbsim.plugins.guard import failure, raise_failure, reproduce
+from mbsim.plugins.helpers import host
+from mbsim.plugins.loader import UserFriction, find_subroutine, load_friction
+
+__all__ = [
+    "UserFriction",
+    "diagnose",
+    "failure",
+    "find_subroutine",
+    "host",
+    "lint",
+    "load_friction",
+    "raise_failure",
+    "reproduce",
+]

@@ -1,0 +1,216 @@
+"""The guard: a user's Python function as a C function that never lets an exception through.
+
+A Python exception cannot cross a C callback. The callback keeps it in `failure` and
+returns a code; the compiled loop stops on the code, and the host calls `raise_failure`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from mbsim.errors import PluginError
+from mbsim.plugins.helpers import StopRun, host
+
+if TYPE_CHECKING:
+    from mbsim.plugins.loader import UserFriction
+
+_PACKAGE = str(Path(__file__).resolve().parent.parent)
+_C_FUNCTION = ctypes.CFUNCTYPE(
+    ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
+)
+
+
+class NotAForce(Exception):
+    """A user function returned something else than three finite numbers."""
+
+
+class Failure:
+    """The first exception of a user function that the run has not yet raised."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what happened, before a new run."""
+        self.error: BaseException | None = None
+        self.element = 0
+        self.time = 0.0
+        self.name = ""
+        self.source = ""
+
+    def store(
+        self, error: BaseException, element: int, time: float, name: str, source: str
+    ) -> None:
+        """Keep an exception and what it belongs to; a later one does not hide the first."""
+        if self.error is None:
+            self.error, self.element, self.time = error, element, time
+            self.name, self.source = name, source
+
+
+failure = Failure()
+
+
+def raise_failure() -> NoReturn:
+    """Raise what a user function raised inside a callback, as a `PluginError`.
+
+    Raises
+    ------
+    PluginError
+        With the element, the time and the user's own frames.
+    KeyboardInterrupt
+        If Ctrl-C arrived while the user's function ran.
+    """
+    error = failure.error
+    if error is None:
+        raise PluginError("a user subroutine failed, but the guard holds no exception")
+    text = _report(error, failure.element, failure.time, failure.name, failure.source)
+    failure.clear()
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    raise PluginError(text) from error
+
+
+def _report(error: BaseException, element: int, time: float, name: str, source: str) -> str:
+    """Return the message: who, when, what, and the user's frames with their lines."""
+    head = f"Force_Contact[{element}]: {name} failed at time {time:.12g}: "
+    if isinstance(error, NotAForce):
+        return f"{head}{error} ({source})"
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not frame.filename.startswith((_PACKAGE, "<frozen"))
+    ]
+    what = (
+        f"py_errmes stopped the run: {error}"
+        if isinstance(error, StopRun)
+        else "".join(traceback.format_exception_only(type(error), error)).strip()
+    )
+    own = [frame for frame in frames if frame.filename == source] or frames
+    place = f"{own[-1].filename}:{own[-1].lineno}: " if own else f"{source}: "
+    lines = [f"{head}{what}", f"  at {place.rstrip(': ')}"]
+    lines += [f"  {line}" for line in "".join(traceback.format_list(frames)).splitlines()]
+    return "\n".join(lines)
+
+
+def three_numbers(result: Any) -> list[float]:
+    """Return a user function's result as three finite floats, or raise `NotAForce`."""
+    shown = repr(result)
+    shown = shown if len(shown) <= 80 else shown[:77] + "..."
+    # numpy arrays have no common base with list; length and indexing make a sequence
+    sized = hasattr(result, "__len__") and hasattr(result, "__getitem__")
+    if not sized or isinstance(result, (str, bytes, dict)):
+        hint = " (no return statement?)" if result is None else ""
+        raise NotAForce(f"returned {shown}{hint}, not 3 finite numbers [Fx, Fy, Tz]")
+    if len(result) != 3:
+        raise NotAForce(f"returned {len(result)} values, {shown}, not 3 finite numbers")
+    try:
+        if any(isinstance(value, (str, bytes)) for value in result):
+            raise TypeError
+        values = [float(value) for value in result]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise NotAForce(f"returned {shown}, not 3 finite numbers") from error
+    if any(value - value != 0.0 for value in values):
+        raise NotAForce(f"returned {shown}, not 3 finite numbers")
+    return values
+
+
+class _Views(dict[int, memoryview]):
+    """Memory of a fixed number of doubles by address; the host's buffers seldom move."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self._array = ctypes.c_double * count
+
+    def __missing__(self, address: int) -> memoryview:
+        if len(self) > 4096:
+            self.clear()
+        view = memoryview(self._array.from_address(address)).cast("B").cast("d")
+        self[address] = view
+        return view
+
+
+def callback(
+    function: Callable[..., Any], name: str, source: str, par_count: int
+) -> tuple[int, object]:
+    """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive."""
+    from mbsim.laws.abi import FRICTION_INPUTS, RAISED_INTERPRETED
+
+    # plain locals and memoryviews: this body costs 0.7 us, numpy views would cost 3
+    inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
+
+    def guarded(element: int, inputs: int, par: int, out: int) -> int:
+        time = 0.0
+        try:
+            given = inputs_at[inputs].tolist()
+            host.time = time = given[0]
+            result = function(
+                element,
+                time,
+                par_at[par].tolist() if par_count else [],
+                par_count,
+                given[13:16],
+                given[16:19],
+                given[2:5],
+                given[5:8],
+                given[10],
+                0,
+                0,
+            )
+            force = out_at[out]
+            try:
+                fx, fy, tz = result
+                if type(result) is not list or fx - fx + fy - fy + tz - tz != 0.0:
+                    fx, fy, tz = three_numbers(result)
+                force[0] = fx
+                force[1] = fy
+                force[4] = tz
+            except Exception:
+                force[0], force[1], force[4] = three_numbers(result)
+            force[2] = force[3] = 0.0
+            return 0
+        except BaseException as error:
+            failure.store(error, element, time, name, source)
+            return RAISED_INTERPRETED
+
+    entry = _C_FUNCTION(guarded)
+    return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
+
+
+def reproduce(
+    user: UserFriction, inputs: Sequence[float] | Any, element_id: int | None = None
+) -> NoReturn:
+    """Run the interpreted function where the compiled one failed, and raise what it raises.
+
+    Parameters
+    ----------
+    user : UserFriction
+        The compiled function that returned RAISED_COMPILED or a force that is not finite.
+    inputs : sequence of float, shape (19,)
+        The fields of `FrictionInput` in order, as the function was given them.
+    element_id : int, optional
+        The Force_Contact; `user.element` if left out.
+
+    Raises
+    ------
+    PluginError
+        Always.
+    """
+    given = [float(value) for value in inputs]
+    element = user.element if element_id is None else int(element_id)
+    name, source = user.name, str(user.source)
+    try:
+        result = user.call(
+            given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10]
+        )
+    except BaseException as error:
+        failure.clear()
+        failure.store(error, element, given[0], name, source)
+        raise_failure()
+    raise PluginError(
+        f"Force_Contact[{element}]: {name} ({source}) failed at time {given[0]:.12g} when compiled, "
+        f"but gives {result} when interpreted; run it with --interpret-plugins"
+    )

@@ -1,0 +1,89 @@
+"""The py_ functions that a user's script finds without importing them."""
+
+from __future__ import annotations
+
+import builtins
+import math
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from mbsim.plugins import kernels
+
+
+class StopRun(BaseException):
+    """py_errmes asked to stop; not an Exception, so that `except Exception` lets it through."""
+
+
+def _to_stderr(line: str) -> None:
+    sys.stderr.write(line + "\n")
+
+
+class Host:
+    """What the scripts see of the run: the time, and where messages go."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+        self.log: Callable[[str], None] = _to_stderr
+
+
+#: The one run of this process. The simulation sets `host.log`; the guard sets `host.time`.
+host = Host()
+
+
+def py_step(x: float, x0: float, h0: float, x1: float, h1: float, iord: int) -> list[Any]:
+    """Return [value, errflg] of STEP (iord 0) or its derivative; errflg 1: bad iord or x1 <= x0."""
+    return list(kernels.mbsim_step(x, x0, h0, x1, h1, iord))
+
+
+def py_step5(x: float, x0: float, h0: float, x1: float, h1: float, iord: int) -> list[Any]:
+    """Return [value, errflg] of STEP5 (iord 0) or its derivative; errflg as `py_step`."""
+    return list(kernels.mbsim_step5(x, x0, h0, x1, h1, iord))
+
+
+def stops(endflg: Any) -> bool:
+    """Return whether an end flag asks to stop: "STOP", "TRUE" in any case, or a true number."""
+    if isinstance(endflg, str):
+        return endflg.strip().upper() in ("STOP", "TRUE")
+    return bool(endflg)
+
+
+def py_errmes(errflg: Any, message: Any = "", id: Any = 0, endflg: Any = "") -> None:
+    """Log an error if `errflg` is true, and stop the run if `endflg` says so."""
+    if not errflg:
+        return
+    host.log(f"ERRMES:USER [{id}] ERROR: {message}")
+    if stops(endflg):
+        raise StopRun(str(message))
+
+
+def py_usrmes(msgflg: Any, message: Any = "", id: Any = 0, msgtyp: Any = "INFO") -> None:
+    """Log a message if `msgflg` is true; `msgtyp` is INFO, WARN, ..."""
+    if msgflg:
+        # INFO_NOPAD and INFO_LOG say where and how it is laid out; the kind is INFO
+        kind = str(msgtyp).strip().upper().split("_")[0] or "INFO"
+        host.log(f"USRMES:USER [{id}] {kind}: {message}")
+
+
+def py_getstm() -> float:
+    """Return the simulation time of the present call."""
+    return host.time
+
+
+def py_get_contact_area() -> float:
+    """Return the area of the contact patch: 0, all contacts being points so far."""
+    return 0.0
+
+
+def print_to_stderr(*args: Any, file: Any = None, **options: Any) -> None:
+    """Print as Python does, but on standard error: --json owns standard output."""
+    builtins.print(*args, file=sys.stderr if file is None else file, **options)
+
+
+def namespace() -> dict[str, Any]:
+    """Return the names that a script starts with: all of `math`, and the helpers."""
+    names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
+    for helper in (py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area):
+        names[helper.__name__] = helper
+    names["print"] = print_to_stderr
+    return names
