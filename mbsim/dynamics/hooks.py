@@ -8,7 +8,7 @@ import numpy as np
 from numba import carray
 
 from mbsim.core import jit
-from mbsim.core.address import pack, unpack
+from mbsim.core.address import pack, view
 from mbsim.dynamics.evaluate import NOT_FINITE, evaluate
 from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
 from mbsim.dynamics.output import blame, events_nearly_full, scaled_error, write_row
@@ -20,7 +20,7 @@ PAUSE_FOR_EVENTS = 2.0
 
 def _rhs(context, t, h, a, b):
     """f(t, y)."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     scene.work.trouble[2] = code
@@ -29,7 +29,7 @@ def _rhs(context, t, h, a, b):
 
 def _project(context, t, h, a, b):
     """Quaternions back to unit length."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     y = carray(a, (scene.rows.y.shape[1],))
     for body in range(len(scene.bodies.mass)):
         at = BODY_SIZE * body + 3
@@ -41,27 +41,27 @@ def _project(context, t, h, a, b):
 
 def _norm(context, t, h, a, b):
     """The scaled local error."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return scaled_error(scene, carray(a, (n,)), carray(b, (n,)))
 
 
 def _check(context, t, h, a, b):
     """The guard of first penetration."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     return first_depth(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
 
 
 def _commit(context, t, h, a, b):
     """The incident table, events and peaks; bit 1: y changed, bit 2: empty the events first."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
     return float(changed) + (PAUSE_FOR_EVENTS if events_nearly_full(scene) else 0.0)
 
 
 def _look(context, t, h, a, b):
     """Peaks at an inner point of a step."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     if code == 0:
@@ -71,18 +71,18 @@ def _look(context, t, h, a, b):
 
 def _inner(context, t, h, a, b):
     """Where in the step a contact turned from closing to opening."""
-    return reversal(unpack(context, Scene), h)
+    return reversal(view(context, Scene), h)
 
 
 def _limit(context, t, h, a, b):
     """The step that lets nothing pass through anything."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     return longest_step(scene, carray(a, (scene.rows.y.shape[1],)))
 
 
 def _output(context, t, h, a, b):
     """A row of results at an interpolated, projected state."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     if code != 0:
@@ -93,7 +93,7 @@ def _output(context, t, h, a, b):
 
 def _reject(context, t, h, a, b):
     """Count a rejected step by reason and contact."""
-    scene = unpack(context, Scene)
+    scene = view(context, Scene)
     reason = int(h)
     contact = scene.work.trouble[1] if reason == BY_CHECK else blame(scene)
     row = contact if contact >= 0 else len(scene.contacts.id)

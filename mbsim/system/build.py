@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement, place
-from mbsim.plugins import UserFriction, load_friction
 from mbsim.system import arrays as a
 from mbsim.system.pairing import PairPlan, half_extent, kernel_size, plan_pairs, reach
+
+if TYPE_CHECKING:
+    from mbsim.plugins import UserFriction
 
 ROWS = 256
 EVENTS = 1024
@@ -292,6 +294,13 @@ def _rows(n: int, nb: int, nc: int, ns: int) -> a.Rows:
     )
 
 
+def _load_friction(contact: Contact, plugins: Sequence[Path], interpret: bool) -> UserFriction:
+    """Load a user's CFFSUB; scenes without one do not import what that needs."""
+    from mbsim.plugins import load_friction
+
+    return load_friction(contact, plugins, interpret)
+
+
 def build(
     model: Model,
     end_time: float,
@@ -320,7 +329,7 @@ def build(
     placement = place(model)
     plans = plan_pairs(model, detector)
     user = {
-        contact.id: load_friction(contact, plugins, interpret)
+        contact.id: _load_friction(contact, plugins, interpret)
         for contact in model.contacts.values()
         if contact.cff_type == "USERCFF"
     }
