@@ -25,16 +25,16 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
+from numba.core import event
 from numba.core.caching import CacheImpl, _CacheLocator
-from numba.extending import intrinsic, register_jitable
+from numba.extending import register_jitable
 
 from mbsim.core.jitable import take_marked
 
 PACKAGE = Path(__file__).resolve().parent.parent
-_IMPORT = re.compile(r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(.+)|import\s+(mbsim[\w.]*))", re.M)
+_IMPORT = re.compile(
+    r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
+)
 
 #: Seconds spent compiling in this process, and the hook that is told before the first compilation.
 compile_seconds = 0.0
@@ -126,23 +126,36 @@ def _register() -> None:
         register_jitable(error_model="numpy")(function)
 
 
-def _timed(work: Callable[[], Any], stats: Callable[[], bool]) -> Any:
-    """Run `work`; if it compiled rather than loaded, say so once and count the time."""
-    global compile_seconds, on_first_compile
-    if stats() and on_first_compile is not None:
-        tell, on_first_compile = on_first_compile, None
-        tell()
-    began = time.perf_counter()
-    result = work()
-    compile_seconds += time.perf_counter() - began
-    return result
+class _Watch(event.Listener):
+    """Counts the time that Numba compiles (loading from the cache is not compiling)."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._began = 0.0
+
+    def on_start(self, happened: Any) -> None:
+        global on_first_compile
+        if self._depth == 0:
+            self._began = time.perf_counter()
+            if on_first_compile is not None:
+                tell, on_first_compile = on_first_compile, None
+                tell()
+        self._depth += 1
+
+    def on_end(self, happened: Any) -> None:
+        global compile_seconds
+        self._depth -= 1
+        if self._depth == 0:
+            compile_seconds += time.perf_counter() - self._began
 
 
-def function(py_func: Callable[..., Any], signature: Any = None) -> Callable[..., Any]:
-    """Return `py_func` compiled (loaded from the cache where it is there)."""
+event.register("numba:run_pass", _Watch())
+
+
+def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `py_func` compiled at its first call (or loaded from the cache)."""
     _register()
-    dispatcher = numba.njit(cache=True, error_model="numpy")(py_func)
-    return dispatcher
+    return numba.njit(cache=True, error_model="numpy")(py_func)
 
 
 _kept: list[Any] = []

@@ -18,6 +18,7 @@ from mbsim.core.rotation import (
     any_tangent,
     cross,
     dot,
+    norm,
     rotate,
     scale,
     spin,
@@ -34,6 +35,9 @@ from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, NORMAL_CALLS, PYTHON_
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 SLOT_COLUMNS = 12
+
+# code of a user's law that made something else than numbers of finite input
+USER_NOT_FINITE = 5
 
 
 @jitable
@@ -177,6 +181,9 @@ def add_contact(scene, t, h, y, dy, s):
         code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal)
         if code != 0:
             return code
+        finite = math.isfinite(out[0] + out[1] + out[4])
+        if not finite and contacts.framed[c] == 1 and math.isfinite(normal + slip[0] + slip[1]):
+            return USER_NOT_FINITE
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
         torque = add(scale(mx, tx), add(scale(my, ty), scale(tz, n)))
@@ -184,6 +191,11 @@ def add_contact(scene, t, h, y, dy, s):
         lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
     add_wrench(scene, y, bi, p, force, torque)
     add_wrench(scene, y, bj, p, scale(-1.0, force), scale(-1.0, torque))
+    noise = scene.pairs.noise[scene.slots.pair[s]]
+    if noise > 0.0:
+        for b in (bi, bj):
+            work.noise[b, 0] += noise * normal
+            work.noise[b, 1] += noise * normal * norm(sub(p, position(scene, y, b)))
 
     # X of the incident follows the slip
     at = scene.slots.x[s]

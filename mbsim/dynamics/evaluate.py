@@ -6,12 +6,13 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
-from mbsim.dynamics.contact import add_contact
+from mbsim.dynamics.contact import USER_NOT_FINITE, add_contact
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import BODY_SIZE
 
-NOT_FINITE = 3  # beside the codes of laws.abi
+# beside the codes of laws.abi and geometry.fcl_detector (4)
+NOT_FINITE = 3
 
 
 @jitable
@@ -23,6 +24,7 @@ def add_gravity(scene):
         for k in range(3):
             work.force[b, k] = mass * g[k]
             work.torque[b, k] = 0.0
+        work.noise[b, 0] = work.noise[b, 1] = 0.0
 
 
 @jitable
@@ -90,3 +92,6 @@ def evaluate(scene, t, h, y, dy):
     if not math.isfinite(accelerate(scene, y, dy)):
         return NOT_FINITE
     return 0
+
+
+__all__ = ["NOT_FINITE", "USER_NOT_FINITE", "evaluate"]

@@ -43,7 +43,7 @@ def _norm(context, t, h, a, b):
     """The scaled local error."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return scaled_error(scene, carray(a, (n,)), carray(b, (n,)))
+    return scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
 
 
 def _check(context, t, h, a, b):

@@ -99,7 +99,19 @@ def events_nearly_full(scene):
 
 
 @jitable
-def scaled_error(scene, e, y):
+def beyond_noise(scene, b, h, dv, dw):
+    """Return the squares of a velocity error less what detection noise does in a step h."""
+    bodies, noise = scene.bodies, scene.work.noise
+    if noise[b, 0] == 0.0:
+        return dv, dw
+    ease = h * noise[b, 0] / bodies.mass[b]
+    least = min(bodies.inertia[b, 0, 0], min(bodies.inertia[b, 1, 1], bodies.inertia[b, 2, 2]))
+    turn = h * noise[b, 1] / least
+    return max(0.0, math.sqrt(dv) - ease) ** 2, max(0.0, math.sqrt(dw) - turn) ** 2
+
+
+@jitable
+def scaled_error(scene, h, e, y):
     """Return the largest over bodies of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and X/L of incidents.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
@@ -113,6 +125,7 @@ def scaled_error(scene, e, y):
         dq = e[at + 3] ** 2 + e[at + 4] ** 2 + e[at + 5] ** 2 + e[at + 6] ** 2
         dv = e[at + 7] ** 2 + e[at + 8] ** 2 + e[at + 9] ** 2
         dw = e[at + 10] ** 2 + e[at + 11] ** 2 + e[at + 12] ** 2
+        dv, dw = beyond_noise(scene, b, h, dv, dw)
         # |dtheta| = 2 |dq| for a unit quaternion
         square = max(
             max(dx / (length * length), 4.0 * dq),

@@ -88,9 +88,10 @@ class Entry:
         id = node.find("id")
         self.label = statement.name + (f"[{_short(id.value)}]" if id else "")
 
-        if not statement.any_attribute(node):
-            self._collect()
-            self._check_content()
+        if statement.any_attribute(node):
+            return
+        self._collect()
+        self._check_content()
         for name, attribute in self._attributes.items():
             self._parse(name, attribute)
         for name, spec in statement.attributes.items():

@@ -74,6 +74,7 @@ class Pairs(NamedTuple):
     kernel: I1  # (np,) address, 0 where FCL does it
     watched: I1  # (np,) 0 where no distance can be known (a plane that moves)
     thickness: F1  # (np,) what a step may not jump over
+    noise: F1  # (np,) scatter of the normals that its detector gives
 
 
 class Contacts(NamedTuple):
@@ -139,7 +140,7 @@ class Work(NamedTuple):
     force: F2  # (nb + 1, 3)
     torque: F2  # (nb + 1, 3) about the cg
     accel: F2  # (nb, 6) of the cg, and angular, global frame
-    noise: F2  # (nb + 1, 2) force and torque that detection may be wrong by
+    noise: F2  # (nb + 1, 2) force and torque that the detector's noise may be wrong by
     frames: F2  # (ng, 12)
     points: F2  # (ns, 7) candidates of geometry.catalog
     touching: I1  # (ns,)

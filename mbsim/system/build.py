@@ -16,6 +16,7 @@ import numpy as np
 
 from mbsim.core import jit
 from mbsim.geometry.catalog import PAIRS, Pair
+from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
@@ -112,7 +113,7 @@ def _graphics(model: Model, placement: Placement, ids: list[int], row: dict[int,
 
 
 def _pairs(
-    plans: list[PairPlan], graphics: a.Graphics, rows: dict[int, int], contacts: list[int], ground: int
+    model: Model, plans: list[PairPlan], graphics: a.Graphics, rows: dict[int, int], contacts: list[int], ground: int
 ) -> a.Pairs:
     """Return the pairs; `rows` is the graphic row by graphic id."""
     n = len(plans)
@@ -125,6 +126,7 @@ def _pairs(
         kernel=np.zeros(n, dtype=np.int64),
         watched=np.ones(n, dtype=np.int64),
         thickness=np.zeros(n),
+        noise=np.zeros(n),
     )
     known: dict[str, int] = {}
     for k, plan in enumerate(plans):
@@ -133,6 +135,9 @@ def _pairs(
                 known[plan.closed_form] = pair_address(PAIRS[plan.closed_form])
             made.kernel[k] = known[plan.closed_form]
         both = [made.graphic_i[k], made.graphic_j[k]]
+        if not plan.closed_form:
+            shapes = [model.graphics[g].shape for g in (plan.graphic_i, plan.graphic_j)]
+            made.noise[k] = states_noise(*shapes)
         moving_plane = any(
             math.isinf(graphics.reach[g]) and graphics.body[g] != ground for g in both
         )
@@ -343,7 +348,7 @@ def build(
 
     graphics = _graphics(model, placement, graphic_ids, row)
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
-    pairs = _pairs(plans, graphics, graphic_row, contact_ids, nb)
+    pairs = _pairs(model, plans, graphics, graphic_row, contact_ids, nb)
     contacts, uses_x = _contacts(contact_list, plans, user)
 
     # X goes behind the bodies in y, slot by slot, for the laws that look at it

@@ -411,7 +411,11 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ("exactly one", "num_steps, print_interval"),
     ),
     "no output": (deck((' print_interval="0.01"', "")), SIMULATE_LINE, ("exactly one", "none")),
-    "too many rows": (deck(('interval="0.01"', 'interval="1e-30"')), SIMULATE_LINE, ('"1e-30"', "output rows")),
+    "too many rows": (
+        deck(('interval="0.01"', 'interval="1e-30"')),
+        SIMULATE_LINE,
+        ('"1e-30"', "output rows"),
+    ),
     "second run starts elsewhere": (
         added('<Simulate start_time="1" end_time="4" num_step="3"/>', "Command"),
         END_OF_COMMAND,

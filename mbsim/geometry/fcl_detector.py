@@ -1,0 +1,174 @@
+"""The door to FCL, and the only file that imports it.
+
+Compiled code calls one C function with the number of pairs waiting; this fills their rows of
+`Work.points` and returns 0, or `DETECTOR_FAILED` with the exception kept for the host.
+FCL's objects are made at the first question: a scene that has a fallback but never needs it
+does not import FCL.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from mbsim.geometry.support import CONVEX, ROUND, support
+from mbsim.model.elements import Graphic
+from mbsim.system.arrays import Scene
+
+DETECTOR_FAILED = 4
+#: Directions that FCL's iterative solver returns scatter by this much (measured on ellipsoids).
+NORMAL_NOISE = 2e-6
+_MESH_CONTACTS = 100_000
+
+
+def states_noise(shape_i: str, shape_j: str) -> float:
+    """Return the scatter of normals that FCL gives for a pair of shapes."""
+    iterative = {"ELLIPSOID", "CYLINDER"}
+    both = {shape_i, shape_j}
+    return NORMAL_NOISE if both & iterative and "PLANE" not in both else 0.0
+
+
+class FclDetector:
+    """FCL behind an address, for the pairs of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    graphics : list of Graphic
+        Row by row as in ``scene.graphics``.
+    """
+
+    def __init__(self, scene: Scene, graphics: list[Graphic]) -> None:
+        self._scene = scene
+        self._graphics = graphics
+        self._objects: dict[tuple[int, int], Any] = {}
+        self._fcl: Any = None
+        self.failure: BaseException | None = None
+        self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._answer)
+        self.address = int(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
+
+    def _answer(self, count: int) -> int:
+        """Detect the first `count` pairs of ``work.fcl``."""
+        try:
+            if self._fcl is None:
+                import fcl
+
+                self._fcl = fcl
+            for pair in self._scene.work.fcl[:count].tolist():
+                self._detect(pair)
+        except BaseException as error:  # nothing may cross a C callback
+            self.failure = error
+            return DETECTOR_FAILED
+        return 0
+
+    def _geometry(self, g: int, flat_partner: float) -> Any:
+        """Return FCL's geometry of graphic g; a plane under a flat shape is a box that size."""
+        fcl, graphic, size = self._fcl, self._graphics[g], self._scene.graphics.size[g]
+        if graphic.shape == "SPHERE":
+            return fcl.Sphere(size[0])
+        if graphic.shape == "ELLIPSOID":
+            return fcl.Ellipsoid(*size)
+        if graphic.shape == "BOX":
+            return fcl.Box(*(2.0 * size))
+        if graphic.shape == "CYLINDER":
+            return fcl.Cylinder(size[0], 2.0 * size[1])
+        if graphic.shape == "PLANE":
+            if flat_partner > 0.0:
+                return fcl.Box(8.0 * flat_partner, 8.0 * flat_partner, 8.0 * flat_partner)
+            return fcl.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        mesh = fcl.BVHModel()
+        assert graphic.vertices is not None and graphic.faces is not None
+        mesh.beginModel(len(graphic.vertices), len(graphic.faces))
+        mesh.addSubModel(graphic.vertices, graphic.faces)
+        mesh.endModel()
+        return mesh
+
+    def _object(self, pair: int, g: int, other: int) -> tuple[Any, float]:
+        """Return the collision object of one side, and the size of its stand-in box or 0."""
+        flat = 0.0
+        if self._graphics[g].shape == "PLANE" and self._graphics[other].shape == "BOX":
+            flat = float(self._scene.graphics.reach[other])
+        # a stand-in belongs to its pair, everything else is shared by all pairs of the graphic
+        key = (g, pair if flat else -1)
+        if key not in self._objects:
+            self._objects[key] = self._fcl.CollisionObject(self._geometry(g, flat))
+        return self._objects[key], flat
+
+    def _frame(self, g: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+        """Return centre and axes of graphic g at the trial point."""
+        frame = self._scene.work.frames[g]
+        return frame[:3], frame[3:].reshape(3, 3)
+
+    def _detect(self, pair: int) -> None:
+        """Fill the candidate rows of one pair."""
+        scene, fcl = self._scene, self._fcl
+        i, j = int(scene.pairs.graphic_i[pair]), int(scene.pairs.graphic_j[pair])
+        objects = []
+        for g, other in ((i, j), (j, i)):
+            body, flat = self._object(pair, g, other)
+            p, R = self._frame(g)
+            if flat:
+                # keep the stand-in right below what lies on it, its face in the plane
+                n, above = R[:, 2], self._frame(other)[0]
+                p = above - n * (n @ (above - p) + 4.0 * flat)
+            body.setTransform(fcl.Transform(R, p))
+            objects.append(body)
+        first, last = int(scene.pairs.slot[pair]), int(scene.pairs.slot[pair + 1])
+        meshes = "MESH" in (self._graphics[i].shape, self._graphics[j].shape)
+        most = _MESH_CONTACTS if meshes else last - first
+        request = fcl.CollisionRequest(num_max_contacts=most, enable_contact=True)
+        result = fcl.CollisionResult()
+        fcl.collide(objects[0], objects[1], request, result)
+        # FCL's normal points from its first object to its second
+        found = [(c.penetration_depth, np.array(c.pos), -np.array(c.normal)) for c in result.contacts]
+        found.sort(key=lambda contact: -contact[0])
+        points = scene.work.points
+        points[first:last, 0] = -0.0
+        sign = -1.0 if scene.pairs.swapped[pair] else 1.0
+        for depth, p, n in found[: last - first]:
+            if last - first == 1:
+                depth, p = self._refine(i, j, depth, p, n)
+                slot = first
+            else:
+                slot = self._slot_of(p, first, last)
+            points[slot, 0] = depth
+            points[slot, 1:4] = p
+            points[slot, 4:7] = sign * n
+
+    def _refine(self, i: int, j: int, depth: float, p: Any, n: Any) -> tuple[float, Any]:
+        """Return depth and midpoint made exact along n from the shapes' support points."""
+        shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
+        size = self._scene.graphics.size
+        if shape_i in CONVEX:
+            low = support(shape_i, size[i], *self._frame(i), -n)
+        elif shape_i == "PLANE":
+            low = self._frame(i)[0]
+        else:
+            return depth, p
+        if shape_j in CONVEX:
+            high = support(shape_j, size[j], *self._frame(j), n)
+        elif shape_j == "PLANE":
+            high = self._frame(j)[0]
+        else:
+            return depth, p
+        exact = float(n @ (high - low))
+        if shape_i in ROUND:
+            return exact, low + 0.5 * exact * n
+        if shape_j in ROUND:
+            return exact, high - 0.5 * exact * n
+        # between flat shapes FCL chooses where, the normal says how high
+        return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
+
+    def _slot_of(self, p: Any, first: int, last: int) -> int:
+        """Return the free slot whose committed incident is nearest, else the first free one."""
+        state, points = self._scene.state, self._scene.work.points
+        best, nearest = -1, np.inf
+        for s in range(first, last):
+            if points[s, 0] > 0.0:
+                continue
+            away = float(np.linalg.norm(p - state.p[s])) if state.touching[s] else 1e300
+            if away < nearest:
+                best, nearest = s, away
+        return best

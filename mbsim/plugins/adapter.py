@@ -1,0 +1,63 @@
+"""The documented CFFSUB arguments on the inside of a compiled friction function.
+
+Apart from `compiled`, so that the cache key of a user's function covers this and no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import carray
+from numba.extending import register_jitable
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from mbsim.core import jit
+from mbsim.laws.abi import FRICTION_SIGNATURE
+
+_STOPPED = 2  # laws.abi.RAISED_COMPILED, as a constant of the compiled code
+
+
+def _adapt(function: Callable[..., Any], count: int) -> Any:
+    """Return CFFSUB with `count` parameters as a C function that signals what it raises."""
+
+    def entry(element, inputs, par, out):
+        a = carray(inputs, (19,))
+        values = to_fixed_tuple(carray(par, (count,)), count)
+        result = carray(out, (5,))
+        code = 0
+        try:
+            force = function(
+                element,
+                a[0],
+                values,
+                count,
+                (a[13], a[14], a[15]),
+                (a[16], a[17], a[18]),
+                (a[2], a[3], a[4]),
+                (a[5], a[6], a[7]),
+                a[10],
+                0,
+                0,
+                a[0],
+            )
+            if len(force) != 3:
+                raise ValueError("not three")
+            result[0] = force[0]
+            result[1] = force[1]
+            result[2] = 0.0
+            result[3] = 0.0
+            result[4] = force[2]
+        except Exception:
+            code = _STOPPED
+        return code
+
+    return entry
+
+
+def friction_address(function: Callable[..., Any], callees: list[Any], count: int) -> int:
+    """Return the address of a rewritten CFFSUB behind FRICTION_SIGNATURE."""
+    # as Python: a division by zero raises, an index beyond the end too
+    for each in (*callees, function):
+        register_jitable(error_model="python", boundscheck=True)(each)
+    return jit.address(_adapt(function, count), FRICTION_SIGNATURE)

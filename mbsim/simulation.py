@@ -1,0 +1,491 @@
+"""The main loop: read this first, then `dynamics/evaluate.py`.
+
+A model becomes a `System`, the system a `Problem`; compiled code advances it and comes back
+to Python only with rows to keep, after a bounded number of evaluations, or to say why not.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim import __version__
+from mbsim.errors import Interrupted, ModelError, PluginError, SolverError
+from mbsim.model.elements import Model, Simulation
+
+if TYPE_CHECKING:
+    from mbsim.results.reading import Results
+    from mbsim.system.build import System
+
+DEFAULT_TOL = 1e-5
+#: Evaluations after which compiled code comes back for progress and Ctrl-C.
+BUDGET = 50_000
+INTEGRATORS = ("DOPRI5",)
+#: MotionSolve's names, all run by the one method there is.
+_MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
+
+Progress = Callable[[float, float, float], None]
+Notify = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a model is run: the command line before the deck's Command before its Model."""
+
+    simulations: tuple[Simulation, ...]
+    integrator: str
+    tol: float
+    h_max: float
+    h_min: float
+    first_step: float
+    notes: tuple[str, ...]
+
+    @property
+    def end_time(self) -> float:
+        """End of the last simulation [T]."""
+        return self.simulations[-1].end_time
+
+
+def _checked(name: str, value: float, low: float, high: float) -> float:
+    """Return a number given by the caller, or raise what is allowed."""
+    if not low < value <= high:
+        raise ModelError(f"{name}={value:g} is not allowed: above {low:g}, at most {high:g}")
+    return value
+
+
+def _simulations(
+    model: Model, end_time: float | None, print_interval: float | None
+) -> tuple[Simulation, ...]:
+    """Return what to run: the deck's Simulate statements, cut or replaced by the caller's times."""
+    planned = list(model.simulations)
+    if end_time is not None:
+        _checked("end_time", end_time, 0.0, math.inf)
+        if not planned:
+            planned = [Simulation(end_time=end_time, print_interval=end_time / 100.0)]
+        planned = [s for s in planned if s.start_time < end_time]
+        if not planned:
+            raise ModelError(f"end_time={end_time:g} is before the deck's first start_time")
+        kept = [replace(s, end_time=min(s.end_time, end_time)) for s in planned]
+        kept[-1] = replace(kept[-1], end_time=end_time)
+        planned = kept
+    if not planned:
+        raise ModelError(f"{model.file}: the deck has no Simulate; give --end-time")
+    if print_interval is not None:
+        _checked("print_interval", print_interval, 0.0, math.inf)
+        planned = [replace(s, print_interval=print_interval) for s in planned]
+    return tuple(planned)
+
+
+def settle(
+    model: Model,
+    end_time: float | None = None,
+    print_interval: float | None = None,
+    integrator: str | None = None,
+    tol: float | None = None,
+) -> Settings:
+    """Return the settings of a run.
+
+    Raises
+    ------
+    ModelError
+        If a value is out of range or there is nothing to simulate.
+    """
+    notes = []
+    simulations = _simulations(model, end_time, print_interval)
+    in_command = next((s.transient for s in simulations if s.transient is not None), None)
+    sources = [in_command, model.transient]
+
+    def said(attribute: str) -> Any:
+        values = (getattr(source, attribute) for source in sources if source is not None)
+        return next((value for value in values if value is not None), None)
+
+    named = (integrator or said("integrator_type") or INTEGRATORS[0]).upper()
+    if named in _MOTIONSOLVE_NAMES:
+        notes.append(f"integrator {named}: run by DOPRI5 (explicit, order 5); no stiff method yet")
+        named = "DOPRI5"
+    if named not in INTEGRATORS:
+        allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
+        raise ModelError(f"integrator={named} is not known; there are {allowed}")
+    chosen = tol if tol is not None else said("integr_tol")
+    chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
+    h_max = said("h_max") or math.inf
+    if model.compatibility.upper().replace("_", "") == "MOTIONSOLVE":
+        h_max = min(h_max, min(s.print_interval for s in simulations))
+        notes.append(f"compatibility MOTIONSOLVE: h_max = {h_max:g} (at most the print interval)")
+    return Settings(
+        simulations,
+        named,
+        chosen,
+        h_max,
+        said("h_min") or 0.0,
+        said("h0_max") or 0.0,
+        tuple(notes),
+    )
+
+
+def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:
+    """Return the output times of one Simulate; a restart's row belongs to the one that follows."""
+    t0, t1, dt = simulation.start_time, simulation.end_time, simulation.print_interval
+    # a whole number of intervals up to rounding ends exactly at the end
+    count = math.floor((t1 - t0) / dt * (1.0 + 1e-12) + 1e-9)
+    times = t0 + dt * np.arange(count + 1)
+    times = times[times < t1 - 1e-9 * dt]
+    return np.append(times, t1) if last else times
+
+
+class Runner:
+    """One run: a system, its integrator, its recorder."""
+
+    def __init__(self, system: System, settings: Settings, recorder: Any, log: Any) -> None:
+        from mbsim.core import jit
+        from mbsim.dynamics.hooks import mechanism
+        from mbsim.integrators import dopri5
+        from mbsim.integrators.problem import Problem
+
+        self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
+        self.method = dopri5.make(system.y0, settings.simulations[0].start_time)
+        self.detector = self._open_fcl_door()
+        self.problem: Problem
+        self.problem, self._table = mechanism(system.scene)
+        self._advance = jit.function(dopri5.advance)
+        pointer = ctypes.c_void_p
+        self._hook = ctypes.CFUNCTYPE(
+            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+        )
+        self.stage = 0  # which Simulate
+        self.loop_seconds = 0.0
+        self.interrupted = False
+
+    def _open_fcl_door(self) -> Any:
+        """Put FCL behind the scene's door where a pair may need it."""
+        if not self.system.needs_fcl:
+            return None
+        from mbsim.geometry.fcl_detector import FclDetector
+
+        graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
+        detector = FclDetector(self.system.scene, graphics)
+        self.system.scene.world.doors[0] = detector.address
+        return detector
+
+    def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> float:
+        """Call one of the problem's hooks from Python."""
+        return float(self._hook(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+
+    def settle_contacts(self, allow_overlap: bool) -> None:
+        """Begin with the incidents that exist at the start; refuse those that are too deep."""
+        t = self.settings.simulations[0].start_time
+        y, f = self.method.y, self.method.k[0]
+        code = self.call(self.problem.rhs, t, 0.0, y, f)
+        if code != 0.0:
+            self.fail(int(code), t)
+        scene, model = self.system.scene, self.system.model
+        faults = []
+        for s in range(len(scene.slots.pair)):
+            depth = float(scene.work.points[s, 0])
+            if not depth > 0.0:
+                continue
+            k = int(scene.slots.contact[s])
+            plan = self.system.pair_plans[int(scene.slots.pair[s])]
+            contact = model.contacts[self.system.contact_ids[k]]
+            name = f"Force_Contact[{contact.id}]"
+            between = f"Post_Graphic[{plan.graphic_i}] and Post_Graphic[{plan.graphic_j}]"
+            self.log.line(f"{name}: {between} overlap by {depth:.6g} at the start, slot {s}")
+            half = min(
+                float(scene.graphics.half[g].min())
+                for g in (scene.pairs.graphic_i[plan_row], scene.pairs.graphic_j[plan_row])
+            ) if (plan_row := int(scene.slots.pair[s])) >= 0 else 0.0
+            ignored = contact.ignore_penetration_larger_than
+            limit = half if ignored is None else min(half, ignored)
+            if depth > limit:
+                faults.append(
+                    f"{model.file}:{contact.source.line}: {name}: {between} overlap by {depth:.6g} "
+                    f"at the start, more than {limit:.6g}; move them apart or give --allow-overlap"
+                )
+        if faults and not allow_overlap:
+            raise ModelError("\n".join(dict.fromkeys(faults)))
+        self.call(self.problem.commit, t, 0.0, y, f)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Return everything a run needs to go on: state, log, method, and where it is."""
+        groups = {"state": self.system.scene.state, "log": self.system.scene.log}
+        arrays = {
+            f"{name}/{field}": np.array(array)
+            for name, group in groups.items()
+            for field, array in zip(group._fields, group, strict=True)
+        }
+        for field, array in zip(self.method._fields, self.method, strict=True):
+            arrays[f"method/{field}"] = np.array(array)
+        arrays["stage"] = np.array(self.stage)
+        arrays["time"] = np.array(self.method.memory[0])
+        return arrays
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go back to a checkpoint."""
+        groups = {
+            "state": self.system.scene.state,
+            "log": self.system.scene.log,
+            "method": self.method,
+        }
+        for name, group in groups.items():
+            for field, array in zip(group._fields, group, strict=True):
+                array[...] = saved[f"{name}/{field}"]
+        self.stage = int(saved["stage"])
+
+    def run(self, progress: Progress | None, resumed: bool) -> None:
+        """Run all Simulate statements from the current stage on."""
+        first = self.stage
+        for stage in range(first, len(self.settings.simulations)):
+            fresh = not (resumed and stage == first)
+            self.stage = stage
+            self._run_stage(self.settings.simulations[stage], fresh, progress)
+
+    def _run_stage(self, simulation: Simulation, fresh: bool, progress: Progress | None) -> None:
+        """Run one Simulate statement."""
+        from mbsim.integrators import dopri5
+
+        method, settings, scene = self.method, self.settings, self.system.scene
+        if simulation.gravity is not None:
+            scene.world.gravity[:] = simulation.gravity.g
+        times = output_times(simulation, self.stage == len(settings.simulations) - 1)
+        h_max = settings.h_max
+        if simulation.transient is not None and simulation.transient.h_max:
+            h_max = min(h_max, simulation.transient.h_max)
+        if fresh:
+            # the statement may have changed what acts: f and the step begin anew
+            method.memory[dopri5.HAVE_F] = 0.0
+            method.memory[dopri5.STEP] = settings.first_step
+            method.memory[dopri5.LAST_STEP] = 0.0
+            method.counts[dopri5.NEXT_OUTPUT] = 1
+            code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
+            if code < 0.0:
+                self.fail(int(-code), times[0])
+        while True:
+            began = time.perf_counter()
+            outcome = self._advance(
+                self.problem,
+                method,
+                simulation.end_time,
+                settings.tol,
+                h_max,
+                settings.h_min,
+                times,
+                BUDGET,
+            )
+            self.loop_seconds += time.perf_counter() - began
+            self.recorder.take()
+            if outcome == dopri5.DONE:
+                return
+            if outcome == dopri5.FAILED:
+                self.fail(int(method.counts[dopri5.CODE]), method.memory[dopri5.TIME])
+            if outcome == dopri5.STEP_TOO_SMALL:
+                self.give_up()
+            if self.interrupted:
+                raise Interrupted(f"interrupted at time {method.memory[dopri5.TIME]:.6g}")
+            if self.recorder.due():
+                self.recorder.flush(self.checkpoint())
+            if progress is not None:
+                h = float(method.memory[dopri5.STEP])
+                progress(float(method.memory[dopri5.TIME]), h, settings.end_time)
+
+    def give_up(self) -> None:
+        """Raise why the step became too small."""
+        from mbsim.integrators import dopri5, problem
+
+        memory, counts, trouble = self.method.memory, self.method.counts, self.system.scene.work.trouble
+        reason = {
+            problem.BY_ERROR: f"its error stays {memory[dopri5.LAST_ERROR]:.3g} times too large",
+            problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
+            problem.BY_NOT_FINITE: "a force or acceleration is not finite",
+        }[int(counts[dopri5.LAST_REASON])]
+        body, contact = int(trouble[0]), int(trouble[1])
+        where = []
+        if counts[dopri5.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
+            where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
+        if 0 <= contact < len(self.system.contact_ids):
+            where.append(f"Force_Contact[{self.system.contact_ids[contact]}]")
+        raise SolverError(
+            f"the step fell to {memory[dopri5.STEP]:.3g} at time {memory[dopri5.TIME]:.9g} "
+            f"because {reason}; at {', '.join(where) or 'no single element'}. "
+            "Results up to there are kept."
+        )
+
+    def fail(self, code: int, t: float) -> None:
+        """Raise what the hooks' code says."""
+        from mbsim.dynamics.evaluate import NOT_FINITE, USER_NOT_FINITE
+        from mbsim.geometry.fcl_detector import DETECTOR_FAILED
+        from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED
+
+        if code == RAISED_INTERPRETED:
+            from mbsim.plugins import raise_failure
+
+            raise_failure()
+        contact = int(self.system.scene.work.trouble[1])
+        element = self.system.contact_ids[contact] if 0 <= contact else 0
+        if code in (RAISED_COMPILED, USER_NOT_FINITE):
+            from mbsim.plugins import reproduce
+
+            reproduce(self.system.user_friction[element], self.system.scene.work.law_in, element)
+            raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
+        if code == DETECTOR_FAILED and self.detector is not None:
+            raise SolverError(f"FCL failed at time {t:.9g}: {self.detector.failure}")
+        if code == NOT_FINITE:
+            raise SolverError(f"a force or acceleration is not finite at time {t:.9g}")
+        raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
+
+    def stats(self, wall: float, compiled: float) -> dict[str, float]:
+        """Return the counters of the run."""
+        from mbsim.integrators import dopri5
+        from mbsim.system import arrays as a
+
+        counts, memory = self.method.counts, self.method.memory
+        counters = self.system.scene.log.counters
+        return {
+            "steps": int(counts[dopri5.STEPS]),
+            "rejected": int(counts[dopri5.REJECTED]),
+            "rhs_evaluations": int(counts[dopri5.EVALUATIONS]),
+            "output_evaluations": int(counts[dopri5.OUTPUTS]),
+            "jacobians": 0,
+            "factorizations": 0,
+            "narrowphase_pairs": int(counters[a.NARROWPHASE]),
+            "skipped_pairs": int(counters[a.SKIPPED]),
+            "fcl_calls": int(counters[a.FCL_CALLS]),
+            "normal_calls": int(counters[a.NORMAL_CALLS]),
+            "friction_calls": int(counters[a.FRICTION_CALLS]),
+            "python_calls": int(counters[a.PYTHON_CALLS]),
+            "h_smallest": float(memory[dopri5.H_SMALLEST]),
+            "h_largest": float(memory[dopri5.H_LARGEST]),
+            "loop_s": self.loop_seconds,
+            "wall_s": wall,
+            "compile_s": compiled,
+        }
+
+
+@contextmanager
+def _stoppable(runner: Runner) -> Iterator[None]:
+    """Let Ctrl-C ask the runner to stop at the next return from compiled code."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ask(number: int, frame: Any) -> None:
+        runner.interrupted = True
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def simulate(
+    model: Model,
+    *,
+    end_time: float | None = None,
+    print_interval: float | None = None,
+    integrator: str | None = None,
+    tol: float | None = None,
+    plugins: Sequence[str | Path] = (),
+    output: str | Path | None = None,
+    resume: bool = False,
+    detector: str = "auto",
+    interpret_plugins: bool = False,
+    allow_overlap: bool = False,
+    progress: Progress | None = None,
+    notify: Notify | None = None,
+) -> Results:
+    """Run a model and return its results.
+
+    Parameters
+    ----------
+    model : Model
+        As `read_model` returns it.
+    end_time, print_interval : float, optional
+        Instead of the deck's [T].
+    integrator : str, optional
+        "DOPRI5".
+    tol : float, optional
+        Local error of a step, dimensionless (README, "Tolerance"); default 1e-5.
+    plugins : sequence of path
+        Files with user subroutines.
+    output : path, optional
+        Folder for result files; None keeps results in memory.
+    resume : bool
+        Go on from the last checkpoint in `output`.
+    detector : {"auto", "fcl"}
+        "fcl" sends every pair through FCL.
+    interpret_plugins, allow_overlap : bool
+        Do not compile user subroutines; start although shapes overlap deeply.
+    progress : callable, optional
+        Called with time, step and end time [T] now and then.
+    notify : callable, optional
+        Called with lines for the user.
+
+    Raises
+    ------
+    ModelError, SolverError, PluginError, ResultsError, Interrupted
+        What was recorded up to there is kept.
+    """
+    from mbsim.core import jit
+    from mbsim.results.log import RunLog
+    from mbsim.results.recorder import Recorder
+    from mbsim.system.build import build
+
+    began = time.perf_counter()
+    settings = settle(model, end_time, print_interval, integrator, tol)
+    tell = notify or (lambda line: None)
+    jit.on_first_compile = lambda: tell(
+        "compiling for this machine; this happens once and may take half a minute"
+    )
+    compiled_before = jit.compile_seconds
+    files = [Path(file) for file in plugins]
+    system = build(model, settings.end_time, files, interpret_plugins, detector)
+    attributes = {
+        "mbsim_version": __version__,
+        "model_file": model.file,
+        "model_sha256": model.sha256,
+        "units": f"{model.units.force} {model.units.mass} {model.units.length} {model.units.time}",
+        "integrator": settings.integrator,
+        "tol": settings.tol,
+        "end_time": settings.end_time,
+        "print_interval": settings.simulations[-1].print_interval,
+        "detector": detector,
+    }
+    recorder = Recorder(system, attributes, None if output is None else Path(output), resume)
+    log = RunLog(system, attributes, recorder.directory, resume)
+    for note in settings.notes:
+        log.line(note)
+    status = "failed"
+    runner = Runner(system, settings, recorder, log)
+    try:
+        with _stoppable(runner):
+            if resume:
+                runner.restore(recorder.checkpoint)
+            else:
+                runner.settle_contacts(allow_overlap)
+            runner.run(progress, resume)
+        status = "finished"
+    except Interrupted as error:
+        status = "interrupted"
+        log.line(str(error))
+        raise
+    except Exception as error:
+        log.line(f"{type(error).__name__}: {error}")
+        raise
+    finally:
+        recorder.take()
+        if status != "finished":
+            recorder.flush(runner.checkpoint())
+        stats = runner.stats(time.perf_counter() - began, jit.compile_seconds - compiled_before)
+        results = recorder.close(status, stats, system.scene.log.contacts)
+        log.close(status, stats)
+    return results
