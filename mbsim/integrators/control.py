@@ -28,6 +28,19 @@ def next_factor(error, before, order, rejected):
 
 
 @jitable
+def quantised(h):
+    """Return h rounded down to six binary digits.
+
+    Rounding errors in an error estimate then leave the next step as it is. Without this they
+    grow from step to step at contacts, and a deck in mm takes other steps than in m.
+    """
+    if not 0.0 < h < math.inf:
+        return h
+    digits, exponent = math.frexp(h)
+    return math.ldexp(math.floor(64.0 * digits + 1e-6) / 64.0, exponent)
+
+
+@jitable
 def smallest_step(t, t_end, h_min):
     """Return the step below which time itself does not advance cleanly, or the deck's h_min."""
     return max(h_min, 16.0 * 2.2e-16 * max(abs(t), 1e-3 * abs(t_end)))

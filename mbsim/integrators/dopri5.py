@@ -16,7 +16,7 @@ import numpy as np
 from mbsim.core.address import call_float
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
-from mbsim.integrators.control import next_factor, smallest_step, starting_step
+from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
 from mbsim.integrators.problem import (
     BY_CHECK,
     BY_ERROR,
@@ -276,7 +276,7 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
         h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
         if h < floor and m.memory[STEP] < floor:
             return STEP_TOO_SMALL
-        h = max(h, floor)
+        h = max(quantised(h), floor)
         # no sliver of a step before the end
         if t + 1.01 * h >= t_end:
             h = t_end - t

@@ -15,6 +15,12 @@ from mbsim.model.frames import marker_frames, marker_loops
 from mbsim.model.mesh import solid_fault
 
 _MOST_LISTED = 10
+# the attribute that names the marker of a graphic, where it is not center_marker_id
+_MARKER_ATTRIBUTE = {
+    "BoxDefinedFromCorner": "corner_marker_id",
+    "Plane": "rm_id",
+    "TriaMesh": "rm_id",
+}
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,8 @@ def _wanted(model: Model) -> Iterator[tuple[Source, str, str, int | None, str]]:
         yield marker.source, element, "rm_id", marker.rm_id, "Reference_Marker"
     for graphic in model.graphics.values():
         element = f"Post_Graphic[{graphic.id}]"
-        yield graphic.source, element, "marker", graphic.marker_id or None, "Reference_Marker"
+        name = _MARKER_ATTRIBUTE.get(graphic.type, "center_marker_id")
+        yield graphic.source, element, name, graphic.marker_id or None, "Reference_Marker"
     for contact in model.contacts.values():
         for name in ("i_graphics_id", "j_graphics_id"):
             for id in getattr(contact, name):
@@ -114,7 +121,9 @@ def _references(model: Model, known: Known) -> Iterator[Fault]:
     for body in model.bodies.values():
         for name in ("cg_id", "im_id", "lprf_id"):
             marker = model.markers.get(getattr(body, name) or 0)
-            if marker is not None and marker.body_id not in (0, body.id):
+            if marker is None or marker.body_id not in model.bodies:
+                continue
+            if marker.body_id != body.id:
                 message = f'{name}="{marker.id}": this marker is on body {marker.body_id}'
                 element = f"Body_Rigid[{body.id}]"
                 yield _fault(body.source, element, f"{message}, must be on the body itself")
@@ -124,7 +133,8 @@ def _loops(model: Model) -> Iterator[Fault]:
     """Yield rings of markers that are given relative to each other."""
     for ring in marker_loops(model):
         first = model.markers[ring[0]]
-        way = " -> ".join(map(str, ring))
+        shown = ring if len(ring) <= _MOST_LISTED else (*ring[: _MOST_LISTED - 1], "...", ring[-1])
+        way = " -> ".join(map(str, shown))
         message = f"rm_id (or the body's lprf_id) leads back to itself: {way}"
         yield _fault(first.source, f"Reference_Marker[{first.id}]", message)
 

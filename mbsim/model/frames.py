@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -99,18 +99,6 @@ def parent_id(model: Model, marker: Marker) -> int | None:
     return body.lprf_id
 
 
-def _chain(model: Model, id: int, known: Mapping[int, Frame]) -> list[Marker]:
-    """Return the markers from `id` up to the first of known place, none where there is none."""
-    chain: dict[int, Marker] = {}
-    step: int | None = id
-    while step is not None and step not in known:
-        if step in chain or step not in model.markers:
-            return []
-        chain[step] = model.markers[step]
-        step = parent_id(model, chain[step])
-    return list(chain.values())
-
-
 def marker_frames(model: Model) -> dict[int, Frame]:
     """Return the global frame of every marker at t = 0, by id.
 
@@ -121,12 +109,23 @@ def marker_frames(model: Model) -> dict[int, Frame]:
         place and are left out; `checks` reports them.
     """
     frames: dict[int, Frame] = {}
+    seen: set[int] = set()
     for id in model.markers:
-        for marker in reversed(_chain(model, id, frames)):
-            above = parent_id(model, marker)
-            parent = GLOBAL if above is None else frames[above]
-            position = parent.p + parent.R @ np.array(marker.pos)
-            frames[marker.id] = Frame(position, parent.R @ marker.R)
+        # up the parents to one that was met before: placed, without a place, or a ring's first
+        chain: list[Marker] = []
+        step: int | None = id
+        while step is not None and step in model.markers and step not in seen:
+            seen.add(step)
+            chain.append(model.markers[step])
+            step = parent_id(model, chain[-1])
+        if step is not None and step not in frames:
+            continue
+
+        # and down again, each in the frame of the one before
+        parent = GLOBAL if step is None else frames[step]
+        for marker in reversed(chain):
+            parent = Frame(parent.p + parent.R @ np.array(marker.pos), parent.R @ marker.R)
+            frames[marker.id] = parent
     return frames
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mbsim.plugins.loader import UserFriction
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
-_C_FUNCTION = ctypes.CFUNCTYPE(
+C_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
 
@@ -176,7 +176,7 @@ def callback(
             failure.store(error, element, time, name, source)
             return RAISED_INTERPRETED
 
-    entry = _C_FUNCTION(guarded)
+    entry = C_FUNCTION(guarded)
     return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
 
 

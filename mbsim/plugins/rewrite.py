@@ -117,21 +117,19 @@ class _Rewrite(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
         if isinstance(node.op, ast.Pow):
-            return self.power(node, node.left, node.right)
+            return self.power(node.left, node.right)
         return node
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
         self.generic_visit(node)
         if isinstance(node.op, ast.Pow):
-            value = ast.copy_location(copy.deepcopy(node.target), node)
-            for part in ast.walk(value):
-                if isinstance(part, ast.Name) and part is value or part is value:
-                    part.ctx = ast.Load()  # type: ignore[attr-defined]
-            return ast.Assign([node.target], self.power(node, value, node.value))
+            value = copy.deepcopy(node.target)
+            value.ctx = ast.Load()
+            return ast.Assign([node.target], self.power(value, node.value))
         return node
 
-    def power(self, node: ast.AST, base: ast.expr, exponent: ast.expr) -> ast.expr:
-        # x**2 and x**3 cannot fail short of overflow and compile to products
+    def power(self, base: ast.expr, exponent: ast.expr) -> ast.expr:
+        # x**2 cannot fail short of overflow, and compiles to a product
         fixed = isinstance(exponent, ast.Constant) and exponent.value in (1, 2)
         if fixed and isinstance(exponent.value, int):  # type: ignore[attr-defined]
             return ast.BinOp(base, ast.Pow(), exponent)

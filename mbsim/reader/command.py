@@ -101,7 +101,7 @@ def _build_simulate(entry: Entry) -> None:
     outputs = [name for name in _OUTPUTS if entry.given(name)]
     refused = [name for name in ("print_increment", "print_array_id") if entry.given(name)]
     if len(outputs) + len(refused) != 1:
-        what = f"both of {', '.join(outputs + refused)}" if outputs or refused else "none"
+        what = ", ".join(outputs + refused) or "none"
         entry.fault(f"exactly one of num_steps and print_interval is needed; {what} given")
         return
     if times is None or refused or entry.get(outputs[0]) is None:

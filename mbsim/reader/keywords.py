@@ -14,7 +14,10 @@ def fold(name: str) -> str:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``; did you mean X?`` with the known name most like `name`, or an empty string."""
     by_fold = {fold(word): word for word in known}
-    close = difflib.get_close_matches(fold(name), by_fold, n=1, cutoff=0.6)
+    word = fold(name)
+    close = difflib.get_close_matches(word, by_fold, n=5, cutoff=0.6)
+    # slips are rare in the first letter: cm_id means cg_id rather than wm_id
+    close.sort(key=lambda match: match[:1] != word[:1])
     return f"; did you mean {by_fold[close[0]]}?" if close else ""
 
 

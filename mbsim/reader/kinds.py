@@ -122,6 +122,7 @@ def _parse_user(text: str) -> tuple[float, ...]:
 def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = None) -> Kind:
     """Return the kind of keywords; both tables are folded spelling -> canonical keyword."""
     canonical = list(dict.fromkeys(allowed.values()))
+    choice = ("one of " if len(canonical) > 1 else "") + ", ".join(canonical)
 
     def parse(text: str) -> str:
         word = fold(text)
@@ -131,9 +132,9 @@ def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = No
             built = ", ".join(canonical)
             raise BadValueError(f"{not_built[word]} is not built yet; built: {built}")
         close = nearest(text, (*canonical, *(not_built or {}).values()))
-        raise BadValueError(f"must be one of {', '.join(canonical)}{close}")
+        raise BadValueError(f"must be {choice}{close}")
 
-    return Kind(f"one of {', '.join(canonical)}", parse)
+    return Kind(choice, parse)
 
 
 REAL = real()

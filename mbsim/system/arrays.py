@@ -118,6 +118,7 @@ class State(NamedTuple):
     t: F2  # (ns, 3) x-axis of the incident marker
     depth: F1  # (ns,)
     rate: F1  # (ns,) of depth
+    normal: F1  # (ns,) normal force
     gap: F1  # (np,) distance that the pair kept when last measured
     centre: F2  # (np, 6) centres of both graphics then
     turn: F2  # (np, 8) quaternions of both bodies then

@@ -239,6 +239,7 @@ def _state(nb: int, np_: int, ns: int) -> a.State:
         t=np.zeros((ns, 3)),
         depth=np.zeros(ns),
         rate=np.zeros(ns),
+        normal=np.zeros(ns),
         gap=np.zeros(np_),
         centre=np.zeros((np_, 6)),
         turn=turn,

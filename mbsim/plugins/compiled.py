@@ -1,0 +1,91 @@
+"""From the text of a whitelisted function to machine code that is kept across processes."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import os
+import re
+import sys
+import types
+import warnings
+from pathlib import Path
+from typing import Any
+
+from mbsim.core import jit
+from mbsim.plugins.adapter import friction_address
+from mbsim.plugins.rewrite import rewritten
+from mbsim.plugins.whitelist import Refused, check, module_globals
+
+#: `par` becomes a tuple; a longer one would make compilation slow
+PAR_MAX = 32
+
+
+def compile_friction(
+    text: str, values: dict[str, Any], name: str, par_count: int
+) -> tuple[int, str]:
+    """Return the address of a compiled CFFSUB and '', or 0 and the reason why there is none.
+
+    `values` is the namespace of the script after it has run: a name that its module binds
+    once to a number is a constant.
+    """
+    if par_count > PAR_MAX:
+        return 0, f"more than {PAR_MAX} parameters"
+    try:
+        known = module_globals(ast.parse(text), values)
+        order = check(name, known)
+    except Refused as refused:
+        return 0, str(refused)
+    try:
+        module = _module(rewritten(order, known))
+        callees = [getattr(module, each) for each in order[:-1]]
+        with warnings.catch_warnings():
+            # Numba's hints on speed are not for the user of a script
+            warnings.simplefilter("ignore")
+            return friction_address(getattr(module, name), callees, par_count), ""
+    except OSError as error:
+        return 0, f"the cache folder {jit.cache_root()} cannot be written ({error})"
+    except Exception as error:
+        return 0, f"does not compile: {_first_words(error)}"
+
+
+def _first_words(error: Exception) -> str:
+    """Return the telling line of one of Numba's long messages."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    lines = [line.strip(" -") for line in plain.splitlines()]
+    telling = [line for line in lines if line and not line.startswith(("Failed in", "During:"))]
+    return f"{type(error).__name__}: {telling[0] if telling else ''}"[:200]
+
+
+def _module(text: str) -> types.ModuleType:
+    """Return the module of a rewritten text, from a file that its content names.
+
+    Numba keys its cache by the file, and pickles the function by the name of its module:
+    both must be the same in the next process.
+    """
+    digest = hashlib.sha256(text.encode()).hexdigest()[:24]
+    name = f"mbsim_plugin_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    file = jit.cache_root() / "plugins" / f"{name}.py"
+    _write(file, text)
+    module = types.ModuleType(name)
+    module.__file__ = str(file)
+    sys.modules[name] = module
+    try:
+        # from the text at hand, not from the file: nobody else's edit gets in
+        exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _write(file: Path, text: str) -> None:
+    """Write a file unless it is there; two processes may do so at once."""
+    if file.is_file() and file.read_bytes() == text.encode():
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draft = file.with_suffix(f".{os.getpid()}.tmp")
+    draft.write_bytes(text.encode())
+    draft.replace(file)

@@ -1,0 +1,352 @@
+"""From a Force_Contact that names a user subroutine to a function that the run can call."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import inspect
+import itertools
+import linecache
+import marshal
+import sys
+import traceback
+import types
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mbsim.errors import ModelError
+from mbsim.model.elements import Contact
+from mbsim.plugins import guard
+from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
+from mbsim.plugins.helpers import host, namespace
+
+_ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
+_LIBRARIES = (".so", ".dll", ".dylib", ".sl")
+_numbers = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class Script:
+    """A user's file after it has run once: its namespace and, unless a .pyc, its text."""
+
+    path: Path
+    text: str | None
+    values: dict[str, Any]
+
+
+Scripts = dict[Path, Script]
+
+
+@dataclass(frozen=True, eq=False)
+class UserFriction:
+    """A user's friction function, ready to be called.
+
+    Keep it alive as long as `address` is in use: an interpreted one owns its callback.
+
+    Attributes
+    ----------
+    address : int
+        Of the C function behind `laws.abi.FRICTION_SIGNATURE`.
+    par : ndarray, shape (n,)
+        The values of cff_param_string; the C function reads them through its `par`.
+    compiled : bool
+        Whether machine code stands there; else a callback into Python.
+    reason : str
+        Why it stays interpreted, empty if compiled.
+    uses_x : bool
+        Whether its text reads the deformation `x`, which the host then integrates.
+    source : Path
+        The user's file.
+    name : str
+        The function in that file.
+    element : int
+        The Force_Contact.
+    function : callable
+        The user's own function object.
+    """
+
+    address: int
+    par: npt.NDArray[np.float64]
+    compiled: bool
+    reason: str
+    uses_x: bool
+    source: Path
+    name: str
+    element: int
+    function: Callable[..., Any] = field(repr=False)
+    keep: object = field(default=None, repr=False)
+
+    def call(
+        self, time: float, par: Any, loci: Any, locj: Any, x: Any, xdot: Any, nforce: float
+    ) -> list[float]:
+        """Return [Fx, Fy, Tz] of the interpreted function; what it raises comes through."""
+        lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
+        host.time = float(time)
+        values, loci, locj, x, xdot = lists
+        result = self.function(
+            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce), 0, 0
+        )
+        return guard.three_numbers(result)
+
+
+def load_friction(
+    contact: Contact,
+    plugin_files: Sequence[Path] = (),
+    interpret: bool = False,
+    scripts: Scripts | None = None,
+    log: Callable[[str], None] | None = None,
+) -> UserFriction:
+    """Return the user's friction function of a contact, compiled if it can be.
+
+    Parameters
+    ----------
+    contact : Contact
+        A Force_Contact of cff_type USERCFF.
+    plugin_files : sequence of Path
+        The files named with --plugin.
+    interpret : bool
+        Leave it interpreted (--interpret-plugins).
+    scripts : dict, optional
+        Files that have run already; pass one dict for all contacts of a run, so that a
+        script that serves several contacts runs once and keeps one set of globals.
+    log : callable, optional
+        Takes the warnings, one line each; `host.log` if left out.
+
+    Returns
+    -------
+    UserFriction
+
+    Raises
+    ------
+    ModelError
+        If the file or the function cannot be used; the message says what to change.
+    """
+    say = log or host.log
+    element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
+    script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
+    function = _function(script, name, element)
+    par = np.array(contact.cff.par, dtype=np.float64)
+    uses_x = True  # a .pyc has no text to look at
+    if script.text is not None:
+        uses_x = reads_parameter(script.text, name, 6)
+        for warning in lint(script.text, name):
+            say(f"{element}: {script.path}: warning: {warning}")
+
+    def user(address: int, reason: str, keep: object = None) -> UserFriction:
+        return UserFriction(
+            address=address,
+            par=par,
+            compiled=not reason,
+            reason=reason,
+            uses_x=uses_x,
+            source=script.path,
+            name=name,
+            element=contact.id,
+            function=function,
+            keep=keep,
+        )
+
+    address, reason = 0, "--interpret-plugins"
+    if not interpret:
+        address, reason = _compiled(script, name, par, user)
+        if reason:
+            say(f"{element}: {name} of {script.path} stays interpreted: {reason}")
+    if not reason:
+        return user(address, "")
+    address, keep = guard.callback(function, name, str(script.path), len(par))
+    return user(address, reason, keep)
+
+
+def _compiled(
+    script: Script,
+    name: str,
+    par: npt.NDArray[np.float64],
+    user: Callable[[int, str], UserFriction],
+) -> tuple[int, str]:
+    """Return the address of compiled code that has passed the probes, or 0 and the reason."""
+    if script.text is None:
+        return 0, "a .pyc has no source"
+    # here and not above: `import mbsim.plugins` must not load Numba
+    from mbsim.plugins.compiled import compile_friction
+    from mbsim.plugins.probe import disagreement
+
+    address, reason = compile_friction(script.text, script.values, name, len(par))
+    if reason:
+        return 0, reason
+    twin = user(0, "probe")
+
+    def call(a: list[float]) -> list[float]:
+        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10])
+
+    # a place that the text does not read needs no probe
+    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6)]
+    reason = disagreement(address, call, par, script.text, twin.element, read)
+    return (0, reason) if reason else (address, "")
+
+
+def find_subroutine(
+    contact: Contact, plugin_files: Sequence[Path] = (), scripts: Scripts | None = None
+) -> Script:
+    """Return the script that defines the friction function of a contact, run once.
+
+    `script_name` in the deck comes before `plugin_files`; two of these that define the
+    function are an error.
+
+    Raises
+    ------
+    ModelError
+        If no file is named, or none that is named can be used.
+    """
+    scripts = {} if scripts is None else scripts
+    cff, element = contact.cff, f"Force_Contact[{contact.id}]"
+    name = cff.fnc_name or "CFFSUB"
+    if cff.interpreter and cff.interpreter.upper() != "PYTHON":
+        raise ModelError(f'{element}: interpreter="{cff.interpreter}" is not built yet, use Python')
+    if cff.script_name:
+        script = _load(Path(cff.script_name), element, scripts)
+        _require(script, name, element)
+        return script
+
+    dll_name = cff.dll_name.strip()
+    if not plugin_files:
+        if dll_name.upper() not in ("", "NULL"):
+            raise ModelError(
+                f'{element}: cff_dll_name="{dll_name}": shared libraries are not built yet; '
+                "name a Python twin with --plugin FILE.py"
+            )
+        said = f'cff_dll_name="{dll_name}"' if dll_name else "no script_name"
+        raise ModelError(
+            f'{element}: cff_fnc_name="{name}" names no file ({said}); '
+            "name one with --plugin FILE.py"
+        )
+    files = dict.fromkeys(Path(file).absolute() for file in plugin_files)
+    loaded = [_load(file, element, scripts) for file in files]
+    found = [script for script in loaded if name in _own(script)]
+    if len(found) > 1:
+        both = ", ".join(str(script.path) for script in found)
+        raise ModelError(f"{element}: {name} is defined twice: {both}")
+    if not found:
+        defined = "; ".join(f"{script.path} defines {_listed(script)}" for script in loaded)
+        raise ModelError(f'{element}: no plugin file defines cff_fnc_name="{name}": {defined}')
+    return found[0]
+
+
+def _own(script: Script) -> dict[str, Any]:
+    """Return what a script has bound beside the names it was given."""
+    given = namespace()
+    return {
+        name: value
+        for name, value in script.values.items()
+        if not name.startswith("__") and (name not in given or value is not given[name])
+    }
+
+
+def _listed(script: Script) -> str:
+    """Return the functions that a script defines, for a message."""
+    functions = [name for name, value in _own(script).items() if inspect.isfunction(value)]
+    return ", ".join(functions) or "no function"
+
+
+def _require(script: Script, name: str, element: str) -> None:
+    if name not in _own(script):
+        raise ModelError(
+            f'{element}: {script.path} does not define cff_fnc_name="{name}"; '
+            f"it defines {_listed(script)}"
+        )
+
+
+def _function(script: Script, name: str, element: str) -> Callable[..., Any]:
+    """Return the function of a script after a look at whether 11 arguments fit."""
+    function = script.values[name]
+    if not callable(function):
+        kind = type(function).__name__
+        raise ModelError(f"{element}: {name} in {script.path} is a {kind}, not a function")
+    if f"{name}_STATES" in script.values or "CFFSUB_STATES" in script.values:
+        raise ModelError(
+            f"{element}: {script.path} sets CFFSUB_STATES; states of user subroutines "
+            "are not built yet"
+        )
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # some functions written in C tell nothing
+        return function  # type: ignore[no-any-return]
+    try:
+        signature.bind(*range(11))
+    except TypeError as error:
+        code = getattr(function, "__code__", None)
+        place = f"{script.path}:{code.co_firstlineno}" if code else str(script.path)
+        raise ModelError(
+            f"{element}: {place}: {name}{signature} cannot be called with the 11 arguments "
+            f"({_ARGUMENTS}): {error}"
+        ) from None
+    return function  # type: ignore[no-any-return]
+
+
+def _load(path: Path, element: str, scripts: Scripts) -> Script:
+    """Return a file of Python, run at most once for one `scripts`."""
+    path = path.absolute()
+    if path in scripts:
+        return scripts[path]
+    if path.suffix.lower() in _LIBRARIES:
+        raise ModelError(f"{element}: {path}: shared libraries are not built yet, use Python")
+    if path.suffix.lower() in (".m", ".oml"):
+        raise ModelError(f"{element}: {path}: MATLAB and Compose are not built yet, use Python")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ModelError(f"{element}: {path}: {error.strerror or error}") from None
+    text = None
+    try:
+        if path.suffix.lower() == ".pyc":
+            code = _bytecode(data, path, element)
+        else:
+            text = importlib.util.decode_source(data)
+            code = compile(text, str(path), "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, UnicodeDecodeError) as error:
+        raise ModelError(f"{element}: {diagnose(data, str(path), error)}") from None
+    if text is not None:
+        # tracebacks show the lines that run, even if the file is edited meanwhile
+        linecache.cache[str(path)] = (len(data), None, text.splitlines(True), str(path))
+    scripts[path] = Script(path, text, _run(code, path, element))
+    return scripts[path]
+
+
+def _bytecode(data: bytes, path: Path, element: str) -> types.CodeType:
+    if data[:4] != importlib.util.MAGIC_NUMBER:
+        raise ModelError(f"{element}: {path} was compiled by another version of Python")
+    try:
+        code = marshal.loads(data[16:])
+    except (ValueError, EOFError, TypeError):
+        code = None
+    if not isinstance(code, types.CodeType):
+        raise ModelError(f"{element}: {path} is not compiled Python")
+    return code
+
+
+def _run(code: types.CodeType, path: Path, element: str) -> dict[str, Any]:
+    """Return the namespace of a script after it has run."""
+    module = types.ModuleType(f"mbsim_user_{path.stem}_{next(_numbers)}")
+    module.__dict__.update(namespace(), __file__=str(path))
+    # dataclasses look their module up, and a script may import its neighbours
+    sys.modules[module.__name__] = module
+    sys.path.insert(0, str(path.parent))
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            exec(code, module.__dict__)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == code.co_filename]
+        place = f"{path}:{lines[-1]}" if lines else str(path)
+        what = traceback.format_exception_only(type(error), error)[-1].strip()
+        raise ModelError(f"{element}: {place}: the script fails when it is read: {what}") from None
+    finally:
+        sys.path.remove(str(path.parent))
+        del sys.modules[module.__name__]
+    return module.__dict__

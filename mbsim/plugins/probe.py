@@ -1,0 +1,122 @@
+"""Trust nothing: a compiled function must give the interpreted one's results before it is used."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import math
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from mbsim.plugins import guard
+from mbsim.plugins.helpers import host
+
+_THRESHOLD_MAX = 24
+_TOLERANCE = 1e-14
+_BELOW, _ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
+
+
+def thresholds(text: str, par: list[float]) -> list[float]:
+    """Return the sizes at which a function may change its mind: its numbers and parameters."""
+    sizes = {abs(float(value)) for value in par}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+            if abs(node.value) < 1e300:
+                sizes.add(abs(float(node.value)))
+    return sorted(size for size in sizes if 0.0 < size < 1e12)[:_THRESHOLD_MAX]
+
+
+def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
+    """Yield the 19 inputs of every probe call; `read`: whether loci, locj and x are read."""
+    chance = random.Random(20)
+    quiet = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0.0, 0.0, 5.0, 0.0, 0.0]
+    quiet += [0.01, 0.02, -0.03, -0.04, 0.05, 0.06]
+    values = sorted({s * side for s in (*sizes, 1.0) for side in (_BELOW, _ABOVE, 0.5)})
+    values += [1e-12, 1e3, 1e6]
+
+    vectors = [(0.0, 0.0, 0.0)]
+    for value in (*values, *(-value for value in values)):
+        vectors += [(value, 0.0, 0.0), (0.0, value, 0.0), (0.0, 0.0, value)]
+        vectors += [(0.6 * value, -0.8 * value, 0.1), (value, value, value)]
+
+    # slip at several normal forces; then deformation, normal force, time and places alone
+    for vector in vectors:
+        for nforce in (0.0, 1.7, 450.0):
+            yield [*quiet[:5], *vector, 0.0, 0.0, nforce, *quiet[11:]]
+        if read[2]:
+            for slip in ((0.0, 0.0, 0.0), (0.3, -0.4, 0.2)):
+                yield [*quiet[:2], *vector, *slip, *quiet[8:]]
+        if read[0]:
+            yield [*quiet[:13], *vector, *quiet[16:]]
+        if read[1]:
+            yield [*quiet[:16], *vector]
+    for value in values:
+        yield [*quiet[:10], value, *quiet[11:]]
+        yield [value, *quiet[1:]]
+
+    # and all of them together, over many magnitudes
+    for _ in range(300):
+        scale = 10.0 ** chance.uniform(-6, 4)
+        yield [
+            chance.uniform(0, 10) if k == 0 else abs(chance.gauss(0, 100)) if k == 10
+            else chance.gauss(0, 1) * (scale if 5 <= k < 8 else 1.0)
+            for k in range(19)
+        ]  # fmt: skip
+
+
+def _near(call: Callable[[list[float]], list[float]], given: list[float]) -> Iterator[list[float]]:
+    """Yield the interpreted results one rounding away."""
+    for factor in (1.0 - 4e-16, 1.0 + 4e-16):
+        try:
+            yield call([value * factor for value in given])
+        except Exception:
+            continue
+
+
+def disagreement(
+    address: int,
+    call: Callable[[list[float]], list[float]],
+    par: Any,
+    text: str,
+    element: int,
+    read: list[bool],
+) -> str:
+    """Return '' if the code at `address` does what `call` does at every probe, else where not."""
+    entry = guard.C_FUNCTION(address)
+    c_inputs, c_out = (ctypes.c_double * 19)(), (ctypes.c_double * 5)()
+    c_par = (ctypes.c_double * max(len(par), 1))(*par)
+    log, host.log = host.log, lambda line: None  # what a probe says is no news
+    try:
+        for given in probes(thresholds(text, list(par)), read):
+            c_inputs[:] = given
+            c_out[:] = [math.nan] * 5
+            signalled = entry(element, c_inputs, c_par, c_out) != 0
+            got = [c_out[0], c_out[1], c_out[4]]
+            signalled = signalled or not all(math.isfinite(value) for value in got)
+            try:
+                wanted: list[float] | None = call(given)
+            except BaseException as error:
+                if isinstance(error, KeyboardInterrupt):
+                    raise
+                wanted = None
+            place = f"xdot={given[5:8]}, nforce={given[10]:g}, x={given[2:5]}, time={given[0]:g}"
+            if signalled != (wanted is None):
+                who = "compiled" if signalled else "interpreted"
+                return f"only the {who} function fails at {place}"
+            if wanted is None or got == wanted:
+                continue
+            wrong = [
+                abs(a - b) - _TOLERANCE * max(abs(a), abs(b))
+                for a, b in zip(got, wanted, strict=True)
+            ]
+            if max(wrong) > 0.0:
+                # hypot and the like may round otherwise; a difference of two near numbers grows it
+                moved = [[abs(a - b) for a, b in zip(near, wanted, strict=True)]
+                         for near in _near(call, given)]  # fmt: skip
+                allowed = [2.0 * max(column) for column in zip(*moved, strict=True)] or [0.0] * 3
+                if any(w > a for w, a in zip(wrong, allowed, strict=True)):
+                    return f"gives {got} when compiled and {wanted} interpreted at {place}"
+    finally:
+        host.log = log
+    return ""
