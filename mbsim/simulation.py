@@ -150,7 +150,7 @@ class Runner:
         from mbsim.core import jit
         from mbsim.dynamics.hooks import mechanism
         from mbsim.integrators import dopri5
-        from mbsim.integrators.problem import Problem
+        from mbsim.core.problem import Problem
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.method = dopri5.make(system.y0, settings.simulations[0].start_time)
@@ -200,10 +200,10 @@ class Runner:
             name = f"Force_Contact[{contact.id}]"
             between = f"Post_Graphic[{plan.graphic_i}] and Post_Graphic[{plan.graphic_j}]"
             self.log.line(f"{name}: {between} overlap by {depth:.6g} at the start, slot {s}")
-            half = min(
-                float(scene.graphics.half[g].min())
-                for g in (scene.pairs.graphic_i[plan_row], scene.pairs.graphic_j[plan_row])
-            ) if (plan_row := int(scene.slots.pair[s])) >= 0 else 0.0
+            pair = int(scene.slots.pair[s])
+            rows = (scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair])
+            # half of the smaller shape, across its thinnest side
+            half = min(float(scene.graphics.half[row].min()) for row in rows)
             ignored = contact.ignore_penetration_larger_than
             limit = half if ignored is None else min(half, ignored)
             if depth > limit:
@@ -299,7 +299,8 @@ class Runner:
 
     def give_up(self) -> None:
         """Raise why the step became too small."""
-        from mbsim.integrators import dopri5, problem
+        from mbsim.core import problem
+        from mbsim.integrators import dopri5
 
         memory, counts, trouble = self.method.memory, self.method.counts, self.system.scene.work.trouble
         reason = {

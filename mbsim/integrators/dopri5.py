@@ -17,7 +17,7 @@ from mbsim.core.address import call_float
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
-from mbsim.integrators.problem import (
+from mbsim.core.problem import (
     BY_CHECK,
     BY_ERROR,
     BY_NOT_FINITE,

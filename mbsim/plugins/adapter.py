@@ -13,9 +13,7 @@ from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.laws.abi import FRICTION_SIGNATURE
-
-_STOPPED = 2  # laws.abi.RAISED_COMPILED, as a constant of the compiled code
+from mbsim.laws.abi import FRICTION_SIGNATURE, RAISED_COMPILED
 
 
 def _adapt(function: Callable[..., Any], count: int) -> Any:
@@ -49,7 +47,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
             result[3] = 0.0
             result[4] = force[2]
         except Exception:
-            code = _STOPPED
+            code = RAISED_COMPILED
         return code
 
     return entry

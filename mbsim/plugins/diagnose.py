@@ -25,12 +25,13 @@ def diagnose(data: bytes | str, path: str, error: Exception | None = None) -> st
         What Python said; used if nothing better is found.
     """
     faults: list[tuple[int, str]] = []
-    text = data
-    if isinstance(text, bytes):
+    if isinstance(data, str):
+        text = data
+    else:
         try:
-            text = text.decode("utf-8")
+            text = data.decode("utf-8")
         except UnicodeDecodeError:
-            text = text.decode("latin-1")
+            text = data.decode("latin-1")
             faults.append((1, "the file is not UTF-8 (read as Latin-1 from here on)"))
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
@@ -56,8 +57,13 @@ def diagnose(data: bytes | str, path: str, error: Exception | None = None) -> st
         faults += [(line, f"warning: {what}") for line, what in warned]
     if not faults:
         faults.append((getattr(error, "lineno", None) or 1, str(getattr(error, "msg", error))))
-    shown = "\n".join(f"  {path}:{line}: {what}" for line, what in sorted(faults))
+    shown = "\n".join(f"  {path}:{line}: {what}" for line, what in sorted(faults, key=_line))
     return f"{path} is not valid Python:\n{shown}"
+
+
+def _line(fault: tuple[int, str]) -> int:
+    """Return the line of a fault, to sort by: faults of one line keep their order."""
+    return fault[0]
 
 
 def _ranges(numbers: list[int], lines: list[str]) -> str:
@@ -78,8 +84,9 @@ def _odd_spaces(lines: list[str]) -> tuple[list[str], list[tuple[int, str]]]:
     for kind in kinds:
         where = [number for number, line in enumerate(lines, 1) if kind in line]
         name = "non-breaking spaces" if kind == "\u00a0" else "spaces of another kind"
+        lines_hit = _ranges(where, lines)
         faults.append(
-            (where[0], f"{name} (U+{ord(kind):04X}) in line {_ranges(where, lines)}: use plain spaces")
+            (where[0], f"{name} (U+{ord(kind):04X}) in line {lines_hit}: use plain spaces")
         )
     return [_SPACES.sub(" ", line) for line in lines], faults
 
@@ -210,15 +217,13 @@ def lint(text: str, name: str) -> list[str]:
             known = {line for line, _ in zeros}
             found += zeros + [item for item in slip.wrong_lengths(node) if item[0] not in known]
             found += slip.unguarded_divisions(node)
-    return [f"line {line}: {what}" for line, what in sorted(found)]
+    return [f"line {line}: {what}" for line, what in sorted(found, key=_line)]
 
 
 def reads_parameter(text: str, name: str, position: int) -> bool:
     """Return whether a function reads its parameter at `position`; True if the text cannot tell."""
     tree = ast.parse(text)
-    found = [
-        node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name
-    ]
+    found = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name]
     bound = sum(
         (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id == name)
         or (isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name == name)

@@ -118,14 +118,14 @@ def three_numbers(result: Any) -> list[float]:
     return values
 
 
-class _Views(dict[int, memoryview]):
+class _Views(dict[int, Any]):
     """Memory of a fixed number of doubles by address; the host's buffers seldom move."""
 
     def __init__(self, count: int) -> None:
         super().__init__()
         self._array = ctypes.c_double * count
 
-    def __missing__(self, address: int) -> memoryview:
+    def __missing__(self, address: int) -> Any:
         if len(self) > 4096:
             self.clear()
         view = memoryview(self._array.from_address(address)).cast("B").cast("d")
@@ -211,6 +211,6 @@ def reproduce(
         failure.store(error, element, given[0], name, source)
         raise_failure()
     raise PluginError(
-        f"Force_Contact[{element}]: {name} ({source}) failed at time {given[0]:.12g} when compiled, "
-        f"but gives {result} when interpreted; run it with --interpret-plugins"
+        f"Force_Contact[{element}]: {name} ({source}) failed at time {given[0]:.12g} when "
+        f"compiled, but gives {result} when interpreted; run it with --interpret-plugins"
     )

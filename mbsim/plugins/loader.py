@@ -185,7 +185,7 @@ def _compiled(
 
     # a place that the text does not read needs no probe
     read = [reads_parameter(script.text, name, position) for position in (4, 5, 6)]
-    reason = disagreement(address, call, par, script.text, twin.element, read)
+    reason = disagreement(address, call, par, script.text, script.values, twin.element, read)
     return (0, reason) if reason else (address, "")
 
 

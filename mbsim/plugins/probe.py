@@ -17,13 +17,15 @@ _TOLERANCE = 1e-14
 _BELOW, _ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
-def thresholds(text: str, par: list[float]) -> list[float]:
+def thresholds(text: str, par: list[float], values: dict[str, Any]) -> list[float]:
     """Return the sizes at which a function may change its mind: its numbers and parameters."""
     sizes = {abs(float(value)) for value in par}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
             if abs(node.value) < 1e300:
                 sizes.add(abs(float(node.value)))
+        elif isinstance(node, ast.Name) and isinstance(values.get(node.id), (int, float)):
+            sizes.add(abs(min(float(values[node.id]), 1e300)))
     return sorted(size for size in sizes if 0.0 < size < 1e12)[:_THRESHOLD_MAX]
 
 
@@ -79,18 +81,21 @@ def disagreement(
     call: Callable[[list[float]], list[float]],
     par: Any,
     text: str,
+    values: dict[str, Any],
     element: int,
     read: list[bool],
 ) -> str:
     """Return '' if the code at `address` does what `call` does at every probe, else where not."""
     entry = guard.C_FUNCTION(address)
     c_inputs, c_out = (ctypes.c_double * 19)(), (ctypes.c_double * 5)()
+    unset = (ctypes.c_double * 5)(*[math.nan] * 5)
     c_par = (ctypes.c_double * max(len(par), 1))(*par)
     log, host.log = host.log, lambda line: None  # what a probe says is no news
     try:
-        for given in probes(thresholds(text, list(par)), read):
-            c_inputs[:] = given
-            c_out[:] = [math.nan] * 5
+        for given in probes(thresholds(text, list(par), values), read):
+            for position, value in enumerate(given):
+                c_inputs[position] = value
+            ctypes.memmove(c_out, unset, ctypes.sizeof(c_out))
             signalled = entry(element, c_inputs, c_par, c_out) != 0
             got = [c_out[0], c_out[1], c_out[4]]
             signalled = signalled or not all(math.isfinite(value) for value in got)

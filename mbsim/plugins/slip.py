@@ -1,5 +1,4 @@
-"""Two faults of friction functions that Python accepts: a result of the wrong length, and a
-division by the slip speed that meets zero."""
+"""Two faults that Python accepts: a result of the wrong length, a division by a slip of zero."""
 
 from __future__ import annotations
 

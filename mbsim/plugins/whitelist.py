@@ -301,9 +301,7 @@ class _Check:
 
     # -- expressions
 
-    def expression(
-        self, root: ast.expr, known: set[str], reading: ast.expr | None = None
-    ) -> None:
+    def expression(self, root: ast.expr, known: set[str], reading: ast.expr | None = None) -> None:
         for node in self._walk(root):
             if isinstance(node, _REFUSED_OPERATORS):
                 raise refuse(root, f"uses the operator {type(node).__name__.lower()}")

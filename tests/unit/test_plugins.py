@@ -207,10 +207,17 @@ def test_everything_else_stays_interpreted_with_a_reason(load, text, reason):
 
 
 def test_a_function_that_differs_when_compiled_is_found_by_the_probes(load):
-    # 2**63 does not fit a machine word; Python's integers grow
-    user = load("n = 1\nfor i in range(63):\n    n = n * 2\nreturn [n * 1.0, 0, 0]")
+    # 2**64 does not fit a machine word; Python's integers grow
+    user = load("n = 1\nfor i in range(64):\n    n = n * 2\nreturn [n * 1.0, 0, 0]")
     assert not user.compiled and "when compiled and" in user.reason
-    assert call(user)[1][0] == 2.0**63
+    assert call(user)[1][0] == 2.0**64
+
+
+def test_a_function_without_parameters_compiles(load):
+    user = load("return [nforce, npar, 0]", par=())
+    assert user.compiled, user.reason
+    assert call(user) == (0, [5.0, 0.0, 0.0, 0.0, 0.0])
+    assert call(load("return [nforce, len(par), 0]", par=(), interpret=True))[0] == 0
 
 
 def test_interpret_leaves_it_interpreted(load):
@@ -284,12 +291,16 @@ def test_a_traceback_shows_the_users_frames_and_lines(load):
     assert "return 1 / a" in text and "in CFFSUB" in text and text.count("File ") == 2
 
 
-@pytest.mark.parametrize("result", ["None", "'abc'", "['a', 'b', 'c']", "7", "{1: 2}", "[None]*3",
-                                    "[1j, 0, 0]", "[10**400, 0, 0]", "[0]*4", "{1, 2, 3}"])  # fmt: skip
+@pytest.mark.parametrize(
+    "result",
+    "None|'abc'|['a', 'b', 'c']|7|{1: 2}|[None]*3|[1j, 0, 0]|[10**400, 0, 0]|[0]*4|{1, 2, 3}".split(
+        "|"
+    ),
+)
 def test_what_is_no_force_is_refused(load, result):
     user = load(f"print(end='')\nreturn {result}")
     assert call(user)[0] == 1
-    with pytest.raises(PluginError, match="returned .*not 3 finite numbers"):
+    with pytest.raises(PluginError, match=r"returned .*not 3 finite numbers"):
         plugins.raise_failure()
 
 
