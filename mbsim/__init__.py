@@ -1,0 +1,41 @@
+"""mbsim: multibody contact simulation from MotionSolve-style decks.
+
+The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`.
+Names are imported at their first use, so that ``import mbsim`` costs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbsim.errors import MbsimError
+    from mbsim.reader.xml import read_model
+    from mbsim.results.reading import open_results
+    from mbsim.simulation import simulate
+
+__version__ = "0.1.0"
+
+__all__ = ["MbsimError", "__version__", "open_results", "read_model", "simulate"]
+
+_HOMES = {
+    "MbsimError": "mbsim.errors",
+    "open_results": "mbsim.results.reading",
+    "read_model": "mbsim.reader.xml",
+    "simulate": "mbsim.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its home (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mbsim' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,74 @@
+"""Bodies over output rows, and rotations over many rows at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbsim.model.elements import Array
+from mbsim.system.arrays import BODY_SIZE
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """Return the vectors v (..., 3) turned by the unit quaternions q (..., 4), w first."""
+    # v + 2 u x (u x v + w v), u the vector part: no matrix is needed
+    u, w = q[..., 1:], q[..., :1]
+    turned: Array = v + 2.0 * np.cross(u, np.cross(u, v) + w * v)
+    return turned
+
+
+def matrices(q: Array) -> Array:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions (..., 4), w first."""
+    axes = [rotate(q, np.broadcast_to(axis, (*q.shape[:-1], 3))) for axis in np.eye(3)]
+    return np.stack(axes, axis=-1)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Moving bodies over n rows, all in the global frame: cg, and angular values.
+
+    `p`, `v`, `w`, `a`, `alpha` are (n, nb, 3), `q` is (n, nb, 4), w first.
+    """
+
+    body_ids: Sequence[int]
+    p: Array
+    q: Array
+    v: Array
+    w: Array
+    a: Array
+    alpha: Array
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.p)
+
+
+def motion(body_ids: Sequence[int], y: Array, accel: Array) -> Motion:
+    """Return the bodies' motion from rows of the ODE vector and of accelerations.
+
+    Parameters
+    ----------
+    body_ids : sequence of int
+        Of the moving bodies, in the order of y.
+    y : ndarray, shape (n, ny)
+        As in `system.arrays`: angular velocity in cg axes.
+    accel : ndarray, shape (n, 6 nb)
+        Of the cg and angular, global.
+    """
+    n, nb = len(y), len(body_ids)
+    bodies: np.ndarray[Any, Any] = y[:, : BODY_SIZE * nb].reshape(n, nb, BODY_SIZE)
+    rates = accel.reshape(n, nb, 6)
+    q = bodies[..., 3:7]
+    return Motion(
+        body_ids=body_ids,
+        p=bodies[..., 0:3],
+        q=q,
+        v=bodies[..., 7:10],
+        w=rotate(q, bodies[..., 10:13]),
+        a=rates[..., 0:3],
+        alpha=rates[..., 3:6],
+    )

@@ -1,0 +1,225 @@
+"""`open_results`: signals of a result file by name."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.errors import ResultsError
+
+if TYPE_CHECKING:
+    import h5py
+
+#: What may follow a name, by the number of columns of the signal.
+_PARTS = {
+    3: {"x": 0, "y": 1, "z": 2},
+    4: {"w": 0, "x": 1, "y": 2, "z": 3},
+    8: {f"F{k}": k - 1 for k in range(1, 9)},
+}
+
+
+class Results:
+    """What a run recorded; `results["bodies/2/position"]` is an array over output times.
+
+    A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
+    in ``/F1`` to ``/F8``). Scalars come as numbers. Use it as a context manager or call
+    `close` to let go of the file.
+    """
+
+    def __init__(self, file: h5py.File, path: Path | None) -> None:
+        self._file = file
+        self.path = path
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"<Results {self.path or 'in memory'}, closed>"
+        rows = len(self._file["time"]) if "time" in self._file else 0
+        return f"<Results {self.path or 'in memory'}, {self.status}, {rows} rows>"
+
+    def close(self) -> None:
+        """Let go of the file; results in memory are gone then."""
+        self._file.close()
+
+    def _open(self) -> h5py.File:
+        if not self._file:
+            raise ResultsError(f"{self.path or 'results in memory'}: the results are closed")
+        return self._file
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the file: version, model, units, settings, status."""
+        return {name: _plain(value) for name, value in self._open().attrs.items()}
+
+    @property
+    def status(self) -> str:
+        """``running`` (killed before its end), ``finished``, ``interrupted`` or ``failed``."""
+        return str(self.attributes.get("status", "unknown"))
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Counters and times of the run; empty if it was killed."""
+        if "stats" not in self._open():
+            return {}
+        return {name: _plain(value) for name, value in self._open()["stats"].attrs.items()}
+
+    def keys(self) -> list[str]:
+        """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
+        import h5py
+
+        names: list[str] = []
+
+        def note(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and not name.startswith("checkpoint/"):
+                names.append(name)
+
+        self._open().visititems(note)
+        return sorted(names, key=_order)
+
+    def ids(self, group: str) -> list[int]:
+        """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
+        return sorted(int(id) for id in self._open().get(group, ()))
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and self._find(name) is not None
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a signal, shape (n, ...), in model units.
+
+        Raises
+        ------
+        ResultsError
+            If there is none of this name; the message says what is near.
+        """
+        found = self._find(name)
+        if found is None:
+            raise ResultsError(self._missing(name))
+        try:
+            dataset, part = found
+            if part is None:
+                return _plain(dataset[()])
+            if part == "mag":
+                return np.linalg.norm(dataset[()], axis=1)
+            return dataset[:, _PARTS[dataset.shape[1]][part]]
+        except OSError as error:
+            raise ResultsError(f"{self.path}: {name} cannot be read: {error}") from None
+
+    def _find(self, name: str) -> tuple[h5py.Dataset, str | None] | None:
+        """Return the dataset of a name and the part of it asked for."""
+        import h5py
+
+        file, whole = self._open(), name.strip("/")
+        if not whole:
+            return None
+        item = file.get(whole)
+        if isinstance(item, h5py.Dataset):
+            return item, None
+        whole, _, part = whole.rpartition("/")
+        item = file.get(whole) if whole else None
+        if not isinstance(item, h5py.Dataset) or item.ndim != 2:
+            return None
+        parts = _PARTS.get(item.shape[1], {})
+        if part in parts or (part == "mag" and item.shape[1] == 3):
+            return item, part
+        return None
+
+    def _missing(self, name: str) -> str:
+        """Return what to say of a name that is not there."""
+        import h5py
+
+        where, asked = str(self.path or "results in memory"), name.strip("/")
+        item = self._open().get(asked) if asked else None
+        if isinstance(item, h5py.Group):
+            inside = ", ".join(sorted(item, key=_order)[:12])
+            return f"{where}: {name} is a group, not a signal; it has {inside or 'nothing'}"
+        near = difflib.get_close_matches(asked, self.keys(), n=3, cutoff=0.5)
+        hint = f"; did you mean {' or '.join(near)}?" if near else "; see `mbsim info`"
+        return f"{where}: no signal {name!r}{hint}"
+
+
+def _order(name: str) -> list[tuple[int, int, str]]:
+    """Return a sorting key that puts body 2 before body 10."""
+    return [(0, int(p), "") if p.isdigit() else (1, 0, p) for p in name.split("/")]
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers and text as Python has them; arrays and tables as numpy has them."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray) and value.dtype.names:
+        # fixed-length bytes as text, so that events["kind"] == "touch" works
+        fields = [
+            (name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names
+        ]
+        return value.astype(fields)
+    return value
+
+
+def finite(value: Any) -> Any:
+    """Return a value for JSON, which has no infinity and no NaN: null in their place."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return finite(value.tolist()) if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def open_results(path: str | Path) -> Results:
+    """Open a result file.
+
+    Parameters
+    ----------
+    path : path-like
+        ``<model>.h5``, of a finished run or not: what a run that still goes on or was
+        killed has published is complete in itself.
+
+    Raises
+    ------
+    ResultsError
+        If the file is not there or is no result file of mbsim.
+    """
+    import h5py
+
+    file = Path(path)
+    if not file.is_file():
+        what = "is a folder" if file.is_dir() else "no such file"
+        raise ResultsError(f"{file}: {what}; a result file is named <model>.h5")
+    try:
+        opened = h5py.File(file, "r", locking=False)
+    except OSError as error:
+        reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
+        raise ResultsError(f"{file}: cannot be read: {reason}") from None
+    if "mbsim_version" not in opened.attrs:
+        opened.close()
+        raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
+    return Results(opened, file)
+
+
+def end_state(results: Results) -> dict[str, dict[str, list[float]]]:
+    """Return every body's pose and velocity in the last row, by id; empty without rows."""
+    if not len(results["time"]):
+        return {}
+    names = ("position", "quaternion", "velocity", "angular_velocity")
+    return {
+        str(id): {name: results[f"bodies/{id}/{name}"][-1].tolist() for name in names}
+        for id in results.ids("bodies")
+    }
