@@ -1,12 +1,12 @@
 """What can go wrong, and the exit code that the command line gives for it.
 
-    MbsimError
-    ├── ModelError        2  the deck, an option or a file the deck names is at fault
-    │   └── DeckError     2  several faults of one deck, each with file and line
-    ├── SolverError       3  the integrator gave up: time, reason, element
-    ├── PluginError       4  a user subroutine failed while the run went on
-    ├── ResultsError      5  results could not be written
-    └── Interrupted     130  the user stopped the run; results up to there are kept
+MbsimError
+├── ModelError        2  the deck, an option or a file the deck names is at fault
+│   └── DeckError     2  several faults of one deck, each with file and line
+├── SolverError       3  the integrator gave up: time, reason, element
+├── PluginError       4  a user subroutine failed while the run went on
+├── ResultsError      5  results could not be written
+└── Interrupted     130  the user stopped the run; results up to there are kept
 """
 
 from __future__ import annotations

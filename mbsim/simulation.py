@@ -148,9 +148,9 @@ class Runner:
 
     def __init__(self, system: System, settings: Settings, recorder: Any, log: Any) -> None:
         from mbsim.core import jit
+        from mbsim.core.problem import Problem
         from mbsim.dynamics.hooks import mechanism
         from mbsim.integrators import dopri5
-        from mbsim.core.problem import Problem
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.method = dopri5.make(system.y0, settings.simulations[0].start_time)
@@ -302,7 +302,11 @@ class Runner:
         from mbsim.core import problem
         from mbsim.integrators import dopri5
 
-        memory, counts, trouble = self.method.memory, self.method.counts, self.system.scene.work.trouble
+        memory, counts, trouble = (
+            self.method.memory,
+            self.method.counts,
+            self.system.scene.work.trouble,
+        )
         reason = {
             problem.BY_ERROR: f"its error stays {memory[dopri5.LAST_ERROR]:.3g} times too large",
             problem.BY_CHECK: "an impact would begin deeper than its contact time allows",

@@ -23,8 +23,11 @@ def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
     if v <= vs:
         u = v / vs
         ratio = 0.5 * mu_static * (3.0 - u * u) / vs
-    else:
+    elif v < vd:
         [mu, errflg] = py_step(v, vs, mu_static, vd, mu_dynamic, 0)
+        py_errmes(errflg, "CFFSUB: py_step could not blend from vs to vd", id, "STOP")
         ratio = mu / v
+    else:
+        ratio = mu_dynamic / v
 
     return [-ratio * nforce * xdot[0], -ratio * nforce * xdot[1], 0.0]

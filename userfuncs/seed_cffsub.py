@@ -16,6 +16,8 @@ As printed it does not run. What was wrong, and what was changed:
    friction force is 0.
 """
 
+# ruff: noqa: RUF059 (errflg stays unread, as in the example)
+
 
 def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
     result = [0, 0, 0]

@@ -55,7 +55,7 @@ def cache_root() -> Path:
     return base / "mbsim"
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
     """Return the digest of a file and the project files that it imports."""
     text = path.read_bytes()

@@ -58,7 +58,7 @@ def trial_quaternion(scene, y, b):
 
 @jitable
 def birth_tangent(scene, graphic_i, n):
-    """Return the x-axis of a new incident marker: I's marker x-axis (or y) projected on the plane."""
+    """Return the x-axis of a new incident marker: I's marker x-axis (or y), projected."""
     R = scene.work.R[scene.graphics.body[graphic_i]]
     S = scene.graphics.marker_R[graphic_i]
     x = rotate(R, (S[0, 0], S[1, 0], S[2, 0]))

@@ -9,10 +9,10 @@ from numba import carray
 
 from mbsim.core import jit
 from mbsim.core.address import pack, view
+from mbsim.core.problem import BY_CHECK, BY_ERROR, HOOK, Problem
 from mbsim.dynamics.evaluate import NOT_FINITE, evaluate
 from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
 from mbsim.dynamics.output import blame, events_nearly_full, scaled_error, write_row
-from mbsim.core.problem import BY_CHECK, BY_ERROR, HOOK, Problem
 from mbsim.system.arrays import BODY_SIZE, Scene
 
 PAUSE_FOR_EVENTS = 2.0

@@ -371,5 +371,7 @@ def longest_step(scene, y):
         way = max(scene.state.gap[pair], 0.0) + thick
         # way = speed h + push h^2 / 2
         if speed > 0.0 or push > 0.0:
-            longest = min(longest, 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way)))
+            longest = min(
+                longest, 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
+            )
     return longest

@@ -122,7 +122,9 @@ class FclDetector:
         result = fcl.CollisionResult()
         fcl.collide(objects[0], objects[1], request, result)
         # FCL's normal points from its first object to its second
-        found = [(c.penetration_depth, np.array(c.pos), -np.array(c.normal)) for c in result.contacts]
+        found = [
+            (c.penetration_depth, np.array(c.pos), -np.array(c.normal)) for c in result.contacts
+        ]
         found.sort(key=lambda contact: -contact[0])
         points = scene.work.points
         points[first:last, 0] = -0.0

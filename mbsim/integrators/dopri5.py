@@ -16,7 +16,6 @@ import numpy as np
 from mbsim.core.address import call_float
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
-from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
 from mbsim.core.problem import (
     BY_CHECK,
     BY_ERROR,
@@ -27,6 +26,7 @@ from mbsim.core.problem import (
     ROWS_FULL,
     STEP_TOO_SMALL,
 )
+from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
 
 ORDER = 5
 STAGES = 7
@@ -125,19 +125,12 @@ def stages(p, m, t, h):
     if code != 0.0:
         return code
     for i in range(n):
-        w[i] = y[i] + h * (
-            B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i]
-        )
+        w[i] = y[i] + h * (B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i])
     call_float(p.project, (p.context, t + h, h, w, w))
     code = call_float(p.rhs, (p.context, t + h, h, w, k[6]))
     for i in range(n):
         m.error[i] = h * (
-            E1 * k[0, i]
-            + E3 * k[2, i]
-            + E4 * k[3, i]
-            + E5 * k[4, i]
-            + E6 * k[5, i]
-            + E7 * k[6, i]
+            E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
         )
     return code
 

@@ -3,12 +3,14 @@
 Apart from `compiled`, so that the cache key of a user's function covers this and no more.
 """
 
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from numba import carray
+from numba import carray  # type: ignore[attr-defined]
 from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
@@ -21,7 +23,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
 
     def entry(element, inputs, par, out):
         a = carray(inputs, (19,))
-        values = to_fixed_tuple(carray(par, (count,)), count)
+        values = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore
         result = carray(out, (5,))
         code = 0
         try:

@@ -5,6 +5,8 @@ then go on quietly. These functions raise as Python does, so that a compiled fun
 fails at the inputs at which the interpreted one fails.
 """
 
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
 import math

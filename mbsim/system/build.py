@@ -83,7 +83,9 @@ def _bodies(placement: Placement) -> a.Bodies:
     )
 
 
-def _graphics(model: Model, placement: Placement, ids: list[int], row: dict[int, int]) -> a.Graphics:
+def _graphics(
+    model: Model, placement: Placement, ids: list[int], row: dict[int, int]
+) -> a.Graphics:
     """Return the shapes in their bodies' cg axes; `row` is the body row by body id."""
     n = len(ids)
     made = a.Graphics(
@@ -113,7 +115,12 @@ def _graphics(model: Model, placement: Placement, ids: list[int], row: dict[int,
 
 
 def _pairs(
-    model: Model, plans: list[PairPlan], graphics: a.Graphics, rows: dict[int, int], contacts: list[int], ground: int
+    model: Model,
+    plans: list[PairPlan],
+    graphics: a.Graphics,
+    rows: dict[int, int],
+    contacts: list[int],
+    ground: int,
 ) -> a.Pairs:
     """Return the pairs; `rows` is the graphic row by graphic id."""
     n = len(plans)
@@ -190,7 +197,9 @@ def _contacts(
         framed=np.array([contact.id in user for contact in contacts], dtype=np.int64),
         ignore_deeper=np.array(
             [
-                math.inf if c.ignore_penetration_larger_than is None else c.ignore_penetration_larger_than
+                math.inf
+                if c.ignore_penetration_larger_than is None
+                else c.ignore_penetration_larger_than
                 for c in contacts
             ],
             dtype=np.float64,
@@ -378,7 +387,9 @@ def build(
         work=_work(nb, len(graphic_ids), len(plans), ns),
         rows=_rows(len(y0), nb, len(contact_ids), ns),
     )
-    needs_fcl = any(not plan.closed_form or plan.closed_form in ("BOX-BOX", "CYLINDER-BOX") for plan in plans)
+    needs_fcl = any(
+        not plan.closed_form or plan.closed_form in ("BOX-BOX", "CYLINDER-BOX") for plan in plans
+    )
     return System(
         model, placement, scene, y0, body_ids, graphic_ids, contact_ids, plans, user, needs_fcl
     )

@@ -90,9 +90,7 @@ def test_does_not_depend_on_where_the_scene_stands(name):
     Q, shift = random_rotation(rng), np.array([3.0, -2.0, 1.0])
     for frame_i, frame_j in list(random_poses(name, 3))[:100]:
         count, points = candidates(name, frame_i, frame_j)
-        moved = [
-            frame(Q @ f[:3] + shift, Q @ f[3:].reshape(3, 3)) for f in (frame_i, frame_j)
-        ]
+        moved = [frame(Q @ f[:3] + shift, Q @ f[3:].reshape(3, 3)) for f in (frame_i, frame_j)]
         count_moved, points_moved = candidates(name, *moved)
         assert count == count_moved
         if count == NOT_MINE:

@@ -35,9 +35,7 @@ def _against_slip(inputs, ratio):
     return (pull * inputs.xdot[0], pull * inputs.xdot[1], 0.0, 0.0, 0.0)
 
 
-@friction_law(
-    "COULOMB_ON", "mu_static", "mu_dynamic", "stiction_trans_vel", "friction_trans_vel"
-)
+@friction_law("COULOMB_ON", "mu_static", "mu_dynamic", "stiction_trans_vel", "friction_trans_vel")
 def coulomb_on(inputs, mu_static, mu_dynamic, stiction_trans_vel, friction_trans_vel):
     """Return Fx, Fy, Mx, My, Tz on I: static peak at vs, dynamic value from vd on."""
     speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
