@@ -453,7 +453,8 @@ def simulate(
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
-    system = build(model, settings.end_time, files, interpret_plugins, detector)
+    said: list[str] = []
+    system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
     attributes = {
         "mbsim_version": __version__,
         "model_file": model.file,

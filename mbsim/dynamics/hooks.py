@@ -77,7 +77,8 @@ def _inner(context, t, h, a, b):
 def _limit(context, t, h, a, b):
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
-    return longest_step(scene, carray(a, (scene.rows.y.shape[1],)))
+    n = scene.rows.y.shape[1]
+    return longest_step(scene, carray(a, (n,)), carray(b, (n,)))
 
 
 def _output(context, t, h, a, b):

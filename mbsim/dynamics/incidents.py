@@ -202,7 +202,7 @@ def reversal(scene, h):
 
 @jitable
 def bounding_gap(scene, pair):
-    """Return a lower bound of the distance of two shapes: ball of one to box or plane of the other."""
+    """Return a lower bound of two shapes' distance: ball of one to box or plane of the other."""
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     best = -math.inf
     for side in range(2):
@@ -352,9 +352,9 @@ def lightest(scene, s):
 
 
 @jitable
-def longest_step(scene, y):
+def longest_step(scene, y, f):
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed."""
-    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
+    pairs, graphics = scene.pairs, scene.graphics
     longest = longest_parting(scene)
     for pair in range(len(pairs.contact)):
         thick = pairs.thickness[pair]
@@ -366,8 +366,10 @@ def longest_step(scene, y):
             b = graphics.body[g]
             if b < len(scene.bodies.mass):
                 reach = graphics.reach[g] + norm(vector(graphics.p[g]))
-                speed += norm(vector(work.v[b])) + norm(vector(work.w[b])) * reach
-                push += norm((work.accel[b, 0], work.accel[b, 1], work.accel[b, 2]))
+                at = BODY_SIZE * b
+                speed += norm((y[at + 7], y[at + 8], y[at + 9]))
+                speed += norm((y[at + 10], y[at + 11], y[at + 12])) * reach
+                push += norm((f[at + 7], f[at + 8], f[at + 9]))
         way = max(scene.state.gap[pair], 0.0) + thick
         # way = speed h + push h^2 / 2
         if speed > 0.0 or push > 0.0:

@@ -39,7 +39,7 @@ def fill_contacts(scene, y, row):
             continue
         at = CONTACT_COLUMNS * scene.slots.contact[s]
         values, point = work.slot[s], work.points[s]
-        gi, gj = sides(scene, s)
+        gi = sides(scene, s)[0]
         force = vector(values[FORCE : FORCE + 3])
         arm = sub((point[1], point[2], point[3]), position(scene, y, scene.graphics.body[gi]))
         moment = cross(arm, force)

@@ -79,7 +79,8 @@ class FclDetector:
                 return fcl.Box(8.0 * flat_partner, 8.0 * flat_partner, 8.0 * flat_partner)
             return fcl.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         mesh = fcl.BVHModel()
-        assert graphic.vertices is not None and graphic.faces is not None
+        assert graphic.vertices is not None
+        assert graphic.faces is not None
         mesh.beginModel(len(graphic.vertices), len(graphic.faces))
         mesh.addSubModel(graphic.vertices, graphic.faces)
         mesh.endModel()

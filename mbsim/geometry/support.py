@@ -1,8 +1,8 @@
 """Support points of convex shapes: the farthest point of a shape in a direction, global frame.
 
 With them a contact found by an iterative detector is made exact along its normal: for a given
-unit normal n from J into I the depth is max over J of n.x minus min over I of n.x, and an error of n
-enters it only in second order.
+unit normal n from J into I the depth is max over J of n.x minus min over I of n.x, and an error
+of n enters it only in second order.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Normal law      int64 f(double depth, double rate, const double *par, double out[3])
                 out: force [F], force at rate 0 [F], stored energy [F L]
-Friction law    int64 f(int64 id, const double in[FRICTION_INPUTS], const double *par, double out[5])
+Friction law    int64 f(int64 id, const double in[19], const double *par, double out[5])
                 in: the fields of `FrictionInput` in order; out: Fx, Fy, Mx, My, Tz on I
 
 `id` is the Force_Contact's. The result is 0, or a code that stops the run: 1 says that an

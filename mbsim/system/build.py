@@ -156,6 +156,11 @@ def _pairs(
     return made
 
 
+def _or(value: float | None, default: float) -> float:
+    """Return `value`, or the default where the deck says nothing."""
+    return default if value is None else value
+
+
 def _contacts(
     contacts: list[Contact], plans: list[PairPlan], user: dict[int, UserFriction]
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
@@ -196,13 +201,7 @@ def _contacts(
         ),
         framed=np.array([contact.id in user for contact in contacts], dtype=np.int64),
         ignore_deeper=np.array(
-            [
-                math.inf
-                if c.ignore_penetration_larger_than is None
-                else c.ignore_penetration_larger_than
-                for c in contacts
-            ],
-            dtype=np.float64,
+            [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
         dmax=np.array([c.dmax or 0.0 for c in contacts], dtype=np.float64),
         first_pair=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
@@ -309,11 +308,21 @@ def _rows(n: int, nb: int, nc: int, ns: int) -> a.Rows:
     )
 
 
-def _load_friction(contact: Contact, plugins: Sequence[Path], interpret: bool) -> UserFriction:
-    """Load a user's CFFSUB; scenes without one do not import what that needs."""
-    from mbsim.plugins import load_friction
+def _load_user_friction(
+    model: Model, plugins: Sequence[Path], interpret: bool, log: Callable[[str], None] | None
+) -> dict[int, UserFriction]:
+    """Load the users' CFFSUBs; scenes without one do not import what that needs."""
+    wanted = [c for c in model.contacts.values() if c.cff_type == "USERCFF"]
+    if not wanted:
+        return {}
+    from mbsim.plugins import failure, host, load_friction
+    from mbsim.plugins.loader import Script
 
-    return load_friction(contact, plugins, interpret)
+    failure.clear()
+    if log is not None:
+        host.log = log
+    scripts: dict[Path, Script] = {}
+    return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
 
 
 def build(
@@ -322,6 +331,7 @@ def build(
     plugins: Sequence[Path] = (),
     interpret: bool = False,
     detector: str = "auto",
+    log: Callable[[str], None] | None = None,
 ) -> System:
     """Return the model as arrays, ready to be integrated.
 
@@ -335,6 +345,8 @@ def build(
     interpret : bool
         Do not compile user subroutines.
     detector : {"auto", "fcl"}
+    log : callable, optional
+        Takes lines for the run's log: what users' scripts print or say.
 
     Raises
     ------
@@ -343,11 +355,7 @@ def build(
     """
     placement = place(model)
     plans = plan_pairs(model, detector)
-    user = {
-        contact.id: _load_friction(contact, plugins, interpret)
-        for contact in model.contacts.values()
-        if contact.cff_type == "USERCFF"
-    }
+    user = _load_user_friction(model, plugins, interpret, log)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
     row = {body.id: nb for body in model.bodies.values()}
@@ -387,9 +395,7 @@ def build(
         work=_work(nb, len(graphic_ids), len(plans), ns),
         rows=_rows(len(y0), nb, len(contact_ids), ns),
     )
-    needs_fcl = any(
-        not plan.closed_form or plan.closed_form in ("BOX-BOX", "CYLINDER-BOX") for plan in plans
-    )
+    needs_fcl = any(not plan.closed_form or plan.may_need_fcl for plan in plans)
     return System(
         model, placement, scene, y0, body_ids, graphic_ids, contact_ids, plans, user, needs_fcl
     )

@@ -26,9 +26,17 @@ class PairPlan:
     slots: int
 
     @property
+    def may_need_fcl(self) -> bool:
+        """Whether the closed form holds only far from edges."""
+        return self.closed_form in ("BOX-BOX", "CYLINDER-BOX")
+
+    @property
     def detector(self) -> str:
         """How `mbsim check` names it."""
-        return f"closed form {self.closed_form}" if self.closed_form else "FCL"
+        if not self.closed_form:
+            return "FCL"
+        near_edges = ", FCL near edges" if self.may_need_fcl else ""
+        return f"closed form {self.closed_form}{near_edges}"
 
 
 def _plan(contact: Contact, i: Graphic, j: Graphic, detector: str) -> PairPlan:
