@@ -91,6 +91,24 @@ class Results:
         self._open().visititems(note)
         return sorted(names, key=_order)
 
+    @property
+    def has_checkpoint(self) -> bool:
+        """Whether a run can go on from here."""
+        return "checkpoint" in self._open()
+
+    def tables(self, group: str) -> dict[str, Any]:
+        """Return all datasets under a group as arrays, by their names in it."""
+        import h5py
+
+        found: dict[str, Any] = {}
+
+        def note(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset):
+                found[name] = np.asarray(item[()])
+
+        self._open()[group].visititems(note)
+        return found
+
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
         return sorted(int(id) for id in self._open().get(group, ()))

@@ -1,0 +1,243 @@
+"""`RunLog`: what was run, how, and what happened, as plain text; one fact a line."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from mbsim.errors import ResultsError
+from mbsim.model.elements import Contact, Model
+from mbsim.results.files import replace_text
+from mbsim.results.store import Value
+from mbsim.system import arrays as a
+from mbsim.system.build import System
+from mbsim.system.pairing import PairPlan
+
+#: A user subroutine may talk at every evaluation; no more lines than this are kept.
+MOST_LINES = 20_000
+_WRITE_SECONDS = 2.0
+#: Statistics that are times; they differ from run to run and come last.
+_TIMES = ("loop_s", "compile_s", "wall_s")
+
+
+def fact(name: str, value: object) -> str:
+    """Return one aligned line."""
+    return f"  {name:<34} {value}"
+
+
+def number(value: float, unit: str = "") -> str:
+    """Return a number for reading, or a dash where there is none."""
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.6g} {unit}".rstrip()
+
+
+class RunLog:
+    """The log of a run; `directory` None keeps it in `lines`.
+
+    The file is written whole now and then and at `close`, each time atomically. A failure
+    to write it while the run goes on does not stop the run; `close` raises it.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        attributes: Mapping[str, Value],
+        directory: Path | None,
+        resume: bool = False,
+    ) -> None:
+        self.system = system
+        self.path = None if directory is None else directory / f"{system.model.name}.log"
+        self.lines: list[str] = []
+        self._dropped = 0
+        self._written_at = time.monotonic()
+        if resume and self.path is not None and self.path.is_file():
+            self.lines += self.path.read_text(encoding="utf-8", errors="replace").splitlines()
+            self.lines += ["", "-" * 40, "resumed from the last checkpoint", ""]
+        self.lines += header(system, attributes)
+        self._first = len(self.lines)
+
+    def line(self, text: str) -> None:
+        """Add a message; one with several lines stays one block."""
+        if len(self.lines) - self._first >= MOST_LINES:
+            self._dropped += 1
+            return
+        self.lines += text.splitlines() or [""]
+        if self.path is not None and time.monotonic() - self._written_at > _WRITE_SECONDS:
+            try:
+                self.flush()
+            except ResultsError:
+                self._written_at = time.monotonic()
+
+    def flush(self) -> None:
+        """Write the file as it is now.
+
+        Raises
+        ------
+        ResultsError
+            If it cannot be written.
+        """
+        if self.path is not None:
+            replace_text(self.path, "\n".join(self.lines) + "\n")
+        self._written_at = time.monotonic()
+
+    def close(
+        self,
+        status: str,
+        stats: Mapping[str, Value],
+        energy: tuple[float, float, float] | None = None,
+    ) -> None:
+        """Add the summary and write the file.
+
+        Parameters
+        ----------
+        status : {"finished", "interrupted", "failed"}
+        stats : mapping
+            Counters and times of the run.
+        energy : tuple of float, optional
+            Kinetic, potential, dissipated at the end (`Recorder.last_energy`).
+
+        Raises
+        ------
+        ResultsError
+            If it cannot be written.
+        """
+        if self._dropped:
+            self.lines.append(f"... and {self._dropped} lines more that are not kept")
+        self.lines += ["", *summary(self.system, status, stats, energy)]
+        self.flush()
+
+
+def counts(model: Model) -> dict[str, int]:
+    """Return the numbers of elements by name, for logs and `mbsim check`."""
+    return {
+        "bodies": sum(not body.is_ground for body in model.bodies.values()),
+        "markers": len(model.markers),
+        "graphics": len(model.graphics),
+        "contacts": len(model.contacts),
+        "requests": len(model.requests),
+    }
+
+
+def units_text(model: Model) -> str:
+    """Return the units of force, mass, length and time in one line."""
+    units = model.units
+    return f"{units.force} {units.mass} {units.length} {units.time}"
+
+
+def pair_text(plan: PairPlan) -> str:
+    """Return how a pair of graphics is tested."""
+    return f"Post_Graphic[{plan.graphic_i}] Post_Graphic[{plan.graphic_j}]: {plan.detector}"
+
+
+def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
+    """Yield what is run and how."""
+    model = system.model
+    yield f"mbsim {attributes.get('mbsim_version', '')}".rstrip()
+    yield ""
+    yield "model"
+    yield fact("file", model.file)
+    yield fact("sha256", model.sha256)
+    yield fact("units", units_text(model))
+    for name, count in counts(model).items():
+        yield fact(name, count)
+    if not model.requests:
+        yield fact("requests written as CSV", "none: the deck has no Post_Request")
+    for note in model.notes:
+        yield f"  note: {note}"
+    for warning in model.warnings:
+        yield f"  warning: {warning}"
+    yield ""
+    yield "settings"
+    shown = ("integrator", "tol", "end_time", "print_interval", "detector")
+    for name in shown:
+        if name in attributes:
+            yield fact(name, attributes[name])
+    for contact in model.contacts.values():
+        yield ""
+        yield title(contact)
+        yield fact("normal law", f"{contact.cnf_type}, built in")
+        yield from _friction_lines(system, contact)
+        for plan in system.pair_plans:
+            if plan.contact == contact.id:
+                yield fact("pair", pair_text(plan))
+    yield ""
+    yield "run"
+
+
+def title(contact: Contact) -> str:
+    """Return a contact's name and label."""
+    return f"Force_Contact[{contact.id}] {contact.label}".rstrip()
+
+
+def _friction_lines(system: System, contact: Contact) -> Iterator[str]:
+    """Yield which friction law a contact has, and why a user's is not compiled."""
+    user = system.user_friction.get(contact.id)
+    if user is None:
+        built_in = contact.cff_type != "COULOMB_OFF"
+        yield fact("friction law", f"{contact.cff_type}, built in" if built_in else "none")
+        return
+    how = "compiled" if user.compiled else "interpreted"
+    yield fact("friction law", f"user {user.name}, {how}")
+    yield fact("friction file", user.source)
+    if not user.compiled:
+        yield fact("interpreted because", user.reason)
+
+
+def summary(
+    system: System,
+    status: str,
+    stats: Mapping[str, Value],
+    energy: tuple[float, float, float] | None,
+) -> Iterator[str]:
+    """Yield what happened: contacts, rejections, energy, statistics, times."""
+    yield f"end: {status}"
+    log = system.scene.log
+    for c, contact_id in enumerate(system.contact_ids):
+        row = log.contacts[c]
+        yield ""
+        yield title(system.model.contacts[contact_id])
+        if not row[a.TOUCHES]:
+            yield fact("first touch", "never")
+            continue
+        yield fact("first touch at time", number(row[a.FIRST_TOUCH]))
+        yield fact("touches", int(row[a.TOUCHES]))
+        yield fact("deepest penetration", number(row[a.PEAK_DEPTH]))
+        yield fact("largest slip speed", number(row[a.PEAK_SLIP]))
+        yield fact("largest force", number(row[a.PEAK_FORCE]))
+        yield fact("largest force at time", number(row[a.PEAK_FORCE_TIME]))
+        yield fact("closing speed of the last touch", number(row[a.APPROACH]))
+        yield fact("effective rebound, first impact", number(row[a.REBOUND]))
+    yield ""
+    yield "rejected steps, by the contact that asked for it"
+    names = [f"Force_Contact[{id}]" for id in system.contact_ids] + ["no contact"]
+    reasons = (
+        (a.REJECT_ERROR, "local error above tol"),
+        (a.REJECT_DEPTH, "impact would begin too deep"),
+        (a.REJECT_NOT_FINITE, "force not finite"),
+    )
+    found = False
+    for name, row in zip(names, log.rejections, strict=True):
+        for column, reason in reasons:
+            if row[column]:
+                found = True
+                yield fact(name, f"{row[column]} {reason}")
+    if not found:
+        yield fact("none", "")
+    if energy is not None:
+        yield ""
+        yield "energy at the end"
+        for name, value in zip(("kinetic", "potential", "dissipated total"), energy, strict=True):
+            yield fact(name, number(value))
+    yield ""
+    yield "statistics"
+    for name, value in stats.items():
+        if name not in _TIMES:
+            yield fact(name, number(value) if isinstance(value, float) else value)
+    yield ""
+    yield "time"
+    for name in _TIMES:
+        if name in stats:
+            yield fact(name, f"{float(stats[name]):.3f}")

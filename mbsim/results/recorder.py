@@ -1,0 +1,345 @@
+"""`Recorder`: output rows of the compiled pipeline become the signals of a result file."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbsim.errors import ModelError, ResultsError
+from mbsim.results.csv_file import write_csv
+from mbsim.results.files import prepare_directory
+from mbsim.results.motion import motion
+from mbsim.results.reading import Results, open_results
+from mbsim.results.requests import COLUMNS, evaluate
+from mbsim.results.store import Store, Value
+from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.system.build import System
+
+Table = np.ndarray[Any, Any]
+
+#: Names of the kinds of `Rows.events`, by number.
+EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
+EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
+
+#: Rows are kept in memory up to this size [bytes], then written to the part file.
+BUFFER_BYTES = 16 << 20
+#: Time between two publications: at least this [s], and so many times what one costs.
+FLUSH_SECONDS = 5.0
+FLUSH_SHARE = 20.0
+
+
+@dataclass(frozen=True)
+class Block:
+    """Output rows as the pipeline leaves them; see `system.arrays.Rows`."""
+
+    time: Table
+    y: Table
+    accel: Table
+    contact: Table
+    energy: Table
+    incident_count: Table
+    incidents: Table
+    events: Table
+
+    @property
+    def bytes(self) -> int:
+        """Memory that the block takes."""
+        return sum(int(array.nbytes) for array in vars(self).values())
+
+
+def _joined(blocks: list[Block]) -> Block:
+    """Return several blocks as one."""
+    if len(blocks) == 1:
+        return blocks[0]
+    columns = zip(*(vars(block).values() for block in blocks), strict=True)
+    return Block(*(np.concatenate(column) for column in columns))
+
+
+class Recorder:
+    """Takes rows away from a running system and keeps them, in files or in memory.
+
+    Parameters
+    ----------
+    system : System
+        Its `scene.rows` are emptied by `take`.
+    attributes : mapping
+        Attributes of the result file: version, model, units, settings.
+    directory : Path or None
+        Where ``<model>.h5`` and ``.csv`` go; None keeps everything in memory.
+    resume : bool
+        Go on from the checkpoint in that folder, then in `checkpoint`.
+
+    Raises
+    ------
+    ResultsError
+        If results cannot be written there, or another run is writing there.
+    ModelError
+        If there is nothing to resume, or it was run with another model or other settings.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        attributes: Mapping[str, Value],
+        directory: Path | None,
+        resume: bool = False,
+    ) -> None:
+        self.system = system
+        self.directory = directory
+        self.checkpoint: dict[str, Table] = {}
+        #: Kinetic, potential and dissipated energy of the last row; None before there is one.
+        self.last_energy: tuple[float, float, float] | None = None
+        self._blocks: list[Block] = []
+        self._bytes = 0
+        self._rows_since_flush = 0
+        self._incidents = 0  # rows of state/incidents so far
+        self._started = False  # whether state/incident_offsets has its first 0
+        self._published_at = time.monotonic()
+        self._target: Path | None = None
+        settings: dict[str, Value] = {**attributes, **_digests(system)}
+        if directory is not None:
+            prepare_directory(directory, system.model.name)
+            self._target = directory / f"{system.model.name}.h5"
+        if resume:
+            self.checkpoint = self._resumed(settings)
+        self._store = Store(self._target, resume)
+        self._store.describe("/", {**settings, "status": "running"})
+        if not resume:
+            self._label()
+        self._store.remove("stats")
+
+    def _resumed(self, settings: Mapping[str, Value]) -> dict[str, Table]:
+        """Return the checkpoint to go on from, after comparing what it was made with."""
+        if self._target is None:
+            raise ModelError("resume: there is no folder with results to go on from")
+        if not self._target.is_file():
+            raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
+        try:
+            with open_results(self._target) as results:
+                _check_same(self._target, results, settings)
+                offsets = results["state/incident_offsets"]
+                self._incidents, self._started = int(offsets[-1]), True
+                return results.tables("checkpoint")
+        except ResultsError as error:
+            raise ModelError(f"--resume: {error}") from None
+
+    def _label(self) -> None:
+        """Write what elements are called, and what requests hold."""
+        for body_id in self.system.body_ids:
+            if label := self.system.model.bodies[body_id].label:
+                self._store.describe(f"bodies/{body_id}", {"label": label})
+        for contact_id in self.system.contact_ids:
+            if label := self.system.model.contacts[contact_id].label:
+                self._store.describe(f"contacts/{contact_id}", {"label": label})
+
+    def take(self) -> None:
+        """Take all rows, incidents and events that the pipeline has left so far."""
+        rows = self.system.scene.rows
+        n, incidents, events = (int(count) for count in rows.used)
+        if n == incidents == events == 0:
+            return
+        block = Block(
+            rows.time[:n].copy(),
+            rows.y[:n].copy(),
+            rows.accel[:n].copy(),
+            rows.contact[:n].copy(),
+            rows.energy[:n].copy(),
+            rows.incident_count[:n].copy(),
+            rows.incidents[:incidents].copy(),
+            rows.events[:events].copy(),
+        )
+        rows.used[:] = 0
+        if n:
+            kinetic, potential, dissipated = block.energy[-1].tolist()
+            self.last_energy = (kinetic, potential, dissipated)
+        self._blocks.append(block)
+        self._bytes += block.bytes
+        self._rows_since_flush += n + events
+        if self._bytes > BUFFER_BYTES:
+            self._write()
+
+    def due(self) -> bool:
+        """Return whether it is time for a flush: they cost a twentieth of the run at most."""
+        pause = max(FLUSH_SECONDS, FLUSH_SHARE * self._store.publish_seconds)
+        return self._target is not None and time.monotonic() - self._published_at > pause
+
+    def flush(self, checkpoint: Mapping[str, Table]) -> None:
+        """Publish all rows taken so far together with the checkpoint that follows them.
+
+        Parameters
+        ----------
+        checkpoint : mapping of str to ndarray
+            Full state after the last row taken, by names that may hold "/".
+
+        Raises
+        ------
+        ResultsError
+            If the disk is full or the folder cannot be written any more.
+        """
+        if self._target is None:
+            return
+        self._write()
+        for name, values in checkpoint.items():
+            self._store.put(f"checkpoint/{name}", values)
+        self._store.publish()
+        self._rows_since_flush = 0
+        self._published_at = time.monotonic()
+
+    def close(
+        self, status: str, stats: Mapping[str, Value], contact_log: Table
+    ) -> Results:
+        """Complete the files and return them as results.
+
+        Parameters
+        ----------
+        status : {"finished", "interrupted", "failed"}
+        stats : mapping
+            Attributes of ``/stats``.
+        contact_log : ndarray, shape (nc, LOG_COLUMNS)
+            `Log.contacts`: largest force, depth and slip over all steps.
+
+        Raises
+        ------
+        ResultsError
+            If the files cannot be written, or could not be before.
+        """
+        self._write(last=True)
+        for row, contact_id in zip(contact_log, self.system.contact_ids, strict=True):
+            group = f"contacts/{contact_id}"
+            self._store.put(f"{group}/peak_force", float(row[PEAK_FORCE]))
+            self._store.put(f"{group}/peak_penetration", float(row[PEAK_DEPTH]))
+            self._store.put(f"{group}/peak_slip_speed", float(row[PEAK_SLIP]))
+        if status == "finished" or self._rows_since_flush:
+            # of rows after the checkpoint, a resumed run would record the second copy
+            self._store.remove("checkpoint")
+        for request in self.system.model.requests.values():
+            about: dict[str, Any] = {"columns": COLUMNS[request.type], "type": request.type}
+            if request.label or request.comment:
+                about["label"] = request.label or request.comment
+            self._store.describe(f"requests/{request.id}", about)
+        self._store.describe("stats", stats)
+        self._store.describe("/", {"status": status})
+        in_memory = self._store.finish()
+        if self._target is None:
+            if in_memory is None:
+                raise ResultsError("results in memory could not be written")
+            return Results(in_memory, None)
+        results = open_results(self._target)
+        if self.directory is not None:
+            write_csv(self._target.with_suffix(".csv"), results, list(self.system.model.requests))
+        return results
+
+    def _write(self, last: bool = False) -> None:
+        """Hand the buffered rows to the store."""
+        if not self._blocks:
+            if self._started:
+                return
+            self._blocks = [_nothing(self.system)]
+        block = _joined(self._blocks)
+        self._blocks, self._bytes = [], 0
+        self._store.append(dict(self._signals(block)), last)
+        self._started = True
+        self._incidents += len(block.incidents)
+
+    def _signals(self, block: Block) -> Iterator[tuple[str, Table]]:
+        """Yield the rows of every dataset."""
+        system = self.system
+        n = len(block.time)
+        yield "time", block.time
+        bodies = motion(system.body_ids, block.y, block.accel)
+        for b, body_id in enumerate(system.body_ids):
+            yield f"bodies/{body_id}/position", bodies.p[:, b]
+            yield f"bodies/{body_id}/quaternion", bodies.q[:, b]
+            yield f"bodies/{body_id}/velocity", bodies.v[:, b]
+            yield f"bodies/{body_id}/angular_velocity", bodies.w[:, b]
+            yield f"bodies/{body_id}/acceleration", bodies.a[:, b]
+        contacts = block.contact.reshape(n, len(system.contact_ids), CONTACT_COLUMNS)
+        for c, contact_id in enumerate(system.contact_ids):
+            yield f"contacts/{contact_id}/force", contacts[:, c, 0:3]
+            yield f"contacts/{contact_id}/torque", contacts[:, c, 3:6]
+            yield f"contacts/{contact_id}/penetration", contacts[:, c, 6]
+            yield f"contacts/{contact_id}/slip_speed", contacts[:, c, 7]
+            yield f"contacts/{contact_id}/incidents", contacts[:, c, 8].astype(np.int64)
+            yield f"contacts/{contact_id}/area", contacts[:, c, 9]
+        for request in system.model.requests.values():
+            markers = system.placement.markers
+            yield f"requests/{request.id}", evaluate(request, markers, bodies)
+        for k, name in enumerate(("kinetic", "potential", "dissipated")):
+            yield f"energy/{name}", block.energy[:, k]
+        yield "state/y", block.y
+        ends = self._incidents + np.cumsum(block.incident_count, dtype=np.int64)
+        # row k has incidents[offsets[k] : offsets[k + 1]]
+        yield "state/incident_offsets", ends if self._started else np.append(0, ends)
+        yield "state/incidents", block.incidents
+        yield "events", _events(block.events)
+
+
+def _events(rows: Table) -> Table:
+    """Return the table of events in order of time; within a step they come slot by slot."""
+    table = np.zeros(len(rows), dtype=EVENT)
+    ordered = rows[np.argsort(rows[:, 0], kind="stable")]
+    table["time"] = ordered[:, 0]
+    table["kind"] = EVENT_KINDS[ordered[:, 1].astype(np.int64)]
+    table["element"] = ordered[:, 2].astype(np.int64)
+    return table
+
+
+def _nothing(system: System) -> Block:
+    """Return a block without rows: a run that failed at once has a complete file too."""
+    rows = system.scene.rows
+    fields = ("time", "y", "accel", "contact", "energy", "incident_count", "incidents", "events")
+    return Block(*(getattr(rows, field)[:0].copy() for field in fields))
+
+
+def _digests(system: System) -> dict[str, Value]:
+    """Return digests of the model as it is run (--set included) and of users' files."""
+    scene = system.scene
+    arrays = [
+        *scene.bodies,
+        *scene.graphics,
+        scene.contacts.id,
+        scene.contacts.normal_par,
+        scene.contacts.friction_par,
+        scene.contacts.ignore_deeper,
+        scene.world.gravity,
+        scene.world.scale,
+        system.y0,
+    ]
+    # addresses are left out: they are others in every process
+    text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
+    text += [repr(plan) for plan in system.pair_plans]
+    text += [repr(request) for request in system.model.requests.values()]
+    model = hashlib.sha256("\n".join(text).encode())
+    for array in arrays:
+        model.update(np.ascontiguousarray(array).tobytes())
+    users = hashlib.sha256()
+    for contact_id, user in system.user_friction.items():
+        users.update(f"{contact_id} {user.name} {user.compiled}\n".encode())
+        users.update(Path(user.source).read_bytes())
+    return {"system_sha256": model.hexdigest(), "subroutines_sha256": users.hexdigest()}
+
+
+def _check_same(path: Path, results: Results, settings: Mapping[str, Value]) -> None:
+    """Raise `ModelError` unless a run with these settings can go on from a result file."""
+    there = results.attributes
+    if results.status == "finished":
+        raise ModelError(f"--resume: {path}: this run has finished; there is nothing to go on with")
+    if not results.has_checkpoint:
+        raise ModelError(f"--resume: {path}: no checkpoint in it; start without --resume")
+    # what explains a difference comes before the digests that only show it
+    for name, value in settings.items():
+        if name == "model_file" or (name == "subroutines_sha256" and results.status == "failed"):
+            continue  # a failed user subroutine may be mended
+        if name not in there or there[name] != value:
+            what = {
+                "model_sha256": "the model file has changed",
+                "system_sha256": "elements of the model have changed (--set?)",
+                "subroutines_sha256": "a user subroutine has changed",
+            }.get(name, f"{name} was {there.get(name, 'not given')} and is {value} now")
+            raise ModelError(f"--resume: {path}: {what}; a run goes on as it began")

@@ -1,0 +1,57 @@
+"""The compile policy: what makes compiled code stale."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from mbsim.core import jit
+
+PACKAGE = Path(jit.__file__).resolve().parent.parent
+
+
+def test_digest_follows_imports_through_files(tmp_path, monkeypatch):
+    shutil.copytree(PACKAGE, tmp_path / "mbsim")
+    package = tmp_path / "mbsim"
+    script = (
+        "from pathlib import Path; from mbsim.core import jit; "
+        f"print(jit.source_digest([Path({str(package)!r}) / 'laws/normal/impact.py']), "
+        f"jit.source_digest([Path({str(package)!r}) / 'laws/friction/coulomb.py']), "
+        f"jit.source_digest([Path({str(package)!r}) / 'dynamics/hooks.py']))"
+    )
+
+    def digests():
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+            env={"PYTHONPATH": str(tmp_path), "PATH": ""},
+        )
+        return done.stdout.split()
+
+    before = digests()
+    law = package / "laws/friction/coulomb.py"
+    law.write_text(law.read_text() + "\n# edited\n")
+    after_law = digests()
+    # a law edit makes that law stale, and nothing else
+    assert after_law[1] != before[1]
+    assert [after_law[0], after_law[2]] == [before[0], before[2]]
+    blend = package / "core/blend.py"
+    blend.write_text(blend.read_text() + "\n# edited\n")
+    after_helper = digests()
+    # an edited helper makes every caller stale, also in other files
+    assert after_helper[0] != after_law[0]
+    assert after_helper[1] != after_law[1]
+
+
+def test_cache_root_can_be_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBSIM_CACHE_DIR", str(tmp_path))
+    assert jit.cache_root() == tmp_path
+    monkeypatch.delenv("MBSIM_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "x"))
+    if sys.platform.startswith("linux"):
+        assert jit.cache_root() == tmp_path / "x" / "mbsim"
