@@ -468,7 +468,7 @@ def simulate(
     }
     recorder = Recorder(system, attributes, None if output is None else Path(output), resume)
     log = RunLog(system, attributes, recorder.directory, resume)
-    for note in settings.notes:
+    for note in (*said, *settings.notes):
         log.line(note)
     status = "failed"
     runner = Runner(system, settings, recorder, log)
@@ -493,5 +493,5 @@ def simulate(
             recorder.flush(runner.checkpoint())
         stats = runner.stats(time.perf_counter() - began, jit.compile_seconds - compiled_before)
         results = recorder.close(status, stats, system.scene.log.contacts)
-        log.close(status, stats)
+        log.close(status, stats, recorder.last_energy)
     return results

@@ -53,8 +53,8 @@ def test_bouncing_sphere(detector):
     z = results["bodies/2/position/z"]
     exact = drop_height(results["time"], 0.6, 0.1, 1.0, 1e8, 1.5, 200.0, 1e-4)
     assert np.abs(z - exact).max() < 1e-5
-    touches = [event for event in results["events"] if event[1] == b"touch"]
-    assert touches[0][0] == pytest.approx(np.sqrt(2 * 0.5 / 9.81), rel=1e-7)
+    touches = [event for event in results["events"] if event["kind"] == "touch"]
+    assert touches[0]["time"] == pytest.approx(np.sqrt(2 * 0.5 / 9.81), rel=1e-7)
 
 
 @BOTH
@@ -105,7 +105,7 @@ def test_sphere_pair(detector):
     results = run_model("sphere_pair.xml", tol=1e-7, detector=detector)
     assert results["contacts/301/peak_force"] == pytest.approx(10696.889, rel=1e-3)
     assert results["contacts/301/peak_penetration"] == pytest.approx(2.7411270e-4, rel=1e-3)
-    touch, leave = (event[0] for event in results["events"])
+    touch, leave = results["events"]["time"]
     assert leave - touch == pytest.approx(4.0339456e-5, rel=1e-3)
     assert results["bodies/1/velocity/x"][-1] == pytest.approx(-10.0, rel=1e-3)
 
@@ -142,7 +142,7 @@ def test_drop_in_metres_and_in_millimetres():
     assert metres.stats["rejected"] == millimetres.stats["rejected"]
     p, p_mm = metres["bodies/2/position"], millimetres["bodies/2/position"] / 1000.0
     assert np.abs(p - p_mm).max() < 1e-9 * np.abs(p).max()
-    touches = [event for event in metres["events"] if event[1] == b"touch"]
+    touches = [event for event in metres["events"] if event["kind"] == "touch"]
     assert len(touches) >= 3
     energy, energy_mm = metres["energy/kinetic"], millimetres["energy/kinetic"] / 1000.0
     np.testing.assert_allclose(energy, energy_mm, rtol=1e-8)
