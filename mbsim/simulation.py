@@ -328,9 +328,9 @@ class Runner:
         """Raise what the hooks' code says."""
         from mbsim.dynamics.evaluate import NOT_FINITE, USER_NOT_FINITE
         from mbsim.geometry.fcl_detector import DETECTOR_FAILED
-        from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED
+        from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
 
-        if code == RAISED_INTERPRETED:
+        if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
             from mbsim.plugins import raise_failure
 
             raise_failure()

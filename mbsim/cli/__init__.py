@@ -1,1 +1,1 @@
-"""The command line: one small module a subcommand, imported when it is used."""
+"""The command line: one small module a subcommand, imported when it is called."""

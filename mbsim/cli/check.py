@@ -1,37 +1,43 @@
-"""`mbsim check`: read and check only."""
+"""`mbsim check`: read a deck and find every fault, without running it."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import click
 
 
 @click.command("check")
-@click.argument("model", type=click.Path(path_type=Path))
-@click.option("--set", "overrides", multiple=True, metavar="SELECTOR=VALUE",
-              help="Change an attribute first, e.g. 'Force_Contact[1].mu_static=0.3'.")  # fmt: skip
-@click.option("--detector", type=click.Choice(["auto", "fcl"]), default="auto")
-def command(model: Path, overrides: tuple[str, ...], detector: str) -> None:
-    """Read and check MODEL.xml; list every fault with file and line."""
-    from mbsim.model.placement import place
+@click.argument("model", type=click.Path())
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="SELECTOR=VALUE",
+    help="Change an attribute first, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
+)
+def command(model: str, overrides: tuple[str, ...]) -> None:
+    """Check MODEL: every fault is listed with file and line.
+
+    Says what is in the model and how each pair of shapes will be tested.
+    """
+    from mbsim.cli.messages import warn
     from mbsim.reader.xml import read_model
+    from mbsim.simulation import settle
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)
-    place(deck)
-    plans = plan_pairs(deck, detector)
-    for line in deck.warnings:
-        click.echo(f"warning: {line}", err=True)
-    for line in deck.notes:
-        click.echo(f"note: {line}", err=True)
-    moving = sum(not body.is_ground for body in deck.bodies.values())
-    click.echo(
-        f"ok: {model}: {moving} moving bodies, {len(deck.markers)} markers, "
-        f"{len(deck.graphics)} graphics, {len(deck.contacts)} contacts"
-    )
+    plans = plan_pairs(deck)
+    # values that a run would refuse; times may still come from the command line
+    notes = settle(deck).notes if deck.simulations else ()
+
+    from mbsim.results.log import counts, pair_text, units_text
+
+    warn(deck.warnings)
+    numbers = ", ".join(f"{count} {name}" for name, count in counts(deck).items())
+    click.echo(f"ok: {model}: {numbers}")
+    click.echo(f"  units {units_text(deck)}")
     for plan in plans:
-        click.echo(
-            f"  Force_Contact[{plan.contact}]: Post_Graphic[{plan.graphic_i}] on "
-            f"Post_Graphic[{plan.graphic_j}]: {plan.detector}"
-        )
+        click.echo(f"  Force_Contact[{plan.contact}]: {pair_text(plan)}")
+    if not deck.simulations:
+        click.echo("  no Simulate: a run needs --end-time")
+    for note in (*deck.notes, *notes):
+        click.echo(f"  note: {note}")

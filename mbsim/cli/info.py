@@ -1,84 +1,156 @@
-"""`mbsim info`: what is in a model or a result file."""
+"""`mbsim info`: what is in a deck or in a result file."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+if TYPE_CHECKING:
+    from mbsim.model.elements import Model
+    from mbsim.results.reading import Results
 
-def _of_model(path: Path) -> dict[str, Any]:
-    """Return what a deck holds."""
-    from mbsim.model.placement import place
-    from mbsim.reader.xml import read_model
-
-    deck = read_model(path)
-    where = place(deck)
-    units = deck.units
-    return {
-        "file": str(path),
-        "units": f"{units.force} {units.mass} {units.length} {units.time}",
-        "moving_bodies": len(where.bodies),
-        "markers": len(deck.markers),
-        "graphics": len(deck.graphics),
-        "contacts": len(deck.contacts),
-        "requests": len(deck.requests),
-        "end_time": deck.simulations[-1].end_time if deck.simulations else None,
-        "size": where.L,
-        "bodies": {
-            str(id): {"label": deck.bodies[id].label, "mass": body.mass / units.mass_scale}
-            for id, body in where.bodies.items()
-        },
-        "warnings": list(deck.warnings),
-        "notes": list(deck.notes),
-    }
-
-
-def _of_results(path: Path) -> dict[str, Any]:
-    """Return what a result file holds."""
-    from mbsim.results.reading import end_state, open_results
-
-    with open_results(path) as results:
-        time = results["time"] if "time" in results else []
-        return {
-            "file": str(path),
-            **results.attributes,
-            "rows": len(time),
-            "last_time": float(time[-1]) if len(time) else None,
-            "stats": results.stats,
-            "signals": results.keys(),
-            "bodies": end_state(results),
-        }
-
-
-def _print(values: dict[str, Any], indent: int = 0) -> None:
-    """Print nested facts, one a line."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            click.echo(" " * indent + f"{name}:")
-            _print(value, indent + 2)
-        elif isinstance(value, list) and value and isinstance(value[0], str):
-            click.echo(" " * indent + f"{name}:")
-            for item in value:
-                click.echo(" " * (indent + 2) + item)
-        elif isinstance(value, list):
-            click.echo(" " * indent + f"{name}: " + " ".join(f"{item:.9g}" for item in value))
-        else:
-            shown = f"{value:.9g}" if isinstance(value, float) else value
-            click.echo(" " * indent + f"{name}: {shown}")
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 @click.command("info")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(file: Path, as_json: bool) -> None:
-    """Say what is in MODEL.xml or RESULT.h5."""
-    values = _of_results(file) if file.suffix.lower() in (".h5", ".hdf5") else _of_model(file)
-    if as_json:
-        from mbsim.results.reading import finite
+    """Show what is in FILE, a model or a result file: units, counts, end state, statistics."""
+    from mbsim.cli.messages import print_json, warn
 
-        click.echo(json.dumps(finite(values)))
+    if _is_result(file):
+        from mbsim.results.reading import open_results
+
+        with open_results(file) as results:
+            about = _about_results(results)
     else:
-        _print(values)
+        from mbsim.reader.xml import read_model
+
+        deck = read_model(file)
+        about = _about_model(deck)
+        warn(deck.warnings)
+    if as_json:
+        print_json(about)
+    else:
+        _show(about)
+
+
+def _is_result(file: Path) -> bool:
+    """Return whether a file is HDF5, by what it holds; one that is not there, by its name."""
+    try:
+        with file.open("rb") as opened:
+            return opened.read(len(_HDF5)) == _HDF5 or file.suffix.lower() in (".h5", ".hdf5")
+    except OSError:
+        return file.suffix.lower() in (".h5", ".hdf5")
+
+
+def _about_model(model: Model) -> dict[str, Any]:
+    """Return what a deck describes."""
+    from mbsim.model.placement import place
+    from mbsim.results.log import counts, pair_text, title, units_text
+    from mbsim.results.reading import finite
+    from mbsim.system.pairing import plan_pairs
+
+    placement = place(model)
+    plans = plan_pairs(model)
+    about = {
+        "kind": "model",
+        "file": model.file,
+        "units": units_text(model),
+        "counts": counts(model),
+        "bodies": {
+            str(body.id): {
+                "label": model.bodies[body.id].label,
+                # as in the deck; the system's mass is scaled so that F = m a
+                "mass": body.mass / model.units.mass_scale,
+                "position": body.p,
+                "velocity": body.v,
+            }
+            for body in placement.bodies.values()
+        },
+        "contacts": {
+            str(contact.id): {
+                "name": title(contact),
+                "normal_law": contact.cnf_type,
+                "friction_law": contact.cff_type,
+                "pairs": [pair_text(plan) for plan in plans if plan.contact == contact.id],
+            }
+            for contact in model.contacts.values()
+        },
+        "requests": {
+            str(request.id): {"type": request.type, "label": request.label or request.comment}
+            for request in model.requests.values()
+        },
+        "simulations": [
+            {"start_time": s.start_time, "end_time": s.end_time, "print_interval": s.print_interval}
+            for s in model.simulations
+        ],
+    }
+    plain: dict[str, Any] = finite(about)
+    return plain
+
+
+def _about_results(results: Results) -> dict[str, Any]:
+    """Return what a result file holds."""
+    from mbsim.results.reading import end_state, finite
+
+    time = results["time"]
+    about = {
+        "kind": "results",
+        "file": str(results.path),
+        "status": results.status,
+        "attributes": results.attributes,
+        "counts": {
+            "rows": len(time),
+            **{name: len(results.ids(name)) for name in ("bodies", "contacts", "requests")},
+            "events": len(results["events"]),
+        },
+        "end_time": float(time[-1]) if len(time) else None,
+        "bodies": end_state(results),
+        "contacts": {
+            str(id): {
+                name: results[f"contacts/{id}/{name}"]
+                for name in ("peak_force", "peak_penetration", "peak_slip_speed")
+                if f"contacts/{id}/{name}" in results
+            }
+            for id in results.ids("contacts")
+        },
+        "stats": results.stats,
+        "signals": results.keys(),
+    }
+    plain: dict[str, Any] = finite(about)
+    return plain
+
+
+def _show(about: dict[str, Any]) -> None:
+    """Print nested facts with indentation."""
+    lines: list[str] = []
+
+    def add(name: str, value: Any, depth: int) -> None:
+        pad = "  " * depth
+        if isinstance(value, dict):
+            if value:
+                lines.append(f"{pad}{name}")
+            for key, item in value.items():
+                add(str(key), item, depth + 1)
+        elif isinstance(value, list) and value and all(isinstance(v, (int, float)) for v in value):
+            numbers = " ".join(f"{v:.9g}" for v in value)
+            lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {numbers}")
+        elif isinstance(value, list):
+            for item in value:
+                if isinstance(item, dict):
+                    inside = ", ".join(f"{key} {entry}" for key, entry in item.items())
+                    lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {inside}")
+                else:
+                    lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {item}")
+        elif value not in ("", None):
+            shown = f"{value:.9g}" if isinstance(value, float) else value
+            lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {shown}")
+
+    for key, value in about.items():
+        add(key, value, 0)
+    # in one piece: a pager that closes early breaks the pipe only once
+    click.echo("\n".join(lines))

@@ -1,59 +1,67 @@
-"""`mbsim`: finds the subcommand, and turns errors into one message and an exit code."""
+"""`mbsim`: the group of subcommands, and how errors become messages and exit codes."""
 
 from __future__ import annotations
 
-import importlib
-import sys
+from importlib import import_module
+from typing import Any
 
 import click
 
 from mbsim import __version__
-from mbsim.errors import MbsimError
+from mbsim.errors import DeckError, Interrupted, MbsimError
 
-#: Subcommand -> its line in `mbsim --help`; each lives in the module of its name.
-_COMMANDS = {
-    "run": "Run a model; results go to a folder.",
-    "check": "Read and check a model; list every fault with file and line.",
-    "info": "Say what is in a model or a result file.",
+#: Subcommand -> module; each module has a click command named `command`.
+COMMANDS = {
+    "run": "mbsim.cli.run",
+    "check": "mbsim.cli.check",
+    "info": "mbsim.cli.info",
 }
 
 
-class _Commands(click.Group):
-    """A group that imports a subcommand only when it is asked for."""
+class Commands(click.Group):
+    """Subcommands by name; errors that a user can act on end without a traceback."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
+        """Return the names in the order of `COMMANDS`."""
+        return list(COMMANDS)
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in _COMMANDS:
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the module of a subcommand."""
+        module = COMMANDS.get(cmd_name)
+        if module is None:
             return None
-        command: click.Command = importlib.import_module(f"mbsim.cli.{name}").command
+        command: click.Command = import_module(module).command
         return command
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(_COMMANDS.items()))
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the subcommand; a message and the exit code of the class for every MbsimError."""
+        try:
+            return super().invoke(ctx)
+        except MbsimError as error:
+            for line in _messages(error):
+                click.echo(f"mbsim: error: {line}", err=True)
+            ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            click.echo("mbsim: error: interrupted", err=True)
+            ctx.exit(Interrupted.exit_code)
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+def _messages(error: MbsimError) -> list[str]:
+    """Return what to print, each with its own prefix: all faults of a deck, else one message."""
+    if isinstance(error, DeckError):
+        return [str(fault) for fault in error.faults]
+    return [str(error)]
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mbsim")
-def group() -> None:
-    """Multibody contact simulation from MotionSolve-style decks."""
-
-
 def main() -> None:
-    """Run the command line; the entry point of the `mbsim` script."""
-    try:
-        group(prog_name="mbsim", standalone_mode=False)
-    except click.exceptions.Abort:
-        sys.exit(130)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
-    except MbsimError as error:
-        click.echo(f"mbsim: error: {error}", err=True)
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        # whoever read our output went away: nothing more to say, and nothing to flush to
-        sys.stdout = None
-        sys.exit(0)
+    """Multibody contact simulation from MotionSolve-style decks.
+
+    Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
+    failed; 5 results could not be written; 130 interrupted, results up to there kept.
+    """
+
+
+if __name__ == "__main__":
+    main()

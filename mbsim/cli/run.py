@@ -1,53 +1,27 @@
-"""`mbsim run`: run a model, show how far it is, say where the results are."""
+"""`mbsim run`: run a deck and write its results."""
 
 from __future__ import annotations
 
-import contextlib
-import json
 import sys
-from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from mbsim.simulation import Progress
-
-
-@contextlib.contextmanager
-def _progress(wanted: bool) -> Iterator[Progress | None]:
-    """Show simulated time, step size and time left while a terminal looks on."""
-    if not wanted or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    columns = (
-        BarColumn(),
-        TextColumn("t = {task.completed:.4g} of {task.total:.4g}"),
-        TextColumn("step {task.fields[step]:.2e}"),
-        TimeRemainingColumn(),
-    )
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("run", total=None, step=0.0)
-
-        def show(time: float, step: float, end_time: float) -> None:
-            bar.update(task, completed=time, total=end_time, step=step)
-
-        yield show
+    from mbsim.errors import MbsimError
+    from mbsim.results.reading import Results
 
 
 @click.command("run")
-@click.argument("model", type=click.Path(path_type=Path))
+@click.argument("model", type=click.Path())
 @click.option(
     "-o",
     "output",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Folder for results; default <model name>/.",
+    help="Folder for results.  [default: <model name>/]",
 )
 @click.option(
     "--plugin",
@@ -55,72 +29,132 @@ def _progress(wanted: bool) -> Iterator[Progress | None]:
     multiple=True,
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="File with user subroutines; may be given again.",
+    help="File with user subroutines; may be repeated.",
 )
 @click.option(
     "--set",
     "overrides",
     multiple=True,
     metavar="SELECTOR=VALUE",
-    help="Change an attribute, e.g. 'Force_Contact[1].mu_static=0.3'.",
+    help="Change an attribute of the deck, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
 )
-@click.option("--integrator", metavar="NAME", help="DOPRI5.")
-@click.option("--tol", type=float, help="Local error of a step, dimensionless; default 1e-5.")
-@click.option("--end-time", type=float, help="Instead of the deck's.")
-@click.option("--print-interval", type=float, help="Instead of the deck's.")
+@click.option("--integrator", metavar="NAME", help="Instead of the deck's.")
+@click.option("--tol", type=float, metavar="X", help="Local error of a step, dimensionless.")
+@click.option("--end-time", type=float, metavar="T", help="Instead of the deck's.")
+@click.option("--print-interval", type=float, metavar="DT", help="Between output rows.")
 @click.option("--resume", is_flag=True, help="Go on from the last checkpoint in DIR.")
-@click.option("--progress", type=click.Choice(["auto", "off"]), default="auto")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.option(
+    "--progress",
+    type=click.Choice(["auto", "off"]),
+    default="auto",
+    show_default=True,
+    help="auto: shown where standard error is a terminal.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the end state as one JSON object.")
 @click.option(
     "--detector",
     type=click.Choice(["auto", "fcl"]),
     default="auto",
-    help="fcl: every pair through FCL.",
+    show_default=True,
+    help="fcl: no closed forms.",
 )
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option("--allow-overlap", is_flag=True, help="Start although shapes overlap deeply.")
 def command(
-    model: Path,
+    model: str,
     output: Path | None,
-    plugins: tuple[Path, ...],
     overrides: tuple[str, ...],
     progress: str,
     as_json: bool,
-    **settings: Any,
+    **options: Any,
 ) -> None:
-    """Run MODEL.xml and write results to a folder."""
+    """Run MODEL and write DIR/<model>.h5, .csv (requests) and .log."""
+    from mbsim.cli.messages import warn
+    from mbsim.errors import Interrupted, PluginError, SolverError
     from mbsim.reader.xml import read_model
+    from mbsim.results.files import prepare_directory
 
     deck = read_model(model, overrides)
-    # reading first: a fault of the deck costs no import of what would run it
-    from mbsim.results.reading import end_state, finite
+    warn(deck.warnings)
+    directory = Path(deck.name) if output is None else output
+    # before anything is compiled: half a minute is too long to hear of a full disk
+    prepare_directory(directory, deck.name)
+    result_file = directory / f"{deck.name}.h5"
+
+    from mbsim.cli.progress import Display
     from mbsim.simulation import simulate
 
-    for line in deck.warnings:
-        click.echo(f"mbsim: warning: {line}", err=True)
-    folder = Path(deck.name) if output is None else output
-    with _progress(progress == "auto") as show:
-        results = simulate(
-            deck,
-            plugins=plugins,
-            output=folder,
-            progress=show,
-            notify=lambda line: click.echo(f"mbsim: {line}", err=True),
-            **settings,
-        )
+    shown = progress == "auto" and sys.stderr.isatty()
+    display = Display() if shown else None
+    with display or nullcontext():
+        try:
+            results = simulate(
+                deck,
+                output=directory,
+                progress=display.update if display else None,
+                notify=display.say if display else _say,
+                **options,
+            )
+        except (SolverError, PluginError, Interrupted) as error:
+            if display:
+                display.stop()
+            _report_failure(result_file, error, as_json)
+            raise
     with results:
-        stats, end = results.stats, float(results["time"][-1])
         if as_json:
-            answer = {
-                "status": results.status,
-                "result_file": str(results.path),
-                "end_time": end,
-                "stats": stats,
-                "bodies": end_state(results),
-            }
-            click.echo(json.dumps(finite(answer)))
-            return
-        click.echo(
-            f"{results.status} at t = {end:g}: {stats['steps']} steps, "
-            f"{stats['rhs_evaluations']} evaluations, {stats['wall_s']:.2f} s; {results.path}"
-        )
+            _print_json(results, result_file)
+        else:
+            _print_summary(results, result_file)
+
+
+def _say(text: str) -> None:
+    """Print a message for the user."""
+    click.echo(f"mbsim: {text}", err=True)
+
+
+def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None:
+    """Say what a run that ended early has kept; its error follows from `main`."""
+    from mbsim.errors import ResultsError
+    from mbsim.results.reading import open_results
+
+    try:
+        with open_results(result_file) as results:
+            # an older file of this name is not what this run has kept
+            if results.status not in ("interrupted", "failed"):
+                return
+            if as_json:
+                _print_json(results, result_file)
+            else:
+                kept = len(results["time"])
+                click.echo(f"mbsim: {kept} rows are kept in {result_file}", err=True)
+    except ResultsError:
+        return
+
+
+def _print_json(results: Results, result_file: Path) -> None:
+    """Print the documented JSON object."""
+    from mbsim.cli.messages import print_json
+    from mbsim.results.reading import end_state, finite
+
+    time = results["time"]
+    print_json(
+        {
+            "status": results.status,
+            "result_file": str(result_file),
+            "end_time": finite(float(time[-1])) if len(time) else None,
+            "stats": finite(results.stats),
+            "bodies": finite(end_state(results)),
+        }
+    )
+
+
+def _print_summary(results: Results, result_file: Path) -> None:
+    """Print a few lines for people."""
+    time, stats = results["time"], results.stats
+    end = f"{time[-1]:.9g}" if len(time) else "-"
+    click.echo(f"{results.status} at time {end}, {len(time)} rows in {result_file}")
+    click.echo(
+        f"{stats.get('steps', 0)} steps, {stats.get('rejected', 0)} rejected, "
+        f"{stats.get('wall_s', 0.0):.2f} s"
+        + (f" ({stats['compile_s']:.1f} s of it compiling)" if stats.get("compile_s") else "")
+    )

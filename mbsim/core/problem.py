@@ -3,7 +3,8 @@
     double hook(int64 context, double t, double h, double *a, double *b)
 
 A mechanism (`dynamics.hooks`) and a scalar test equation (the tests) look the same, and a
-method is compiled once for all. Codes are 0 for success.
+method is compiled once for all. Codes are 0 for success. A trial point whose rhs fails is tried again nearer to the committed
+one before the run ends, but for codes from AT_ONCE on.
 
 | hook   | a, b                        | returns                                              |
 |--------|-----------------------------|------------------------------------------------------|
@@ -44,6 +45,9 @@ class Problem(NamedTuple):
     output: int
     reject: int
 
+
+#: Codes of a hook that end the run without another try.
+AT_ONCE = 100.0
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL = range(5)

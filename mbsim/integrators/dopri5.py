@@ -17,6 +17,7 @@ from mbsim.core.address import call_float
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
+    AT_ONCE,
     BY_CHECK,
     BY_ERROR,
     BY_NOT_FINITE,
@@ -31,6 +32,8 @@ from mbsim.integrators.control import next_factor, quantised, smallest_step, sta
 ORDER = 5
 STAGES = 7
 NOT_FINITE = 3.0
+#: A hook that fails is tried again at a tenth of the step, so many times.
+MOST_FAILURES = 8
 
 C2, C3, C4, C5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
 A21 = 1 / 5
@@ -260,6 +263,7 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
             return ROWS_FULL if full > 0.0 else FAILED
     stop_at = m.counts[EVALUATIONS] + budget
     rejected = False
+    failures = 0
     while m.memory[TIME] < t_end:
         if m.counts[EVALUATIONS] >= stop_at:
             return PAUSED
@@ -267,8 +271,6 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
         floor = smallest_step(t, t_end, h_min)
         h = min(m.memory[STEP], h_max)
         h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
-        if h < floor and m.memory[STEP] < floor:
-            return STEP_TOO_SMALL
         h = max(quantised(h), floor)
         # no sliver of a step before the end
         if t + 1.01 * h >= t_end:
@@ -276,16 +278,19 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
 
         # try
         code = stages(p, m, t, h)
-        if code == NOT_FINITE:
+        if code != 0.0:
+            # a trial far ahead may be where no law was meant for: come nearer before giving up
+            failures += 1
+            if code != NOT_FINITE and (failures > MOST_FAILURES or h <= floor or code >= AT_ONCE):
+                m.counts[CODE] = int(code)
+                return FAILED
             reject(p, m, t, BY_NOT_FINITE)
-            m.memory[STEP] = 0.25 * h
+            m.memory[STEP] = max(0.1 * h, floor)
             rejected = True
-            if m.memory[STEP] < floor:
+            if h <= floor:
                 return STEP_TOO_SMALL
             continue
-        if code != 0.0:
-            m.counts[CODE] = int(code)
-            return FAILED
+        failures = 0
         error = call_float(p.norm, (p.context, t, h, m.error, m.trial)) / tol
         m.memory[LAST_ERROR] = error
         if not error <= 1.0:
@@ -293,15 +298,16 @@ def advance(p, m, t_end, tol, h_max, h_min, times, budget):
             finite = math.isfinite(error)
             m.memory[STEP] = h * (next_factor(error, 1.0, ORDER, True) if finite else 0.2)
             rejected = True
-            if m.memory[STEP] < floor:
+            if h <= floor:
                 return STEP_TOO_SMALL
+            m.memory[STEP] = max(m.memory[STEP], floor)
             continue
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[6]))
         if part < 1.0:
             reject(p, m, t, BY_CHECK)
-            m.memory[STEP] = part * h
-            if m.memory[STEP] < floor:
+            if h <= floor:
                 return STEP_TOO_SMALL
+            m.memory[STEP] = max(part * h, floor)
             continue
 
         # take

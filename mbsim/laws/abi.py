@@ -26,6 +26,8 @@ from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 FRICTION_INPUTS = 19
 RAISED_INTERPRETED = 1
 RAISED_COMPILED = 2
+#: Codes from here on end the run at once; others are tried again at a shorter step.
+STOPPED_BY_USER = 100
 
 _PTR = types.CPointer(types.float64)
 NORMAL_SIGNATURE = types.int64(types.float64, types.float64, _PTR, _PTR)

@@ -29,7 +29,7 @@ class NotAForce(Exception):
 
 
 class Failure:
-    """The first exception of a user function that the run has not yet raised."""
+    """The last exception of a user function that the run has not yet raised."""
 
     def __init__(self) -> None:
         self.clear()
@@ -45,10 +45,13 @@ class Failure:
     def store(
         self, error: BaseException, element: int, time: float, name: str, source: str
     ) -> None:
-        """Keep an exception and what it belongs to; a later one does not hide the first."""
-        if self.error is None:
-            self.error, self.element, self.time = error, element, time
-            self.name, self.source = name, source
+        """Keep an exception and what it belongs to.
+
+        The integrator comes nearer before it gives up, so the last one is nearest to where
+        the run stands.
+        """
+        self.error, self.element, self.time = error, element, time
+        self.name, self.source = name, source
 
 
 failure = Failure()
@@ -137,7 +140,7 @@ def callback(
     function: Callable[..., Any], name: str, source: str, par_count: int
 ) -> tuple[int, object]:
     """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive."""
-    from mbsim.laws.abi import FRICTION_INPUTS, RAISED_INTERPRETED
+    from mbsim.laws.abi import FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
 
     # plain locals and memoryviews: this body costs 0.7 us, numpy views would cost 3
     inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
@@ -174,7 +177,7 @@ def callback(
             return 0
         except BaseException as error:
             failure.store(error, element, time, name, source)
-            return RAISED_INTERPRETED
+            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
 
     entry = C_FUNCTION(guarded)
     return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry

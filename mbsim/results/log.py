@@ -6,14 +6,17 @@ import math
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mbsim.errors import ResultsError
 from mbsim.model.elements import Contact, Model
 from mbsim.results.files import replace_text
 from mbsim.results.store import Value
 from mbsim.system import arrays as a
-from mbsim.system.build import System
 from mbsim.system.pairing import PairPlan
+
+if TYPE_CHECKING:
+    from mbsim.system.build import System
 
 #: A user subroutine may talk at every evaluation; no more lines than this are kept.
 MOST_LINES = 20_000
@@ -31,7 +34,7 @@ def number(value: float, unit: str = "") -> str:
     """Return a number for reading, or a dash where there is none."""
     if not math.isfinite(value):
         return "-"
-    return f"{value:.6g} {unit}".rstrip()
+    return f"{value + 0.0:.6g} {unit}".rstrip()  # + 0.0: no -0
 
 
 class RunLog:
@@ -229,8 +232,8 @@ def summary(
     if energy is not None:
         yield ""
         yield "energy at the end"
-        for name, value in zip(("kinetic", "potential", "dissipated total"), energy, strict=True):
-            yield fact(name, number(value))
+        for name, amount in zip(("kinetic", "potential", "dissipated total"), energy, strict=True):
+            yield fact(name, number(amount))
     yield ""
     yield "statistics"
     for name, value in stats.items():

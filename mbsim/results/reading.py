@@ -183,9 +183,7 @@ def _plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, np.ndarray) and value.dtype.names:
         # fixed-length bytes as text, so that events["kind"] == "touch" works
-        fields = [
-            (name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names
-        ]
+        fields = [(name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names]
         return value.astype(fields)
     return value
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from mbsim.results.reading import Results, open_results
 from mbsim.results.requests import COLUMNS, evaluate
 from mbsim.results.store import Store, Value
 from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
-from mbsim.system.build import System
+
+if TYPE_CHECKING:
+    from mbsim.system.build import System
 
 Table = np.ndarray[Any, Any]
 
@@ -191,9 +193,7 @@ class Recorder:
         self._rows_since_flush = 0
         self._published_at = time.monotonic()
 
-    def close(
-        self, status: str, stats: Mapping[str, Value], contact_log: Table
-    ) -> Results:
+    def close(self, status: str, stats: Mapping[str, Value], contact_log: Table) -> Results:
         """Complete the files and return them as results.
 
         Parameters
