@@ -217,21 +217,23 @@ class Runner:
 
     def checkpoint(self) -> dict[str, Any]:
         """Return everything a run needs to go on: state, log, method, and where it is."""
-        groups = {"state": self.system.scene.state, "log": self.system.scene.log}
+        groups: dict[str, Any] = {
+            "state": self.system.scene.state,
+            "log": self.system.scene.log,
+            "method": self.method,
+        }
         arrays = {
             f"{name}/{field}": np.array(array)
             for name, group in groups.items()
             for field, array in zip(group._fields, group, strict=True)
         }
-        for field, array in zip(self.method._fields, self.method, strict=True):
-            arrays[f"method/{field}"] = np.array(array)
         arrays["stage"] = np.array(self.stage)
         arrays["time"] = np.array(self.method.memory[0])
         return arrays
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
-        groups = {
+        groups: dict[str, Any] = {
             "state": self.system.scene.state,
             "log": self.system.scene.log,
             "method": self.method,
@@ -251,6 +253,7 @@ class Runner:
 
     def _run_stage(self, simulation: Simulation, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
+        from mbsim.core import problem
         from mbsim.integrators import dopri5
 
         method, settings, scene = self.method, self.settings, self.system.scene
@@ -283,11 +286,11 @@ class Runner:
             )
             self.loop_seconds += time.perf_counter() - began
             self.recorder.take()
-            if outcome == dopri5.DONE:
+            if outcome == problem.DONE:
                 return
-            if outcome == dopri5.FAILED:
+            if outcome == problem.FAILED:
                 self.fail(int(method.counts[dopri5.CODE]), method.memory[dopri5.TIME])
-            if outcome == dopri5.STEP_TOO_SMALL:
+            if outcome == problem.STEP_TOO_SMALL:
                 self.give_up()
             if self.interrupted:
                 raise Interrupted(f"interrupted at time {method.memory[dopri5.TIME]:.6g}")
@@ -455,7 +458,7 @@ def simulate(
     files = [Path(file) for file in plugins]
     said: list[str] = []
     system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
-    attributes = {
+    attributes: dict[str, str | float | int] = {
         "mbsim_version": __version__,
         "model_file": model.file,
         "model_sha256": model.sha256,

@@ -9,13 +9,15 @@ does not import FCL.
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.geometry.support import CONVEX, ROUND, support
 from mbsim.model.elements import Graphic
-from mbsim.system.arrays import Scene
+
+if TYPE_CHECKING:
+    from mbsim.system.arrays import Scene
 
 DETECTOR_FAILED = 4
 #: Directions that FCL's iterative solver returns scatter by this much (measured on ellipsoids).

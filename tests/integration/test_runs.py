@@ -180,7 +180,7 @@ def test_end_time_and_print_interval_of_the_caller(tmp_path):
 
 def test_deep_overlap_at_the_start_is_refused_unless_allowed(tmp_path):
     model = GROUND + sphere(-0.05) + contact() + GRAVITY
-    with pytest.raises(ModelError, match="overlap by 0.15"):
+    with pytest.raises(ModelError, match=r"overlap by 0\.15"):
         run_deck(tmp_path, model)
     results = run_deck(tmp_path, model, end_time=0.05, allow_overlap=True)
     assert results["bodies/2/velocity/z"][-1] > 0

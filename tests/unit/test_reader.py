@@ -91,7 +91,8 @@ def test_friction_spellings(tmp_path: Path, spelling: str, canonical: str) -> No
 def test_any_root_and_order(tmp_path: Path) -> None:
     model_part = re.search("<Model>.*</Model>", MINIMAL, re.DOTALL)
     command_part = re.search("<Command>.*</Command>", MINIMAL, re.DOTALL)
-    assert model_part and command_part
+    assert model_part
+    assert command_part
     bare = read(tmp_path, model_part[0])
     assert bare.simulations == ()
     turned = f"<a><b>{command_part[0]}</b><c version='2'>{model_part[0]}</c></a>"
@@ -260,7 +261,8 @@ def test_graphics(tmp_path: Path) -> None:
     assert shapes[6] == ("MESH", (), zero)
     assert 7 not in shapes
     mesh = model.graphics[6]
-    assert mesh.vertices is not None and mesh.faces is not None
+    assert mesh.vertices is not None
+    assert mesh.faces is not None
     assert (mesh.vertices.shape, mesh.faces.shape) == ((4, 3), (4, 3))
     text = "\n".join(model.notes)
     for word in ("color", "ends_type", "xmin", "Frustum"):
@@ -276,7 +278,8 @@ def test_mesh_files(tmp_path: Path, kind: str) -> None:
     cube.export(tmp_path / f"part.{suffix}", file_type=kind)
     text = added(f'<Post_Graphic id="6" type="TriaMesh" rm_id="20" file="part.{suffix}"/>')
     mesh = read(tmp_path, text).graphics[6]
-    assert mesh.vertices is not None and mesh.faces is not None
+    assert mesh.vertices is not None
+    assert mesh.faces is not None
     assert (mesh.vertices.shape, mesh.faces.shape) == ((8, 3), (12, 3))
     np.testing.assert_array_equal(mesh.vertices.max(axis=0), (0.5, 1.0, 1.5))
 
@@ -299,9 +302,11 @@ def test_commands_in_sequence(tmp_path: Path) -> None:
     )
     first, second = read(tmp_path, text).simulations
     assert first.gravity is None
-    assert first.transient is not None and first.transient.h_max is None
+    assert first.transient is not None
+    assert first.transient.h_max is None
     assert (second.start_time, second.end_time, second.print_interval) == (3.0, 5.0, 0.5)
-    assert second.gravity is not None and second.gravity.g == (1.0, 0.0, -9.81)
+    assert second.gravity is not None
+    assert second.gravity.g == (1.0, 0.0, -9.81)
     assert second.transient is not None
     assert (second.transient.integr_tol, second.transient.h_max) == (1e-5, 0.1)
 
@@ -404,7 +409,8 @@ def test_mutated_values_give_a_model_or_a_model_error(
         return
     assert isinstance(model, Model)
     placement = place(model)
-    assert math.isfinite(placement.L) and placement.L > 0.0
+    assert math.isfinite(placement.L)
+    assert placement.L > 0.0
 
 
 @settings(max_examples=200, deadline=None)
