@@ -140,12 +140,12 @@ def _show(about: dict[str, Any]) -> None:
             numbers = " ".join(f"{v:.9g}" for v in value)
             lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {numbers}")
         elif isinstance(value, list):
+            if value:
+                lines.append(f"{pad}{name}")
             for item in value:
-                if isinstance(item, dict):
-                    inside = ", ".join(f"{key} {entry}" for key, entry in item.items())
-                    lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {inside}")
-                else:
-                    lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {item}")
+                facts = item.items() if isinstance(item, dict) else ()
+                inside = ", ".join(f"{key} {entry}" for key, entry in facts)
+                lines.append(f"{pad}  {inside or item}")
         elif value not in ("", None):
             shown = f"{value:.9g}" if isinstance(value, float) else value
             lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {shown}")

@@ -35,7 +35,7 @@ def slow_deck(folder):
         "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
         "    if time > 0.5 and not calls:\n"
         "        calls.append(1)\n"
-        "        print('half', file=sys.stderr, flush=True)\n"
+        "        print('reached 0.5', file=sys.stderr, flush=True)\n"
         "    return [-50.0 * xdot[0] - 10.0 * x[0], -50.0 * xdot[1] - 10.0 * x[1], 0.0]\n",
         encoding="utf-8",
     )
@@ -57,7 +57,7 @@ def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path):
         [*CLI, *map(str, arguments)], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     for line in process.stderr:
-        if "half" in line:
+        if "reached 0.5" in line:
             process.send_signal(signal.SIGINT)
             break
     _, rest = process.communicate(timeout=120)
