@@ -1,0 +1,109 @@
+"""Measurements, printed and never judged: python -m pytest -m bench -s tests/bench"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import COULOMB, GRAVITY, GROUND, MODELS, USERFUNCS, contact, sphere, write_deck
+
+import mbsim
+
+pytestmark = pytest.mark.bench
+CLI = [sys.executable, "-c", "from mbsim.cli.main import main; main()"]
+LAWS = {
+    "COULOMB_ON": COULOMB,
+    "compiled CFFSUB": {
+        "cff_type": "USERCFF",
+        "cff_param_string": "USER(0.3,0.2,0.01,0.02)",
+        "cff_fnc_name": "CFFSUB",
+        "script_name": str(USERFUNCS / "coulomb_stribeck.py"),
+    },
+    "no friction": {},
+}
+
+
+@pytest.mark.parametrize("law", list(LAWS))
+def test_cost_of_an_evaluation(tmp_path, law):
+    # sliding, bouncing sphere: 2 m fall, k = 1e5
+    model = (
+        GROUND
+        + sphere(2.1, v=(2.0, 0, 0))
+        + contact(stiffness=1e5, damping=50, dmax=1e-3, **LAWS[law])
+        + GRAVITY
+    )
+    deck = mbsim.read_model(write_deck(tmp_path, model, end_time=3.0))
+    costs = []
+    for _ in range(6):
+        stats = mbsim.simulate(deck, tol=1e-11).stats
+        count = stats["rhs_evaluations"] + stats["output_evaluations"]
+        costs.append(1e9 * stats["loop_s"] / count)
+    print(f"\n{law}: {statistics.median(costs[1:]):.0f} ns an evaluation, all included")
+    assert np.isfinite(costs).all()
+
+
+def test_whole_runs(tmp_path):
+    commands = {
+        "--help": ["--help"],
+        "check": ["check", MODELS / "bowling_ball.xml"],
+        "run bowling_ball": ["run", MODELS / "bowling_ball.xml", "-o", tmp_path / "out"],
+    }
+    print()
+    for name, arguments in commands.items():
+        times = []
+        for _ in range(6):
+            began = time.perf_counter()
+            done = subprocess.run([*CLI, *map(str, arguments)], capture_output=True)
+            times.append(time.perf_counter() - began)
+            assert done.returncode == 0
+        print(f"{name}: {statistics.median(times[1:]):.2f} s")
+
+
+def test_calls_of_user_subroutines():
+    from mbsim.core import jit
+    from mbsim.core.address import call_int
+    from mbsim.core.jitable import jitable
+    from mbsim.plugins import load_friction
+
+    @jitable
+    def call(address, given, par, out):
+        return call_int(address, (1, given, par, out))
+
+    def loop(address, given, par, out, count):
+        for _ in range(count):
+            call(address, given, par, out)
+
+    run = jit.function(loop)
+    deck = mbsim.read_model(MODELS / "bowling_ball.xml")
+    given, out = np.zeros(19), np.zeros(5)
+    given[5], given[10] = 0.3, 50.0
+    print()
+    for interpret, count in ((False, 1_000_000), (True, 100_000)):
+        user = load_friction(deck.contacts[301], (), interpret)
+        run(user.address, given, user.par, out, 10)
+        times, bodies = [], []
+        for _ in range(5):
+            began = time.perf_counter()
+            run(user.address, given, user.par, out, count)
+            times.append((time.perf_counter() - began) / count)
+        zero = [0.0, 0.0, 0.0]
+        for _ in range(5):
+            began = time.perf_counter()
+            for _ in range(20_000):
+                user.function(
+                    1, 0.0, [0.2, 0.2, 0.02, 0.02], 4, zero, zero, zero, [0.3, 0.0, 0.0], 50.0, 0, 0
+                )
+            bodies.append((time.perf_counter() - began) / 20_000)
+        kind = "interpreted" if interpret else "compiled"
+        body = statistics.median(bodies) if interpret else 0.0
+        cost = statistics.median(times)
+        print(f"{kind}: {1e9 * cost:.0f} ns a call, {1e9 * (cost - body):.0f} ns above its body")
+        assert cost > 0
