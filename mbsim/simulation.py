@@ -28,8 +28,10 @@ if TYPE_CHECKING:
     from mbsim.system.build import System
 
 DEFAULT_TOL = 1e-5
-#: Evaluations after which compiled code comes back for progress and Ctrl-C.
-BUDGET = 50_000
+#: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
+#: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
+RETURN_SECONDS = 0.1
+FIRST_BUDGET = 200
 INTEGRATORS = ("DOPRI5",)
 #: MotionSolve's names, all run by the one method there is.
 _MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
@@ -39,21 +41,33 @@ Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How a model is run: the command line before the deck's Command before its Model."""
+class Stage:
+    """One Simulate with what holds for it; steps in [T]."""
 
-    simulations: tuple[Simulation, ...]
-    integrator: str
+    simulation: Simulation
     tol: float
     h_max: float
     h_min: float
-    first_step: float
+    h0_max: float  # 0 if not given
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a model is run: the command line before the deck's Command before its Model."""
+
+    stages: tuple[Stage, ...]
+    integrator: str
     notes: tuple[str, ...]
 
     @property
     def end_time(self) -> float:
         """End of the last simulation [T]."""
-        return self.simulations[-1].end_time
+        return self.stages[-1].simulation.end_time
+
+    @property
+    def tol(self) -> float:
+        """Tolerance of the first simulation."""
+        return self.stages[0].tol
 
 
 def _checked(name: str, value: float, low: float, high: float) -> float:
@@ -101,36 +115,32 @@ def settle(
         If a value is out of range or there is nothing to simulate.
     """
     notes = []
-    simulations = _simulations(model, end_time, print_interval)
-    in_command = next((s.transient for s in simulations if s.transient is not None), None)
-    sources = [in_command, model.transient]
+    stages = []
+    names = set()
+    motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
+    for simulation in _simulations(model, end_time, print_interval):
+        sources = (simulation.transient, model.transient)
 
-    def said(attribute: str) -> Any:
-        values = (getattr(source, attribute) for source in sources if source is not None)
-        return next((value for value in values if value is not None), None)
+        def said(attribute: str, sources: Any = sources) -> Any:
+            values = (getattr(source, attribute) for source in sources if source is not None)
+            return next((value for value in values if value is not None), None)
 
-    named = (integrator or said("integrator_type") or INTEGRATORS[0]).upper()
-    if named in _MOTIONSOLVE_NAMES:
-        notes.append(f"integrator {named}: run by DOPRI5 (explicit, order 5); no stiff method yet")
-        named = "DOPRI5"
-    if named not in INTEGRATORS:
-        allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
-        raise ModelError(f"integrator={named} is not known; there are {allowed}")
-    chosen = tol if tol is not None else said("integr_tol")
-    chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
-    h_max = said("h_max") or math.inf
-    if model.compatibility.upper().replace("_", "") == "MOTIONSOLVE":
-        h_max = min(h_max, min(s.print_interval for s in simulations))
-        notes.append(f"compatibility MOTIONSOLVE: h_max = {h_max:g} (at most the print interval)")
-    return Settings(
-        simulations,
-        named,
-        chosen,
-        h_max,
-        said("h_min") or 0.0,
-        said("h0_max") or 0.0,
-        tuple(notes),
-    )
+        names.add((integrator or said("integrator_type") or INTEGRATORS[0]).upper())
+        chosen = tol if tol is not None else said("integr_tol")
+        chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
+        h_max = said("h_max") or math.inf
+        if motionsolve:
+            h_max = min(h_max, simulation.print_interval)
+        stages.append(Stage(simulation, chosen, h_max, said("h_min") or 0.0, said("h0_max") or 0.0))
+    if motionsolve:
+        notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
+    for name in sorted(names):
+        if name in _MOTIONSOLVE_NAMES:
+            notes.append(f"integrator {name}: run by DOPRI5 (explicit, order 5)")
+        elif name not in INTEGRATORS:
+            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
+            raise ModelError(f"integrator={name} is not known; there are {allowed}")
+    return Settings(tuple(stages), INTEGRATORS[0], tuple(notes))
 
 
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:
@@ -153,7 +163,7 @@ class Runner:
         from mbsim.integrators import dopri5
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
-        self.method = dopri5.make(system.y0, settings.simulations[0].start_time)
+        self.method = dopri5.make(system.y0, settings.stages[0].simulation.start_time)
         self.detector = self._open_fcl_door()
         self.problem: Problem
         self.problem, self._table = mechanism(system.scene)
@@ -183,7 +193,7 @@ class Runner:
 
     def settle_contacts(self, allow_overlap: bool) -> None:
         """Begin with the incidents that exist at the start; refuse those that are too deep."""
-        t = self.settings.simulations[0].start_time
+        t = self.settings.stages[0].simulation.start_time
         y, f = self.method.y, self.method.k[0]
         code = self.call(self.problem.rhs, t, 0.0, y, f)
         if code != 0.0:
@@ -246,45 +256,49 @@ class Runner:
     def run(self, progress: Progress | None, resumed: bool) -> None:
         """Run all Simulate statements from the current stage on."""
         first = self.stage
-        for stage in range(first, len(self.settings.simulations)):
+        for stage in range(first, len(self.settings.stages)):
             fresh = not (resumed and stage == first)
             self.stage = stage
-            self._run_stage(self.settings.simulations[stage], fresh, progress)
+            self._run_stage(self.settings.stages[stage], fresh, progress)
 
-    def _run_stage(self, simulation: Simulation, fresh: bool, progress: Progress | None) -> None:
+    def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
         from mbsim.core import problem
         from mbsim.integrators import dopri5
 
-        method, settings, scene = self.method, self.settings, self.system.scene
+        method, scene, simulation = self.method, self.system.scene, stage.simulation
         if simulation.gravity is not None:
             scene.world.gravity[:] = simulation.gravity.g
-        times = output_times(simulation, self.stage == len(settings.simulations) - 1)
-        h_max = settings.h_max
-        if simulation.transient is not None and simulation.transient.h_max:
-            h_max = min(h_max, simulation.transient.h_max)
+        times = output_times(simulation, self.stage == len(self.settings.stages) - 1)
+        budget = FIRST_BUDGET
         if fresh:
             # the statement may have changed what acts: f and the step begin anew
             method.memory[dopri5.HAVE_F] = 0.0
-            method.memory[dopri5.STEP] = settings.first_step
+            method.memory[dopri5.STEP] = 0.0
+            method.memory[dopri5.FIRST_MAX] = stage.h0_max
             method.memory[dopri5.LAST_STEP] = 0.0
             method.counts[dopri5.NEXT_OUTPUT] = 1
             code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
             if code < 0.0:
                 self.fail(int(-code), times[0])
         while True:
-            began = time.perf_counter()
+            began, before = time.perf_counter(), int(method.counts[dopri5.EVALUATIONS])
             outcome = self._advance(
                 self.problem,
                 method,
                 simulation.end_time,
-                settings.tol,
-                h_max,
-                settings.h_min,
+                stage.tol,
+                stage.h_max,
+                stage.h_min,
                 times,
-                BUDGET,
+                budget,
             )
-            self.loop_seconds += time.perf_counter() - began
+            elapsed = time.perf_counter() - began
+            self.loop_seconds += elapsed
+            done = int(method.counts[dopri5.EVALUATIONS]) - before
+            wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
+            # at most four times as many: the first calls also compile or load code
+            budget = int(min(max(wanted, 1.0), 4.0 * budget))
             self.recorder.take()
             if outcome == problem.DONE:
                 return
@@ -298,7 +312,7 @@ class Runner:
                 self.recorder.flush(self.checkpoint())
             if progress is not None:
                 h = float(method.memory[dopri5.STEP])
-                progress(float(method.memory[dopri5.TIME]), h, settings.end_time)
+                progress(float(method.memory[dopri5.TIME]), h, self.settings.end_time)
 
     def give_up(self) -> None:
         """Raise why the step became too small."""
@@ -458,6 +472,9 @@ def simulate(
     files = [Path(file) for file in plugins]
     said: list[str] = []
     system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
+    for number, user in system.user_friction.items():
+        how = "compiled" if user.compiled else f"interpreted: {user.reason}"
+        tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
     attributes: dict[str, str | float | int] = {
         "mbsim_version": __version__,
         "model_file": model.file,
@@ -466,7 +483,7 @@ def simulate(
         "integrator": settings.integrator,
         "tol": settings.tol,
         "end_time": settings.end_time,
-        "print_interval": settings.simulations[-1].print_interval,
+        "print_interval": settings.stages[-1].simulation.print_interval,
         "detector": detector,
     }
     recorder = Recorder(system, attributes, None if output is None else Path(output), resume)

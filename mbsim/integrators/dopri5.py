@@ -63,12 +63,13 @@ class Method(NamedTuple):
     trial: F1  # (n,)
     error: F1  # (n,)
     dense: F2  # (5, n) polynomial of the last accepted step
-    memory: F1  # (9,) see the names below
+    memory: F1  # (10,) see the names below
     counts: I1  # (8,) see the names below
 
 
 # memory
-TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST, LAST_TIME, LAST_STEP = range(9)
+TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
+LAST_TIME, LAST_STEP, FIRST_MAX = range(7, 10)
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 
@@ -76,7 +77,7 @@ STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 def make(y0: np.ndarray, t0: float) -> Method:
     """Return the method at rest at (t0, y0)."""
     n = len(y0)
-    memory = np.zeros(9)
+    memory = np.zeros(10)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
     memory[H_SMALLEST] = math.inf
@@ -243,6 +244,8 @@ def begin(p, m, t, t_end, tol):
         m.memory[HAVE_F] = 1.0
     if m.memory[STEP] == 0.0:
         m.memory[STEP] = first_step(p, m, t, t_end - t, tol)
+        if m.memory[FIRST_MAX] > 0.0:
+            m.memory[STEP] = min(m.memory[STEP], m.memory[FIRST_MAX])
     return 0.0
 
 
