@@ -29,6 +29,8 @@ Table = np.ndarray[Any, Any]
 EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
 EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
 
+_PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
+
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
 #: Time between two publications: at least this [s], and so many times what one costs.
@@ -111,10 +113,10 @@ class Recorder:
         if resume:
             self.checkpoint = self._resumed(settings)
         self._store = Store(self._target, resume)
-        self._store.describe("/", {**settings, "status": "running"})
-        if not resume:
-            self._label()
-        self._store.remove("stats")
+        labels = {} if resume else self._labels()
+        self._store.update(
+            attributes={"/": {**settings, "status": "running"}, **labels}, remove=["stats"]
+        )
 
     def _resumed(self, settings: Mapping[str, Value]) -> dict[str, Table]:
         """Return the checkpoint to go on from, after comparing what it was made with."""
@@ -131,14 +133,23 @@ class Recorder:
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
 
-    def _label(self) -> None:
-        """Write what elements are called, and what requests hold."""
-        for body_id in self.system.body_ids:
-            if label := self.system.model.bodies[body_id].label:
-                self._store.describe(f"bodies/{body_id}", {"label": label})
-        for contact_id in self.system.contact_ids:
-            if label := self.system.model.contacts[contact_id].label:
-                self._store.describe(f"contacts/{contact_id}", {"label": label})
+    def _labels(self) -> dict[str, dict[str, Any]]:
+        """Return what elements are called and what requests hold, by group or dataset."""
+        model = self.system.model
+        named = {f"bodies/{id}": model.bodies[id].label for id in self.system.body_ids}
+        named |= {f"contacts/{id}": model.contacts[id].label for id in self.system.contact_ids}
+        return {name: {"label": label} for name, label in named.items() if label}
+
+    def _columns(self) -> dict[str, dict[str, Any]]:
+        """Return what the columns of the requests are, by dataset."""
+        return {
+            f"requests/{request.id}": {
+                "columns": COLUMNS[request.type],
+                "type": request.type,
+                "label": request.label or request.comment,
+            }
+            for request in self.system.model.requests.values()
+        }
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
@@ -187,8 +198,9 @@ class Recorder:
         if self._target is None:
             return
         self._write()
-        for name, values in checkpoint.items():
-            self._store.put(f"checkpoint/{name}", values)
+        self._store.update(
+            values={f"checkpoint/{name}": array for name, array in checkpoint.items()}
+        )
         self._store.publish()
         self._rows_since_flush = 0
         self._published_at = time.monotonic()
@@ -210,21 +222,18 @@ class Recorder:
             If the files cannot be written, or could not be before.
         """
         self._write(last=True)
-        for row, contact_id in zip(contact_log, self.system.contact_ids, strict=True):
-            group = f"contacts/{contact_id}"
-            self._store.put(f"{group}/peak_force", float(row[PEAK_FORCE]))
-            self._store.put(f"{group}/peak_penetration", float(row[PEAK_DEPTH]))
-            self._store.put(f"{group}/peak_slip_speed", float(row[PEAK_SLIP]))
-        if status == "finished" or self._rows_since_flush:
-            # of rows after the checkpoint, a resumed run would record the second copy
-            self._store.remove("checkpoint")
-        for request in self.system.model.requests.values():
-            about: dict[str, Any] = {"columns": COLUMNS[request.type], "type": request.type}
-            if request.label or request.comment:
-                about["label"] = request.label or request.comment
-            self._store.describe(f"requests/{request.id}", about)
-        self._store.describe("stats", stats)
-        self._store.describe("/", {"status": status})
+        peaks = {
+            f"contacts/{contact_id}/peak_{name}": float(row[column])
+            for row, contact_id in zip(contact_log, self.system.contact_ids, strict=True)
+            for name, column in _PEAKS.items()
+        }
+        # of rows after the checkpoint, a resumed run would record a second copy
+        stale = status == "finished" or self._rows_since_flush > 0
+        self._store.update(
+            values=peaks,
+            attributes={**self._columns(), "stats": stats, "/": {"status": status}},
+            remove=["checkpoint"] if stale else [],
+        )
         in_memory = self._store.finish()
         if self._target is None:
             if in_memory is None:
@@ -243,7 +252,7 @@ class Recorder:
             self._blocks = [_nothing(self.system)]
         block = _joined(self._blocks)
         self._blocks, self._bytes = [], 0
-        self._store.append(dict(self._signals(block)), last)
+        self._store.update(rows=dict(self._signals(block)), last=last)
         self._started = True
         self._incidents += len(block.incidents)
 

@@ -8,11 +8,12 @@ one published. HDF5 itself promises nothing of a file whose writer was killed.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from mbsim.results.files import problem, sync
 if TYPE_CHECKING:
     import h5py
 
+Table = np.ndarray[Any, Any]
 Value = str | float | int
 #: Bytes of a chunk: small enough for many signals, large enough for long runs.
 _CHUNK = 8192
@@ -112,63 +114,104 @@ class Store:
         assert self.target is not None
         return self.target.with_name(f".{self.target.name}.tmp")
 
-    def append(self, rows: Mapping[str, np.ndarray[Any, Any]], last: bool = False) -> None:
-        """Add rows to the datasets of these names, made at their first rows.
+    def update(
+        self,
+        rows: Mapping[str, Table] | None = None,
+        values: Mapping[str, Any] | None = None,
+        attributes: Mapping[str, Mapping[str, Any]] | None = None,
+        remove: Iterable[str] = (),
+        last: bool = False,
+    ) -> None:
+        """Change the file in one go.
 
-        `last` says that no more will follow: a file written at once needs no chunks.
+        Parameters
+        ----------
+        rows : mapping
+            Rows to add to the datasets of these names, made at their first rows.
+        values : mapping
+            Datasets to write whole, in the place of those of their names.
+        attributes : mapping of mapping
+            Attributes of datasets and of groups, which are made if they are not there.
+        remove : iterable of str
+            Datasets and groups to take out, if they are there.
+        last : bool
+            No more rows will follow: a file written at once needs no chunks.
         """
         if self.broken:
             return
-        growing = self._growing or not last
+        rows, attributes = rows or {}, attributes or {}
+        arrays = {name: np.asarray(value) for name, value in (values or {}).items()}
+        items = [*rows.values(), *arrays.values()]
         with self._writing():
-            for name, values in rows.items():
-                if self._growing and name in self.file:
-                    dataset = self.file[name]
-                    count = dataset.shape[0]
-                    dataset.resize(count + len(values), axis=0)
-                    dataset[count:] = values
-                elif growing:
-                    width = max(1, values.itemsize * int(np.prod(values.shape[1:])))
-                    chunk = (max(1, min(1024, _CHUNK // width)), *values.shape[1:])
-                    if 0 in chunk:
-                        chunk = tuple(max(1, size) for size in chunk)
-                    limits = (None, *values.shape[1:])
-                    self.file.create_dataset(name, data=values, maxshape=limits, chunks=chunk)
-                else:
-                    self.file.create_dataset(name, data=values)
-            self._growing = True
+            self._reserve(sum(int(array.nbytes) for array in items), len(items) + len(attributes))
+            for name in remove:
+                if name in self.file:
+                    del self.file[name]
+            growing = self._growing or not last
+            for name, array in rows.items():
+                self._append(name, array, growing)
+            self._growing = self._growing or bool(rows)
+            for name, array in arrays.items():
+                self._put(name, array)
+            for name, facts in attributes.items():
+                if name != "/" and name not in self.file:
+                    self.file.create_group(name)
+                self.file[name].attrs.update(facts)
+            self._settle()
 
-    def put(self, name: str, value: Any) -> None:
-        """Write a dataset whole, in the place of one of its name."""
-        if self.broken:
+    def _reserve(self, size: int, items: int) -> None:
+        """Raise OSError unless the disk has room for `size` bytes in `items` places.
+
+        HDF5 cannot be left when it meets a full disk: it prints, and may crash at the
+        close. So the room is taken before it writes.
+        """
+        if self.target is None:
             return
-        with self._writing():
-            before = self.file.get(name)
-            array = np.asarray(value)
-            if before is not None and before.shape == array.shape and before.dtype == array.dtype:
-                before[...] = array
+        # chunks are allocated whole, and each dataset has an index and a header
+        room = size + size // 8 + items * 3 * _CHUNK + (1 << 18)
+        end = os.fstat(self._lock).st_size
+        if hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._lock, end, room)
                 return
-            if before is not None:
-                del self.file[name]
-            self.file[name] = array
+            except OSError as error:
+                if error.errno not in (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS):
+                    raise
+        if shutil.disk_usage(self.part.parent).free < room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def remove(self, name: str) -> None:
-        """Remove a dataset or group if it is there."""
-        if self.broken:
-            return
-        with self._writing():
-            if name in self.file:
-                del self.file[name]
+    def _settle(self) -> None:
+        """Bring everything to the file, and give back the room that was not used."""
+        self.file.flush()
+        if self.target is not None:
+            os.ftruncate(self._lock, self.file.id.get_filesize())
 
-    def describe(self, name: str, attributes: Mapping[str, Any]) -> None:
-        """Set attributes of a dataset or group, which is made if it is not there."""
-        if self.broken:
+    def _append(self, name: str, rows: Table, growing: bool) -> None:
+        """Add rows to one dataset."""
+        if self._growing and name in self.file:
+            if len(rows):
+                dataset = self.file[name]
+                count = dataset.shape[0]
+                dataset.resize(count + len(rows), axis=0)
+                dataset[count:] = rows
+        elif growing:
+            width = max(1, rows.itemsize * int(np.prod(rows.shape[1:])))
+            columns = (max(1, size) for size in rows.shape[1:])
+            chunk = (max(1, min(1024, _CHUNK // width)), *columns)
+            limits = (None, *rows.shape[1:])
+            self.file.create_dataset(name, data=rows, maxshape=limits, chunks=chunk)
+        else:
+            self.file.create_dataset(name, data=rows)
+
+    def _put(self, name: str, array: Table) -> None:
+        """Write one dataset whole."""
+        before = self.file.get(name)
+        if before is not None and (before.shape, before.dtype) == (array.shape, array.dtype):
+            before[...] = array
             return
-        with self._writing():
-            if name != "/" and name not in self.file:
-                self.file.create_group(name)
-            for key, value in attributes.items():
-                self.file[name].attrs[key] = value
+        if before is not None:
+            del self.file[name]
+        self.file.create_dataset(name, data=array)
 
     def publish(self) -> None:
         """Put a complete copy in the target's place; does nothing in memory."""
@@ -176,7 +219,6 @@ class Store:
             return
         began = time.perf_counter()
         with self._writing():
-            self.file.flush()
             shutil.copyfile(self.part, self._copy)
             sync(self._copy)
             os.replace(self._copy, self.target)
@@ -187,7 +229,6 @@ class Store:
         if self.broken:
             return None
         if self.target is None:
-            self.file.flush()
             return self.file
         with self._writing():
             self.file.close()

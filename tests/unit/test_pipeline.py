@@ -89,3 +89,88 @@ def test_spheres_on_a_plane_need_neither_fcl_trimesh_nor_matplotlib(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def quaternion_about_z(angle):
+    return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+
+
+def test_incident_marker_turns_with_a_turntable(tmp_path):
+    from mbsim.dynamics.contact import tangent
+    from mbsim.dynamics.kinematics import place_bodies
+
+    # a ball on a disc, both moving bodies; the frame must turn with both
+    disc = """<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="2"/>
+    <Reference_Marker id="30" body_id="3"/>
+    <Post_Graphic id="300" type="BoxDefinedFromCenter" center_marker_id="30"
+      length_x="2" length_y="2" length_z="0.2"/>"""
+    (tmp_path / "law.py").write_text(
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        "    return [-x[0], -x[1], 0.0]\n"
+    )
+    law = {"cff_type": "USERCFF", "cff_fnc_name": "CFFSUB", "script_name": "law.py"}
+    model = sphere(0.1999, x=0.4) + disc + contact(200, 300, **law)
+    system, rhs = evaluator(write_deck(tmp_path, model))
+    scene, y = system.scene, system.y0.copy()
+    rhs(y)
+    n = (0.0, 0.0, 1.0)
+    place_bodies(scene, y)
+    gi = int(scene.pairs.graphic_i[0])
+    bodies = int(scene.graphics.body[gi]), int(scene.graphics.body[1 - gi])
+    born = np.array(tangent(scene, y, 0, gi, *bodies, n))
+    # at birth: I's marker x-axis projected
+    np.testing.assert_allclose(born, [1.0, 0.0, 0.0], atol=1e-15)
+
+    scene.state.touching[0] = 1
+    scene.state.t[0], scene.state.n[0] = born, n
+    scene.state.q[:2] = y[[3, 4, 5, 6]], y[[16, 17, 18, 19]]
+    for ball, table, expected in ((0.3, 0.3, 0.3), (0.4, 0.0, 0.2), (-2.0, -2.0, -2.0)):
+        turned = y.copy()
+        turned[3:7], turned[16:20] = quaternion_about_z(ball), quaternion_about_z(table)
+        place_bodies(scene, turned)
+        t = np.array(tangent(scene, turned, 0, gi, *bodies, n))
+        np.testing.assert_allclose(t, [np.cos(expected), np.sin(expected), 0.0], atol=1e-14)
+
+
+def test_incident_marker_follows_the_normal_by_the_shortest_rotation():
+    from mbsim.core.rotation import turn_with_normal
+
+    tilt = 0.3
+    t = turn_with_normal((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (np.sin(tilt), 0.0, np.cos(tilt)))
+    np.testing.assert_allclose(t, [np.cos(tilt), 0.0, -np.sin(tilt)], atol=1e-15)
+    # about the tangent itself nothing turns
+    t = turn_with_normal((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, np.sin(tilt), np.cos(tilt)))
+    np.testing.assert_allclose(t, [1.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_user_law_sees_the_surface_points_in_the_markers_axes(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "seen = {}\n"
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        "    seen.update(id=id, time=time, par=par, npar=npar, loci=loci, locj=locj,\n"
+        "                xdot=xdot, nforce=nforce, dflag=dflag, iflag=iflag)\n"
+        "    return [0.0, 0.0, 0.0]\n"
+    )
+    law = {
+        "cff_type": "USERCFF",
+        "cff_param_string": "USER(1,2.5)",
+        "cff_fnc_name": "CFFSUB",
+        "script_name": "law.py",
+    }
+    model = """<Body_Rigid id="1" isground="TRUE"/>
+    <Reference_Marker id="10" body_id="1" pos_x="1.0" psi="1.5707963267948966"/>
+    <Post_Graphic id="100" type="Plane" rm_id="10"/>"""
+    deck = write_deck(
+        tmp_path,
+        model + sphere(0.098, x=1.3, v=(0.5, 0.2, 0.0), w=(0.0, 0.0, 3.0)) + contact(**law),
+    )
+    system, rhs = evaluator(deck)
+    rhs(system.y0)
+    seen = system.user_friction[301].function.__globals__["seen"]
+    assert (seen["id"], seen["npar"], seen["par"]) == (301, 2, [1.0, 2.5])
+    assert (seen["dflag"], seen["iflag"]) == (0, 0)
+    # the ball's lowest point, 2 mm below the plane; the plane's highest, in its turned marker
+    np.testing.assert_allclose(seen["loci"], [0.0, 0.0, -0.1], atol=1e-15)
+    np.testing.assert_allclose(seen["locj"], [0.0, -0.3, 0.0], atol=1e-15)
+    np.testing.assert_allclose(seen["xdot"], [0.5, 0.2, 3.0], atol=1e-15)
+    assert seen["nforce"] == pytest.approx(1e5 * 0.002**1.5)

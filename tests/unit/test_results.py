@@ -454,7 +454,7 @@ def test_log_of_a_resumed_run_goes_on(tmp_path: Path) -> None:
     again = RunLog(system, SETTINGS, tmp_path, resume=True)
     again.close("finished", {})
     text = (tmp_path / "deck.log").read_text()
-    assert text.index("before") < text.index("resumed") < text.index("end: finished")
+    assert text.index("before") < text.index("resumed from the last") < text.index("end: finished")
 
 
 def test_a_talkative_subroutine_does_not_fill_memory(tmp_path: Path) -> None:
