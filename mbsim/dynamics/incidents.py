@@ -69,6 +69,15 @@ def deepest_of_impact(scene, c, energy):
 
 
 @jitable
+def touched(scene, pair):
+    """Return whether a pair touched at the committed state."""
+    for s in range(scene.pairs.slot[pair], scene.pairs.slot[pair + 1]):
+        if scene.state.touching[s] == 1:
+            return True
+    return False
+
+
+@jitable
 def first_depth(scene, t, h, y):
     """Return 1, or the part of the step to take so that a new incident begins shallow.
 
@@ -80,6 +89,10 @@ def first_depth(scene, t, h, y):
     part = 1.0
     for s in range(len(scene.slots.pair)):
         if work.touching[s] == 0 or state.touching[s] == 1 or work.slot[s, RATE] <= 0.0:
+            continue
+        pair = scene.slots.pair[s]
+        if scene.pairs.regroups[pair] == 1 and touched(scene, pair):
+            # not an impact: the points of a contact that goes on were chosen anew
             continue
         c = scene.slots.contact[s]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
@@ -306,11 +319,8 @@ def commit(scene, t, h, y):
     for pair in range(len(pairs.contact)):
         if pairs.watched[pair] == 0:
             continue
-        touching = False
-        for s in range(pairs.slot[pair], pairs.slot[pair + 1]):
-            touching = touching or state.touching[s] == 1
         gap = state.gap[pair]
-        if touching:
+        if touched(scene, pair):
             state.gap[pair] = 0.0
         elif gap <= 0.0 or moved(scene, y, pair, 0) + moved(scene, y, pair, 1) > 0.5 * gap:
             # half of the gap is used up: measure where the shapes are now

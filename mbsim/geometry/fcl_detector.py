@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.geometry.support import CONVEX, ROUND, support
+from mbsim.geometry.support import CONVEX, ROUND, face_normal, round_normal, support
 from mbsim.model.elements import Graphic
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ class FclDetector:
         sign = -1.0 if scene.pairs.swapped[pair] else 1.0
         for depth, p, n in found[: last - first]:
             if last - first == 1:
+                n = self._sharpen(i, j, n)
                 depth, p = self._refine(i, j, depth, p, n)
                 slot = first
             else:
@@ -141,6 +142,24 @@ class FclDetector:
             points[slot, 0] = depth
             points[slot, 1:4] = p
             points[slot, 4:7] = sign * n
+
+    def _sharpen(self, i: int, j: int, n: Any) -> Any:
+        """Return the normal made exact where a shape is round and the other round or a box."""
+        shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
+        size, frame_i, frame_j = self._scene.graphics.size, self._frame(i), self._frame(j)
+        if shape_i in ROUND and shape_j in ROUND:
+            return round_normal(shape_i, size[i], frame_i, shape_j, size[j], frame_j, n)
+        if shape_i in ROUND and shape_j == "BOX":
+            face = face_normal(
+                size[j], frame_j, lambda d: support(shape_i, size[i], *frame_i, -d), n
+            )
+            return n if face is None else face
+        if shape_j in ROUND and shape_i == "BOX":
+            face = face_normal(
+                size[i], frame_i, lambda d: support(shape_j, size[j], *frame_j, -d), -n
+            )
+            return n if face is None else -face
+        return n
 
     def _refine(self, i: int, j: int, depth: float, p: Any, n: Any) -> tuple[float, Any]:
         """Return depth and midpoint made exact along n from the shapes' support points."""

@@ -235,6 +235,9 @@ class Recorder:
             remove=["checkpoint"] if stale else [],
         )
         in_memory = self._store.finish()
+        if self._store.failure is not None:
+            # raised once already, maybe; a caller that cleans up shall not hear another story
+            raise self._store.failure
         if self._target is None:
             if in_memory is None:
                 raise ResultsError("results in memory could not be written")

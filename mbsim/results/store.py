@@ -44,6 +44,7 @@ class Store:
 
         self.target = target
         self.broken = False
+        self.failure: ResultsError | None = None
         self.publish_seconds = 0.0
         self._lock = -1
         self._growing = False
@@ -87,7 +88,8 @@ class Store:
             yield
         except (OSError, RuntimeError) as error:
             self.abandon()
-            raise problem(self.target or Path("memory"), error) from None
+            self.failure = problem(self.target or Path("memory"), error)
+            raise self.failure from None
 
     def abandon(self) -> None:
         """Drop the part file; what was published stays."""

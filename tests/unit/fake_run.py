@@ -98,7 +98,7 @@ def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
         rows.y[at, 0] = k
         rows.y[at, 10:13] = (0.0, 0.0, 0.5)
         rows.accel[at] = k
-        rows.contact[at] = np.arange(a.CONTACT_COLUMNS) + 100 * k
+        rows.contact[at].reshape(-1, a.CONTACT_COLUMNS)[:] = np.arange(a.CONTACT_COLUMNS) + 100 * k
         rows.energy[at] = (k, 2 * k, 3 * k)
         rows.incident_count[at] = k % 2
         if k % 2:

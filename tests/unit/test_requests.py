@@ -14,15 +14,15 @@ from mbsim.model.placement import MarkerPlace
 from mbsim.results.motion import Motion, matrices, motion, rotate
 from mbsim.results.requests import angles_313, evaluate, rotation_angle
 
-I, J, REF, GROUND = 1, 2, 3, 4
+MARKER, J, REF, GROUND = 1, 2, 3, 4
 random = np.random.default_rng(7)
 R_I, R_J, R_REF = (rotation_313(*random.uniform(-3, 3, 3)) for _ in range(3))
 P_I, P_J, P_GROUND = (random.normal(size=3) for _ in range(3))
 EYE, ZERO = np.eye(3), np.zeros(3)
 
-#: Markers I on body 10, J and REF on body 20, GROUND on ground.
+#: MARKER on body 10, J and REF on body 20, GROUND on ground.
 MARKERS = {
-    I: MarkerPlace(I, 10, ZERO, EYE, P_I, R_I),
+    MARKER: MarkerPlace(MARKER, 10, ZERO, EYE, P_I, R_I),
     J: MarkerPlace(J, 20, ZERO, EYE, P_J, R_J),
     REF: MarkerPlace(REF, 20, ZERO, EYE, ZERO, R_REF),
     GROUND: MarkerPlace(GROUND, 1, P_GROUND, R_REF, P_GROUND, R_REF),
@@ -54,7 +54,7 @@ def moving(t: np.ndarray[Any, Any]) -> Motion:
     return motion([10, 20], y, accel)
 
 
-def request(kind: str, j: int | None = None, ref: int | None = None, i: int = I) -> Request:
+def request(kind: str, j: int | None = None, ref: int | None = None, i: int = MARKER) -> Request:
     """Return a request."""
     return Request(1, f"MARKER_{kind}", i_marker_id=i, j_marker_id=j, ref_marker_id=ref)
 
@@ -113,7 +113,7 @@ def test_angles_are_of_i_in_j() -> None:
 
 def test_body_on_a_turntable() -> None:
     # unit circle at 2 rad/s: v = 2, a = -4 towards the centre
-    markers = {I: MarkerPlace(I, 5, ZERO, EYE, np.array([1.0, 0.0, 0.0]), EYE)}
+    markers = {MARKER: MarkerPlace(MARKER, 5, ZERO, EYE, np.array([1.0, 0.0, 0.0]), EYE)}
     t = np.array([0.0, 0.3])
     y = np.zeros((2, 14))
     y[:, 3], y[:, 6], y[:, 12] = np.cos(t), np.sin(t), 2.0
