@@ -466,7 +466,7 @@ def simulate(
     settings = settle(model, end_time, print_interval, integrator, tol)
     tell = notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
-        "compiling for this machine; this happens once and may take half a minute"
+        "compiling what this model needs (up to half a minute); later runs load it"
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
@@ -490,6 +490,10 @@ def simulate(
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
+    if system.user_friction:
+        from mbsim.plugins import host
+
+        host.log = log.line
     status = "failed"
     runner = Runner(system, settings, recorder, log)
     try:
@@ -509,9 +513,15 @@ def simulate(
         raise
     finally:
         recorder.take()
-        if status != "finished":
-            recorder.flush(runner.checkpoint())
         stats = runner.stats(time.perf_counter() - began, jit.compile_seconds - compiled_before)
-        results = recorder.close(status, stats, system.scene.log.contacts)
-        log.close(status, stats, recorder.last_energy)
+        try:
+            if recorder.empty and recorder.directory is not None:
+                # it ended before its first row: an earlier result in that folder stays
+                recorder.abandon()
+            else:
+                if status != "finished":
+                    recorder.flush(runner.checkpoint())
+                results = recorder.close(status, stats, system.scene.log.contacts)
+        finally:
+            log.close(status, stats, recorder.last_energy)
     return results

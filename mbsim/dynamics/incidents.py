@@ -321,10 +321,14 @@ def commit(scene, t, h, y):
             continue
         gap = state.gap[pair]
         if touched(scene, pair):
-            state.gap[pair] = 0.0
-        elif gap <= 0.0 or moved(scene, y, pair, 0) + moved(scene, y, pair, 1) > 0.5 * gap:
+            state.gap[pair] = state.left[pair] = 0.0
+            continue
+        way = moved(scene, y, pair, 0) + moved(scene, y, pair, 1)
+        state.left[pair] = gap - way
+        if gap <= 0.0 or way > 0.5 * gap:
             # half of the gap is used up: measure where the shapes are now
             measure_gap(scene, y, pair)
+            state.left[pair] = state.gap[pair]
     return changed
 
 
@@ -380,7 +384,7 @@ def longest_step(scene, y, f):
                 speed += norm((y[at + 7], y[at + 8], y[at + 9]))
                 speed += norm((y[at + 10], y[at + 11], y[at + 12])) * reach
                 push += norm((f[at + 7], f[at + 8], f[at + 9]))
-        way = max(scene.state.gap[pair], 0.0) + thick
+        way = max(scene.state.left[pair], 0.0) + thick
         # way = speed h + push h^2 / 2
         if speed > 0.0 or push > 0.0:
             longest = min(

@@ -8,7 +8,7 @@ from mbsim.core.jitable import jitable
 
 SAFETY = 0.9
 SHRINK = 0.2
-GROW = 5.0
+GROW = 3.0
 
 
 @jitable

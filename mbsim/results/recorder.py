@@ -205,6 +205,15 @@ class Recorder:
         self._rows_since_flush = 0
         self._published_at = time.monotonic()
 
+    @property
+    def empty(self) -> bool:
+        """Whether not one row was recorded, by this run or by the one that it resumes."""
+        return not (self._started or self._blocks)
+
+    def abandon(self) -> None:
+        """Leave what an earlier run published as it is, and drop this one."""
+        self._store.abandon()
+
     def close(self, status: str, stats: Mapping[str, Value], contact_log: Table) -> Results:
         """Complete the files and return them as results.
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Table = np.ndarray[Any, Any]
 Value = str | float | int
 #: Bytes of a chunk: small enough for many signals, large enough for long runs.
-_CHUNK = 8192
+_CHUNK = 4096
 
 
 class Store:
@@ -170,7 +170,7 @@ class Store:
         if self.target is None:
             return
         # chunks are allocated whole, and each dataset has an index and a header
-        room = size + size // 8 + items * 3 * _CHUNK + (1 << 18)
+        room = size + size // 8 + items * 4 * _CHUNK + (1 << 18)
         end = os.fstat(self._lock).st_size
         if hasattr(os, "posix_fallocate"):
             try:

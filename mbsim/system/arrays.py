@@ -121,6 +121,7 @@ class State(NamedTuple):
     rate: F1  # (ns,) of depth
     normal: F1  # (ns,) normal force
     gap: F1  # (np,) distance that the pair kept when last measured
+    left: F1  # (np,) what the motion since has left of it for certain
     centre: F2  # (np, 6) centres of both graphics then
     turn: F2  # (np, 8) quaternions of both bodies then
 

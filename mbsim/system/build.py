@@ -252,6 +252,7 @@ def _state(nb: int, np_: int, ns: int) -> a.State:
         rate=np.zeros(ns),
         normal=np.zeros(ns),
         gap=np.zeros(np_),
+        left=np.zeros(np_),
         centre=np.zeros((np_, 6)),
         turn=turn,
     )

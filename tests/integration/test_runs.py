@@ -247,3 +247,27 @@ def test_json_is_one_object_and_nothing_else(tmp_path):
     }  # fmt: skip
     for name in ("steps", "rejected", "rhs_evaluations", "friction_calls", "wall_s", "compile_s"):
         assert name in answer["stats"]
+
+
+def test_a_run_that_cannot_begin_leaves_an_earlier_result_alone(tmp_path):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
+    assert cli("run", deck, "-o", tmp_path / "out").returncode == 0
+    before = (tmp_path / "out/deck.h5").read_bytes()
+    write_deck(tmp_path, GROUND + sphere(-0.05) + contact() + GRAVITY, end_time=0.1)
+    done = cli("run", deck, "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert (tmp_path / "out/deck.h5").read_bytes() == before
+    assert not list((tmp_path / "out").glob(".*"))
+
+
+def test_messages_of_a_user_subroutine_are_in_the_log(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        "    py_usrmes(1, 'touched', id, 'INFO')\n"
+        "    return [0.0, 0.0, 0.0]\n"
+    )
+    law = {"cff_type": "USERCFF", "cff_fnc_name": "CFFSUB", "script_name": "law.py"}
+    deck = write_deck(tmp_path, GROUND + sphere(0.3) + contact(**law) + GRAVITY, end_time=0.3)
+    assert cli("run", deck, "-o", tmp_path / "out").returncode == 0
+    text = (tmp_path / "out/deck.log").read_text()
+    assert "USRMES:USER [301] INFO: touched" in text

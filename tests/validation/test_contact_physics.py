@@ -49,7 +49,10 @@ def test_bouncing_sphere_converges():
 @pytest.mark.parametrize(
     ("name", "signal"),
     [("drop_m.xml", "bodies/2/position"), ("free_top.xml", "bodies/2/quaternion"),
-     ("sphere_pair.xml", "bodies/1/velocity"), ("bowling_ball.xml", "bodies/2/position")],
+     ("sphere_pair.xml", "bodies/1/velocity"), ("bowling_ball.xml", "bodies/2/position"),
+     ("drop_mm.xml", "bodies/2/position"), ("incline_slip.xml", "bodies/2/position"),
+     ("sliding_block.xml", "bodies/2/position"), ("mesh_on_plane.xml", "bodies/2/position"),
+     ("ellipsoid_on_box.xml", "bodies/2/position/z")],
 )  # fmt: skip
 def test_models_converge(name, signal):
     exact = run_model(name, tol=1e-12)[signal]
