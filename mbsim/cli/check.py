@@ -21,7 +21,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     """
     from mbsim.cli.messages import warn
     from mbsim.reader.xml import read_model
-    from mbsim.simulation import settle
+    from mbsim.settings import settle
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)

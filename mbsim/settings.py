@@ -1,0 +1,130 @@
+"""How a model is run: the command line before the deck's Command before its Model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbsim.errors import ModelError
+from mbsim.model.elements import Model, Simulation
+
+DEFAULT_TOL = 1e-5
+INTEGRATORS = ("DOPRI5",)
+#: MotionSolve's names, all run by the one method there is.
+_MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One Simulate with what holds for it; steps in [T]."""
+
+    simulation: Simulation
+    tol: float
+    h_max: float
+    h_min: float
+    h0_max: float  # 0 if not given
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a model is run: the command line before the deck's Command before its Model."""
+
+    stages: tuple[Stage, ...]
+    integrator: str
+    notes: tuple[str, ...]
+
+    @property
+    def end_time(self) -> float:
+        """End of the last simulation [T]."""
+        return self.stages[-1].simulation.end_time
+
+    @property
+    def tol(self) -> float:
+        """Tolerance of the first simulation."""
+        return self.stages[0].tol
+
+
+def _checked(name: str, value: float, low: float, high: float) -> float:
+    """Return a number given by the caller, or raise what is allowed."""
+    if not low < value <= high:
+        raise ModelError(f"{name}={value:g} is not allowed: above {low:g}, at most {high:g}")
+    return value
+
+
+def _simulations(
+    model: Model, end_time: float | None, print_interval: float | None
+) -> tuple[Simulation, ...]:
+    """Return what to run: the deck's Simulate statements, cut or replaced by the caller's times."""
+    planned = list(model.simulations)
+    if end_time is not None:
+        _checked("end_time", end_time, 0.0, math.inf)
+        if not planned:
+            planned = [Simulation(end_time=end_time, print_interval=end_time / 100.0)]
+        planned = [s for s in planned if s.start_time < end_time]
+        if not planned:
+            raise ModelError(f"end_time={end_time:g} is before the deck's first start_time")
+        kept = [replace(s, end_time=min(s.end_time, end_time)) for s in planned]
+        kept[-1] = replace(kept[-1], end_time=end_time)
+        planned = kept
+    if not planned:
+        raise ModelError(f"{model.file}: the deck has no Simulate; give --end-time")
+    if print_interval is not None:
+        _checked("print_interval", print_interval, 0.0, math.inf)
+        planned = [replace(s, print_interval=print_interval) for s in planned]
+    return tuple(planned)
+
+
+def settle(
+    model: Model,
+    end_time: float | None = None,
+    print_interval: float | None = None,
+    integrator: str | None = None,
+    tol: float | None = None,
+) -> Settings:
+    """Return the settings of a run.
+
+    Raises
+    ------
+    ModelError
+        If a value is out of range or there is nothing to simulate.
+    """
+    notes = []
+    stages = []
+    names = set()
+    motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
+    for simulation in _simulations(model, end_time, print_interval):
+        sources = (simulation.transient, model.transient)
+
+        def said(attribute: str, sources: Any = sources) -> Any:
+            values = (getattr(source, attribute) for source in sources if source is not None)
+            return next((value for value in values if value is not None), None)
+
+        names.add((integrator or said("integrator_type") or INTEGRATORS[0]).upper())
+        chosen = tol if tol is not None else said("integr_tol")
+        chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
+        h_max = said("h_max") or math.inf
+        if motionsolve:
+            h_max = min(h_max, simulation.print_interval)
+        stages.append(Stage(simulation, chosen, h_max, said("h_min") or 0.0, said("h0_max") or 0.0))
+    if motionsolve:
+        notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
+    for name in sorted(names):
+        if name in _MOTIONSOLVE_NAMES:
+            notes.append(f"integrator {name}: run by DOPRI5 (explicit, order 5)")
+        elif name not in INTEGRATORS:
+            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
+            raise ModelError(f"integrator={name} is not known; there are {allowed}")
+    return Settings(tuple(stages), INTEGRATORS[0], tuple(notes))
+
+
+def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:
+    """Return the output times of one Simulate; a restart's row belongs to the one that follows."""
+    t0, t1, dt = simulation.start_time, simulation.end_time, simulation.print_interval
+    # a whole number of intervals up to rounding ends exactly at the end
+    count = math.floor((t1 - t0) / dt * (1.0 + 1e-12) + 1e-9)
+    times = t0 + dt * np.arange(count + 1)
+    times = times[times < t1 - 1e-9 * dt]
+    return np.append(times, t1) if last else times
