@@ -372,7 +372,8 @@ def longest_step(scene, y, f):
     longest = longest_parting(scene)
     for pair in range(len(pairs.contact)):
         thick = pairs.thickness[pair]
-        if math.isinf(thick):
+        # in touch the stages feel the force, and sliding along is no approach
+        if math.isinf(thick) or touched(scene, pair):
             continue
         speed, push = 0.0, 0.0
         for side in range(2):
