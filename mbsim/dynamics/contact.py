@@ -48,12 +48,12 @@ def velocity_at(scene, y, b, p):
 
 
 @jitable
-def trial_quaternion(scene, y, b):
-    """Return the quaternion of body b at the trial point."""
+def turned(scene, y, b, n):
+    """Return the angle by which body b turned about n since the committed state."""
     if b == len(scene.bodies.mass):
-        return (1.0, 0.0, 0.0, 0.0)
+        return 0.0
     at = BODY_SIZE * b + 3
-    return (y[at], y[at + 1], y[at + 2], y[at + 3])
+    return twist_about((y[at], y[at + 1], y[at + 2], y[at + 3]), scene.state.q[b], n)
 
 
 @jitable
@@ -82,11 +82,7 @@ def tangent(scene, y, s, graphic_i, bi, bj, n):
     if state.touching[s] == 0:
         return birth_tangent(scene, graphic_i, n)
     t = turn_with_normal(vector(state.t[s]), vector(state.n[s]), n)
-    angle = 0.5 * (
-        twist_about(trial_quaternion(scene, y, bi), state.q[bi], n)
-        + twist_about(trial_quaternion(scene, y, bj), state.q[bj], n)
-    )
-    return spin(t, n, angle)
+    return spin(t, n, 0.5 * (turned(scene, y, bi, n) + turned(scene, y, bj, n)))
 
 
 @jitable
