@@ -49,8 +49,9 @@ class Settings:
 
 def _checked(name: str, value: float, low: float, high: float) -> float:
     """Return a number given by the caller, or raise what is allowed."""
-    if not low < value <= high:
-        raise ModelError(f"{name}={value:g} is not allowed: above {low:g}, at most {high:g}")
+    if not low < value <= high or math.isinf(value):
+        most = "finite" if math.isinf(high) else f"at most {high:g}"
+        raise ModelError(f"{name}={value:g} is not allowed: above {low:g}, {most}")
     return value
 
 
@@ -93,7 +94,7 @@ def settle(
     """
     notes = []
     stages = []
-    names = set()
+    names, from_deck = set(), set()
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -104,6 +105,8 @@ def settle(
 
         names.add((integrator or said("integrator_type") or INTEGRATORS[0]).upper())
         chosen = tol if tol is not None else said("integr_tol")
+        if tol is None and chosen is not None:
+            from_deck.add(f"integr_tol {chosen:g} of the deck is used as the dimensionless tol")
         chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
         h_max = said("h_max") or math.inf
         if motionsolve:
@@ -117,7 +120,7 @@ def settle(
         elif name not in INTEGRATORS:
             allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
             raise ModelError(f"integrator={name} is not known; there are {allowed}")
-    return Settings(tuple(stages), INTEGRATORS[0], tuple(notes))
+    return Settings(tuple(stages), INTEGRATORS[0], (*notes, *sorted(from_deck)))
 
 
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:

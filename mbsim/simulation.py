@@ -38,13 +38,16 @@ Notify = Callable[[str], None]
 class Runner:
     """One run: a system, its integrator, its recorder."""
 
-    def __init__(self, system: System, settings: Settings, recorder: Any, log: Any) -> None:
+    def __init__(
+        self, system: System, settings: Settings, recorder: Any, log: Any, tell: Notify
+    ) -> None:
         from mbsim.core import jit
         from mbsim.core.problem import Problem
         from mbsim.dynamics.hooks import mechanism
         from mbsim.integrators import dopri5
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
+        self.tell = tell
         self.method = dopri5.make(system.y0, settings.stages[0].simulation.start_time)
         self.detector = self._open_fcl_door()
         self.problem: Problem
@@ -98,6 +101,8 @@ class Runner:
             half = min(float(scene.graphics.half[row].min()) for row in rows)
             ignored = contact.ignore_penetration_larger_than
             limit = half if ignored is None else min(half, ignored)
+            if depth > 0.1 * limit and s == scene.pairs.slot[pair]:
+                self.tell(f"{name}: {between} overlap by {depth:.6g} at the start")
             if depth > limit:
                 faults.append(
                     f"{model.file}:{contact.source.line}: {name}: {between} overlap by {depth:.6g} "
@@ -354,6 +359,8 @@ def simulate(
     files = [Path(file) for file in plugins]
     said: list[str] = []
     system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
+    for note in settings.notes:
+        tell(note)
     for number, user in system.user_friction.items():
         how = "compiled" if user.compiled else f"interpreted: {user.reason}"
         tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
@@ -377,7 +384,7 @@ def simulate(
 
         host.log = log.line
     status = "failed"
-    runner = Runner(system, settings, recorder, log)
+    runner = Runner(system, settings, recorder, log, tell)
     try:
         with _stoppable(runner):
             if resume:

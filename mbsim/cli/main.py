@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
 from typing import Any
 
 import click
 
 from mbsim import __version__
-from mbsim.errors import DeckError, Interrupted, MbsimError
+from mbsim.errors import DeckError, Interrupted, MbsimError, ResultsError
 
 #: Subcommand -> module; each module has a click command named `command`.
 COMMANDS = {
@@ -41,6 +43,15 @@ class Commands(click.Group):
             for line in _messages(error):
                 click.echo(f"mbsim: error: {line}", err=True)
             ctx.exit(error.exit_code)
+        except BrokenPipeError:
+            # whoever read our output has seen enough; nothing is left to flush to it
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            ctx.exit(0)
+        except OSError as error:
+            # files of ours raise MbsimError: this is standard output, on a full disk say
+            click.echo(f"mbsim: error: standard output: {error.strerror}", err=True)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            ctx.exit(ResultsError.exit_code)
         except KeyboardInterrupt:
             click.echo("mbsim: error: interrupted", err=True)
             ctx.exit(Interrupted.exit_code)

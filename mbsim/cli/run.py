@@ -38,8 +38,15 @@ if TYPE_CHECKING:
     metavar="SELECTOR=VALUE",
     help="Change an attribute of the deck, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
 )
-@click.option("--integrator", metavar="NAME", help="Instead of the deck's.")
-@click.option("--tol", type=float, metavar="X", help="Local error of a step, dimensionless.")
+@click.option(
+    "--integrator", metavar="NAME", help="DOPRI5, or a MotionSolve name, which runs DOPRI5."
+)
+@click.option(
+    "--tol",
+    type=float,
+    metavar="X",
+    help="Local error of a step, dimensionless; default: the deck's integr_tol, else 1e-5.",
+)
 @click.option("--end-time", type=float, metavar="T", help="Instead of the deck's.")
 @click.option("--print-interval", type=float, metavar="DT", help="Between output rows.")
 @click.option("--resume", is_flag=True, help="Go on from the last checkpoint in DIR.")

@@ -11,7 +11,7 @@ import math
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, RATE, SLIP, sides, velocity_at
+from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, RATE, SLIP, STORED, sides, velocity_at
 from mbsim.dynamics.detection import measure_pair, moved
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
@@ -143,7 +143,7 @@ def crossing(depth0, rate0, depth1, rate1, h):
 
 
 @jitable
-def log_touch(scene, t, h, s):
+def log_touch(scene, t, h, y, s):
     """Note that slot s began to touch within the step that ends at t."""
     row, log = scene.work.slot[s], scene.log.contacts[scene.slots.contact[s]]
     speed = max(row[RATE], 0.0)
@@ -152,12 +152,15 @@ def log_touch(scene, t, h, s):
     if math.isnan(log[FIRST_TOUCH]):
         log[FIRST_TOUCH] = t - back
     log[TOUCHES] += 1.0
-    log[APPROACH] = speed
+    # the spring has already taken some of the speed at the touch
+    mass = effective_mass(scene, y, s)
+    taken = 2.0 * row[STORED] / mass if mass > 0.0 else 0.0
+    log[APPROACH] = math.sqrt(speed * speed + taken) if h > 0.0 else 0.0
     record_event(scene, t - back, TOUCH, s)
 
 
 @jitable
-def log_leave(scene, t, h, s):
+def log_leave(scene, t, h, y, s):
     """Note that slot s ceased to touch within the step that ends at t."""
     state, log = scene.state, scene.log.contacts[scene.slots.contact[s]]
     depth, rate = state.depth[s], state.rate[s]
@@ -167,7 +170,13 @@ def log_leave(scene, t, h, s):
     else:
         part = min(1.0, -depth / (rate * h)) if rate < 0.0 else 0.5
     if math.isnan(log[REBOUND]) and log[APPROACH] > 0.0:
-        log[REBOUND] = max(-rate, 0.0) / log[APPROACH]
+        # how fast the points of the last touch part, now that nothing acts on them
+        gi, gj = sides(scene, s)
+        p, graphics = vector(state.p[s]), scene.graphics
+        v = sub(
+            velocity_at(scene, y, graphics.body[gi], p), velocity_at(scene, y, graphics.body[gj], p)
+        )
+        log[REBOUND] = max(dot(v, vector(state.n[s])), 0.0) / log[APPROACH]
     record_event(scene, t - (1.0 - part) * h, LEAVE, s)
 
 
@@ -281,9 +290,9 @@ def commit_slot(scene, t, h, y, s):
         fresh = another_point(scene, y, h, s)
         changed = 1 if fresh else 0
     if now == 1 and before == 0:
-        log_touch(scene, t, h, s)
+        log_touch(scene, t, h, y, s)
     elif now == 0 and before == 1:
-        log_leave(scene, t, h, s)
+        log_leave(scene, t, h, y, s)
     # X of an incident that ended, or that is another than before, begins again at 0; at
     # touch X has gathered since the touch within the step and stays
     at = scene.slots.x[s]

@@ -271,3 +271,44 @@ def test_messages_of_a_user_subroutine_are_in_the_log(tmp_path):
     assert cli("run", deck, "-o", tmp_path / "out").returncode == 0
     text = (tmp_path / "out/deck.log").read_text()
     assert "USRMES:USER [301] INFO: touched" in text
+
+
+@pytest.mark.parametrize("options", [["--end-time", "inf"], ["--print-interval", "0"]])
+def test_times_that_are_no_times_are_refused(tmp_path, options):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
+    done = cli("run", deck, "-o", tmp_path / "out", *options)
+    assert done.returncode == 2
+    assert "not allowed" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_full_standard_output_is_one_message(tmp_path):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*CLI, "run", str(deck), "-o", str(tmp_path / "out")],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert done.returncode == 5
+    assert "Traceback" not in done.stderr
+    with mbsim.open_results(tmp_path / "out/deck.h5") as results:
+        assert results.status == "finished"
+
+
+def test_logged_rebound_is_the_measured_one(tmp_path):
+    model = GROUND + sphere(0.2, v=(0, 0, -1.0)) + contact(damping=50, dmax=1e-3)
+    results = run_deck(tmp_path, model, end_time=0.5, tol=1e-8, output=tmp_path / "out")
+    text = (tmp_path / "out/deck.log").read_text()
+    logged = float(text.split("effective rebound, first impact")[1].split()[0])
+    assert logged == pytest.approx(results["bodies/2/velocity/z"][-1], rel=1e-4)
+    assert logged == pytest.approx(0.4813434809, rel=1e-4)
+
+
+def test_a_stiff_integrator_is_replaced_with_a_word(tmp_path):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
+    done = cli("run", deck, "-o", tmp_path / "out", "--integrator", "VSTIFF")
+    assert done.returncode == 0
+    assert "run by DOPRI5" in done.stderr
