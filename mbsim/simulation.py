@@ -154,8 +154,10 @@ class Runner:
         from mbsim.integrators import dopri5
 
         method, scene, simulation = self.method, self.system.scene, stage.simulation
-        if simulation.gravity is not None:
-            scene.world.gravity[:] = simulation.gravity.g
+        # the last change so far holds; a resumed run may have missed an earlier one
+        for passed in self.settings.stages[: self.stage + 1]:
+            if passed.simulation.gravity is not None:
+                scene.world.gravity[:] = passed.simulation.gravity.g
         times = output_times(simulation, self.stage == len(self.settings.stages) - 1)
         budget = FIRST_BUDGET
         if fresh:

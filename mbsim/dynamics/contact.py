@@ -197,7 +197,7 @@ def add_contact(scene, t, h, y, dy, s):
     at = scene.slots.x[s]
     if at >= 0:
         dy[at], dy[at + 1], dy[at + 2] = slip[0], slip[1], spin_rates[2]
-    dy[len(dy) - 1] += lost
+    dy[len(dy) - len(contacts.id) + c] += lost
 
     # what recorder, log and commit want to know
     row = work.slot[s]

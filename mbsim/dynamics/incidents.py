@@ -18,6 +18,7 @@ from mbsim.geometry.catalog import axis
 from mbsim.system.arrays import (
     APPROACH,
     BODY_SIZE,
+    ENERGY_LOST,
     FIRST_TOUCH,
     LEAVE,
     PEAK_DEPTH,
@@ -324,6 +325,9 @@ def commit(scene, t, h, y):
         for k in range(4):
             state.q[b, k] = y[BODY_SIZE * b + 3 + k]
     watch_peaks(scene, t)
+    contacts = len(scene.contacts.id)
+    for c in range(contacts):
+        scene.log.contacts[c, ENERGY_LOST] = y[len(y) - contacts + c]
 
     for pair in range(len(pairs.contact)):
         if pairs.watched[pair] == 0:

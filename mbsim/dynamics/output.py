@@ -25,7 +25,10 @@ def fill_energy(scene, y, row):
     for s in range(len(scene.slots.pair)):
         if scene.work.touching[s] == 1:
             potential += scene.work.slot[s, STORED]
-    row[0], row[1], row[2] = kinetic, potential, y[len(y) - 1]
+    dissipated = 0.0
+    for c in range(len(scene.contacts.id)):
+        dissipated += y[len(y) - len(scene.contacts.id) + c]
+    row[0], row[1], row[2] = kinetic, potential, dissipated
 
 
 @jitable

@@ -213,6 +213,7 @@ def summary(
         yield fact("largest force at time", number(row[a.PEAK_FORCE_TIME]))
         yield fact("closing speed of the last touch", number(row[a.APPROACH]))
         yield fact("effective rebound, first impact", number(row[a.REBOUND]))
+        yield fact("energy lost, damper and friction", number(row[a.ENERGY_LOST]))
     yield ""
     yield "rejected steps, by the contact that asked for it"
     names = [f"Force_Contact[{id}]" for id in system.contact_ids] + ["no contact"]

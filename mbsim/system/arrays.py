@@ -6,7 +6,8 @@ slots. Everything is in model units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
-slot whose law uses it; last the energy dissipated so far.
+slot whose law uses it; last the energy that each contact has dissipated so far (one number
+where there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ BODY_SIZE = 13
     REBOUND,  # separation speed over closing speed, of the first impact that left again
     TOUCHES,
     PEAK_FORCE_TIME,
-) = range(8)
-LOG_COLUMNS = 8
+    ENERGY_LOST,  # dissipated by the damper and by friction
+) = range(9)
+LOG_COLUMNS = 9
 
 # entries of `Log.counters`
 NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS = range(6)

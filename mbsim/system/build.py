@@ -223,10 +223,10 @@ def _speed_scale(model: Model, placement: Placement, end_time: float) -> float:
     return max(fastest, math.sqrt(g * length), length / end_time if end_time > 0.0 else 0.0)
 
 
-def _initial_y(placement: Placement, x_count: int) -> np.ndarray[Any, Any]:
+def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.ndarray[Any, Any]:
     """Return the ODE vector at the start: X and dissipated energy are 0."""
     bodies = list(placement.bodies.values())
-    y = np.zeros(a.BODY_SIZE * len(bodies) + 3 * x_count + 1)
+    y = np.zeros(a.BODY_SIZE * len(bodies) + 3 * x_count + max(1, contact_count))
     for k, body in enumerate(bodies):
         row = y[a.BODY_SIZE * k : a.BODY_SIZE * (k + 1)]
         row[0:3] = body.p
@@ -380,7 +380,7 @@ def build(
     x = np.full(ns, -1, dtype=np.int64)
     carried = np.flatnonzero(uses_x[slot_contact]) if ns else np.zeros(0, dtype=np.int64)
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
-    y0 = _initial_y(placement, len(carried))
+    y0 = _initial_y(placement, len(carried), len(contact_ids))
 
     speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(

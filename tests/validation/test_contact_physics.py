@@ -299,3 +299,24 @@ def test_shapes_on_shapes_come_to_rest(tmp_path, kinds):
     assert total.max() <= total[0] * 1.02
     assert np.isfinite(results["bodies/3/position"]).all()
     assert results["bodies/3/position/z"][-1] > 0.09
+
+
+def test_energy_lost_is_kept_for_each_contact(tmp_path):
+    # a ball that only rubs loses 1/7 of what it has, m v^2 / 2, until it rolls
+    depth = (9.81 / 1e8) ** (2 / 3)
+    model = (
+        GROUND
+        + sphere(0.1 - depth, v=(2.0, 0, 0))
+        + sphere(5.0, body=3)
+        + contact(stiffness=1e8, damping=200, dmax=1e-4, **{**COULOMB, "mu_dynamic": 0.3})
+        + contact(300, 100, id=302)
+        + GRAVITY
+    )
+    out = tmp_path / "out"
+    results = run_deck(tmp_path, model, end_time=0.8, tol=1e-8, output=out)
+    text = (out / "deck.log").read_text()
+    lost = [float(part.split()[0]) for part in text.split("energy lost, damper and friction")[1:]]
+    assert lost[0] == pytest.approx(0.5 * 4.0 * 2.0 / 7.0, rel=2e-3)
+    # the other ball is still falling
+    assert len(lost) == 1
+    assert results["energy/dissipated"][-1] == pytest.approx(sum(lost), rel=1e-4)
