@@ -152,8 +152,9 @@ class _Watch(event.Listener):
 event.register("numba:run_pass", _Watch())
 
 
+@functools.cache
 def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `py_func` compiled at its first call (or loaded from the cache)."""
+    """Return `py_func` compiled at its first call (or loaded from the cache), once a process."""
     _register()
     return numba.njit(cache=True, error_model="numpy")(py_func)
 
@@ -161,6 +162,7 @@ def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
 _kept: list[Any] = []
 
 
+@functools.cache
 def address(py_func: Callable[..., Any], signature: Any) -> int:
     """Return the address of `py_func` compiled as a C function; it lives as long as the process."""
     _register()

@@ -12,6 +12,7 @@ compiled one did. Results that are not finite are found by the caller, for every
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -83,12 +84,14 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     return entry
 
 
+@functools.cache
 def normal_address(law: NormalLaw) -> int:
     """Return the address of a normal law behind `NORMAL_SIGNATURE`."""
     entry = _adapt_normal(law.force, law.energy, len(law.parameters))
     return jit.address(entry, NORMAL_SIGNATURE)
 
 
+@functools.cache
 def friction_address(law: FrictionLaw) -> int:
     """Return the address of a friction law behind `FRICTION_SIGNATURE`."""
     return jit.address(_adapt_friction(law.force, len(law.parameters)), FRICTION_SIGNATURE)

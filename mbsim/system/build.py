@@ -6,6 +6,7 @@ without friction no friction law, a law that does not look at X no X.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -63,6 +64,7 @@ def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
     return entry
 
 
+@functools.cache
 def pair_address(pair: Pair) -> int:
     """Return the address of a closed-form pair."""
     from numba import types
