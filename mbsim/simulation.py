@@ -232,7 +232,8 @@ class Runner:
 
     def fail(self, code: int, t: float) -> None:
         """Raise what the hooks' code says."""
-        from mbsim.dynamics.evaluate import NOT_FINITE, USER_NOT_FINITE
+        from mbsim.core.problem import NOT_FINITE
+        from mbsim.dynamics.contact import USER_NOT_FINITE
         from mbsim.geometry.fcl_detector import DETECTOR_FAILED
         from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
 

@@ -47,14 +47,13 @@ class GroupType(types.Type):
                 inner = GroupType(hint)
                 found[name] = inner, word
                 word += inner.words
-        self.words = word
         return found
 
-    def __getattr__(self, name: str) -> Any:
-        if name == "words":
-            self.fields  # noqa: B018  computes it
-            return self.__dict__["words"]
-        raise AttributeError(name)
+    @property
+    def words(self) -> int:
+        """Length of the group's table: a pointer and a shape for each array."""
+        kinds = [kind for kind, _ in self.fields.values()]
+        return sum(k.words if isinstance(k, GroupType) else 1 + k.ndim for k in kinds)
 
 
 @register_model(GroupType)

@@ -46,8 +46,10 @@ class Problem(NamedTuple):
     reject: int
 
 
-#: Codes of a hook that end the run without another try.
-AT_ONCE = 100.0
+# codes of an rhs; a problem may have others of its own
+NOT_FINITE = 3
+#: Codes from here on end the run without another try.
+AT_ONCE = 100
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL = range(5)

@@ -34,7 +34,6 @@ from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, NORMAL_CALLS, PYTHON_
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
-SLOT_COLUMNS = 12
 
 # code of a user's law that made something else than numbers of finite input
 USER_NOT_FINITE = 5

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
-from mbsim.dynamics.contact import USER_NOT_FINITE, add_contact
+from mbsim.dynamics.contact import add_contact
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import BODY_SIZE
-
-# beside the codes of laws.abi and geometry.fcl_detector (4)
-NOT_FINITE = 3
 
 
 @jitable
@@ -37,7 +35,6 @@ def add_contacts(scene, t, h, y, dy):
             code = add_contact(scene, t, h, y, dy, s)
             if code != 0:
                 scene.work.trouble[1] = scene.slots.contact[s]
-                scene.work.trouble[3] = s
                 return code
     return 0
 
@@ -92,6 +89,3 @@ def evaluate(scene, t, h, y, dy):
     if not math.isfinite(accelerate(scene, y, dy)):
         return NOT_FINITE
     return 0
-
-
-__all__ = ["NOT_FINITE", "USER_NOT_FINITE", "evaluate"]

@@ -9,8 +9,8 @@ from numba import carray
 
 from mbsim.core import jit
 from mbsim.core.address import pack, view
-from mbsim.core.problem import BY_CHECK, BY_ERROR, HOOK, Problem
-from mbsim.dynamics.evaluate import NOT_FINITE, evaluate
+from mbsim.core.problem import BY_CHECK, HOOK, Problem
+from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
 from mbsim.dynamics.output import blame, events_nearly_full, scaled_error, write_row
 from mbsim.system.arrays import BODY_SIZE, Scene
@@ -23,7 +23,6 @@ def _rhs(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
-    scene.work.trouble[2] = code
     return float(code)
 
 
@@ -87,7 +86,6 @@ def _output(context, t, h, a, b):
     n = scene.rows.y.shape[1]
     code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     if code != 0:
-        scene.work.trouble[2] = code
         return -float(code)
     return 1.0 if write_row(scene, t, carray(a, (n,))) else 0.0
 
@@ -111,6 +109,3 @@ def mechanism(scene: Scene) -> tuple[Problem, np.ndarray]:
     table = pack(scene)
     addresses = [jit.address(hook, HOOK) for hook in _HOOKS]
     return Problem(int(table.ctypes.data), *addresses), table
-
-
-__all__ = ["BY_ERROR", "NOT_FINITE", "PAUSE_FOR_EVENTS", "mechanism"]

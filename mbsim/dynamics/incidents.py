@@ -107,7 +107,6 @@ def first_depth(scene, t, h, y):
             if wanted < part:
                 part = wanted
                 work.trouble[1] = c
-                work.trouble[3] = s
     return part
 
 

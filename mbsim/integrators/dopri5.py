@@ -23,6 +23,7 @@ from mbsim.core.problem import (
     BY_NOT_FINITE,
     DONE,
     FAILED,
+    NOT_FINITE,
     PAUSED,
     ROWS_FULL,
     STEP_TOO_SMALL,
@@ -31,7 +32,6 @@ from mbsim.integrators.control import next_factor, quantised, smallest_step, sta
 
 ORDER = 5
 STAGES = 7
-NOT_FINITE = 3.0
 #: A hook that fails is tried again at a tenth of the step, so many times.
 MOST_FAILURES = 8
 

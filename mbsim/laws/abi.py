@@ -22,13 +22,13 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
 FRICTION_INPUTS = 19
 RAISED_INTERPRETED = 1
 RAISED_COMPILED = 2
-#: Codes from here on end the run at once; others are tried again at a shorter step.
-STOPPED_BY_USER = 100
+STOPPED_BY_USER = AT_ONCE
 
 _PTR = types.CPointer(types.float64)
 NORMAL_SIGNATURE = types.int64(types.float64, types.float64, _PTR, _PTR)

@@ -23,7 +23,8 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
 
     def entry(element, inputs, par, out):
         a = carray(inputs, (19,))
-        values = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore
+        # mypy sees the typing context that Numba passes to an intrinsic as a first argument
+        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
         result = carray(out, (5,))
         code = 0
         try:
@@ -48,7 +49,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
             result[2] = 0.0
             result[3] = 0.0
             result[4] = force[2]
-        except Exception:
+        except Exception:  # the only kind Numba can catch; `reproduce` finds out which
             code = RAISED_COMPILED
         return code
 

@@ -45,7 +45,7 @@ def compile_friction(
             return friction_address(getattr(module, name), callees, par_count), ""
     except OSError as error:
         return 0, f"the cache folder {jit.cache_root()} cannot be written ({error})"
-    except Exception as error:
+    except Exception as error:  # whatever Numba cannot do, Python still can
         return 0, f"does not compile: {_first_words(error)}"
 
 

@@ -171,7 +171,7 @@ def callback(
                 force[0] = fx
                 force[1] = fy
                 force[4] = tz
-            except Exception:
+            except Exception:  # not three plain numbers: say what it is, or take what converts
                 force[0], force[1], force[4] = three_numbers(result)
             force[2] = force[3] = 0.0
             return 0

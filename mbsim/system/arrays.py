@@ -150,11 +150,11 @@ class Work(NamedTuple):
     points: F2  # (ns, 7) candidates of geometry.catalog
     touching: I1  # (ns,)
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
-    slot: F2  # (ns, 12) see dynamics.contact
+    slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     fcl: I1  # (np,) pairs that FCL shall do
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
-    trouble: I1  # (4,) worst body of the error norm, contact at fault, code, slot
+    trouble: I1  # (2,) worst body of the error norm, contact at fault
 
 
 class Rows(NamedTuple):
@@ -171,6 +171,7 @@ class Rows(NamedTuple):
     used: I1  # (3,) rows, incidents, events
 
 
+SLOT_COLUMNS = 12
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 
 

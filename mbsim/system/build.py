@@ -291,11 +291,11 @@ def _work(nb: int, ng: int, np_: int, ns: int) -> a.Work:
         points=np.full((ns, 7), np.nan),
         touching=np.zeros(ns, dtype=np.int64),
         t=np.full((ns, 3), np.nan),
-        slot=np.full((ns, 12), np.nan),
+        slot=np.full((ns, a.SLOT_COLUMNS), np.nan),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
-        trouble=np.full(4, -1, dtype=np.int64),
+        trouble=np.full(2, -1, dtype=np.int64),
     )
 
 
