@@ -162,7 +162,8 @@ def add_contact(scene, t, h, y, dy, s):
     code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     if code != 0:
         return code
-    normal, elastic, stored = out[0], out[1], out[2]
+    share = point[7]
+    normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
 
     force = scale(normal, n)

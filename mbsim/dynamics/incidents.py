@@ -97,7 +97,7 @@ def first_depth(scene, t, h, y):
             continue
         c = scene.slots.contact[s]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
-        energy = 0.5 * effective_mass(scene, y, s) * speed * speed
+        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, 7]
         deepest = deepest_of_impact(scene, c, energy)
         allowed = max(3.0 * deepest / 70.0, 1e-3 * contacts.dmax[c])
         if depth > allowed:

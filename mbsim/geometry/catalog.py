@@ -5,8 +5,10 @@ arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
 * `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing;
-* `points` (slots, 7), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
-  candidate), contact point (midpoint of the two surface points), unit normal from J into I.
+* `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
+  candidate), contact point (midpoint of the two surface points), unit normal from J into I,
+  and its share of the law's force (1 unless a manifold splits the force of one corner over
+  several points, so that the sum does not jump when a corner passes over an edge).
 
 It fills every one of its `slots` rows and returns their number, or `NOT_MINE` where the
 closed form does not hold for this pose: the pair then goes through FCL. A slot's identity
@@ -23,6 +25,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 
 NOT_MINE = -1
+#: Numbers of one candidate: depth, point, normal, share.
+POINT = 8
 
 
 class Pair(NamedTuple):
@@ -48,11 +52,12 @@ def pair(shape_i: str, shape_j: str, slots: int) -> Any:
 
 
 @jitable
-def put_point(row, depth, p, n):
+def put_point(row, depth, p, n, share=1.0):
     """Write one candidate into a row of `points`."""
     row[0] = depth
     row[1], row[2], row[3] = p[0], p[1], p[2]
     row[4], row[5], row[6] = n[0], n[1], n[2]
+    row[7] = share
 
 
 @jitable

@@ -145,6 +145,7 @@ class FclDetector:
             points[slot, 0] = depth
             points[slot, 1:4] = p
             points[slot, 4:7] = sign * n
+            points[slot, 7] = 1.0
 
     def _sharpen(self, i: int, j: int, n: Any) -> Any:
         """Return the normal made exact where a shape is round and the other round or a box."""

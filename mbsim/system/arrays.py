@@ -147,7 +147,7 @@ class Work(NamedTuple):
     accel: F2  # (nb, 6) of the cg, and angular, global frame
     noise: F2  # (nb + 1, 2) force and torque that the detector's noise may be wrong by
     frames: F2  # (ng, 12)
-    points: F2  # (ns, 7) candidates of geometry.catalog
+    points: F2  # (ns, POINT) candidates of geometry.catalog
     touching: I1  # (ns,)
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.core import jit
-from mbsim.geometry.catalog import PAIRS, Pair
+from mbsim.geometry.catalog import PAIRS, POINT, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
@@ -58,7 +58,7 @@ def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
             carray(size_i, (3,)),
             carray(frame_j, (12,)),
             carray(size_j, (3,)),
-            carray(out, (slots, 7)),
+            carray(out, (slots, POINT)),
         )
 
     return entry
@@ -288,7 +288,7 @@ def _work(nb: int, ng: int, np_: int, ns: int) -> a.Work:
         accel=np.full((nb, 6), np.nan),
         noise=np.zeros((nb + 1, 2)),
         frames=np.full((ng, 12), np.nan),
-        points=np.full((ns, 7), np.nan),
+        points=np.full((ns, POINT), np.nan),
         touching=np.zeros(ns, dtype=np.int64),
         t=np.full((ns, 3), np.nan),
         slot=np.full((ns, a.SLOT_COLUMNS), np.nan),

@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 import pytest
 
-from mbsim.geometry.catalog import NOT_MINE, PAIRS
+from mbsim.geometry.catalog import NOT_MINE, PAIRS, POINT
 from mbsim.geometry.support import support
 from mbsim.system.build import pair_address
 
@@ -48,7 +48,7 @@ def random_poses(name, seed):
 def candidates(name, frame_i, frame_j):
     pair = PAIRS[name]
     shape_i, shape_j = name.split("-")
-    points = np.full((pair.slots, 7), np.nan)
+    points = np.full((pair.slots, POINT), np.nan)
     count = pair.points(frame_i, SIZES[shape_i], frame_j, SIZES[shape_j], points)
     return count, points
 
@@ -67,7 +67,7 @@ def test_fills_every_row_with_numbers_and_unit_normals(name):
         used += 1
         assert count == PAIRS[name].slots
         assert np.isfinite(points).all()
-        np.testing.assert_allclose(np.linalg.norm(points[:, 4:], axis=1), 1.0, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(points[:, 4:7], axis=1), 1.0, atol=1e-12)
     # boxes at random near each other are seldom over the middle of a face
     assert used > 0 or name in ("BOX-BOX", "CYLINDER-BOX")
 
@@ -97,7 +97,7 @@ def test_does_not_depend_on_where_the_scene_stands(name):
             continue
         np.testing.assert_allclose(points_moved[:, 0], points[:, 0], atol=1e-13)
         np.testing.assert_allclose(points_moved[:, 1:4], points[:, 1:4] @ Q.T + shift, atol=1e-12)
-        np.testing.assert_allclose(points_moved[:, 4:], points[:, 4:] @ Q.T, atol=1e-12)
+        np.testing.assert_allclose(points_moved[:, 4:7], points[:, 4:7] @ Q.T, atol=1e-12)
 
 
 def test_sphere_pair_is_symmetric_under_exchange():
@@ -105,7 +105,7 @@ def test_sphere_pair_is_symmetric_under_exchange():
         _, points = candidates("SPHERE-SPHERE", frame_i, frame_j)
         _, other = candidates("SPHERE-SPHERE", frame_j, frame_i)
         np.testing.assert_allclose(points[0, :4], other[0, :4], atol=1e-14)
-        np.testing.assert_allclose(points[0, 4:], -other[0, 4:], atol=1e-14)
+        np.testing.assert_allclose(points[0, 4:7], -other[0, 4:7], atol=1e-14)
 
 
 def fcl_answer(name, frame_i, frame_j):
@@ -150,7 +150,7 @@ def test_deepest_point_equals_fcl(name, tolerance):
         touching += 1
         depth, _, n = max(found, key=lambda contact: contact[0])
         assert deepest[0] == pytest.approx(depth, abs=tolerance)
-        np.testing.assert_allclose(deepest[4:], n, atol=100 * tolerance)
+        np.testing.assert_allclose(deepest[4:7], n, atol=100 * tolerance)
     assert touching > 20
 
 
@@ -176,7 +176,7 @@ def test_upright_cylinder_has_isotropic_stiffness_against_tilting():
             "CYLINDER-PLANE", frame([0, 0, 0.4 - 1e-3], R), frame(np.zeros(3), np.eye(3))
         )
         down = points[points[:, 0] > 0]
-        moment = sum(np.cross(row[1:4], row[0] * row[4:]) for row in down)
+        moment = sum(np.cross(row[1:4], row[0] * row[4:7]) for row in down)
         moments.append([moment @ axis, np.linalg.norm(moment - (moment @ axis) * axis)])
     moments = np.array(moments)
     np.testing.assert_allclose(moments[:, 0], moments[0, 0], rtol=1e-6)
@@ -186,7 +186,7 @@ def test_upright_cylinder_has_isotropic_stiffness_against_tilting():
 def test_box_over_the_middle_of_a_face_is_a_box_on_a_plane():
     slab = frame([0.0, 0.0, -0.5], np.eye(3))
     small = np.array([0.1, 0.1, 0.1])
-    points = np.zeros((8, 7))
+    points = np.zeros((8, POINT))
     count = PAIRS["BOX-BOX"].points(
         frame([0.3, 0.2, 0.099], np.eye(3)), small, slab, np.array([2.0, 2.0, 0.5]), points
     )
@@ -194,17 +194,17 @@ def test_box_over_the_middle_of_a_face_is_a_box_on_a_plane():
     down = points[points[:, 0] > 0]
     assert len(down) == 4
     np.testing.assert_allclose(down[:, 0], 1e-3, atol=1e-15)
-    np.testing.assert_allclose(down[:, 4:], [[0, 0, 1]] * 4)
+    np.testing.assert_allclose(down[:, 4:7], [[0, 0, 1]] * 4)
     # the other way round the normal still points from J into I
     count = PAIRS["BOX-BOX"].points(
         slab, np.array([2.0, 2.0, 0.5]), frame([0.3, 0.2, 0.099], np.eye(3)), small, points
     )
     assert count == 8
-    np.testing.assert_allclose(points[points[:, 0] > 0][:, 4:], [[0, 0, -1]] * 4)
+    np.testing.assert_allclose(points[points[:, 0] > 0][:, 4:7], [[0, 0, -1]] * 4)
 
 
 def test_box_near_an_edge_is_left_to_fcl():
-    points = np.zeros((8, 7))
+    points = np.zeros((8, POINT))
     count = PAIRS["BOX-BOX"].points(
         frame([1.95, 0.0, 0.099], np.eye(3)),
         np.array([0.1, 0.1, 0.1]),
