@@ -78,30 +78,42 @@ class Runner:
 
     def settle_contacts(self, allow_overlap: bool) -> None:
         """Begin with the incidents that exist at the start; refuse those that are too deep."""
+        from mbsim.system.arrays import LIVE
+
         t = self.settings.stages[0].simulation.start_time
         y, f = self.method.y, self.method.k[0]
         code = self.call(self.problem.rhs, t, 0.0, y, f)
         if code != 0.0:
             self.fail(int(code), t)
         scene, model = self.system.scene, self.system.model
+        if self.system.plans.crowds:
+            # nothing is listed yet: list what is near, then look again
+            self.call(self.problem.commit, t, 0.0, y, f)
+            code = self.call(self.problem.rhs, t, 0.0, y, f)
+            if code != 0.0:
+                self.fail(int(code), t)
         faults = []
-        for s in range(len(scene.slots.pair)):
+        pairs = scene.pairs
+        live = pairs.live[: pairs.count[LIVE]]
+        slots = [s for pair in live for s in range(pairs.slot[pair], pairs.last[pair])]
+        for s in slots:
+            # those that are ignored for their depth overlap too
             depth = float(scene.work.points[s, 0])
             if not depth > 0.0:
                 continue
-            k = int(scene.slots.contact[s])
-            plan = self.system.pair_plans[int(scene.slots.pair[s])]
+            pair = int(scene.slots.pair[s])
+            rows = (int(pairs.graphic_i[pair]), int(pairs.graphic_j[pair]))
+            graphic_i, graphic_j = (self.system.graphic_ids[row] for row in rows)
+            k = int(scene.kinds.contact[pairs.kind[pair]])
             contact = model.contacts[self.system.contact_ids[k]]
             name = f"Force_Contact[{contact.id}]"
-            between = f"Post_Graphic[{plan.graphic_i}] and Post_Graphic[{plan.graphic_j}]"
+            between = f"Post_Graphic[{graphic_i}] and Post_Graphic[{graphic_j}]"
             self.log.line(f"{name}: {between} overlap by {depth:.6g} at the start, slot {s}")
-            pair = int(scene.slots.pair[s])
-            rows = (scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair])
             # half of the smaller shape, across its thinnest side
             half = min(float(scene.graphics.half[row].min()) for row in rows)
             ignored = contact.ignore_penetration_larger_than
             limit = half if ignored is None else min(half, ignored)
-            if depth > 0.1 * limit and s == scene.pairs.slot[pair]:
+            if depth > 0.1 * limit and s == pairs.slot[pair]:
                 self.tell(f"{name}: {between} overlap by {depth:.6g} at the start")
             if depth > limit:
                 faults.append(
@@ -112,13 +124,20 @@ class Runner:
             raise ModelError("\n".join(dict.fromkeys(faults)))
         self.call(self.problem.commit, t, 0.0, y, f)
 
-    def checkpoint(self) -> dict[str, Any]:
-        """Return everything a run needs to go on: state, log, method, and where it is."""
-        groups: dict[str, Any] = {
-            "state": self.system.scene.state,
-            "log": self.system.scene.log,
+    def _saved(self) -> dict[str, Any]:
+        """Return all groups of arrays in which a run goes on."""
+        scene = self.system.scene
+        return {
+            "state": scene.state,
+            "pairs": scene.pairs,
+            "crowds": scene.crowds,
+            "log": scene.log,
             "method": self.method,
         }
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Return everything a run needs to go on: state, log, method, and where it is."""
+        groups = self._saved()
         arrays = {
             f"{name}/{field}": np.array(array)
             for name, group in groups.items()
@@ -130,11 +149,7 @@ class Runner:
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
-        groups: dict[str, Any] = {
-            "state": self.system.scene.state,
-            "log": self.system.scene.log,
-            "method": self.method,
-        }
+        groups = self._saved()
         for name, group in groups.items():
             for field, array in zip(group._fields, group, strict=True):
                 array[...] = saved[f"{name}/{field}"]
@@ -234,6 +249,7 @@ class Runner:
         """Raise what the hooks' code says."""
         from mbsim.core.problem import NOT_FINITE
         from mbsim.dynamics.contact import USER_NOT_FINITE
+        from mbsim.dynamics.detection import CROWDED
         from mbsim.geometry.fcl_detector import DETECTOR_FAILED
         from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
 
@@ -250,6 +266,10 @@ class Runner:
             raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
         if code == DETECTOR_FAILED and self.detector is not None:
             raise SolverError(f"FCL failed at time {t:.9g}: {self.detector.failure}")
+        if code == CROWDED:
+            raise SolverError(
+                f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
+            )
         if code == NOT_FINITE:
             raise SolverError(f"a force or acceleration is not finite at time {t:.9g}")
         raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
@@ -270,6 +290,7 @@ class Runner:
             "factorizations": 0,
             "narrowphase_pairs": int(counters[a.NARROWPHASE]),
             "skipped_pairs": int(counters[a.SKIPPED]),
+            "pair_listings": int(counters[a.LISTINGS]),
             "fcl_calls": int(counters[a.FCL_CALLS]),
             "normal_calls": int(counters[a.NORMAL_CALLS]),
             "friction_calls": int(counters[a.FRICTION_CALLS]),

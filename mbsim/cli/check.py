@@ -29,14 +29,15 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 
-    from mbsim.results.log import counts, pair_text, units_text
+    from mbsim.results.log import counts, pair_texts, units_text
 
     warn(deck.warnings)
     numbers = ", ".join(f"{count} {name}" for name, count in counts(deck).items())
     click.echo(f"ok: {model}: {numbers}")
     click.echo(f"  units {units_text(deck)}")
-    for plan in plans:
-        click.echo(f"  Force_Contact[{plan.contact}]: {pair_text(plan)}")
+    for contact_id in deck.contacts:
+        for text in pair_texts(plans, contact_id):
+            click.echo(f"  Force_Contact[{contact_id}]: {text}")
     if not deck.simulations:
         click.echo("  no Simulate: a run needs --end-time")
     for note in (*deck.notes, *notes):

@@ -50,7 +50,7 @@ def _is_result(file: Path) -> bool:
 def _about_model(model: Model) -> dict[str, Any]:
     """Return what a deck describes."""
     from mbsim.model.placement import place
-    from mbsim.results.log import counts, pair_text, title, units_text
+    from mbsim.results.log import counts, pair_texts, title, units_text
     from mbsim.results.reading import finite
     from mbsim.system.pairing import plan_pairs
 
@@ -76,7 +76,7 @@ def _about_model(model: Model) -> dict[str, Any]:
                 "name": title(contact),
                 "normal_law": contact.cnf_type,
                 "friction_law": contact.cff_type,
-                "pairs": [pair_text(plan) for plan in plans if plan.contact == contact.id],
+                "pairs": list(pair_texts(plans, contact.id)),
             }
             for contact in model.contacts.values()
         },

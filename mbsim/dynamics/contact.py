@@ -68,14 +68,14 @@ def birth_tangent(scene, graphic_i, n):
 
 
 @jitable
-def tangent(scene, y, s, graphic_i, bi, bj, n):
-    """Return the x-axis of the incident marker of slot s at the trial point.
+def tangent(scene, y, s, c, graphic_i, bi, bj, n):
+    """Return the x-axis of the incident marker of slot s of contact c at the trial point.
 
     Since the committed state it has turned with the normal by the shortest rotation and about
     the normal by the mean of both bodies' turns; a new incident gets its axes by birth.
     """
     state = scene.state
-    if scene.contacts.framed[scene.slots.contact[s]] == 0:
+    if scene.contacts.framed[c] == 0:
         # the law is the same in every tangent frame
         return any_tangent(n)
     if state.touching[s] == 0:
@@ -97,9 +97,15 @@ def sides(scene, s):
     """Return the graphics of a slot in the contact's order: I, J."""
     pair = scene.slots.pair[s]
     i, j = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
-    if scene.pairs.swapped[pair] == 1:
+    if scene.kinds.swapped[scene.pairs.kind[pair]] == 1:
         return j, i
     return i, j
+
+
+@jitable
+def contact_of(scene, s):
+    """Return the contact of slot s."""
+    return scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
 
 
 @jitable
@@ -141,7 +147,7 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
 def add_contact(scene, t, h, y, dy, s):
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
     contacts, work = scene.contacts, scene.work
-    c = scene.slots.contact[s]
+    c = contact_of(scene, s)
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
@@ -151,7 +157,7 @@ def add_contact(scene, t, h, y, dy, s):
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
     w = sub(vector(work.w[bi]), vector(work.w[bj]))
     rate = -dot(v, n)
-    tx = tangent(scene, y, s, gi, bi, bj, n)
+    tx = tangent(scene, y, s, c, gi, bi, bj, n)
     ty = cross(n, tx)
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
@@ -187,7 +193,7 @@ def add_contact(scene, t, h, y, dy, s):
         lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
     add_wrench(scene, y, bi, p, force, torque)
     add_wrench(scene, y, bj, p, scale(-1.0, force), scale(-1.0, torque))
-    noise = scene.pairs.noise[scene.slots.pair[s]]
+    noise = scene.kinds.noise[scene.pairs.kind[scene.slots.pair[s]]]
     if noise > 0.0:
         for b in (bi, bj):
             work.noise[b, 0] += noise * normal

@@ -7,7 +7,7 @@ import math
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
-from mbsim.dynamics.contact import add_contact
+from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import BODY_SIZE
@@ -30,12 +30,12 @@ def add_contacts(scene, t, h, y, dy):
     """Add the forces of every touching slot; return 0 or a law's code."""
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
         dy[k] = 0.0
-    for s in range(len(scene.slots.pair)):
-        if scene.work.touching[s] == 1:
-            code = add_contact(scene, t, h, y, dy, s)
-            if code != 0:
-                scene.work.trouble[1] = scene.slots.contact[s]
-                return code
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        code = add_contact(scene, t, h, y, dy, hit[k])
+        if code != 0:
+            scene.work.trouble[1] = contact_of(scene, hit[k])
+            return code
     return 0
 
 

@@ -12,7 +12,7 @@ from mbsim.core.address import pack, view
 from mbsim.core.problem import BY_CHECK, HOOK, Problem
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
-from mbsim.dynamics.output import blame, events_nearly_full, scaled_error, write_row
+from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.system.arrays import BODY_SIZE, Scene
 
 PAUSE_FOR_EVENTS = 2.0
@@ -55,7 +55,7 @@ def _commit(context, t, h, a, b):
     """The incident table, events and peaks; bit 1: y changed, bit 2: empty the events first."""
     scene = view(context, Scene)
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
-    return float(changed) + (PAUSE_FOR_EVENTS if events_nearly_full(scene) else 0.0)
+    return float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
 
 
 def _look(context, t, h, a, b):

@@ -11,8 +11,19 @@ import math
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, RATE, SLIP, STORED, sides, velocity_at
-from mbsim.dynamics.detection import measure_pair, moved
+from mbsim.dynamics.contact import (
+    DEPTH,
+    FORCE,
+    NORMAL,
+    RATE,
+    SLIP,
+    STORED,
+    contact_of,
+    sides,
+    velocity_at,
+)
+from mbsim.dynamics.crowd import follow
+from mbsim.dynamics.detection import measure_pair
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
 from mbsim.system.arrays import (
@@ -21,6 +32,7 @@ from mbsim.system.arrays import (
     ENERGY_LOST,
     FIRST_TOUCH,
     LEAVE,
+    LIVE,
     PEAK_DEPTH,
     PEAK_FORCE,
     PEAK_FORCE_TIME,
@@ -70,15 +82,6 @@ def deepest_of_impact(scene, c, energy):
 
 
 @jitable
-def touched(scene, pair):
-    """Return whether a pair touched at the committed state."""
-    for s in range(scene.pairs.slot[pair], scene.pairs.slot[pair + 1]):
-        if scene.state.touching[s] == 1:
-            return True
-    return False
-
-
-@jitable
 def first_depth(scene, t, h, y):
     """Return 1, or the part of the step to take so that a new incident begins shallow.
 
@@ -88,14 +91,17 @@ def first_depth(scene, t, h, y):
     """
     work, state, contacts = scene.work, scene.state, scene.contacts
     part = 1.0
-    for s in range(len(scene.slots.pair)):
-        if work.touching[s] == 0 or state.touching[s] == 1 or work.slot[s, RATE] <= 0.0:
+    hit = work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if state.touching[s] == 1 or work.slot[s, RATE] <= 0.0:
             continue
         pair = scene.slots.pair[s]
-        if scene.pairs.regroups[pair] == 1 and touched(scene, pair):
+        kind = scene.pairs.kind[pair]
+        if scene.kinds.regroups[kind] == 1 and scene.pairs.touches[pair] > 0:
             # not an impact: the points of a contact that goes on were chosen anew
             continue
-        c = scene.slots.contact[s]
+        c = scene.kinds.contact[kind]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
         energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, 7]
         deepest = deepest_of_impact(scene, c, energy)
@@ -118,7 +124,7 @@ def record_event(scene, t, kind, s):
     if k < len(rows.events):
         rows.events[k, 0] = t
         rows.events[k, 1] = kind
-        rows.events[k, 2] = scene.contacts.id[scene.slots.contact[s]]
+        rows.events[k, 2] = scene.contacts.id[contact_of(scene, s)]
         rows.events[k, 3] = s
         rows.used[2] = k + 1
 
@@ -145,7 +151,7 @@ def crossing(depth0, rate0, depth1, rate1, h):
 @jitable
 def log_touch(scene, t, h, y, s):
     """Note that slot s began to touch within the step that ends at t."""
-    row, log = scene.work.slot[s], scene.log.contacts[scene.slots.contact[s]]
+    row, log = scene.work.slot[s], scene.log.contacts[contact_of(scene, s)]
     speed = max(row[RATE], 0.0)
     # the depth is small by the guard: the way back at closing speed, within the step
     back = min(row[DEPTH] / speed, h) if speed > 0.0 else 0.0
@@ -162,7 +168,7 @@ def log_touch(scene, t, h, y, s):
 @jitable
 def log_leave(scene, t, h, y, s):
     """Note that slot s ceased to touch within the step that ends at t."""
-    state, log = scene.state, scene.log.contacts[scene.slots.contact[s]]
+    state, log = scene.state, scene.log.contacts[contact_of(scene, s)]
     depth, rate = state.depth[s], state.rate[s]
     after = scene.work.points[s, 0]
     if after < 0.0 and after > -1e3 * depth:
@@ -183,28 +189,24 @@ def log_leave(scene, t, h, y, s):
 @jitable
 def watch_peaks(scene, t):
     """Keep the largest force, depth and slip of every contact at the point just evaluated."""
-    work = scene.work
-    for c in range(len(scene.contacts.id)):
-        fx, fy, fz = 0.0, 0.0, 0.0
+    work, net, hit = scene.work, scene.work.net, scene.work.hit
+    if hit[len(hit) - 1] == 0:
+        return
+    for c in range(len(net)):
+        net[c, 0] = net[c, 1] = net[c, 2] = 0.0
+    for k in range(hit[len(hit) - 1]):
+        row, c = work.slot[hit[k]], contact_of(scene, hit[k])
         log = scene.log.contacts[c]
-        pairs = scene.pairs
-        any_touch = False
-        first = pairs.slot[scene.contacts.first_pair[c]]
-        last = pairs.slot[scene.contacts.first_pair[c + 1]]
-        for s in range(first, last):
-            if work.touching[s] == 1:
-                any_touch = True
-                row = work.slot[s]
-                fx += row[FORCE]
-                fy += row[FORCE + 1]
-                fz += row[FORCE + 2]
-                log[PEAK_DEPTH] = max(log[PEAK_DEPTH], row[DEPTH])
-                if row[NORMAL] > 0.0:
-                    log[PEAK_SLIP] = max(log[PEAK_SLIP], row[SLIP])
-        force = math.sqrt(fx * fx + fy * fy + fz * fz)
-        if any_touch and force > log[PEAK_FORCE]:
-            log[PEAK_FORCE] = force
-            log[PEAK_FORCE_TIME] = t
+        for j in range(3):
+            net[c, j] += row[FORCE + j]
+        log[PEAK_DEPTH] = max(log[PEAK_DEPTH], row[DEPTH])
+        if row[NORMAL] > 0.0:
+            log[PEAK_SLIP] = max(log[PEAK_SLIP], row[SLIP])
+    for c in range(len(net)):
+        force = norm(vector(net[c]))
+        if force > scene.log.contacts[c, PEAK_FORCE]:
+            scene.log.contacts[c, PEAK_FORCE] = force
+            scene.log.contacts[c, PEAK_FORCE_TIME] = t
 
 
 @jitable
@@ -213,9 +215,10 @@ def reversal(scene, h):
 
     Called before `commit`: the committed table holds the begin of the step, `work` its end.
     """
-    work, state = scene.work, scene.state
-    for s in range(len(scene.slots.pair)):
-        if work.touching[s] == 1 and state.touching[s] == 1:
+    work, state, hit = scene.work, scene.state, scene.state.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if work.touching[s] == 1:
             before, after = state.rate[s], work.slot[s, RATE]
             if before > 0.0 and after <= 0.0:
                 return before / (before - after)
@@ -244,25 +247,17 @@ def bounding_gap(scene, pair):
 
 
 @jitable
-def measure_gap(scene, y, pair):
-    """Store how far apart the pair is at the accepted point, and where its shapes are."""
-    pairs, graphics, state, work = scene.pairs, scene.graphics, scene.state, scene.work
+def measure_gap(scene, pair):
+    """Store how far apart the pair is at the accepted point."""
+    pairs, work = scene.pairs, scene.work
     if measure_pair(scene, pair):
-        deepest = -math.inf
-        for s in range(pairs.slot[pair], pairs.slot[pair + 1]):
+        first, deepest = pairs.slot[pair], -math.inf
+        for s in range(first, first + scene.kinds.slots[pairs.kind[pair]]):
             deepest = max(deepest, work.points[s, 0])
-        state.gap[pair] = -deepest
+        gap = -deepest
     else:
-        state.gap[pair] = bounding_gap(scene, pair)
-    for side in range(2):
-        g = pairs.graphic_i[pair] if side == 0 else pairs.graphic_j[pair]
-        b = graphics.body[g]
-        for k in range(3):
-            state.centre[pair, 3 * side + k] = work.frames[g, k]
-        if b < len(scene.bodies.mass):
-            at = BODY_SIZE * b + 3
-            for k in range(4):
-                state.turn[pair, 4 * side + k] = y[at + k]
+        gap = bounding_gap(scene, pair)
+    pairs.gap[pair] = pairs.left[pair] = gap
 
 
 @jitable
@@ -286,7 +281,8 @@ def commit_slot(scene, t, h, y, s):
     now, before = work.touching[s], state.touching[s]
     changed = 0
     fresh = now != before
-    if now == 1 and before == 1 and scene.pairs.kernel[scene.slots.pair[s]] == 0:
+    kind = scene.pairs.kind[scene.slots.pair[s]]
+    if now == 1 and before == 1 and scene.kinds.kernel[kind] == 0:
         fresh = another_point(scene, y, h, s)
         changed = 1 if fresh else 0
     if now == 1 and before == 0:
@@ -314,33 +310,59 @@ def commit_slot(scene, t, h, y, s):
 
 
 @jitable
+def commit_incidents(scene, t, h, y):
+    """Write the incident table for the accepted point; return 1 if y changed under contact."""
+    state, work, pairs = scene.state, scene.work, scene.pairs
+    old, new, last = state.hit, work.hit, len(work.hit) - 1
+    changed = 0
+    for k in range(old[last]):
+        pairs.touches[scene.slots.pair[old[k]]] = 0
+        if work.touching[old[k]] == 0:
+            changed = max(changed, commit_slot(scene, t, h, y, old[k]))
+    for k in range(new[last]):
+        changed = max(changed, commit_slot(scene, t, h, y, new[k]))
+        old[k] = new[k]
+    for k in range(new[last]):
+        pairs.touches[scene.slots.pair[new[k]]] += 1
+    old[last] = new[last]
+    return changed
+
+
+@jitable
+def commit_gaps(scene):
+    """Take what the shapes moved from the distance of every pair; measure where half is gone."""
+    pairs, work = scene.pairs, scene.work
+    for k in range(pairs.count[LIVE]):
+        pair = pairs.live[k]
+        if pairs.touches[pair] > 0:
+            pairs.gap[pair] = pairs.left[pair] = 0.0
+            continue
+        way = work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]]
+        if way > 0.0 or pairs.gap[pair] <= 0.0:
+            pairs.left[pair] -= way
+            if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
+                measure_gap(scene, pair)
+
+
+@jitable
 def commit(scene, t, h, y):
     """Take the point evaluated last as accepted; return 1 if y changed so that f did."""
-    state, pairs = scene.state, scene.pairs
-    changed = 0
-    for s in range(len(scene.slots.pair)):
-        changed = max(changed, commit_slot(scene, t, h, y, s))
-    for b in range(len(scene.bodies.mass)):
-        for k in range(4):
-            state.q[b, k] = y[BODY_SIZE * b + 3 + k]
+    state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
+    changed = commit_incidents(scene, t, h, y)
     watch_peaks(scene, t)
     contacts = len(scene.contacts.id)
     for c in range(contacts):
         scene.log.contacts[c, ENERGY_LOST] = y[len(y) - contacts + c]
-
-    for pair in range(len(pairs.contact)):
-        if pairs.watched[pair] == 0:
-            continue
-        gap = state.gap[pair]
-        if touched(scene, pair):
-            state.gap[pair] = state.left[pair] = 0.0
-            continue
-        way = moved(scene, y, pair, 0) + moved(scene, y, pair, 1)
-        state.left[pair] = gap - way
-        if gap <= 0.0 or way > 0.5 * gap:
-            # half of the gap is used up: measure where the shapes are now
-            measure_gap(scene, y, pair)
-            state.left[pair] = state.gap[pair]
+    commit_gaps(scene)
+    for b in range(ground):
+        for k in range(4):
+            state.q[b, k] = y[BODY_SIZE * b + 3 + k]
+    for g in range(len(graphics.body)):
+        if graphics.body[g] < ground:
+            for k in range(3):
+                state.centre[g, k] = scene.work.frames[g, k]
+    if len(scene.crowds.contact) > 0:
+        follow(scene, y)
     return changed
 
 
@@ -353,11 +375,12 @@ def longest_parting(scene):
     any stage would miss that with an error estimate of 0, so it may use up half of the depth.
     """
     state, longest = scene.state, math.inf
-    for s in range(len(scene.slots.pair)):
-        if state.touching[s] == 1 and state.normal[s] == 0.0 and state.rate[s] < 0.0:
+    for k in range(state.hit[len(state.hit) - 1]):
+        s = state.hit[k]
+        if state.normal[s] == 0.0 and state.rate[s] < 0.0:
             depth, speed = state.depth[s], -state.rate[s]
             # what is left is nothing beside the depths of an impact at this speed
-            c = scene.slots.contact[s]
+            c = contact_of(scene, s)
             mass = lightest(scene, s)
             deepest = deepest_of_impact(scene, c, 0.5 * mass * speed * speed)
             if depth > 1e-5 * deepest:
@@ -378,29 +401,46 @@ def lightest(scene, s):
 
 
 @jitable
+def time_for(way, speed, push):
+    """Return the time in which a shape can come `way` far: way = speed h + push h^2 / 2."""
+    if speed == 0.0 and push == 0.0:
+        return math.inf
+    return 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
+
+
+@jitable
 def longest_step(scene, y, f):
-    """Return a step that no pair can use to pass through: gap plus thickness at closing speed."""
-    pairs, graphics = scene.pairs, scene.graphics
+    """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
+
+    Nor may a shape of a crowd leave where the list of near pairs holds.
+    """
+    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     longest = longest_parting(scene)
-    for pair in range(len(pairs.contact)):
-        thick = pairs.thickness[pair]
-        # in touch the stages feel the force, and sliding along is no approach
-        if math.isinf(thick) or touched(scene, pair):
+    for g in range(len(graphics.body)):
+        b = graphics.body[g]
+        if b < len(scene.bodies.mass):
+            reach = graphics.reach[g] + norm(vector(graphics.p[g]))
+            at = BODY_SIZE * b
+            turning = norm((y[at + 10], y[at + 11], y[at + 12]))
+            speed = norm((y[at + 7], y[at + 8], y[at + 9]))
+            # a plane, which has no reach, is never passed through
+            speed += turning * reach if reach < math.inf else 0.0
+            push = norm((f[at + 7], f[at + 8], f[at + 9]))
+            work.speed[g, 0], work.speed[g, 1] = speed, push
+            room = scene.crowds.room[g]
+            if room < math.inf:
+                longest = min(longest, time_for(0.9 * room, speed, push))
+    for k in range(pairs.count[LIVE]):
+        pair = pairs.live[k]
+        i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        # half of the thinner shape: a step may bury it no deeper before it is seen; what a
+        # half-space has swallowed it still pushes out, so nothing passes through a plane
+        if math.isinf(graphics.thin[i]) or math.isinf(graphics.thin[j]):
             continue
-        speed, push = 0.0, 0.0
-        for side in range(2):
-            g = pairs.graphic_i[pair] if side == 0 else pairs.graphic_j[pair]
-            b = graphics.body[g]
-            if b < len(scene.bodies.mass):
-                reach = graphics.reach[g] + norm(vector(graphics.p[g]))
-                at = BODY_SIZE * b
-                speed += norm((y[at + 7], y[at + 8], y[at + 9]))
-                speed += norm((y[at + 10], y[at + 11], y[at + 12])) * reach
-                push += norm((f[at + 7], f[at + 8], f[at + 9]))
-        way = max(scene.state.left[pair], 0.0) + thick
-        # way = speed h + push h^2 / 2
-        if speed > 0.0 or push > 0.0:
-            longest = min(
-                longest, 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
-            )
+        # in touch the stages feel the force, and sliding along is no approach
+        if pairs.touches[pair] == 0:
+            way = max(pairs.left[pair], 0.0) + 0.5 * min(graphics.thin[i], graphics.thin[j])
+            speed = work.speed[i, 0] + work.speed[j, 0]
+            push = work.speed[i, 1] + work.speed[j, 1]
+            longest = min(longest, time_for(way, speed, push))
     return longest

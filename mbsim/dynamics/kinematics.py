@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import matrix_from_quaternion, rotate
 from mbsim.system.arrays import BODY_SIZE
@@ -39,5 +41,42 @@ def place_graphic(scene, y, g):
     c = rotate(R, (graphics.p[g, 0], graphics.p[g, 1], graphics.p[g, 2]))
     for r in range(3):
         frame[r] = x[r] + c[r]
+    if graphics.turns[g] == 0:
+        # nobody asks for the axes of a sphere
+        return
+    for r in range(3):
         for k in range(3):
             frame[3 + 3 * r + k] = R[r, 0] * S[0, k] + R[r, 1] * S[1, k] + R[r, 2] * S[2, k]
+
+
+@jitable
+def place_graphics(scene, y):
+    """Place every shape that moves, and bound how far any of its points has come.
+
+    Since the committed state the centre moved by |dx|, and a turn by angle a moves points at
+    radius r by at most 2 r sin(a/2), cos(a/2) = |q.q0|. Return whether all shapes are where
+    the list of near pairs still holds.
+    """
+    graphics, work, state = scene.graphics, scene.work, scene.state
+    listed = True
+    for g in range(len(graphics.body)):
+        b = graphics.body[g]
+        if b == len(scene.bodies.mass):
+            continue
+        place_graphic(scene, y, g)
+        way = math.inf
+        if graphics.reach[g] < math.inf:
+            frame, centre = work.frames[g], state.centre[g]
+            dx, dy, dz = frame[0] - centre[0], frame[1] - centre[1], frame[2] - centre[2]
+            way = math.sqrt(dx * dx + dy * dy + dz * dz)
+            if graphics.turns[g] == 1:
+                at, before = BODY_SIZE * b + 3, state.q[b]
+                d, qq = 0.0, 0.0
+                for k in range(4):
+                    d += y[at + k] * before[k]
+                    qq += y[at + k] * y[at + k]
+                way += 2.0 * graphics.reach[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
+        work.way[g] = way
+        if way > scene.crowds.room[g]:
+            listed = False
+    return listed

@@ -6,9 +6,9 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, rotate, sub, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, SLIP, STORED, TORQUE, sides
+from mbsim.dynamics.contact import DEPTH, FORCE, SLIP, STORED, TORQUE, contact_of, sides
 from mbsim.dynamics.kinematics import position
-from mbsim.system.arrays import BODY_SIZE, CONTACT_COLUMNS
+from mbsim.system.arrays import BODY_SIZE, CONTACT_COLUMNS, LIVE
 
 
 @jitable
@@ -22,9 +22,9 @@ def fill_energy(scene, y, row):
         w = (y[at + 10], y[at + 11], y[at + 12])
         kinetic += 0.5 * (bodies.mass[b] * dot(v, v) + dot(w, rotate(bodies.inertia[b], w)))
         potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
-    for s in range(len(scene.slots.pair)):
-        if scene.work.touching[s] == 1:
-            potential += scene.work.slot[s, STORED]
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        potential += scene.work.slot[hit[k], STORED]
     dissipated = 0.0
     for c in range(len(scene.contacts.id)):
         dissipated += y[len(y) - len(scene.contacts.id) + c]
@@ -37,10 +37,9 @@ def fill_contacts(scene, y, row):
     work = scene.work
     for k in range(len(row)):
         row[k] = 0.0
-    for s in range(len(scene.slots.pair)):
-        if work.touching[s] == 0:
-            continue
-        at = CONTACT_COLUMNS * scene.slots.contact[s]
+    for h in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[h]
+        at = CONTACT_COLUMNS * contact_of(scene, s)
         values, point = work.slot[s], work.points[s]
         gi = sides(scene, s)[0]
         force = vector(values[FORCE : FORCE + 3])
@@ -60,9 +59,8 @@ def fill_incidents(scene, y):
     rows, work = scene.rows, scene.work
     first = rows.used[1]
     k = first
-    for s in range(len(scene.slots.pair)):
-        if work.touching[s] == 0 or k >= len(rows.incidents):
-            continue
+    for h in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[h]
         row = rows.incidents[k]
         at = scene.slots.x[s]
         row[0] = s
@@ -92,13 +90,19 @@ def write_row(scene, t, y):
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, y)
     rows.used[0] = k + 1
-    return k + 1 >= len(rows.time)
+    return k + 1 >= len(rows.time) or no_room(scene)
 
 
 @jitable
-def events_nearly_full(scene):
-    """Return whether another step could overflow the table of events."""
-    return scene.rows.used[2] + 2 * len(scene.slots.pair) > len(scene.rows.events)
+def no_room(scene):
+    """Return whether another step or row could overflow the tables of events and incidents."""
+    rows, pairs, slots = scene.rows, scene.pairs, 0
+    room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
+    if room >= 2 * len(scene.slots.pair):
+        return False
+    for k in range(pairs.count[LIVE]):
+        slots += pairs.last[pairs.live[k]] - pairs.slot[pairs.live[k]]
+    return room < 2 * slots
 
 
 @jitable
@@ -136,11 +140,13 @@ def scaled_error(scene, h, e, y):
         )
         if not square <= largest:
             largest, worst = square, b
-    for s in range(len(scene.slots.pair)):
-        at = scene.slots.x[s]
-        if at >= 0:
-            square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
-            largest = max(largest, max(square, e[at + 2] ** 2))
+    for side in range(2):
+        hit = scene.work.hit if side == 0 else scene.state.hit
+        for k in range(hit[len(hit) - 1]):
+            at = scene.slots.x[hit[k]]
+            if at >= 0:
+                square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
+                largest = max(largest, max(square, e[at + 2] ** 2))
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 
@@ -149,12 +155,13 @@ def scaled_error(scene, h, e, y):
 def blame(scene):
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
     worst, hardest, contact = scene.work.trouble[0], 0.0, -1
-    for s in range(len(scene.slots.pair)):
-        if scene.work.touching[s] == 1:
-            gi, gj = sides(scene, s)
-            of_body = scene.graphics.body[gi] == worst or scene.graphics.body[gj] == worst
-            force = vector(scene.work.slot[s, FORCE : FORCE + 3])
-            size = dot(force, force)
-            if of_body and size >= hardest:
-                hardest, contact = size, scene.slots.contact[s]
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        gi, gj = sides(scene, s)
+        of_body = scene.graphics.body[gi] == worst or scene.graphics.body[gj] == worst
+        force = vector(scene.work.slot[s, FORCE : FORCE + 3])
+        size = dot(force, force)
+        if of_body and size >= hardest:
+            hardest, contact = size, contact_of(scene, s)
     return contact

@@ -121,7 +121,9 @@ class FclDetector:
                 p = above - n * (n @ (above - p) + 4.0 * flat)
             body.setTransform(fcl.Transform(R, p))
             objects.append(body)
-        first, last = int(scene.pairs.slot[pair]), int(scene.pairs.slot[pair + 1])
+        kind = scene.pairs.kind[pair]
+        first = int(scene.pairs.slot[pair])
+        last = first + int(scene.kinds.slots[kind])
         meshes = "MESH" in (self._graphics[i].shape, self._graphics[j].shape)
         most = _MESH_CONTACTS if meshes else last - first
         request = fcl.CollisionRequest(num_max_contacts=most, enable_contact=True)
@@ -134,7 +136,7 @@ class FclDetector:
         found.sort(key=lambda contact: -contact[0])
         points = scene.work.points
         points[first:last, 0] = -0.0
-        sign = -1.0 if scene.pairs.swapped[pair] else 1.0
+        sign = -1.0 if scene.kinds.swapped[kind] else 1.0
         for depth, p, n in found[: last - first]:
             if last - first == 1:
                 n = self._sharpen(i, j, n)

@@ -178,14 +178,16 @@ def _contacts(model: Model) -> Iterator[Fault]:
         bodies = {side: _body_ids(model, graphics) for side, graphics in sides.items()}
         for side in "ij":
             used |= {graphic.id: graphic for graphic in sides[side]}
-            if len(bodies[side]) > 1:
-                listed = _listed(sorted(bodies[side]))
-                message = f"{side}_graphics_id: on bodies {listed}; all must be on one body"
-                yield _fault(contact.source, element, message)
+        if contact.with_itself and len(bodies["i"] | bodies["j"]) > 1:
+            # a set in contact with itself; whose graphics share a body do not touch each other
+            bodies["i"] = set()
         for body in sorted(bodies["i"] & bodies["j"]):
             message = f"i_graphics_id and j_graphics_id are both on body {body}"
             yield _fault(contact.source, element, f"{message}; must be on two bodies")
         planes = [next((g.id for g in sides[side] if g.shape == "PLANE"), None) for side in "ij"]
+        if contact.with_itself:
+            flat = [g.id for g in sides["i"] if g.shape == "PLANE"]
+            planes = [flat[0], flat[1]] if len(flat) > 1 else [None]
         if None not in planes:
             message = f"graphics {planes[0]} and {planes[1]} are both planes; one must be a solid"
             yield _fault(contact.source, element, message)

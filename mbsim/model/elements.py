@@ -132,6 +132,11 @@ class Contact:
     cff: Subroutine = Subroutine()
     source: Source = Source()
 
+    @property
+    def with_itself(self) -> bool:
+        """Whether I and J are the same graphics: all of them touch each other."""
+        return set(self.i_graphics_id) == set(self.j_graphics_id)
+
 
 @dataclass(frozen=True)
 class Gravity:

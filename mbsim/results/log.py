@@ -13,7 +13,7 @@ from mbsim.model.elements import Contact, Model
 from mbsim.results.files import replace_text
 from mbsim.results.store import Value
 from mbsim.system import arrays as a
-from mbsim.system.pairing import PairPlan
+from mbsim.system.pairing import Plans
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -130,9 +130,21 @@ def units_text(model: Model) -> str:
     return f"{units.force} {units.mass} {units.length} {units.time}"
 
 
-def pair_text(plan: PairPlan) -> str:
-    """Return how a pair of graphics is tested."""
-    return f"Post_Graphic[{plan.graphic_i}] Post_Graphic[{plan.graphic_j}]: {plan.detector}"
+def pair_texts(plans: Plans, contact_id: int) -> Iterator[str]:
+    """Yield how the pairs of graphics of a contact are tested."""
+    for plan in plans.pairs:
+        if plan.kind.contact == contact_id:
+            names = f"Post_Graphic[{plan.graphic_i}] Post_Graphic[{plan.graphic_j}]"
+            yield f"{names}: {plan.kind.detector}"
+    for crowd in plans.crowds:
+        if crowd.contact == contact_id:
+            if crowd.same:
+                what = f"{len(crowd.i)} graphics with each other"
+            else:
+                what = f"{len(crowd.i)} with {len(crowd.j)} graphics"
+            yield f"{what}, {crowd.pairs} pairs: near ones are found by a grid"
+            for (shape_i, shape_j), kind in crowd.kinds.items():
+                yield f"{shape_i} {shape_j}: {kind.detector}"
 
 
 def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
@@ -163,9 +175,8 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
         yield title(contact)
         yield fact("normal law", f"{contact.cnf_type}, built in")
         yield from _friction_lines(system, contact)
-        for plan in system.pair_plans:
-            if plan.contact == contact.id:
-                yield fact("pair", pair_text(plan))
+        for text in pair_texts(system.plans, contact.id):
+            yield fact("pair", text)
     yield ""
     yield "run"
 

@@ -336,7 +336,7 @@ def _digests(system: System) -> dict[str, Value]:
     ]
     # addresses are left out: they are others in every process
     text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
-    text += [repr(plan) for plan in system.pair_plans]
+    text += [repr(system.plans)]
     text += [repr(request) for request in system.model.requests.values()]
     model = hashlib.sha256("\n".join(text).encode())
     for array in arrays:

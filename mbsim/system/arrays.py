@@ -1,8 +1,10 @@
 """Every array of the compiled pipeline, grouped by use: shape and meaning on its line.
 
-Counts: nb moving bodies (row nb of a body array is ground), ng graphics, np pairs, nc
-contacts, ns slots. A *slot* is a place for one incident: a pair owns a fixed range of
-slots. Everything is in model units, global frame unless said otherwise.
+Counts: nb moving bodies (row nb of a body array is ground), ng graphics, nk kinds, np places
+for pairs, nc contacts, ns slots. A *slot* is a place for one incident: a pair owns a range of
+slots. A contact of few graphics lists all its pairs for good; one of many, a *crowd*, lists
+those that are near, and the list follows the motion (dynamics.crowd). Everything is in model
+units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
@@ -33,8 +35,11 @@ BODY_SIZE = 13
 LOG_COLUMNS = 9
 
 # entries of `Log.counters`
-NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS = range(6)
-COUNTERS = 6
+NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS, LISTINGS = range(7)
+COUNTERS = 7
+
+# entries of `Pairs.count`
+LIVE, FREE, FIXED, WANTED = range(4)
 
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
@@ -61,23 +66,57 @@ class Graphics(NamedTuple):
     reach: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
     half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
+    thin: F1  # (ng,) half of the thinnest side; inf for a plane
+    shape: I1  # (ng,) class of shape, see `Crowds.kind`
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)
 
 
-class Pairs(NamedTuple):
-    """Graphics that may touch, in the order that their kernel wants."""
+class Kinds(NamedTuple):
+    """How two shapes of a contact are tested against each other."""
 
-    contact: I1  # (np,)
+    contact: I1  # (nk,)
+    kernel: I1  # (nk,) address, 0 where FCL does it
+    slots: I1  # (nk,) points it gives at most
+    swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
+    regroups: I1  # (nk,) 1 where points may appear deep in a contact: FCL chooses them anew
+    noise: F1  # (nk,) scatter of the normals that its detector gives
+
+
+class Pairs(NamedTuple):
+    """Graphics that may touch, in the order that their kernel wants; saved with the state."""
+
+    kind: I1  # (np,)
     graphic_i: I1  # (np,) the kernel's I
     graphic_j: I1  # (np,)
-    swapped: I1  # (np,) 1 where the kernel's I is the contact's J
-    slot: I1  # (np + 1,) first slot
-    kernel: I1  # (np,) address, 0 where FCL does it
-    watched: I1  # (np,) 0 where no distance can be known (a plane that moves)
-    regroups: I1  # (np,) 1 where points may appear deep in a contact: FCL chooses them anew
-    thickness: F1  # (np,) what a step may not jump over
-    noise: F1  # (np,) scatter of the normals that its detector gives
+    slot: I1  # (np,) first slot
+    last: I1  # (np,) one behind the last slot
+    touches: I1  # (np,) slots that touched at the committed state
+    gap: F1  # (np,) distance that the pair kept when last measured
+    left: F1  # (np,) what the motion since has left of it for certain
+    live: I1  # (np,) places in use, ascending; those of crowds behind all others
+    free: I1  # (np,) places not in use, the next one last
+    count: I1  # (4,) live, free, live for good, places that a listing lacked
+
+
+class Crowds(NamedTuple):
+    """Contacts of many graphics, whose near pairs are found as they move."""
+
+    contact: I1  # (crowds,)
+    same: I1  # (crowds,) 1 where I and J are one set: each pair once, none on one body
+    first: I2  # (crowds, 4) where I begins and ends in `member`, where J begins and ends
+    member: I1  # graphics
+    kind: I2  # (crowds, shapes^2) kind by shape class of I and of J, -1 for none
+    swap: I2  # (crowds, shapes^2) 1 where the kernel wants the other order
+    size: F1  # (2,) a pair is near if its boxes are nearer than the first; a usual reach
+    reference: F2  # (ng, 7) centre and quaternion of the body when pairs were last listed
+    room: F1  # (ng,) how far any point may still move before that; inf for who is in no crowd
+    box: F2  # (ng, 6) lower and upper corner then
+    cell: I1  # (ng,) of the grid
+    order: I1  # (ng,) members cell by cell
+    start: I1  # (cells + 1,) where a cell begins in `order`
+    head: I1  # (ng,) first place of a pair whose I is this graphic, -1 for none
+    next: I1  # (np,) next place of the same I
 
 
 class Contacts(NamedTuple):
@@ -92,14 +131,12 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
-    first_pair: I1  # (nc + 1,)
 
 
 class Slots(NamedTuple):
     """Places for incidents."""
 
     pair: I1  # (ns,)
-    contact: I1  # (ns,)
     x: I1  # (ns,) where X starts in y, -1 where it is not carried
 
 
@@ -112,9 +149,10 @@ class World(NamedTuple):
 
 
 class State(NamedTuple):
-    """The physical state beside y: the incident table, and what the motion bound refers to."""
+    """The physical state beside y: the incident table, and where everything was."""
 
     q: F2  # (nb + 1, 4) quaternions at the committed state
+    centre: F2  # (ng, 3) centres of the graphics at the committed state
     touching: I1  # (ns,)
     p: F2  # (ns, 3) contact point
     n: F2  # (ns, 3) normal from J into I
@@ -122,10 +160,7 @@ class State(NamedTuple):
     depth: F1  # (ns,)
     rate: F1  # (ns,) of depth
     normal: F1  # (ns,) normal force
-    gap: F1  # (np,) distance that the pair kept when last measured
-    left: F1  # (np,) what the motion since has left of it for certain
-    centre: F2  # (np, 6) centres of both graphics then
-    turn: F2  # (np, 8) quaternions of both bodies then
+    hit: I1  # (ns + 1,) slots that touched, their number last
 
 
 class Log(NamedTuple):
@@ -147,11 +182,15 @@ class Work(NamedTuple):
     accel: F2  # (nb, 6) of the cg, and angular, global frame
     noise: F2  # (nb + 1, 2) force and torque that the detector's noise may be wrong by
     frames: F2  # (ng, 12)
+    way: F1  # (ng,) how far any point may have moved since the committed state
+    speed: F2  # (ng, 2) of its fastest point, and acceleration of its centre
     points: F2  # (ns, POINT) candidates of geometry.catalog
     touching: I1  # (ns,)
+    hit: I1  # (ns + 1,) slots that touch, their number last
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     fcl: I1  # (np,) pairs that FCL shall do
+    net: F2  # (nc, 3) force of each contact
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
     trouble: I1  # (2,) worst body of the error norm, contact at fault
@@ -166,7 +205,7 @@ class Rows(NamedTuple):
     contact: F2  # (rows, CONTACT_COLUMNS nc)
     energy: F2  # (rows, 3) kinetic, potential, dissipated
     incident_count: I1  # (rows,)
-    incidents: F2  # (rows ns, 14) slot, p, n, t, X, depth
+    incidents: F2  # (capacity, 14) slot, p, n, t, X, depth
     events: F2  # (capacity, 4) time, kind, contact, slot
     used: I1  # (3,) rows, incidents, events
 
@@ -180,7 +219,9 @@ class Scene(NamedTuple):
 
     bodies: Bodies
     graphics: Graphics
+    kinds: Kinds
     pairs: Pairs
+    crowds: Crowds
     contacts: Contacts
     slots: Slots
     world: World

@@ -23,13 +23,28 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
-from mbsim.system.pairing import PairPlan, half_extent, kernel_size, plan_pairs, reach
+from mbsim.system.pairing import (
+    Kind,
+    Plans,
+    half_extent,
+    kernel_size,
+    plan_pairs,
+    reach,
+    thinnest,
+)
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
 
 ROWS = 256
 EVENTS = 1024
+INCIDENTS = 100_000
+#: Places for near pairs of a crowd, for each of its graphics.
+NEAR_EACH = 24
+#: Most cells of the grid that finds them, for each graphic.
+CELLS_EACH = 4
+#: Boxes nearer than this many radii are listed as near.
+SKIN = 0.3
 
 
 @dataclass
@@ -43,7 +58,7 @@ class System:
     body_ids: list[int]  # moving bodies, row by row
     graphic_ids: list[int]
     contact_ids: list[int]
-    pair_plans: list[PairPlan]
+    plans: Plans
     user_friction: dict[int, UserFriction]  # by contact id
     needs_fcl: bool
 
@@ -86,7 +101,7 @@ def _bodies(placement: Placement) -> a.Bodies:
 
 
 def _graphics(
-    model: Model, placement: Placement, ids: list[int], row: dict[int, int]
+    model: Model, placement: Placement, ids: list[int], row: dict[int, int], shapes: list[str]
 ) -> a.Graphics:
     """Return the shapes in their bodies' cg axes; `row` is the body row by body id."""
     n = len(ids)
@@ -98,6 +113,8 @@ def _graphics(
         reach=np.zeros(n),
         half=np.zeros((n, 3)),
         turns=np.ones(n, dtype=np.int64),
+        thin=np.zeros(n),
+        shape=np.zeros(n, dtype=np.int64),
         marker_p=np.zeros((n, 3)),
         marker_R=np.zeros((n, 3, 3)),
     )
@@ -111,53 +128,111 @@ def _graphics(
         made.reach[g] = reach(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
+        made.thin[g] = thinnest(graphic)
+        made.shape[g] = shapes.index(graphic.shape)
         made.marker_p[g] = marker.p_B
         made.marker_R[g] = marker.R_B
     return made
 
 
-def _pairs(
-    model: Model,
-    plans: list[PairPlan],
-    graphics: a.Graphics,
-    rows: dict[int, int],
-    contacts: list[int],
-    ground: int,
-) -> a.Pairs:
-    """Return the pairs; `rows` is the graphic row by graphic id."""
-    n = len(plans)
-    made = a.Pairs(
-        contact=np.array([contacts.index(plan.contact) for plan in plans], dtype=np.int64),
-        graphic_i=np.array([rows[plan.graphic_i] for plan in plans], dtype=np.int64),
-        graphic_j=np.array([rows[plan.graphic_j] for plan in plans], dtype=np.int64),
-        swapped=np.array([plan.swapped for plan in plans], dtype=np.int64),
-        slot=np.concatenate([[0], np.cumsum([plan.slots for plan in plans])]).astype(np.int64),
-        kernel=np.zeros(n, dtype=np.int64),
-        watched=np.ones(n, dtype=np.int64),
-        regroups=np.array(
-            [not plan.closed_form or plan.may_need_fcl for plan in plans], dtype=np.int64
+def _kinds(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
+    """Return how pairs are tested; `contacts` is the contact row by id."""
+    known = {k.closed_form: pair_address(PAIRS[k.closed_form]) for k in kinds if k.closed_form}
+    return a.Kinds(
+        contact=np.array([contacts[k.contact] for k in kinds], dtype=np.int64),
+        kernel=np.array([known.get(k.closed_form, 0) for k in kinds], dtype=np.int64),
+        slots=np.array([k.slots for k in kinds], dtype=np.int64),
+        swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
+        regroups=np.array([not k.closed_form or k.may_need_fcl for k in kinds], dtype=np.int64),
+        noise=np.array(
+            [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),
-        thickness=np.zeros(n),
-        noise=np.zeros(n),
     )
-    known: dict[str, int] = {}
-    for k, plan in enumerate(plans):
-        if plan.closed_form:
-            if plan.closed_form not in known:
-                known[plan.closed_form] = pair_address(PAIRS[plan.closed_form])
-            made.kernel[k] = known[plan.closed_form]
-        both = [made.graphic_i[k], made.graphic_j[k]]
-        if not plan.closed_form:
-            shapes = [model.graphics[g].shape for g in (plan.graphic_i, plan.graphic_j)]
-            made.noise[k] = states_noise(*shapes)
-        moving_plane = any(
-            math.isinf(graphics.reach[g]) and graphics.body[g] != ground for g in both
-        )
-        made.watched[k] = 0 if moving_plane else 1
-        # half of the thinner shape: a step may bury it no deeper before it is seen; what a
-        # half-space has swallowed it still pushes out, so nothing passes through a plane
-        plane = any(math.isinf(graphics.reach[g]) for g in both)
-        made.thickness[k] = math.inf if plane else 0.5 * min(graphics.half[g].min() for g in both)
+
+
+def _crowd_places(plans: Plans) -> tuple[int, int]:
+    """Return how many pairs of crowds can be near at once, and the slots of one such place."""
+    if not plans.crowds:
+        return 0, 0
+    places = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.crowds)
+    return places, max(kind.slots for crowd in plans.crowds for kind in crowd.kinds.values())
+
+
+def _pairs(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[a.Pairs, int]:
+    """Return the places for pairs and the number of their slots; `rows`: graphic row by id.
+
+    Listed pairs come first and stay; the places of crowds have slots for any of their kinds.
+    """
+    fixed = len(plans.pairs)
+    places, wide = _crowd_places(plans)
+    n = fixed + places
+    row_of = {kind: k for k, kind in enumerate(kinds)}
+    listed = np.array([plan.kind.slots for plan in plans.pairs], dtype=np.int64)
+    ends = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(listed)])
+    crowd_slots = ends[-1] + wide * np.arange(places + 1)
+    made = a.Pairs(
+        kind=np.zeros(n, dtype=np.int64),
+        graphic_i=np.zeros(n, dtype=np.int64),
+        graphic_j=np.zeros(n, dtype=np.int64),
+        slot=np.concatenate([ends[:-1], crowd_slots[:-1]]),
+        last=np.concatenate([ends[1:], crowd_slots[1:]]),
+        touches=np.zeros(n, dtype=np.int64),
+        gap=np.zeros(n),
+        left=np.zeros(n),
+        live=np.arange(n),
+        free=np.arange(n)[::-1].copy(),
+        count=np.array([fixed, places, fixed, 0], dtype=np.int64),
+    )
+    for k, plan in enumerate(plans.pairs):
+        made.kind[k] = row_of[plan.kind]
+        made.graphic_i[k], made.graphic_j[k] = rows[plan.graphic_i], rows[plan.graphic_j]
+    return made, int(crowd_slots[-1])
+
+
+def _crowds(
+    plans: Plans,
+    kinds: list[Kind],
+    rows: dict[int, int],
+    graphics: a.Graphics,
+    shapes: list[str],
+    contacts: dict[int, int],
+    places: int,
+) -> a.Crowds:
+    """Return the contacts whose near pairs are found as they move."""
+    n, ng = len(plans.crowds), len(graphics.body)
+    row_of = {kind: k for k, kind in enumerate(kinds)}
+    made = a.Crowds(
+        contact=np.array([contacts[crowd.contact] for crowd in plans.crowds], dtype=np.int64),
+        same=np.array([crowd.same for crowd in plans.crowds], dtype=np.int64),
+        first=np.zeros((n, 4), dtype=np.int64),
+        member=np.array([rows[g] for c in plans.crowds for g in (*c.i, *c.j)], dtype=np.int64),
+        kind=np.full((n, len(shapes) ** 2), -1, dtype=np.int64),
+        swap=np.zeros((n, len(shapes) ** 2), dtype=np.int64),
+        size=np.zeros(2),
+        reference=np.zeros((ng if n else 0, 7)),
+        room=np.full(ng, math.inf),
+        box=np.zeros((ng if n else 0, 6)),
+        cell=np.zeros(ng if n else 0, dtype=np.int64),
+        order=np.zeros(ng if n else 0, dtype=np.int64),
+        start=np.zeros(CELLS_EACH * ng + 64 if n else 0, dtype=np.int64),
+        head=np.zeros(ng if n else 0, dtype=np.int64),
+        next=np.zeros(places if n else 0, dtype=np.int64),
+    )
+    at = 0
+    for k, crowd in enumerate(plans.crowds):
+        middle, end = at + len(crowd.i), at + len(crowd.i) + len(crowd.j)
+        made.first[k] = at, middle, middle, end
+        at = end
+        for (shape_i, shape_j), kind in crowd.kinds.items():
+            i, j = shapes.index(shape_i), shapes.index(shape_j)
+            both = [(i, j, 0), (j, i, 1)] if crowd.same and i != j else [(i, j, 0)]
+            for p, q, other in both:
+                made.kind[k, p * len(shapes) + q] = row_of[kind]
+                made.swap[k, p * len(shapes) + q] = int(kind.swapped) ^ other
+    if n:
+        sizes = graphics.reach[made.member]
+        usual = float(np.median(sizes[np.isfinite(sizes)]))
+        made.size[:] = SKIN * usual, usual
     return made
 
 
@@ -167,7 +242,7 @@ def _or(value: float | None, default: float) -> float:
 
 
 def _contacts(
-    contacts: list[Contact], plans: list[PairPlan], user: dict[int, UserFriction]
+    contacts: list[Contact], user: dict[int, UserFriction]
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
@@ -193,8 +268,6 @@ def _contacts(
             wide[k, : len(values)] = values
         return wide
 
-    of_contact = [plan.contact for plan in plans]
-    counts = [of_contact.count(contact.id) for contact in contacts]
     made = a.Contacts(
         id=np.array([contact.id for contact in contacts], dtype=np.int64),
         normal_law=np.array([address for address, _ in normal], dtype=np.int64),
@@ -209,7 +282,6 @@ def _contacts(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
         dmax=np.array([c.dmax or 0.0 for c in contacts], dtype=np.float64),
-        first_pair=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
     )
     return made, uses_x
 
@@ -238,14 +310,13 @@ def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.nda
     return y
 
 
-def _state(nb: int, np_: int, ns: int) -> a.State:
+def _state(nb: int, ng: int, ns: int) -> a.State:
     """Return the incident table before anything touched."""
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
-    turn = np.zeros((np_, 8))
-    turn[:, 0] = turn[:, 4] = 1.0
     return a.State(
         q=q,
+        centre=np.zeros((ng, 3)),
         touching=np.zeros(ns, dtype=np.int64),
         p=np.zeros((ns, 3)),
         n=np.zeros((ns, 3)),
@@ -253,10 +324,7 @@ def _state(nb: int, np_: int, ns: int) -> a.State:
         depth=np.zeros(ns),
         rate=np.zeros(ns),
         normal=np.zeros(ns),
-        gap=np.zeros(np_),
-        left=np.zeros(np_),
-        centre=np.zeros((np_, 6)),
-        turn=turn,
+        hit=np.zeros(ns + 1, dtype=np.int64),
     )
 
 
@@ -273,8 +341,14 @@ def _log(nc: int) -> a.Log:
     )
 
 
-def _work(nb: int, ng: int, np_: int, ns: int) -> a.Work:
+def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
     """Return scratch, with the ground's rows as they stay."""
+    ng = len(graphics.body)
+    fixed = graphics.body == nb
+    frames = np.full((ng, 12), np.nan)
+    frames[fixed] = np.hstack([graphics.p, graphics.R.reshape(-1, 9)])[fixed]
+    # nobody turns a sphere
+    frames[graphics.turns == 0, 3:] = np.eye(3).ravel()
     R = np.full((nb + 1, 3, 3), np.nan)
     R[nb] = np.eye(3)
     v, w = np.full((nb + 1, 3), np.nan), np.full((nb + 1, 3), np.nan)
@@ -287,12 +361,16 @@ def _work(nb: int, ng: int, np_: int, ns: int) -> a.Work:
         torque=np.full((nb + 1, 3), np.nan),
         accel=np.full((nb, 6), np.nan),
         noise=np.zeros((nb + 1, 2)),
-        frames=np.full((ng, 12), np.nan),
-        points=np.full((ns, POINT), np.nan),
+        frames=frames,
+        way=np.where(fixed, 0.0, np.nan),
+        speed=np.where(fixed[:, None], 0.0, np.full((ng, 2), np.nan)),
+        points=np.zeros((ns, POINT)),
         touching=np.zeros(ns, dtype=np.int64),
-        t=np.full((ns, 3), np.nan),
-        slot=np.full((ns, a.SLOT_COLUMNS), np.nan),
+        hit=np.zeros(ns + 1, dtype=np.int64),
+        t=np.zeros((ns, 3)),
+        slot=np.zeros((ns, a.SLOT_COLUMNS)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
+        net=np.zeros((nc, 3)),
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
         trouble=np.full(2, -1, dtype=np.int64),
@@ -308,8 +386,8 @@ def _rows(n: int, nb: int, nc: int, ns: int) -> a.Rows:
         contact=np.zeros((ROWS, a.CONTACT_COLUMNS * nc)),
         energy=np.zeros((ROWS, 3)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
-        incidents=np.zeros((ROWS * ns, 14)),
-        events=np.zeros((max(EVENTS, 8 * ns), 4)),
+        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), 14)),
+        events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS), 4)),
         used=np.zeros(3, dtype=np.int64),
     )
 
@@ -361,26 +439,34 @@ def build(
     """
     placement = place(model)
     plans = plan_pairs(model, detector)
+    kinds = plans.kinds
     user = _load_user_friction(model, plugins, interpret, log)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
     row = {body.id: nb for body in model.bodies.values()}
     row.update({body_id: k for k, body_id in enumerate(body_ids)})
-    graphic_ids = list(dict.fromkeys(g for plan in plans for g in (plan.graphic_i, plan.graphic_j)))
+    listed = [g for plan in plans.pairs for g in (plan.graphic_i, plan.graphic_j)]
+    crowded = [g for crowd in plans.crowds for g in (*crowd.i, *crowd.j)]
+    graphic_ids = list(dict.fromkeys([*listed, *crowded]))
+    shapes = sorted({model.graphics[g].shape for g in graphic_ids})
     contact_list = list(model.contacts.values())
     contact_ids = [contact.id for contact in contact_list]
+    contact_row = {contact_id: k for k, contact_id in enumerate(contact_ids)}
 
-    graphics = _graphics(model, placement, graphic_ids, row)
+    graphics = _graphics(model, placement, graphic_ids, row, shapes)
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
-    pairs = _pairs(model, plans, graphics, graphic_row, contact_ids, nb)
-    contacts, uses_x = _contacts(contact_list, plans, user)
+    pairs, ns = _pairs(plans, kinds, graphic_row)
+    contacts, uses_x = _contacts(contact_list, user)
 
     # X goes behind the bodies in y, slot by slot, for the laws that look at it
-    ns = int(pairs.slot[-1])
-    slot_pair = np.repeat(np.arange(len(plans), dtype=np.int64), [plan.slots for plan in plans])
-    slot_contact = pairs.contact[slot_pair]
+    slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
+    wanted = np.zeros(ns, dtype=bool)
+    for k, plan in enumerate(plans.pairs):
+        wanted[pairs.slot[k] : pairs.last[k]] = uses_x[contact_row[plan.kind.contact]]
+    if any(uses_x[contact_row[crowd.contact]] for crowd in plans.crowds):
+        wanted[pairs.slot[len(plans.pairs)] :] = True
     x = np.full(ns, -1, dtype=np.int64)
-    carried = np.flatnonzero(uses_x[slot_contact]) if ns else np.zeros(0, dtype=np.int64)
+    carried = np.flatnonzero(wanted)
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
     y0 = _initial_y(placement, len(carried), len(contact_ids))
 
@@ -388,20 +474,22 @@ def build(
     scene = a.Scene(
         bodies=_bodies(placement),
         graphics=graphics,
+        kinds=_kinds(kinds, contact_row),
         pairs=pairs,
+        crowds=_crowds(plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot)),
         contacts=contacts,
-        slots=a.Slots(slot_pair, slot_contact, x),
+        slots=a.Slots(slot_pair, x),
         world=a.World(
             np.array(model.gravity.g, dtype=np.float64),
             np.array([placement.L, speed if speed > 0.0 else placement.L]),
             np.zeros(1, dtype=np.int64),
         ),
-        state=_state(nb, len(plans), ns),
+        state=_state(nb, len(graphic_ids), ns),
         log=_log(len(contact_ids)),
-        work=_work(nb, len(graphic_ids), len(plans), ns),
+        work=_work(nb, graphics, len(pairs.slot), ns, len(contact_ids)),
         rows=_rows(len(y0), nb, len(contact_ids), ns),
     )
-    needs_fcl = any(not plan.closed_form or plan.may_need_fcl for plan in plans)
+    needs_fcl = any(not kind.closed_form or kind.may_need_fcl for kind in kinds)
     return System(
         model, placement, scene, y0, body_ids, graphic_ids, contact_ids, plans, user, needs_fcl
     )

@@ -1,4 +1,10 @@
-"""Which graphics may touch, and what detects each pair: a closed form or FCL."""
+"""Which graphics may touch, and what detects them: a closed form or FCL.
+
+A contact tests every I graphic with every J graphic. Up to `MOST_LISTED` pairs are listed for
+good; the pairs of a larger contact, a *crowd*, are too many to look at and are found as
+they come near (`dynamics.crowd`). A crowd whose I and J are the same graphics is a set in contact
+with itself: each pair once, none on one body.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +18,18 @@ from mbsim.model.elements import Contact, Graphic, Model
 #: Shapes with flat sides: FCL gives several points for two of them, one for all others.
 _FLAT = {"BOX", "PLANE"}
 FCL_SLOTS = 8
+#: Contacts with more pairs than this are crowds. Listing costs a pair 5 ns an evaluation, looking
+#: for near pairs a graphic some 100 ns now and then (tests/bench/test_crowd.py).
+MOST_LISTED = 300
 
 
 @dataclass(frozen=True)
-class PairPlan:
-    """One pair of graphics of a contact, in the order that its detector wants."""
+class Kind:
+    """How two shapes of a contact are tested, in the order that their detector wants."""
 
-    contact: int
-    graphic_i: int  # ids
-    graphic_j: int
+    contact: int  # id
+    shape_i: str
+    shape_j: str
     swapped: bool
     closed_form: str  # name in PAIRS, or empty where FCL does it
     slots: int
@@ -39,8 +48,49 @@ class PairPlan:
         return f"closed form {self.closed_form}{near_edges}"
 
 
-def _plan(contact: Contact, i: Graphic, j: Graphic, detector: str) -> PairPlan:
-    """Return the plan of one pair."""
+@dataclass(frozen=True)
+class PairPlan:
+    """One pair of graphics (ids), in the order of its kind."""
+
+    kind: Kind
+    graphic_i: int
+    graphic_j: int
+
+
+@dataclass(frozen=True)
+class CrowdPlan:
+    """A contact of many graphics (ids), with its kinds by shape of the contact's I and J."""
+
+    contact: int
+    i: tuple[int, ...]
+    j: tuple[int, ...]
+    same: bool
+    kinds: dict[tuple[str, str], Kind]
+
+    @property
+    def pairs(self) -> int:
+        """Return how many pairs there could be."""
+        n = len(self.i)
+        return n * (n - 1) // 2 if self.same else n * len(self.j)
+
+
+@dataclass(frozen=True)
+class Plans:
+    """All pairs of a model: listed one by one, or as crowds."""
+
+    pairs: tuple[PairPlan, ...]
+    crowds: tuple[CrowdPlan, ...]
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """Return every kind once, listed pairs' first."""
+        listed = [plan.kind for plan in self.pairs]
+        crowded = [kind for crowd in self.crowds for kind in crowd.kinds.values()]
+        return list(dict.fromkeys([*listed, *crowded]))
+
+
+def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
+    """Return how graphics like these two are tested."""
     flat = i.shape in _FLAT and j.shape in _FLAT
     fcl_slots = FCL_SLOTS if flat else 1
     for a, b, swapped in ((i, j, False), (j, i, True)):
@@ -48,11 +98,45 @@ def _plan(contact: Contact, i: Graphic, j: Graphic, detector: str) -> PairPlan:
         if name in PAIRS and detector != "fcl":
             # a box over a box may have to fall back on FCL, whose points need places too
             slots = max(PAIRS[name].slots, fcl_slots)
-            return PairPlan(contact.id, a.id, b.id, swapped, name, slots)
-    return PairPlan(contact.id, i.id, j.id, False, "", fcl_slots)
+            return Kind(contact, a.shape, b.shape, swapped, name, slots)
+    return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
-def plan_pairs(model: Model, detector: str = "auto") -> list[PairPlan]:
+def _two_planes(model: Model, contact: Contact, i: int, j: int) -> Fault:
+    """Return the fault of a plane against a plane."""
+    return Fault(
+        model.file,
+        contact.source.line,
+        f"Force_Contact[{contact.id}]",
+        f"Post_Graphic[{i}] and Post_Graphic[{j}] are both planes; "
+        "give one of them a body of finite size",
+    )
+
+
+def _crowd(
+    model: Model, contact: Contact, same: bool, detector: str
+) -> tuple[CrowdPlan, list[Fault]]:
+    """Return a contact of many graphics, and what is wrong with it."""
+    kinds: dict[tuple[str, str], Kind] = {}
+    faults = []
+    i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
+    first: list[dict[str, int]] = [{}, {}]
+    for side, ids in zip(first, (i_ids, j_ids), strict=True):
+        for id in ids:
+            side.setdefault(model.graphics[id].shape, id)
+    for shape_i, i in first[0].items():
+        for shape_j, j in first[1].items():
+            if shape_i == shape_j == "PLANE":
+                if same and sum(model.graphics[id].shape == "PLANE" for id in i_ids) == 1:
+                    continue
+                faults.append(_two_planes(model, contact, i, j))
+            elif (shape_j, shape_i) not in kinds or not same:
+                a, b = model.graphics[i], model.graphics[j]
+                kinds[shape_i, shape_j] = _kind(contact.id, a, b, detector)
+    return CrowdPlan(contact.id, i_ids, j_ids, same, kinds), faults
+
+
+def plan_pairs(model: Model, detector: str = "auto") -> Plans:
     """Return every I graphic with every J graphic of every contact.
 
     Parameters
@@ -66,26 +150,37 @@ def plan_pairs(model: Model, detector: str = "auto") -> list[PairPlan]:
     DeckError
         If two shapes cannot be tested against each other (two planes).
     """
-    plans, faults = [], []
+    pairs, crowds, faults = [], [], []
     for contact in model.contacts.values():
-        for i in contact.i_graphics_id:
-            for j in contact.j_graphics_id:
+        i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
+        same = contact.with_itself
+        many = len(i_ids) * (len(i_ids) - 1) // 2 if same else len(i_ids) * len(j_ids)
+        if many > MOST_LISTED:
+            crowd, wrong = _crowd(model, contact, same, detector)
+            crowds.append(crowd)
+            faults += wrong
+            continue
+        for place, i in enumerate(i_ids):
+            for j in j_ids[place + 1 :] if same else j_ids:
                 a, b = model.graphics[i], model.graphics[j]
+                if (
+                    same
+                    and model.markers[a.marker_id].body_id == model.markers[b.marker_id].body_id
+                ):
+                    continue
                 if a.shape == b.shape == "PLANE":
-                    faults.append(
-                        Fault(
-                            model.file,
-                            contact.source.line,
-                            f"Force_Contact[{contact.id}]",
-                            f"Post_Graphic[{i}] and Post_Graphic[{j}] are both planes; "
-                            "give one of them a body of finite size",
-                        )
-                    )
-                else:
-                    plans.append(_plan(contact, a, b, detector))
+                    faults.append(_two_planes(model, contact, i, j))
+                    continue
+                kind = _kind(contact.id, a, b, detector)
+                pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
     if faults:
         raise DeckError(faults)
-    return plans
+    return Plans(tuple(pairs), tuple(crowds))
+
+
+def thinnest(graphic: Graphic) -> float:
+    """Return half of the thinnest side; inf for a plane."""
+    return min(half_extent(graphic))
 
 
 def half_extent(graphic: Graphic) -> tuple[float, float, float]:

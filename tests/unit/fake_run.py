@@ -83,7 +83,7 @@ def fake_system_of(model: Model) -> Any:
         y0=y0,
         body_ids=list(placement.bodies),
         contact_ids=list(model.contacts),
-        pair_plans=plan_pairs(model),
+        plans=plan_pairs(model),
         user_friction={},
     )
 

@@ -321,10 +321,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         CONTACT_LINE,
         ("Force_Contact[301]", "both on body 2"),
     ),
-    "I on two bodies": (
+    "a body on both sides": (
         deck(('num_i_graphics="1" i_graphics_id="200"', 'i_graphics_id="200, 100"')),
         CONTACT_LINE,
-        ("Force_Contact[301]", "i_graphics_id", "bodies 1, 2"),
+        ("Force_Contact[301]", "i_graphics_id", "both on body 1"),
     ),
     "count of graphics": (
         deck(('num_i_graphics="1"', 'num_i_graphics="2"')),
