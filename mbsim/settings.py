@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.integrators.catalog import METHODS
 from mbsim.model.elements import Model, Simulation
 
 DEFAULT_TOL = 1e-5
-INTEGRATORS = ("DOPRI5",)
-#: MotionSolve's names, all run by the one method there is.
+INTEGRATORS = tuple(METHODS)
+#: MotionSolve's names, all run by the first method.
 _MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
 
 
@@ -78,6 +79,24 @@ def _simulations(
     return tuple(planned)
 
 
+def _method(names: set[str]) -> tuple[str, list[str]]:
+    """Return the one method of all Simulates, and what is to be said about its name."""
+    first = INTEGRATORS[0]
+    notes, methods = [], set()
+    for name in sorted(names):
+        if name in _MOTIONSOLVE_NAMES:
+            notes.append(f"integrator {name}: run by {first} ({METHODS[first]})")
+        elif name not in INTEGRATORS:
+            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
+            raise ModelError(f"integrator={name} is not known; there are {allowed}")
+        methods.add(first if name in _MOTIONSOLVE_NAMES else name)
+    if len(methods) > 1:
+        raise ModelError(
+            f"integrator_type: one method runs all Simulates, not {' and '.join(sorted(methods))}"
+        )
+    return methods.pop(), notes
+
+
 def settle(
     model: Model,
     end_time: float | None = None,
@@ -114,13 +133,8 @@ def settle(
         stages.append(Stage(simulation, chosen, h_max, said("h_min") or 0.0, said("h0_max") or 0.0))
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
-    for name in sorted(names):
-        if name in _MOTIONSOLVE_NAMES:
-            notes.append(f"integrator {name}: run by DOPRI5 (explicit, order 5)")
-        elif name not in INTEGRATORS:
-            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
-            raise ModelError(f"integrator={name} is not known; there are {allowed}")
-    return Settings(tuple(stages), INTEGRATORS[0], (*notes, *sorted(from_deck)))
+    method, said_of_names = _method(names)
+    return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:
