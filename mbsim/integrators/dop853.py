@@ -1,7 +1,7 @@
 """Explicit Runge-Kutta of order 8 with errors of order 5 and 3 and dense output of order 7.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving ODEs I (1993), section II.5, II.6 and II.10
-(the method of Dormand and Prince as in their code DOP853, whose published coefficients stand below).
+(the method of Dormand and Prince as in their code DOP853, with its published coefficients).
 Twelve stages; the thirteenth is the first of the next step and taken at the projected point.
 A step with an output in it costs four evaluations more: three stages, and the end once again,
 because a problem is committed at the point that it was evaluated at last.
