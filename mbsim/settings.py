@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.integrators.catalog import METHODS
 from mbsim.model.elements import Model, Simulation
 
 DEFAULT_TOL = 1e-5
-INTEGRATORS = ("DOPRI5",)
-#: MotionSolve's names, all run by the one method there is.
+INTEGRATORS = tuple(METHODS)
+#: MotionSolve's names, all run by the first method.
 _MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
 
 
@@ -78,6 +79,38 @@ def _simulations(
     return tuple(planned)
 
 
+def _asked_method(model: Model, sources: Any, integrator: str | None) -> tuple[str, str]:
+    """Return the name of the method for one Simulate, and where it was said."""
+    if integrator:
+        return integrator.upper(), "integrator"
+    for source in sources:
+        if source is not None and source.integrator_type:
+            where = f"{model.file}:{source.source.line}: Param_Transient: integrator_type"
+            return source.integrator_type.upper(), where
+    return INTEGRATORS[0], "integrator (default)"
+
+
+def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
+    """Return the one method of all Simulates, and what is to be said about its name.
+
+    `asked` has for every name that was given where it was said.
+    """
+    first = INTEGRATORS[0]
+    notes = []
+    methods: dict[str, str] = {}
+    for name, where in sorted(asked.items()):
+        if name in _MOTIONSOLVE_NAMES:
+            notes.append(f"integrator {name}: run by {first} ({METHODS[first]})")
+        elif name not in INTEGRATORS:
+            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
+            raise ModelError(f"{where}={name} is not known; there are {allowed}")
+        methods.setdefault(first if name in _MOTIONSOLVE_NAMES else name, where)
+    if len(methods) > 1:
+        both = " and ".join(f"{where}={name}" for name, where in methods.items())
+        raise ModelError(f"{both}: one method runs all Simulates")
+    return next(iter(methods)), notes
+
+
 def settle(
     model: Model,
     end_time: float | None = None,
@@ -94,7 +127,8 @@ def settle(
     """
     notes = []
     stages = []
-    names, from_deck = set(), set()
+    asked: dict[str, str] = {}
+    from_deck = set()
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -103,7 +137,8 @@ def settle(
             values = (getattr(source, attribute) for source in sources if source is not None)
             return next((value for value in values if value is not None), None)
 
-        names.add((integrator or said("integrator_type") or INTEGRATORS[0]).upper())
+        method, where = _asked_method(model, sources, integrator)
+        asked.setdefault(method, where)
         chosen = tol if tol is not None else said("integr_tol")
         if tol is None and chosen is not None:
             from_deck.add(f"integr_tol {chosen:g} of the deck is used as the dimensionless tol")
@@ -114,13 +149,8 @@ def settle(
         stages.append(Stage(simulation, chosen, h_max, said("h_min") or 0.0, said("h0_max") or 0.0))
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
-    for name in sorted(names):
-        if name in _MOTIONSOLVE_NAMES:
-            notes.append(f"integrator {name}: run by DOPRI5 (explicit, order 5)")
-        elif name not in INTEGRATORS:
-            allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
-            raise ModelError(f"integrator={name} is not known; there are {allowed}")
-    return Settings(tuple(stages), INTEGRATORS[0], (*notes, *sorted(from_deck)))
+    method, said_of_names = _method(asked)
+    return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:

@@ -44,15 +44,17 @@ class Runner:
         from mbsim.core import jit
         from mbsim.core.problem import Problem
         from mbsim.dynamics.hooks import mechanism
-        from mbsim.integrators import dopri5
+        from mbsim.integrators import catalog, driver, scheme
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
-        self.method = dopri5.make(system.y0, settings.stages[0].simulation.start_time)
+        method = catalog.load(settings.integrator)
+        self.method = scheme.make(method, system.y0, settings.stages[0].simulation.start_time)
         self.detector = self._open_fcl_door()
         self.problem: Problem
         self.problem, self._table = mechanism(system.scene)
-        self._advance = jit.function(dopri5.advance)
+        self._steps, self._bench = scheme.bind(method, self.problem, self.method)
+        self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
             ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
@@ -166,7 +168,7 @@ class Runner:
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
         from mbsim.core import problem
-        from mbsim.integrators import dopri5
+        from mbsim.integrators import scheme
 
         method, scene, simulation = self.method, self.system.scene, stage.simulation
         # the last change so far holds; a resumed run may have missed an earlier one
@@ -177,19 +179,20 @@ class Runner:
         budget = FIRST_BUDGET
         if fresh:
             # the statement may have changed what acts: f and the step begin anew
-            method.memory[dopri5.HAVE_F] = 0.0
-            method.memory[dopri5.STEP] = 0.0
-            method.memory[dopri5.FIRST_MAX] = stage.h0_max
-            method.memory[dopri5.LAST_STEP] = 0.0
-            method.counts[dopri5.NEXT_OUTPUT] = 1
+            method.memory[scheme.HAVE_F] = 0.0
+            method.memory[scheme.STEP] = 0.0
+            method.memory[scheme.FIRST_MAX] = stage.h0_max
+            method.memory[scheme.LAST_STEP] = 0.0
+            method.counts[scheme.NEXT_OUTPUT] = 1
             code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
             if code < 0.0:
                 self.fail(int(-code), times[0])
         while True:
-            began, before = time.perf_counter(), int(method.counts[dopri5.EVALUATIONS])
+            began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
                 self.problem,
                 method,
+                self._steps,
                 simulation.end_time,
                 stage.tol,
                 stage.h_max,
@@ -199,7 +202,7 @@ class Runner:
             )
             elapsed = time.perf_counter() - began
             self.loop_seconds += elapsed
-            done = int(method.counts[dopri5.EVALUATIONS]) - before
+            done = int(method.counts[scheme.EVALUATIONS]) - before
             wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
             # at most four times as many: the first calls also compile or load code
             budget = int(min(max(wanted, 1.0), 4.0 * budget))
@@ -207,21 +210,21 @@ class Runner:
             if outcome == problem.DONE:
                 return
             if outcome == problem.FAILED:
-                self.fail(int(method.counts[dopri5.CODE]), method.memory[dopri5.TIME])
+                self.fail(int(method.counts[scheme.CODE]), method.memory[scheme.TIME])
             if outcome == problem.STEP_TOO_SMALL:
                 self.give_up()
             if self.interrupted:
-                raise Interrupted(f"interrupted at time {method.memory[dopri5.TIME]:.6g}")
+                raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
             if self.recorder.due():
                 self.recorder.flush(self.checkpoint())
             if progress is not None:
-                h = float(method.memory[dopri5.STEP])
-                progress(float(method.memory[dopri5.TIME]), h, self.settings.end_time)
+                h = float(method.memory[scheme.STEP])
+                progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
 
     def give_up(self) -> None:
         """Raise why the step became too small."""
         from mbsim.core import problem
-        from mbsim.integrators import dopri5
+        from mbsim.integrators import scheme
 
         memory, counts, trouble = (
             self.method.memory,
@@ -229,18 +232,18 @@ class Runner:
             self.system.scene.work.trouble,
         )
         reason = {
-            problem.BY_ERROR: f"its error stays {memory[dopri5.LAST_ERROR]:.3g} times too large",
+            problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
             problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
             problem.BY_NOT_FINITE: "a force or acceleration is not finite",
-        }[int(counts[dopri5.LAST_REASON])]
+        }[int(counts[scheme.LAST_REASON])]
         body, contact = int(trouble[0]), int(trouble[1])
         where = []
-        if counts[dopri5.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
+        if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
             where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
         if 0 <= contact < len(self.system.contact_ids):
             where.append(f"Force_Contact[{self.system.contact_ids[contact]}]")
         raise SolverError(
-            f"the step fell to {memory[dopri5.STEP]:.3g} at time {memory[dopri5.TIME]:.9g} "
+            f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
             f"because {reason}; at {', '.join(where) or 'no single element'}. "
             "Results up to there are kept."
         )
@@ -276,16 +279,16 @@ class Runner:
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run."""
-        from mbsim.integrators import dopri5
+        from mbsim.integrators import scheme
         from mbsim.system import arrays as a
 
         counts, memory = self.method.counts, self.method.memory
         counters = self.system.scene.log.counters
         return {
-            "steps": int(counts[dopri5.STEPS]),
-            "rejected": int(counts[dopri5.REJECTED]),
-            "rhs_evaluations": int(counts[dopri5.EVALUATIONS]),
-            "output_evaluations": int(counts[dopri5.OUTPUTS]),
+            "steps": int(counts[scheme.STEPS]),
+            "rejected": int(counts[scheme.REJECTED]),
+            "rhs_evaluations": int(counts[scheme.EVALUATIONS]),
+            "output_evaluations": int(counts[scheme.OUTPUTS]),
             "jacobians": 0,
             "factorizations": 0,
             "narrowphase_pairs": int(counters[a.NARROWPHASE]),
@@ -295,8 +298,8 @@ class Runner:
             "normal_calls": int(counters[a.NORMAL_CALLS]),
             "friction_calls": int(counters[a.FRICTION_CALLS]),
             "python_calls": int(counters[a.PYTHON_CALLS]),
-            "h_smallest": float(memory[dopri5.H_SMALLEST]),
-            "h_largest": float(memory[dopri5.H_LARGEST]),
+            "h_smallest": float(memory[scheme.H_SMALLEST]),
+            "h_largest": float(memory[scheme.H_LARGEST]),
             "loop_s": self.loop_seconds,
             "wall_s": wall,
             "compile_s": compiled,
@@ -345,7 +348,7 @@ def simulate(
     end_time, print_interval : float, optional
         Instead of the deck's [T].
     integrator : str, optional
-        "DOPRI5".
+        "DOPRI5" (order 5) or "DOP853" (order 8, for tolerances of 1e-8 and less).
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default 1e-5.
     plugins : sequence of path

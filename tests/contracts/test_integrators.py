@@ -1,22 +1,47 @@
-"""What an integrator has to keep, on scalar equations that know no bodies."""
+"""What an integrator has to keep, on equations that know no bodies and on a free top."""
 
 from __future__ import annotations
 
 import math
+import sys
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import carray
+from numba import carray, cfunc
 
 from mbsim.core import jit
+from mbsim.core.address import call_float, pack, view
+from mbsim.core.arrays import F2, I1
 from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem
-from mbsim.integrators import dopri5
+from mbsim.integrators import catalog, dop853, driver, scheme
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import MODELS, run_model
+
+import mbsim
+
+METHODS = list(catalog.METHODS)
+#: Order of the step and of the dense output.
+ORDERS = {"DOPRI5": (5, 4), "DOP853": (8, 7)}
+BOTH = pytest.mark.parametrize("name", METHODS)
 
 
 def _oscillator(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[1]
     f[1] = -y[0] + math.sin(2.0 * t)
+    return 0.0
+
+
+def _kepler(context, t, h, a, b):
+    # y = x, y, x', y' of a planet round a sun of strength 1
+    y, f = carray(a, (4,)), carray(b, (4,))
+    cube = math.sqrt(y[0] * y[0] + y[1] * y[1]) ** 3
+    f[0], f[1] = y[2], y[3]
+    f[2], f[3] = -y[0] / cube, -y[1] / cube
     return 0.0
 
 
@@ -27,9 +52,42 @@ def _blows_up(context, t, h, a, b):
     return 0.0
 
 
-def _norm(context, t, h, a, b):
+def _rough(context, t, h, a, b):
+    y, f = carray(a, (2,)), carray(b, (2,))
+    f[0] = y[1]
+    f[1] = -y[0] + (1.0 if math.sin(7.0 * t) > 0.0 else -1.0)
+    return 0.0
+
+
+def _refuses(context, t, h, a, b):
+    y, f = carray(a, (2,)), carray(b, (2,))
+    f[0] = 0.6 - y[0]
+    f[1] = 0.0
+    return 7.0 if y[0] < 0.5 else 0.0
+
+
+def _turns(context, t, h, a, b):
+    y, f = carray(a, (2,)), carray(b, (2,))
+    f[0], f[1] = -3.0 * y[1], 3.0 * y[0]
+    return 0.0
+
+
+def _to_the_circle(context, t, h, a, b):
+    y = carray(a, (2,))
+    length = math.sqrt(y[0] * y[0] + y[1] * y[1])
+    y[0] /= length
+    y[1] /= length
+    return 0.0
+
+
+def _norm2(context, t, h, a, b):
     e = carray(a, (2,))
     return math.sqrt(e[0] * e[0] + e[1] * e[1])
+
+
+def _norm4(context, t, h, a, b):
+    e = carray(a, (4,))
+    return math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
 
 
 def _zero(context, t, h, a, b):
@@ -48,19 +106,42 @@ def _far(context, t, h, a, b):
     return 1e300
 
 
+class Table(NamedTuple):
+    """Rows that `_keep` writes: t, y0, y1."""
+
+    rows: F2
+    used: I1
+
+
+def _keep(context, t, h, a, b):
+    table, y = view(context, Table), carray(a, (2,))
+    row = table.rows[table.used[0]]
+    row[0], row[1], row[2] = t, y[0], y[1]
+    table.used[0] += 1
+    return 0.0
+
+
 def exact(t):
     # y'' = -y + sin 2t, y(0) = 1, y'(0) = 0
-    return math.cos(t) + 2.0 / 3.0 * math.sin(t) - math.sin(2.0 * t) / 3.0
+    return np.cos(t) + 2.0 / 3.0 * np.sin(t) - np.sin(2.0 * t) / 3.0
 
 
-def make_problem(rhs, context=0, output=_zero):
-    hooks = (rhs, _zero, _norm, _one, _zero, _zero, _none, _far, output, _zero)
+ECCENTRICITY = 0.3
+PERIHELION = (1.0 - ECCENTRICITY, 0.0, 0.0, math.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY)))
+
+
+def planet(t):
+    """Return the place of the planet that passed its perihelion at t = 0, by Kepler's equation."""
+    anomaly = t
+    for _ in range(60):
+        anomaly = t + ECCENTRICITY * math.sin(anomaly)
+    across = math.sqrt(1.0 - ECCENTRICITY**2) * math.sin(anomaly)
+    return np.array([math.cos(anomaly) - ECCENTRICITY, across])
+
+
+def make_problem(rhs, context=0, norm=_norm2, output=_zero, project=_zero):
+    hooks = (rhs, project, norm, _one, _zero, _zero, _none, _far, output, _zero)
     return Problem(context, *[jit.address(hook, HOOK) for hook in hooks])
-
-
-@pytest.fixture(scope="module")
-def advance():
-    return jit.function(dopri5.advance)
 
 
 @pytest.fixture(scope="module")
@@ -68,79 +149,243 @@ def oscillator():
     return make_problem(_oscillator)
 
 
-def run(advance, problem, tol, h_max=math.inf, y0=(1.0, 0.0), end=5.0, budget=10**8):
-    method = dopri5.make(np.array(y0), 0.0)
-    outcome = advance(problem, method, end, tol, h_max, 0.0, np.zeros(0), budget)
-    return outcome, method
+class Run:
+    """One method on one problem."""
+
+    def __init__(self, name, problem, y0=(1.0, 0.0), step=0.0):
+        method = catalog.load(name)
+        self.problem, self.state = problem, scheme.make(method, np.array(y0), 0.0)
+        self.state.memory[scheme.STEP] = step
+        self.steps, self._kept = scheme.bind(method, problem, self.state)
+
+    def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
+        advance = jit.function(driver.advance)
+        times = np.array(times, dtype=float)
+        return advance(self.problem, self.state, self.steps, end, tol, h_max, 0.0, times, budget)
 
 
-def test_observed_order_is_five(advance, oscillator):
+def observed(errors):
+    """Return the order between the first and the last of (h, error)."""
+    (h0, e0), (h1, e1) = errors[0], errors[-1]
+    return math.log(e0 / e1) / math.log(h0 / h1)
+
+
+def at_least_the_order(order, name):
+    # DOP853 has small coefficients: the next order shows as well
+    return order == pytest.approx(5.0, abs=0.3) if name == "DOPRI5" else 7.5 <= order < 10.0
+
+
+@BOTH
+def test_observed_order_on_an_oscillator(oscillator, name):
     errors = []
-    for n in (20, 40, 80):
+    for n in (20, 40, 80) if name == "DOPRI5" else (8, 16, 32):
         # a loose tolerance: h_max decides, so the step is fixed
-        method = dopri5.make(np.array([1.0, 0.0]), 0.0)
-        method.memory[dopri5.STEP] = 5.0 / n
-        advance(oscillator, method, 5.0, 1e3, 5.0 / n, 0.0, np.zeros(0), 10**8)
-        errors.append((5.0 / method.counts[dopri5.STEPS], abs(method.y[0] - exact(5.0))))
-    (h0, e0), _, (h2, e2) = errors
-    order = math.log(e0 / e2) / math.log(h0 / h2)
-    assert order == pytest.approx(5.0, abs=0.3)
+        run = Run(name, oscillator, step=5.0 / n)
+        run(5.0, 1e9, h_max=5.0 / n)
+        count = run.state.counts[scheme.STEPS]
+        errors.append((5.0 / count, abs(run.state.y[0] - exact(5.0))))
+    assert at_least_the_order(observed(errors), name), errors
 
 
-def test_observed_order_of_dense_output_is_at_least_four(advance, oscillator):
+@BOTH
+def test_observed_order_on_a_planet(name):
+    problem = make_problem(_kepler, norm=_norm4)
     errors = []
-    for n in (16, 64):
-        method = dopri5.make(np.array([1.0, 0.0]), 0.0)
-        method.memory[dopri5.STEP] = 5.0 / n
-        worst, before = 0.0, 0
-        out = np.zeros(2)
-        while method.memory[dopri5.TIME] < 5.0:
-            advance(oscillator, method, 5.0, 1e3, 5.0 / n, 0.0, np.zeros(0), 1)
-            if method.counts[dopri5.STEPS] == before:
-                continue
-            before = method.counts[dopri5.STEPS]
-            t, h = method.memory[dopri5.LAST_TIME], method.memory[dopri5.LAST_STEP]
-            for s in (0.2, 0.5, 0.7):
-                dopri5.interpolate(method, s, out)
-                worst = max(worst, abs(out[0] - exact(t + s * h)))
-        errors.append((5.0 / method.counts[dopri5.STEPS], worst))
-    (h0, e0), (h1, e1) = errors
-    # local order 5 of the interpolant: 4 globally
-    assert math.log(e0 / e1) / math.log(h0 / h1) > 3.9
+    for n in (128, 256, 512) if name == "DOPRI5" else (32, 64, 128):
+        run = Run(name, problem, y0=PERIHELION, step=8.0 / n)
+        run(8.0, 1e9, h_max=8.0 / n)
+        assert run.state.counts[scheme.STEPS] == n
+        errors.append((8.0 / n, np.abs(run.state.y[:2] - planet(8.0)).max()))
+    assert at_least_the_order(observed(errors), name), errors
 
 
-def test_error_falls_with_the_tolerance_down_to_rounding(advance, oscillator):
+@BOTH
+def test_observed_order_of_dense_output(name):
+    times = np.linspace(0.0, 5.0, 1002)[1:]
     errors = []
-    for tol in 10.0 ** -np.arange(3, 14):
-        outcome, method = run(advance, oscillator, tol)
-        assert outcome == DONE
-        errors.append(abs(method.y[0] - exact(5.0)))
-    assert errors[-1] < 1e-11
+    for n in (16, 64) if name == "DOPRI5" else (8, 16):
+        table = Table(np.zeros((len(times), 3)), np.zeros(1, dtype=np.int64))
+        packed = pack(table)
+        run = Run(name, make_problem(_oscillator, int(packed.ctypes.data), output=_keep))
+        run.state.memory[scheme.STEP] = 5.0 / n
+        run(5.0, 1e9, h_max=5.0 / n, times=times)
+        assert table.rows[:, 0].tolist() == times.tolist()
+        worst = np.abs(table.rows[:, 1] - exact(times)).max()
+        errors.append((5.0 / run.state.counts[scheme.STEPS], worst))
+    assert observed(errors) > ORDERS[name][1] - 0.1, errors
+
+
+@BOTH
+def test_dense_output_costs_nothing_where_none_is_due(oscillator, name):
+    silent, talking = Run(name, oscillator), Run(name, oscillator)
+    silent(5.0, 1e-6)
+    talking(5.0, 1e-6, times=[2.5])
+    more = talking.state.counts - silent.state.counts
+    assert more[scheme.STEPS] == 0
+    assert more[scheme.EVALUATIONS] == (0 if name == "DOPRI5" else 4)
+    assert talking.state.y.tolist() == silent.state.y.tolist()
+
+
+@BOTH
+def test_error_falls_with_the_tolerance_down_to_rounding(oscillator, name):
+    errors = []
+    for tol in 10.0 ** -np.arange(3, 15):
+        run = Run(name, oscillator)
+        assert run(5.0, tol) == DONE
+        errors.append(abs(run.state.y[0] - exact(5.0)))
+    assert errors[-1] < 1e-13
     assert errors[0] / errors[-1] > 1e7
+    for looser, tighter in zip(errors, errors[2:], strict=False):
+        assert tighter < max(looser, 1e-14), errors
 
 
-def test_a_bounded_number_of_evaluations_a_call(advance, oscillator):
-    outcome, method = run(advance, oscillator, 1e-12, budget=60)
-    assert outcome == PAUSED
-    assert method.counts[dopri5.EVALUATIONS] <= 60 + 8
+@BOTH
+def test_a_bounded_number_of_evaluations_a_call(oscillator, name):
+    run = Run(name, oscillator)
+    assert run(5.0, 1e-12, budget=60) == PAUSED
+    assert run.state.counts[scheme.EVALUATIONS] <= 60 + 16
 
 
-def test_pauses_do_not_change_the_result(advance, oscillator):
-    _, straight = run(advance, oscillator, 1e-8)
-    method = dopri5.make(np.array([1.0, 0.0]), 0.0)
-    while advance(oscillator, method, 5.0, 1e-8, math.inf, 0.0, np.zeros(0), 13) == PAUSED:
+@BOTH
+@pytest.mark.parametrize("rhs", [_oscillator, _rough])
+def test_pauses_do_not_change_the_result(name, rhs):
+    # the second has rejected steps: a pause may fall between one and the next try
+    problem = make_problem(rhs)
+    straight, paused = Run(name, problem), Run(name, problem)
+    straight(5.0, 1e-8)
+    while paused(5.0, 1e-8, budget=1) == PAUSED:
         pass
-    assert method.y.tolist() == straight.y.tolist()
-    assert method.counts[dopri5.STEPS] == straight.counts[dopri5.STEPS]
+    assert (straight.state.counts[scheme.REJECTED] > 5) == (rhs is _rough)
+    assert paused.state.y.tolist() == straight.state.y.tolist()
+    assert paused.state.counts.tolist() == straight.state.counts.tolist()
 
 
-def test_ends_at_a_pole_instead_of_hanging(advance):
+@BOTH
+def test_ends_at_a_pole_instead_of_hanging(name):
     # y' = y^2, y(0) = 1 has a pole at t = 1
-    outcome, method = run(advance, make_problem(_blows_up), 1e-8, end=2.0)
-    assert outcome == STEP_TOO_SMALL
-    assert method.memory[dopri5.TIME] == pytest.approx(1.0, abs=1e-3)
+    run = Run(name, make_problem(_blows_up))
+    assert run(2.0, 1e-8) == STEP_TOO_SMALL
+    assert run.state.memory[scheme.TIME] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_h_max_is_kept(advance, oscillator):
-    _, method = run(advance, oscillator, 1e-2, h_max=0.05)
-    assert method.memory[dopri5.H_LARGEST] <= 0.05
+@BOTH
+def test_h_max_is_kept(oscillator, name):
+    run = Run(name, oscillator)
+    run(5.0, 1e-2, h_max=0.05)
+    assert run.state.memory[scheme.H_LARGEST] <= 0.05
+
+
+@BOTH
+def test_a_failing_step_is_tried_nearer_and_told(name):
+    # no law was meant for y < 0.5: the rhs refuses it, and the solution stays above
+    run = Run(name, make_problem(_refuses), y0=(1.0, 0.0), step=4.0)
+    assert run(5.0, 1e-6) == DONE
+    assert run.state.counts[scheme.REJECTED] > 0
+    assert run.state.y[0] == pytest.approx(0.6 + 0.4 * math.exp(-5.0), abs=1e-5)
+
+
+@BOTH
+def test_stays_on_the_manifold_and_begins_the_next_step_there(name):
+    run = Run(name, make_problem(_turns, project=_to_the_circle))
+    assert run(5.0, 1e-6) == DONE
+    y0, y1 = run.state.y
+    assert math.hypot(y0, y1) == pytest.approx(1.0, abs=3e-16)
+    assert run.state.k[0].tolist() == [-3.0 * y1, 3.0 * y0]
+    assert [y0, y1] == pytest.approx([math.cos(15.0), math.sin(15.0)], abs=1e-4)
+
+
+def top_run(folder, name, steps_a_second):
+    """Run the free top for 2 s with steps of one length; return its results."""
+    text = (MODELS / "free_top.xml").read_text(encoding="utf-8")
+    h_max = f'<Param_Transient h_max="{1 / steps_a_second!r}"/>'
+    path = Path(folder) / "top.xml"
+    path.write_text(text.replace("<Command>", f"<Command>{h_max}"), encoding="utf-8")
+    deck = mbsim.read_model(path)
+    return mbsim.simulate(deck, end_time=2.0, print_interval=0.01, tol=0.1, integrator=name)
+
+
+@BOTH
+def test_observed_orders_on_the_free_top(tmp_path, name):
+    exact = run_model(
+        "free_top.xml", end_time=2.0, print_interval=0.01, tol=1e-13, integrator="DOP853"
+    )["bodies/2/quaternion"]
+    at_end, dense = [], []
+    for steps in (64, 128) if name == "DOPRI5" else (16, 32):
+        results = top_run(tmp_path, name, steps)
+        assert 2 * steps <= results.stats["steps"] <= 2 * steps + 8
+        errors = np.abs(results["bodies/2/quaternion"] - exact).max(axis=1)
+        at_end.append((1 / steps, errors[-1]))
+        dense.append((1 / steps, errors.max()))
+    assert at_least_the_order(observed(at_end), name), at_end
+    assert observed(dense) > ORDERS[name][1] - 0.1, dense
+
+
+def test_the_table_of_dop853_is_the_published_one():
+    table = pytest.importorskip("scipy.integrate._ivp.dop853_coefficients")
+    np.testing.assert_array_equal(dop853.A, table.A)
+    np.testing.assert_array_equal(dop853.C, table.C)
+    np.testing.assert_array_equal(dop853.D, table.D)
+    np.testing.assert_array_equal(dop853.E5[0], table.E5[:12])
+    np.testing.assert_allclose(dop853.E3[0], table.E3[:12], rtol=0, atol=1e-17)
+
+
+def test_the_table_of_dop853_meets_the_conditions_of_its_order():
+    A, C, B = dop853.A, dop853.C, dop853.A[12]
+    np.testing.assert_allclose(A.sum(axis=1), C, rtol=0, atol=2e-14)
+    for k in range(8):
+        assert B @ C**k == pytest.approx(1.0 / (k + 1.0), abs=1e-15)
+    for k in range(7):
+        # sum b_i a_ij c_j^k = 1 / ((k+1) (k+2)): the trees of height 2 up to order 8
+        assert B @ A @ C**k == pytest.approx(1.0 / ((k + 1.0) * (k + 2.0)), abs=1e-15)
+    # an error estimate is blind to what its lower order integrates exactly
+    assert [dop853.E5[0] @ C[:12] ** k for k in range(5)] == pytest.approx([0.0] * 5, abs=1e-15)
+    assert [dop853.E3[0] @ C[:12] ** k for k in range(3)] == pytest.approx([0.0] * 3, abs=1e-15)
+
+
+def test_error_of_dop853_joins_both_estimates():
+    assert dop853.combined_error(0.0, 1.0) == 0.0
+    assert dop853.combined_error(3.0, 0.0) == 3.0
+    assert dop853.combined_error(3.0, 40.0) == pytest.approx(9.0 / 5.0)
+    assert math.isnan(dop853.combined_error(math.inf, math.inf))
+
+
+def _verlet(context, t, h, a, b):
+    # velocity Verlet of (x, v): one evaluation a step, no error estimate
+    p, m = scheme.on_bench(context)
+    m.counts[scheme.EVALUATIONS] += 1
+    m.trial[0] = m.y[0] + h * (m.y[1] + 0.5 * h * m.k[0, 1])
+    m.trial[1] = m.y[1]
+    code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[1]))
+    m.trial[1] = m.y[1] + 0.5 * h * (m.k[0, 1] + m.k[1, 1])
+    m.k[1, 0] = m.trial[1]
+    return code
+
+
+def _cubic(context, t, h, a, b):
+    _, m = scheme.on_bench(context)
+    for i in range(2):
+        rise = m.trial[i] - m.y[i]
+        m.dense[0, i], m.dense[1, i] = m.y[i], rise
+        m.dense[2, i] = h * m.k[0, i] - rise
+        m.dense[3, i] = 2.0 * rise - h * (m.k[0, i] + m.k[1, i])
+    return 0.0
+
+
+def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
+    errors = []
+    # not cached: Numba would not see a change in scheme.py
+    attempt, cubic = (cfunc(HOOK, error_model="numpy")(f) for f in (_verlet, _cubic))
+    for n in (100, 200):
+        run = Run("DOPRI5", oscillator)
+        method = scheme.Scheme(_verlet, _cubic, stages=2, last=1, dense=4, order=0.0)
+        run.state = scheme.make(method, np.array([1.0, 0.0]), 0.0)
+        bound, run.kept = scheme.bind(catalog.load("DOPRI5"), oscillator, run.state)
+        run.steps = bound._replace(
+            attempt=attempt.address, fit_dense=cubic.address, last=1, order=0.0
+        )
+        assert run(5.0, 1e-5, h_max=5.0 / n, times=[0.33, 4.9]) == DONE
+        assert run.state.counts[scheme.STEPS] == n
+        assert run.state.counts[scheme.EVALUATIONS] == n + 1
+        assert run.state.memory[scheme.H_LARGEST] == pytest.approx(5.0 / n)
+        errors.append((5.0 / n, abs(run.state.y[0] - exact(5.0))))
+    assert observed(errors) == pytest.approx(2.0, abs=0.1)

@@ -50,9 +50,11 @@ def slow_deck(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
-def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path):
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
+def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path, method):
     deck = slow_deck(tmp_path)
-    arguments = ["run", deck, "-o", tmp_path / "a", "--progress", "off"]
+    by = ["--integrator", method]
+    arguments = ["run", deck, "-o", tmp_path / "a", "--progress", "off", *by]
     process = subprocess.Popen(
         [*CLI, *map(str, arguments)], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -69,9 +71,14 @@ def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path):
         assert 0.5 <= t[-1] < 40.0
         assert len(results["bodies/2/position"]) == len(t)
 
+    other = cli(
+        *arguments, "--resume", "--integrator", "DOPRI5" if method != "DOPRI5" else "DOP853"
+    )
+    assert other.returncode == 2
+    assert f"integrator was {method}" in other.stderr
     resumed = cli(*arguments, "--resume")
     assert resumed.returncode == 0, resumed.stderr
-    straight = cli("run", deck, "-o", tmp_path / "b")
+    straight = cli("run", deck, "-o", tmp_path / "b", *by)
     assert straight.returncode == 0, straight.stderr
     with (
         mbsim.open_results(tmp_path / "a/deck.h5") as a,
@@ -312,3 +319,31 @@ def test_a_stiff_integrator_is_replaced_with_a_word(tmp_path):
     done = cli("run", deck, "-o", tmp_path / "out", "--integrator", "VSTIFF")
     assert done.returncode == 0
     assert "run by DOPRI5" in done.stderr
+
+
+def test_two_methods_in_one_run_are_refused(tmp_path):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
+    one, two = (
+        f'<Param_Transient integrator_type="{name}"/>'
+        f'<Simulate analysis_type="Transient" end_time="{end}" print_interval="0.01"/>'
+        for end, name in ((0.05, "DOP853"), (0.1, "DOPRI5"))
+    )
+    text = deck.read_text(encoding="utf-8")
+    begin, end = text.index("<Simulate"), text.index("</Command>")
+    deck.write_text(text[:begin] + one + two + text[end:], encoding="utf-8")
+    done = cli("run", deck, "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert "Param_Transient: integrator_type=DOP853 and" in done.stderr
+    assert "integrator_type=DOPRI5: one method runs all Simulates" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_pauses_do_not_change_a_run(tmp_path, monkeypatch):
+    from mbsim import simulation
+
+    ends = []
+    for budget in (50, 10**9):
+        monkeypatch.setattr(simulation, "FIRST_BUDGET", budget)
+        results = run_deck(tmp_path, BOUNCE, end_time=1.0, tol=1e-4)
+        ends.append([results.stats["steps"], *results["bodies/2/position"][-1]])
+    assert ends[0] == ends[1]

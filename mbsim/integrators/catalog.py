@@ -1,0 +1,22 @@
+"""The methods by name; a method's module is imported when a run uses it."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mbsim.integrators.scheme import Scheme
+
+#: Name for --integrator and what it is; the module of the same name in lower case has `SCHEME`.
+METHODS = {
+    "DOPRI5": "explicit, order 5",
+    "DOP853": "explicit, order 8",
+}
+
+
+def load(name: str) -> Scheme:
+    """Return the method of that name."""
+    module = importlib.import_module(f"mbsim.integrators.{name.lower()}")
+    scheme: Scheme = module.SCHEME
+    return scheme

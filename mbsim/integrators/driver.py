@@ -1,0 +1,280 @@
+"""The driver of the explicit one-step methods: steps, control, guards, outputs, returns to Python.
+
+A method (`scheme.py`) tries a step; the driver decides about it, the problem's hooks have their
+say, and a step is taken. After E. Hairer, S. P. Norsett, G. Wanner, Solving ODEs I (1993), II.4.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_float
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import (
+    AT_ONCE,
+    BY_CHECK,
+    BY_ERROR,
+    BY_NOT_FINITE,
+    DONE,
+    FAILED,
+    NOT_FINITE,
+    PAUSED,
+    ROWS_FULL,
+    STEP_TOO_SMALL,
+)
+from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
+from mbsim.integrators.scheme import (
+    AFTER_REJECTION,
+    CODE,
+    ERROR_BEFORE,
+    EVALUATIONS,
+    FAILURES,
+    FIRST_MAX,
+    H_LARGEST,
+    H_SMALLEST,
+    HAVE_F,
+    LAST_ERROR,
+    LAST_REASON,
+    LAST_STEP,
+    LAST_TIME,
+    NEXT_OUTPUT,
+    OUTPUTS,
+    REJECTED,
+    STEP,
+    STEPS,
+    TIME,
+    TOL,
+)
+
+#: A hook that fails is tried again at a tenth of the step, so many times.
+MOST_FAILURES = 8
+
+
+@jitable
+def interpolate(m, s, out):
+    """Write the state at the part s (0..1) of the last fitted step into `out`."""
+    d, r = m.dense, 1.0 - s
+    last = len(d) - 1
+    for i in range(len(out)):
+        value = d[last, i]
+        for j in range(last - 1, -1, -1):
+            value = d[j, i] + (s if j % 2 == 0 else r) * value
+        out[i] = value
+
+
+@jitable
+def first_step(p, m, t, span, order):
+    """Return a first step from f and a small explicit Euler probe."""
+    n = len(m.y)
+    rate = call_float(p.norm, (p.context, t, 0.0, m.k[0], m.y))
+    probe = 1e-4 / rate if rate > 1e-4 / span else span
+    probe = min(probe, 1e-3 * span)
+    for i in range(n):
+        m.trial[i] = m.y[i] + probe * m.k[0, i]
+    m.counts[EVALUATIONS] += 1
+    code = call_float(p.rhs, (p.context, t + probe, probe, m.trial, m.k[1]))
+    curvature = 0.0
+    if code == 0.0:
+        for i in range(n):
+            m.error[i] = (m.k[1, i] - m.k[0, i]) / probe
+        curvature = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
+    return starting_step(rate, curvature, m.memory[TOL], order, span)
+
+
+@jitable
+def begin(p, m, steps, t, t_end, h_max):
+    """Evaluate f at the committed point and choose a first step where there is none."""
+    if m.memory[HAVE_F] == 0.0:
+        m.counts[EVALUATIONS] += 1
+        code = call_float(p.rhs, (p.context, t, 0.0, m.y, m.k[0]))
+        if code != 0.0:
+            return code
+        m.memory[HAVE_F] = 1.0
+    if m.memory[STEP] == 0.0:
+        if steps.order == 0.0:
+            m.memory[STEP] = min(h_max, t_end - t)
+        else:
+            m.memory[STEP] = first_step(p, m, t, t_end - t, steps.order)
+        if m.memory[FIRST_MAX] > 0.0:
+            m.memory[STEP] = min(m.memory[STEP], m.memory[FIRST_MAX])
+    return 0.0
+
+
+@jitable
+def length(p, m, steps, t, t_end, h_max, floor):
+    """Return the length of the step to try from t."""
+    h = min(m.memory[STEP], h_max)
+    h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
+    # a fixed step is what the user said
+    h = max(quantised(h) if steps.order > 0.0 else h, floor)
+    # no sliver of a step before the end
+    return t_end - t if t + 1.01 * h >= t_end else h
+
+
+@jitable
+def reject(p, m, t, h, reason):
+    """Count a rejected step, tell the problem, and note the length h to try instead."""
+    m.counts[REJECTED] += 1
+    m.counts[LAST_REASON] = reason
+    call_float(p.reject, (p.context, t, float(reason), m.y, m.error))
+    m.memory[STEP] = h
+
+
+@jitable
+def gives_up(m, code, h, floor):
+    """Return whether a hook's failure ends the run; else it is tried again nearer."""
+    # a trial far ahead may be where no law was meant for: come nearer before giving up
+    m.counts[FAILURES] += 1
+    tried = m.counts[FAILURES] > MOST_FAILURES or h <= floor
+    return code != NOT_FINITE and (tried or code >= AT_ONCE)
+
+
+@jitable
+def output_within(m, times, t):
+    """Return whether an output is due up to time t."""
+    return m.counts[NEXT_OUTPUT] < len(times) and times[m.counts[NEXT_OUTPUT]] <= t
+
+
+@jitable
+def outputs(p, m, times):
+    """Write a row for every output time within the last step; return 0 or what stopped it."""
+    t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
+    t_new = m.memory[TIME]
+    while m.counts[NEXT_OUTPUT] < len(times):
+        when = times[m.counts[NEXT_OUTPUT]]
+        if when > t_new:
+            return 0.0
+        interpolate(m, min(1.0, (when - t) / h), m.trial)
+        call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
+        m.counts[OUTPUTS] += 1
+        m.counts[NEXT_OUTPUT] += 1
+        code = call_float(p.output, (p.context, when, 0.0, m.trial, m.error))
+        if code != 0.0:
+            return code
+    return 0.0
+
+
+@jitable
+def look_inside(p, m, asked):
+    """Let the problem look at inner points of the last step; return 0 or its code."""
+    t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
+    # the force of a damped contact peaks before its depth does
+    for part in (asked, 0.8 * asked, 0.5 * asked):
+        interpolate(m, part, m.trial)
+        call_float(p.project, (p.context, t + part * h, 0.0, m.trial, m.trial))
+        m.counts[OUTPUTS] += 1
+        code = call_float(p.look, (p.context, t + part * h, part * h, m.trial, m.error))
+        if code != 0.0:
+            return code
+    return 0.0
+
+
+@jitable
+def accept(p, m, steps, t, h, asked):
+    """Take the trial point; return the problem's word on it, or a negative code."""
+    word = call_float(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
+    for i in range(len(m.y)):
+        m.y[i] = m.trial[i]
+        m.k[0, i] = m.k[steps.last, i]
+    m.memory[LAST_TIME], m.memory[LAST_STEP] = t, h
+    m.memory[TIME] = t + h
+    m.memory[H_SMALLEST] = min(m.memory[H_SMALLEST], h)
+    m.memory[H_LARGEST] = max(m.memory[H_LARGEST], h)
+    m.counts[STEPS] += 1
+    if asked >= 0.0:
+        code = look_inside(p, m, asked)
+        if code != 0.0:
+            return -code
+    return word
+
+
+@jitable
+def choose_next(m, steps, h, h_max):
+    """Note the length of the step after one of length h that was good enough."""
+    if steps.order == 0.0:
+        m.memory[STEP] = h_max
+        return
+    error = m.memory[LAST_ERROR]
+    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, False)
+    m.memory[STEP] = h * (min(factor, 1.0) if m.memory[AFTER_REJECTION] == 1.0 else factor)
+    m.memory[ERROR_BEFORE] = max(error, 1e-4)
+    m.memory[AFTER_REJECTION] = 0.0
+
+
+def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
+    """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
+
+    `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them.
+    """
+    m.memory[TOL] = tol
+    code = begin(p, m, steps, m.memory[TIME], t_end, h_max)
+    if code != 0.0:
+        m.counts[CODE] = int(code)
+        return FAILED
+    # rows of the last step that found the table full
+    if m.memory[LAST_STEP] > 0.0:
+        full = outputs(p, m, times)
+        if full != 0.0:
+            m.counts[CODE] = int(-full)
+            return ROWS_FULL if full > 0.0 else FAILED
+    stop_at = m.counts[EVALUATIONS] + budget
+    while m.memory[TIME] < t_end:
+        if m.counts[EVALUATIONS] >= stop_at:
+            return PAUSED
+        t = m.memory[TIME]
+        floor = smallest_step(t, t_end, h_min)
+        h = length(p, m, steps, t, t_end, h_max, floor)
+
+        # try
+        code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
+        error, part, asked = m.memory[LAST_ERROR], 1.0, -1.0
+        if code == 0.0 and error <= 1.0:
+            part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
+            if part >= 1.0:
+                asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
+                if asked >= 0.0 or output_within(m, times, t + h):
+                    code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+        if code != 0.0:
+            if gives_up(m, code, h, floor):
+                m.counts[CODE] = int(code)
+                return FAILED
+            reject(p, m, t, max(0.1 * h, floor), BY_NOT_FINITE)
+            m.memory[AFTER_REJECTION] = 1.0
+            if h <= floor:
+                return STEP_TOO_SMALL
+            continue
+        m.counts[FAILURES] = 0
+        if not error <= 1.0:
+            shrink = next_factor(error, 1.0, steps.order, True) if math.isfinite(error) else 0.2
+            reject(p, m, t, max(shrink * h, floor), BY_ERROR)
+            m.memory[AFTER_REJECTION] = 1.0
+            if h <= floor:
+                return STEP_TOO_SMALL
+            continue
+        if part < 1.0:
+            reject(p, m, t, max(part * h, floor), BY_CHECK)
+            if h <= floor:
+                return STEP_TOO_SMALL
+            continue
+
+        # take
+        choose_next(m, steps, h, h_max)
+        word = accept(p, m, steps, t, h, asked)
+        if t + h >= t_end:
+            m.memory[TIME] = t_end
+        if word < 0.0:
+            m.counts[CODE] = int(-word)
+            return FAILED
+        full = outputs(p, m, times)
+        if full < 0.0:
+            m.counts[CODE] = int(-full)
+            return FAILED
+        if word == 1.0 or word == 3.0:
+            m.counts[EVALUATIONS] += 1
+            code = call_float(p.rhs, (p.context, t + h, 0.0, m.y, m.k[0]))
+            if code != 0.0:
+                m.counts[CODE] = int(code)
+                return FAILED
+        if full > 0.0 or word >= 2.0:
+            return ROWS_FULL
+    return DONE
