@@ -49,10 +49,16 @@ class Runner:
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
         method = catalog.load(settings.integrator)
-        self.method = scheme.make(method, system.y0, settings.stages[0].simulation.start_time)
+        self.method = scheme.make(
+            method,
+            system.y0,
+            settings.stages[0].simulation.start_time,
+            len(system.body_ids),
+        )
+        system.scene.world.fixed_step[0] = int(method.order == 0.0)
         self.detector = self._open_fcl_door()
         self.problem: Problem
-        self.problem, self._table = mechanism(system.scene)
+        self.problem, self._table = mechanism(system.scene, method.order == 0.0)
         self._steps, self._bench = scheme.bind(method, self.problem, self.method)
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p

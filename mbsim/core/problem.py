@@ -16,6 +16,7 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | look   | y at an inner point, -      | code; called where `commit` before asked for it       |
 | inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
 | limit  | y, f                        | longest step that may be tried                        |
+| stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
 """
@@ -44,6 +45,7 @@ class Problem(NamedTuple):
     limit: int
     output: int
     reject: int
+    stable: int = 0  # only for methods without error estimate
 
 
 # codes of an rhs; a problem may have others of its own

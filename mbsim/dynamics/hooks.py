@@ -13,6 +13,7 @@ from mbsim.core.problem import BY_CHECK, HOOK, Problem
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
+from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import BODY_SIZE, Scene
 
 PAUSE_FOR_EVENTS = 2.0
@@ -101,11 +102,22 @@ def _reject(context, t, h, a, b):
     return 0.0
 
 
+def _stable(context, t, h, a, b):
+    """The step for a method without error estimate, h being the tolerance."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return stable_step(scene, h, carray(a, (n,)), carray(b, (n,)))
+
+
 _HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
 
 
-def mechanism(scene: Scene) -> tuple[Problem, np.ndarray]:
-    """Return the mechanism as a `Problem`, and the table that must live as long as it is used."""
+def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
+    """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
+
+    Only a method without error estimate, `fixed_step`, needs the last hook.
+    """
     table = pack(scene)
-    addresses = [jit.address(hook, HOOK) for hook in _HOOKS]
+    hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
+    addresses = [jit.address(hook, HOOK) for hook in hooks]
     return Problem(int(table.ctypes.data), *addresses), table

@@ -409,13 +409,13 @@ def time_for(way, speed, push):
 
 
 @jitable
-def longest_step(scene, y, f):
+def longest_way(scene, y, f):
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
 
     Nor may a shape of a crowd leave where the list of near pairs holds.
     """
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
-    longest = longest_parting(scene)
+    longest = math.inf
     for g in range(len(graphics.body)):
         b = graphics.body[g]
         if b < len(scene.bodies.mass):
@@ -444,3 +444,9 @@ def longest_step(scene, y, f):
             push = work.speed[i, 1] + work.speed[j, 1]
             longest = min(longest, time_for(way, speed, push))
     return longest
+
+
+@jitable
+def longest_step(scene, y, f):
+    """Return a step that may be tried: nothing passes through, no parting is leapt over."""
+    return min(longest_parting(scene), longest_way(scene, y, f))

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 METHODS = {
     "DOPRI5": "explicit, order 5",
     "DOP853": "explicit, order 8",
+    "VERLET": "explicit, order 2, one evaluation a step within its stability bound",
 }
 
 

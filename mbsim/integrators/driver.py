@@ -40,6 +40,7 @@ from mbsim.integrators.scheme import (
     NEXT_OUTPUT,
     OUTPUTS,
     REJECTED,
+    STABLE_EVERY,
     STEP,
     STEPS,
     TIME,
@@ -82,6 +83,12 @@ def first_step(p, m, t, span, order):
 
 
 @jitable
+def stable(p, m, t, h_max):
+    """Return the step of a method without error estimate."""
+    return min(h_max, call_float(p.stable, (p.context, t, m.memory[TOL], m.y, m.k[0])))
+
+
+@jitable
 def begin(p, m, steps, t, t_end, h_max):
     """Evaluate f at the committed point and choose a first step where there is none."""
     if m.memory[HAVE_F] == 0.0:
@@ -92,7 +99,7 @@ def begin(p, m, steps, t, t_end, h_max):
         m.memory[HAVE_F] = 1.0
     if m.memory[STEP] == 0.0:
         if steps.order == 0.0:
-            m.memory[STEP] = min(h_max, t_end - t)
+            m.memory[STEP] = stable(p, m, t, h_max)
         else:
             m.memory[STEP] = first_step(p, m, t, t_end - t, steps.order)
         if m.memory[FIRST_MAX] > 0.0:
@@ -104,9 +111,9 @@ def begin(p, m, steps, t, t_end, h_max):
 def length(p, m, steps, t, t_end, h_max, floor):
     """Return the length of the step to try from t."""
     h = min(m.memory[STEP], h_max)
-    h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
-    # a fixed step is what the user said
-    h = max(quantised(h) if steps.order > 0.0 else h, floor)
+    if steps.order > 0.0:
+        h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
+    h = max(quantised(h), floor)
     # no sliver of a step before the end
     return t_end - t if t + 1.01 * h >= t_end else h
 
@@ -192,7 +199,7 @@ def accept(p, m, steps, t, h, asked):
 def choose_next(m, steps, h, h_max):
     """Note the length of the step after one of length h that was good enough."""
     if steps.order == 0.0:
-        m.memory[STEP] = h_max
+        m.memory[STEP] = h
         return
     error = m.memory[LAST_ERROR]
     factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, False)
@@ -223,15 +230,19 @@ def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
             return PAUSED
         t = m.memory[TIME]
         floor = smallest_step(t, t_end, h_min)
+        if steps.order == 0.0 and m.counts[STEPS] % STABLE_EVERY == 0:
+            m.memory[STEP] = stable(p, m, t, h_max)
         h = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
         code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
         error, part, asked = m.memory[LAST_ERROR], 1.0, -1.0
         if code == 0.0 and error <= 1.0:
-            part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
+            if steps.order > 0.0:
+                part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
             if part >= 1.0:
-                asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
+                if steps.order > 0.0:
+                    asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
                 if asked >= 0.0 or output_within(m, times, t + h):
                     code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
         if code != 0.0:

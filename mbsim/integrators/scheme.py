@@ -14,7 +14,8 @@ uses. With p the problem, m the `Method` and k the stages, k[0] = f at the commi
   d0 + s (d1 + r (d2 + s (d3 + r (d4 + ...)))).
 
 `order` is the power of h that the error of a step has; 0 stands for a method without an error
-estimate: every step has the length h_max (shortened at the end and by the problem's own guards).
+estimate: the step is what the problem's hook `stable` says, at most h_max, and holds for
+STABLE_EVERY steps; the guards of single impacts are left out.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
 LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION = range(7, 12)
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
+
+
+#: Steps for which a stable step is believed.
+STABLE_EVERY = 16
 
 
 class Scheme(NamedTuple):
@@ -58,12 +63,13 @@ class Method(NamedTuple):
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
     memory: F1  # (12,) see the names above
     counts: I1  # (8,) see the names above
+    bodies: I1  # (1,) how many bodies begin y, for methods that know positions from velocities
 
 
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (11,) the fields of `Problem`
+    problem: I1  # (12,) the fields of `Problem`
     method: Method
 
 
@@ -77,8 +83,8 @@ class Steps(NamedTuple):
     order: float
 
 
-def make(scheme: Scheme, y0: Any, t0: float) -> Method:
-    """Return the method at rest at (t0, y0)."""
+def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
+    """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies."""
     n = len(y0)
     memory = np.zeros(12)
     memory[TIME] = t0
@@ -92,6 +98,7 @@ def make(scheme: Scheme, y0: Any, t0: float) -> Method:
         np.zeros((scheme.dense, n)),
         memory,
         np.zeros(8, dtype=np.int64),
+        np.array([bodies], dtype=np.int64),
     )
 
 
@@ -111,7 +118,7 @@ def on_bench(context):
     """Return the problem and the method that stand behind `context`."""
     bench = view(context, Bench)
     w = bench.problem
-    problem = Problem(w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9], w[10])
+    problem = Problem(w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9], w[10], w[11])
     return problem, bench.method
 
 

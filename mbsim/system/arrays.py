@@ -146,6 +146,7 @@ class World(NamedTuple):
     gravity: F1  # (3,)
     scale: F1  # (2,) length L and speed V of the error norm
     doors: I1  # (1,) address of the FCL detector
+    fixed_step: I1  # (1,) 1 for a method without error estimate
 
 
 class State(NamedTuple):
@@ -191,6 +192,7 @@ class Work(NamedTuple):
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
+    block: F2  # (nb, 10) stiffness that acts on a body (3 x 3), and damping
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
     trouble: I1  # (2,) worst body of the error norm, contact at fault

@@ -371,6 +371,7 @@ def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),
+        block=np.zeros((nb, 10)),
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
         trouble=np.full(2, -1, dtype=np.int64),
@@ -482,6 +483,7 @@ def build(
         world=a.World(
             np.array(model.gravity.g, dtype=np.float64),
             np.array([placement.L, speed if speed > 0.0 else placement.L]),
+            np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
         ),
         state=_state(nb, len(graphic_ids), ns),
