@@ -8,14 +8,16 @@ Source: Altair MotionSolve Reference Guide, function IMPACT, with x1 - x = d.
 
 from __future__ import annotations
 
+import math
+
 from mbsim.core.blend import step
 from mbsim.laws.catalog import normal_law
 from mbsim.laws.spring import power_spring
 
 
 def impact_constants(stiffness, exponent, damping, dmax):
-    """Return the attributes as they are; without damping dmax may be absent and is not used."""
-    return stiffness, exponent, damping, 1.0 if dmax is None else dmax
+    """Return the attributes as they are; dmax may be absent where there is no damping."""
+    return stiffness, exponent, damping, math.inf if dmax is None else dmax
 
 
 @normal_law("IMPACT", "stiffness", "exponent", "damping", "dmax", constants=impact_constants)
