@@ -60,8 +60,10 @@ def sphere(
 
 
 def contact(i=200, j=100, id=301, **attributes):
-    """Return a Force_Contact; IMPACT unless said otherwise."""
-    values = {"cnf_type": "IMPACT", "stiffness": 1e5, "exponent": 1.5}
+    """Return a Force_Contact; IMPACT with k = 1e5, e = 1.5 unless said otherwise."""
+    values = {"cnf_type": "IMPACT"}
+    if "cnf_type" not in attributes:
+        values |= {"stiffness": 1e5, "exponent": 1.5}
     values.update(attributes)
     text = " ".join(f'{name}="{value}"' for name, value in values.items())
     return (

@@ -52,15 +52,16 @@ def friction_input(a):
     )
 
 
-def _adapt_normal(force: Callable[..., Any], energy: Callable[..., Any], count: int) -> Any:
-    """Return `force` and `energy` of `count` parameters as one C function."""
+def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
+    """Return a normal law of `count` constants as a C function."""
 
     def entry(depth, rate, par, out):
         values = to_fixed_tuple(carray(par, (count,)), count)
         result = carray(out, (3,))
-        result[0] = force(depth, rate, *values)
-        result[1] = force(depth, 0.0, *values)
-        result[2] = energy(depth, *values)
+        force, elastic, stored = law(depth, rate, *values)
+        result[0] = force
+        result[1] = elastic
+        result[2] = stored
         return 0
 
     return entry
@@ -87,8 +88,7 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
 @functools.cache
 def normal_address(law: NormalLaw) -> int:
     """Return the address of a normal law behind `NORMAL_SIGNATURE`."""
-    entry = _adapt_normal(law.force, law.energy, len(law.parameters))
-    return jit.address(entry, NORMAL_SIGNATURE)
+    return jit.address(_adapt_normal(law.law, len(law.takes)), NORMAL_SIGNATURE)
 
 
 @functools.cache
@@ -97,8 +97,12 @@ def friction_address(law: FrictionLaw) -> int:
     return jit.address(_adapt_friction(law.force, len(law.parameters)), FRICTION_SIGNATURE)
 
 
-def parameters(law: NormalLaw | FrictionLaw, contact: Any) -> np.ndarray[Any, Any]:
-    """Return the law's parameters as the contact element gives them, shape (n,)."""
+def normal_constants(law: NormalLaw, contact: Any) -> np.ndarray[Any, Any]:
+    """Return what the law's formula takes, from a contact element, shape (n,)."""
     values = [getattr(contact, name) for name in law.parameters]
-    # IMPACT without damping needs no dmax; 1 keeps its STEP defined and unused
-    return np.array([1.0 if value is None else value for value in values], dtype=np.float64)
+    return np.array(law.constants(*values), dtype=np.float64)
+
+
+def friction_parameters(law: FrictionLaw, contact: Any) -> np.ndarray[Any, Any]:
+    """Return the law's parameters as the contact element gives them, shape (n,)."""
+    return np.array([getattr(contact, name) for name in law.parameters], dtype=np.float64)

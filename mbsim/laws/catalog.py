@@ -1,10 +1,13 @@
 """The two registries of laws, and what a law is.
 
-A normal law is ``force(depth, depth_rate, *parameters)`` with, beside it, the energy
-``energy(depth, *parameters)`` that it stores at rest. A friction law is
-``force(inputs, *parameters)`` with `inputs` a `FrictionInput`. Parameters are
-attributes of Force_Contact, in the deck's words. A law file is a formula with
-its source; nothing in it is about arrays, XML or compilation.
+A normal law is ``law(depth, depth_rate, *constants)`` and returns three numbers: the force,
+the force at rate 0 (the elastic part) and the energy stored, which is the integral of the
+elastic part over depth. Power is lost at (force - elastic) * rate, and no law may make that
+negative. A friction law is ``force(inputs, *parameters)`` with `inputs` a `FrictionInput`.
+Parameters are attributes of Force_Contact, in the deck's words; where the formula of a normal
+law takes other numbers than the deck gives, ``constants(*parameters)`` makes them once, before
+the run. A law file is a formula with its source; nothing in it is about arrays, XML or
+compilation.
 """
 
 from __future__ import annotations
@@ -19,12 +22,18 @@ Vector = tuple[float, float, float]
 
 
 class NormalLaw(NamedTuple):
-    """A normal law: its functions, and the Force_Contact attributes they take in order."""
+    """A normal law, and the Force_Contact attributes from which its constants are made."""
 
     name: str
-    force: Callable[..., float]
-    energy: Callable[..., float]
+    law: Callable[..., tuple[float, float, float]]
     parameters: tuple[str, ...]
+    constants: Callable[..., tuple[float, ...]]
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """Names of the constants that `law` takes after depth and depth rate."""
+        code = self.law.__code__
+        return code.co_varnames[2 : code.co_argcount]
 
 
 class FrictionLaw(NamedTuple):
@@ -54,14 +63,18 @@ NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")
 FRICTION_LAWS: Registry[FrictionLaw] = Registry("mbsim.laws.friction")
 
 
-def normal_law(name: str, *parameters: str, energy: Callable[..., float]) -> Any:
+def _as_given(*parameters: float) -> tuple[float, ...]:
+    return parameters
+
+
+def normal_law(
+    name: str, *parameters: str, constants: Callable[..., tuple[float, ...]] = _as_given
+) -> Any:
     """Register the decorated function as the normal law `name` of these attributes."""
 
-    def register(force: Callable[..., float]) -> Callable[..., float]:
-        jitable(force)
-        jitable(energy)
-        NORMAL_LAWS.put(name, NormalLaw(name, force, energy, parameters))
-        return force
+    def register(law: Callable[..., Any]) -> Callable[..., Any]:
+        NORMAL_LAWS.put(name, NormalLaw(name, jitable(law), parameters, constants))
+        return law
 
     return register
 

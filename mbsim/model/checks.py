@@ -5,11 +5,13 @@ Every check adds its faults to one list, so that a user sees all of them at once
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from mbsim.errors import Fault
 from mbsim.model.body_mass import BodyMassError, body_mass
+from mbsim.model.contact_radius import by_materials, side_radius
 from mbsim.model.elements import Contact, Graphic, Model, Source
 from mbsim.model.frames import marker_frames, marker_loops
 from mbsim.model.mesh import solid_fault
@@ -191,6 +193,7 @@ def _contacts(model: Model) -> Iterator[Fault]:
         if None not in planes:
             message = f"graphics {planes[0]} and {planes[1]} are both planes; one must be a solid"
             yield _fault(contact.source, element, message)
+        yield from _radii(model, contact)
 
     for graphic in used.values():
         element = f"Post_Graphic[{graphic.id}]"
@@ -202,6 +205,23 @@ def _contacts(model: Model) -> Iterator[Fault]:
             if message:
                 file = f'file="{graphic.mesh_file}": ' if graphic.mesh_file else ""
                 yield _fault(graphic.source, element, file + message)
+
+
+def _radii(model: Model, contact: Contact) -> Iterator[Fault]:
+    """Yield sides whose radius HERTZ needs and cannot know, and two flat sides."""
+    ids = (*contact.i_graphics_id, *contact.j_graphics_id)
+    if not by_materials(contact) or any(id not in model.graphics for id in ids):
+        return
+    element = f"Force_Contact[{contact.id}]"
+    radii = {side: side_radius(contact, side, model.graphics) for side in "ij"}
+    for side, radius in radii.items():
+        if radius is None:
+            message = f"{side}_radius: missing; must be a number > 0: HERTZ by elastic moduli takes"
+            message += " it from graphics that are spheres of one radius, or planes and boxes"
+            yield _fault(contact.source, element, message)
+    if all(radius == math.inf for radius in radii.values()):
+        message = "both sides are flat, HERTZ by elastic moduli needs a round one: give i_radius or"
+        yield _fault(contact.source, element, f"{message} j_radius > 0, or stiffness")
 
 
 def _warnings(model: Model) -> Iterator[str]:

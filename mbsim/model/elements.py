@@ -124,6 +124,16 @@ class Contact:
     exponent: float = 1.5
     damping: float = 0.0
     dmax: float | None = None
+    penalty: float = 0.1
+    restitution_coef: float | None = None
+    ref_velocity: float | None = None
+    normal_trans_vel: float = 1e-3
+    i_elastic_modulus: float | None = None
+    j_elastic_modulus: float | None = None
+    i_poisson_ratio: float | None = None
+    j_poisson_ratio: float | None = None
+    i_radius: float | None = None  # HERTZ takes those of the graphics where these are None
+    j_radius: float | None = None
     cff_type: str = "COULOMB_OFF"
     mu_static: float = 0.0
     mu_dynamic: float = 0.0

@@ -19,25 +19,16 @@ from mbsim.reader.kinds import (
     IDS,
     NOT_NEGATIVE,
     POSITIVE,
+    RATIO,
     REAL,
     TEXT,
+    UNIT,
     USER,
     keyword,
 )
+from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
 from mbsim.reader.statement import Entry, Spec, Statement
 
-_DEFAULT_SPEED = 1e-3  # documented, in model units whatever these are
-
-# which attributes a law reads; the others of the family have no effect and get a note
-_CNF_USES = {
-    "IMPACT": {"stiffness", "exponent", "damping", "dmax"},
-}
-_CNF_ALL = {
-    *_CNF_USES["IMPACT"],
-    *("penalty", "restitution_coef", "normal_trans_vel"),
-    *("i_elastic_modulus", "j_elastic_modulus", "i_layer_depth", "j_layer_depth"),
-    *("cnf_param_string", "cnf_fnc_name", "cnf_dll_name"),
-}
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 _CFF_USES: dict[str, set[str]] = {
     "COULOMB_ON": {"mu_static", "mu_dynamic", *_SPEEDS},
@@ -58,11 +49,9 @@ def _build_contact(entry: Entry) -> None:
     cnf_type = entry.get("cnf_type", "IMPACT")
     cff_type = entry.get("cff_type", "COULOMB_OFF")
     if entry.get("cnf_type") is not None:
-        _note_unused(entry, f"cnf_type {cnf_type}", _CNF_ALL - _CNF_USES[cnf_type])
+        check_normal(entry, cnf_type)
     if entry.get("cff_type") is not None or not entry.given("cff_type"):
-        _note_unused(entry, f"cff_type {cff_type}", _CFF_ALL - _CFF_USES[cff_type])
-    if entry.get("cnf_type") == "IMPACT":
-        _check_impact(entry)
+        note_unused(entry, f"cff_type {cff_type}", _CFF_ALL - _CFF_USES[cff_type])
     if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
         _check_coulomb(entry, cff_type)
 
@@ -78,11 +67,21 @@ def _build_contact(entry: Entry) -> None:
         exponent=entry.get("exponent", 1.5),
         damping=entry.get("damping", 0.0),
         dmax=entry.get("dmax"),
+        penalty=entry.get("penalty", 0.1),
+        restitution_coef=entry.get("restitution_coef"),
+        ref_velocity=entry.get("ref_velocity"),
+        normal_trans_vel=entry.get("normal_trans_vel", DEFAULT_SPEED),
+        i_elastic_modulus=entry.get("i_elastic_modulus"),
+        j_elastic_modulus=entry.get("j_elastic_modulus"),
+        i_poisson_ratio=entry.get("i_poisson_ratio"),
+        j_poisson_ratio=entry.get("j_poisson_ratio"),
+        i_radius=entry.get("i_radius"),
+        j_radius=entry.get("j_radius"),
         cff_type=cff_type,
         mu_static=entry.get("mu_static", 0.0),
         mu_dynamic=entry.get("mu_dynamic", 0.0),
-        stiction_trans_vel=entry.get("stiction_trans_vel", _DEFAULT_SPEED),
-        friction_trans_vel=entry.get("friction_trans_vel", _DEFAULT_SPEED),
+        stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
+        friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
         cff=_subroutine(entry) if cff_type == "USERCFF" else el.Subroutine(),
         source=entry.source,
     )
@@ -97,40 +96,14 @@ def _check_count(entry: Entry, side: str) -> None:
         entry.fault(message, f"num_{side}_graphics")
 
 
-def _note_unused(entry: Entry, law: str, names: set[str]) -> None:
-    """Note the attributes of other laws, which the chosen law does not read."""
-    for name in entry.statement.attributes:
-        if name in names and entry.given(name):
-            entry.note(f"has no effect with {law}", name)
-
-
-def _check_impact(entry: Entry) -> None:
-    """Check what IMPACT needs: a depth of full damping wherever there is damping."""
-    if entry.get("damping", 0.0) > 0.0 and not entry.given("dmax"):
-        entry.fault(
-            "dmax: missing; IMPACT with damping > 0 needs dmax > 0, the depth of full damping"
-        )
-    if entry.get("stiffness", 0.0) == 0.0 and (
-        not entry.given("stiffness") or entry.get("stiffness") is not None
-    ):
-        entry.warn("stiffness is 0: the contact has no spring and holds nothing apart")
-    if entry.get("exponent", 1.5) < 1.0:
-        entry.warn("below 1 the stiffness is infinite at touch", "exponent")
-
-
 def _check_coulomb(entry: Entry, cff_type: str) -> None:
     """Check friction coefficients and transition velocities against each other."""
-    uses = [name for name in _SPEEDS if name in _CFF_USES[cff_type]]
-    units = entry.draft.units
-    for name in uses:
-        if not entry.given(name) and units and units.length_m != units.time_s:
-            entry.warn(
-                f"{name}: not given; the default 1e-3 is in model units "
-                f"({units.length}/{units.time}), here {1e-3 * units.length_m / units.time_s:g} m/s"
-            )
+    for name in _SPEEDS:
+        if name in _CFF_USES[cff_type]:
+            warn_default_speed(entry, name)
     if cff_type != "COULOMB_ON":
         return
-    vs, vd = (entry.get(name, _DEFAULT_SPEED) for name in _SPEEDS)
+    vs, vd = (entry.get(name, DEFAULT_SPEED) for name in _SPEEDS)
     known = all(entry.get(name) is not None or not entry.given(name) for name in _SPEEDS)
     if known and vd < vs:
         given = "friction_trans_vel" if entry.given("friction_trans_vel") else "stiction_trans_vel"
@@ -197,10 +170,17 @@ FORCE_CONTACT = Statement(
         "damping": Spec(NOT_NEGATIVE),
         "dmax": Spec(POSITIVE),
         "penalty": Spec(NOT_NEGATIVE),
-        "restitution_coef": Spec(NOT_NEGATIVE, alias="restitution_coeff"),
+        "restitution_coef": Spec(UNIT, alias="restitution_coeff"),
+        # ours: the approach speed at which restitution_coef holds
+        "ref_velocity": Spec(POSITIVE),
         "normal_trans_vel": Spec(POSITIVE),
         "i_elastic_modulus": Spec(NOT_NEGATIVE),
         "j_elastic_modulus": Spec(NOT_NEGATIVE),
+        # ours: what Hertz's theory needs beside the moduli; radii are else those of the graphics
+        "i_poisson_ratio": Spec(RATIO),
+        "j_poisson_ratio": Spec(RATIO),
+        "i_radius": Spec(POSITIVE),
+        "j_radius": Spec(POSITIVE),
         "i_layer_depth": Spec(POSITIVE),
         "j_layer_depth": Spec(POSITIVE),
         "cnf_param_string": Spec(USER),

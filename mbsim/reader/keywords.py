@@ -31,8 +31,8 @@ def spellings(**canonical: str) -> dict[str, str]:
 
 
 # one keyword, many documented forms; the canonical one is the key
-CNF_TYPES = spellings(IMPACT="")
-CNF_NOT_BUILT = spellings(POISSON="", VOLUME="", USERCNF="USER", HUNT_CROSSLEY="", HERTZ="")
+CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="")
+CNF_NOT_BUILT = spellings(VOLUME="", USERCNF="USER")
 CFF_TYPES = spellings(
     COULOMB_ON="ON",
     COULOMB_OFF="OFF",

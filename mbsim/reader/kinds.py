@@ -47,12 +47,18 @@ def parse_integer(text: str) -> int:
     return int(text)
 
 
-def real(allowed: str = "a number", *, above: float = -math.inf, least: float = -math.inf) -> Kind:
-    """Return the kind of numbers > `above` and >= `least`."""
+def real(
+    allowed: str = "a number",
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    most: float = math.inf,
+) -> Kind:
+    """Return the kind of numbers > `above`, >= `least` and <= `most`."""
 
     def parse(text: str) -> float:
         value = parse_real(text)
-        if not (value > above and value >= least):
+        if not (value > above and least <= value <= most):
             raise BadValueError
         return value
 
@@ -140,6 +146,8 @@ def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = No
 REAL = real()
 POSITIVE = real("a number > 0", above=0.0)
 NOT_NEGATIVE = real("a number >= 0", least=0.0)
+UNIT = real("a number from 0 to 1", least=0.0, most=1.0)
+RATIO = real("a number > -1 and <= 0.5", above=-1.0, most=0.5)
 REAL_NO_EXPRESSION = Kind("a number", _parse_expression)
 INTEGER = Kind("a whole number", parse_integer)
 COUNT = Kind("a whole number > 0", _parse_count)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mbsim.errors import ResultsError
+from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
 from mbsim.results.files import replace_text
 from mbsim.results.store import Value
@@ -173,7 +174,7 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
     for contact in model.contacts.values():
         yield ""
         yield title(contact)
-        yield fact("normal law", f"{contact.cnf_type}, built in")
+        yield from _normal_lines(system, contact)
         yield from _friction_lines(system, contact)
         for text in pair_texts(system.plans, contact.id):
             yield fact("pair", text)
@@ -184,6 +185,15 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
 def title(contact: Contact) -> str:
     """Return a contact's name and label."""
     return f"Force_Contact[{contact.id}] {contact.label}".rstrip()
+
+
+def _normal_lines(system: System, contact: Contact) -> Iterator[str]:
+    """Yield a contact's normal law, and the numbers its formula took from the deck."""
+    yield fact("normal law", f"{contact.cnf_type}, built in")
+    row = system.scene.contacts.normal_par[system.contact_ids.index(contact.id)]
+    # a row is as long as the longest law's
+    for name, value in zip(NORMAL_LAWS[contact.cnf_type].takes, row, strict=False):
+        yield fact(f"  {name}", number(value))
 
 
 def _friction_lines(system: System, contact: Contact) -> Iterator[str]:

@@ -20,6 +20,7 @@ from mbsim.geometry.catalog import PAIRS, POINT, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
@@ -241,6 +242,12 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None else value
 
 
+def _full_damping_depth(contact: Contact) -> float:
+    """Return dmax [L] where the normal law reads it, else 0."""
+    read = "dmax" in NORMAL_LAWS[contact.cnf_type].parameters
+    return _or(contact.dmax, 0.0) if read else 0.0
+
+
 def _contacts(
     contacts: list[Contact], user: dict[int, UserFriction]
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
@@ -249,7 +256,7 @@ def _contacts(
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
     for k, contact in enumerate(contacts):
         law = NORMAL_LAWS[contact.cnf_type]
-        normal.append((abi.normal_address(law), abi.parameters(law, contact)))
+        normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
         if contact.id in user:
             friction.append(user[contact.id].par)
             addresses.append(user[contact.id].address)
@@ -259,7 +266,7 @@ def _contacts(
             addresses.append(0)
         else:
             friction_law = FRICTION_LAWS[contact.cff_type]
-            friction.append(abi.parameters(friction_law, contact))
+            friction.append(abi.friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
@@ -281,7 +288,7 @@ def _contacts(
         ignore_deeper=np.array(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
-        dmax=np.array([c.dmax or 0.0 for c in contacts], dtype=np.float64),
+        dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
     )
     return made, uses_x
 
@@ -450,7 +457,7 @@ def build(
     crowded = [g for crowd in plans.crowds for g in (*crowd.i, *crowd.j)]
     graphic_ids = list(dict.fromkeys([*listed, *crowded]))
     shapes = sorted({model.graphics[g].shape for g in graphic_ids})
-    contact_list = list(model.contacts.values())
+    contact_list = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
     contact_ids = [contact.id for contact in contact_list]
     contact_row = {contact_id: k for k, contact_id in enumerate(contact_ids)}
 

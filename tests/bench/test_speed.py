@@ -67,6 +67,45 @@ def test_whole_runs(tmp_path):
         print(f"{name}: {statistics.median(times[1:]):.2f} s")
 
 
+NORMAL = {
+    "IMPACT": {"stiffness": 1e5, "exponent": 1.5, "damping": 50.0, "dmax": 1e-3},
+    "IMPACT, exponent 2.2": {"stiffness": 1e5, "exponent": 2.2, "damping": 50.0, "dmax": 1e-3},
+    "HUNT_CROSSLEY": {"stiffness": 1e5, "exponent": 1.5, "damping": 0.5},
+    "HERTZ": {"stiffness": 1e5, "damping": 0.5},
+    "POISSON": {"penalty": 1e5, "restitution_coef": 0.5},
+}
+
+
+def test_calls_of_normal_laws():
+    from mbsim.core import jit
+    from mbsim.core.address import call_int
+    from mbsim.laws import abi
+    from mbsim.laws.catalog import NORMAL_LAWS
+    from mbsim.model.elements import Contact
+
+    def loop(address, depths, rate, par, out):
+        total = 0.0
+        for depth in depths:
+            call_int(address, (depth, rate, par, out))
+            total += out[0] + out[2]
+        return total
+
+    run = jit.function(loop)
+    depths, out = np.random.default_rng(1).uniform(0.0, 2e-3, 1_000_000), np.zeros(3)
+    print()
+    for name, values in NORMAL.items():
+        kind = name.split(",")[0]
+        law = NORMAL_LAWS[kind]
+        par = abi.normal_constants(law, Contact(id=1, cnf_type=kind, **values))
+        times = []
+        for _ in range(6):
+            began = time.perf_counter()
+            total = run(abi.normal_address(law), depths, 0.3, par, out)
+            times.append(1e9 * (time.perf_counter() - began) / len(depths))
+        print(f"{name}: {statistics.median(times[1:]):.1f} ns a call")
+        assert total > 0.0
+
+
 def test_calls_of_user_subroutines():
     from mbsim.core import jit
     from mbsim.core.address import call_int

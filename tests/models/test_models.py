@@ -183,3 +183,38 @@ def test_mesh_on_plane():
     assert np.abs(results["bodies/2/position/z"] - exact).max() < 2e-5
     # a regular solid of 320 faces lacks some percent of the ball's volume
     assert 0.9 < mass / (700 * 4 / 3 * np.pi * 0.1**3) < 1.0
+
+
+@BOTH
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-6)])
+def test_hunt_crossley_pair(detector, tol, allowed):
+    results = run_model("hunt_crossley_pair.xml", tol=tol, detector=detector)
+    assert results["bodies/1/velocity/x"][-1] == pytest.approx(-1.4, rel=allowed)
+    assert results["bodies/2/velocity/x"][-1] == pytest.approx(0.7, rel=allowed)
+    # half of the reduced mass times what the relative speed has lost
+    lost = 0.5 * (2 / 3) * (3.0**2 - 2.1**2)
+    assert results["energy/dissipated"][-1] == pytest.approx(lost, rel=allowed)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-11, 1e-6)])
+def test_hertz_sphere(tol, allowed):
+    # tol refers to the size of the scene over its time, here about 900 times the sphere's speed
+    results = run_model("hertz_sphere.xml", tol=tol)
+    assert results["contacts/301/peak_penetration"] == pytest.approx(4.9717175e-5, rel=allowed)
+    assert results["contacts/301/peak_force"] == pytest.approx(11369.858, rel=allowed)
+    touch, leave = results["events"]["time"]
+    assert leave - touch == pytest.approx(7.3165664e-4, rel=allowed)
+    assert results["bodies/2/velocity/z"][-1] == pytest.approx(0.2, rel=allowed)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-6)])
+def test_poisson_walls(tol, allowed):
+    results = run_model("poisson_walls.xml", tol=tol)
+    events = results["events"]
+    assert [event["kind"] for event in events] == ["touch", "leave"] * 4
+    t, v = results["time"], results["bodies/2/velocity/z"]
+    leaves = [event["time"] for event in events if event["kind"] == "leave"]
+    for n, leave in enumerate(leaves, 1):
+        after = np.searchsorted(t, leave)
+        assert abs(v[after]) == pytest.approx(2.0 * 0.8**n, rel=allowed)
+    assert leaves[-1] == pytest.approx(1.067262, rel=max(allowed, 1e-6))

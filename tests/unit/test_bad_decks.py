@@ -36,12 +36,17 @@ MIXED_MESH = MESH.format(
 )
 
 INERTIA = 'inertia_xx="0.02" inertia_yy="0.02" inertia_zz="0.02"'
-POISSON = 'cnf_type="Impact" stiffness="1e8" exponent="1.5" damping="200" dmax="1e-4"'
+IMPACT = 'cnf_type="Impact" stiffness="1e8" exponent="1.5" damping="200" dmax="1e-4"'
 
 
 def marker(attributes: str) -> str:
     """Return the minimal deck with attributes added to marker 20."""
     return deck(('body_id="2" pos_z', f'body_id="2" {attributes} pos_z'))
+
+
+def law(attributes: str) -> str:
+    """Return the minimal deck with another normal law."""
+    return deck((IMPACT, attributes))
 
 
 def in_contact(mesh: str) -> str:
@@ -260,10 +265,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
     "sensor": (added('<SENSOR_EVENT id="4"/>'), END_OF_MODEL, ("Sensor_Event", "not built yet")),
     "save": (added('<Save model_file="a.xml"/>', "Command"), END_OF_COMMAND, ("Save",)),
-    "POISSON": (
-        deck((POISSON, 'cnf_type="POISSON" penalty="1e5"')),
+    "VOLUME": (
+        law('cnf_type="VOLUME" i_elastic_modulus="1e5"'),
         CONTACT_LINE + 1,
-        ("Force_Contact[301]", 'cnf_type="POISSON"', "not built yet", "IMPACT"),
+        ("Force_Contact[301]", 'cnf_type="VOLUME"', "not built yet", "IMPACT, POISSON"),
     ),
     "REGION": (
         deck(('cff_type="C', 'contact_points="REGION" cff_type="C')),
@@ -341,6 +346,92 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         deck((' dmax="1e-4"', "")),
         CONTACT_LINE,
         ("Force_Contact[301]", "dmax: missing", "damping > 0"),
+    ),
+    "restitution above 1": (
+        law('cnf_type="POISSON" penalty="1e5" restitution_coef="1.1"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'restitution_coef="1.1"', "from 0 to 1"),
+    ),
+    "normal_trans_vel zero": (
+        law('cnf_type="POISSON" penalty="1e5" normal_trans_vel="0"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'normal_trans_vel="0"', "number > 0"),
+    ),
+    "penalty negative": (
+        law('cnf_type="POISSON" penalty="-1"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'penalty="-1"', ">= 0"),
+    ),
+    "damping and restitution": (
+        law(
+            'cnf_type="HUNT_CROSSLEY" stiffness="1e8" damping="1" restitution_coef="0.5"'
+            ' ref_velocity="1"'
+        ),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'restitution_coef="0.5"', "damping or restitution_coef, not both"),
+    ),
+    "restitution 0": (
+        law('cnf_type="HUNT_CROSSLEY" stiffness="1" restitution_coef="0" ref_velocity="1"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'restitution_coef="0"', "> 0 and <= 1"),
+    ),
+    "restitution without speed": (
+        law('cnf_type="HERTZ" stiffness="1e8" restitution_coef="0.5"'),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "ref_velocity: missing", "number > 0"),
+    ),
+    "ref_velocity negative": (
+        law('cnf_type="HERTZ" stiffness="1e8" restitution_coef="0.5" ref_velocity="-1"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'ref_velocity="-1"', "number > 0"),
+    ),
+    "HERTZ without stiffness": (
+        law('cnf_type="HERTZ"'),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "stiffness: missing", "i_elastic_modulus"),
+    ),
+    "HERTZ by both": (
+        law('cnf_type="HERTZ" stiffness="1e8" i_elastic_modulus="7e10" i_poisson_ratio="0.3"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'stiffness="1e8"', "not both"),
+    ),
+    "HERTZ without Poisson's ratio": (
+        law('cnf_type="HERTZ" i_elastic_modulus="7e10"'),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "i_poisson_ratio: missing", "-1", "0.5"),
+    ),
+    "Poisson's ratio": (
+        law('cnf_type="HERTZ" i_elastic_modulus="7e10" i_poisson_ratio="0.6"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'i_poisson_ratio="0.6"', "<= 0.5"),
+    ),
+    "modulus zero": (
+        law('cnf_type="HERTZ" i_elastic_modulus="0" i_poisson_ratio="0.3"'),
+        CONTACT_LINE + 1,
+        ("Force_Contact[301]", 'i_elastic_modulus="0"', "number > 0"),
+    ),
+    "HERTZ of a shape without a radius": (
+        deck(
+            (IMPACT, 'cnf_type="HERTZ" i_elastic_modulus="7e10" i_poisson_ratio="0.3"'),
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="Cylinder" center_marker_id="20" radius="0.1" length="0.1"',
+            ),
+        ),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "i_radius: missing", "number > 0"),
+    ),
+    "HERTZ of two flat sides": (
+        deck(
+            (IMPACT, 'cnf_type="HERTZ" i_elastic_modulus="7e10" i_poisson_ratio="0.3"'),
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="BoxDefinedFromCenter" center_marker_id="20" length_x="0.1" length_y="0.1"'
+                ' length_z="0.1"',
+            ),
+        ),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "both sides are flat", "i_radius"),
     ),
     "dmax zero": (deck(('dmax="1e-4"', 'dmax="0."')), CONTACT_LINE + 1, ('dmax="0."', "> 0")),
     "vd below vs": (

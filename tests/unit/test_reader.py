@@ -182,6 +182,68 @@ def test_friction_is_off_where_no_type_is_given(tmp_path: Path) -> None:
     assert any("mu_static: has no effect with cff_type COULOMB_OFF" in n for n in model.notes)
 
 
+def law(attributes: str) -> str:
+    old = 'cnf_type="Impact" stiffness="1e8" exponent="1.5" damping="200" dmax="1e-4"'
+    return deck((old, attributes))
+
+
+def test_normal_laws(tmp_path: Path) -> None:
+    text = law('cnf_type="huntCrossley" stiffness="1e6" restitutioncoeff="0.5" ref_velocity="2"')
+    contact = read(tmp_path, text).contacts[301]
+    assert (contact.cnf_type, contact.stiffness, contact.exponent) == ("HUNT_CROSSLEY", 1e6, 1.5)
+    assert (contact.restitution_coef, contact.ref_velocity) == (0.5, 2.0)
+
+    contact = read(tmp_path, law('cnf_type="poisson" penalty="1e5"')).contacts[301]
+    assert (contact.cnf_type, contact.penalty, contact.normal_trans_vel) == ("POISSON", 1e5, 1e-3)
+    assert contact.restitution_coef is None
+
+    text = law('cnf_type="Hertz" i_elastic_modulus="7e10" i_poisson_ratio="0.3" i_radius="0.2"')
+    model = read(tmp_path, text)
+    contact = model.contacts[301]
+    assert (contact.i_elastic_modulus, contact.i_poisson_ratio) == (7e10, 0.3)
+    assert (contact.i_radius, contact.j_radius, contact.j_elastic_modulus) == (0.2, None, None)
+    assert any("j_elastic_modulus: not given: this side is rigid" in note for note in model.notes)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "note"),
+    [
+        ('cnf_type="POISSON" penalty="1" damping="3"', "damping: has no effect with cnf_type PO"),
+        ('cnf_type="HERTZ" stiffness="1" exponent="2"', "exponent: has no effect with cnf_type HE"),
+        ('cnf_type="HERTZ" stiffness="1" i_radius="2"', "where stiffness is given"),
+        ('cnf_type="HUNT_CROSSLEY" stiffness="1" dmax="2"', "dmax: has no effect with cnf_type HU"),
+        ('cnf_type="HUNT_CROSSLEY" stiffness="1" ref_velocity="2"', "without restitution_coef"),
+        ('cnf_type="IMPACT" stiffness="1" penalty="2"', "penalty: has no effect with cnf_type IM"),
+        ('cnf_type="IMPACT" stiffness="1" restitution_coef="1"', "restitution_coef: has no effect"),
+    ],
+)
+def test_what_a_normal_law_does_not_read_is_noted(
+    tmp_path: Path, attributes: str, note: str
+) -> None:
+    assert any(note in line for line in read(tmp_path, law(attributes)).notes)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "warning"),
+    [
+        ('cnf_type="POISSON" restitution_coef="0.5"', "penalty: not given"),
+        ('cnf_type="POISSON" penalty="0"', 'penalty="0": is 0'),
+        ('cnf_type="HUNT_CROSSLEY"', "stiffness is 0"),
+        ('cnf_type="HUNT_CROSSLEY" stiffness="1" exponent="0.9"', "infinite at touch"),
+    ],
+)
+def test_a_weak_spring_warns(tmp_path: Path, attributes: str, warning: str) -> None:
+    assert any(warning in line for line in read(tmp_path, law(attributes)).warnings)
+
+
+def test_default_normal_trans_vel_warns_in_mm(tmp_path: Path) -> None:
+    poisson = law('cnf_type="POISSON" penalty="1e5"')
+    assert not read(tmp_path, poisson).warnings
+    in_mm = poisson.replace('length_unit="METER"', 'length_unit="MILLIMETER"')
+    warnings = read(tmp_path, in_mm).warnings
+    assert any("normal_trans_vel: not given" in line and "1e-06 m/s" in line for line in warnings)
+
+
 def test_user_subroutine(tmp_path: Path) -> None:
     (tmp_path / "friction.py").write_text("def CFFSUB(*a): return [0.0, 0.0, 0.0]\n")
     user = (

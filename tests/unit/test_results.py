@@ -425,6 +425,8 @@ def test_log(tmp_path: Path) -> None:
     facts = [" ".join(line.split()) for line in text.splitlines()]
     for said in (
         "units NEWTON KILOGRAM METER SECOND",
+        "normal law IMPACT, built in",
+        "stiffness 1e+08",
         "friction law COULOMB_ON, built in",
         "pair Post_Graphic[200] Post_Graphic[100]: closed form SPHERE-PLANE",
         "USRMES:USER [1] INFO: hello",

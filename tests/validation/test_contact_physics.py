@@ -52,7 +52,8 @@ def test_bouncing_sphere_converges():
      ("sphere_pair.xml", "bodies/1/velocity"), ("bowling_ball.xml", "bodies/2/position"),
      ("drop_mm.xml", "bodies/2/position"), ("incline_slip.xml", "bodies/2/position"),
      ("sliding_block.xml", "bodies/2/position"), ("mesh_on_plane.xml", "bodies/2/position"),
-     ("ellipsoid_on_box.xml", "bodies/2/position/z")],
+     ("ellipsoid_on_box.xml", "bodies/2/position/z"),
+     ("hunt_crossley_pair.xml", "bodies/1/position"), ("poisson_walls.xml", "bodies/2/position")],
 )  # fmt: skip
 def test_models_converge(name, signal):
     exact = run_model(name, tol=1e-12)[signal]
