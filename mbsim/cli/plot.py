@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mbsim.results.reading import Results
 
 _RESULT_SUFFIXES = (".h5", ".hdf5")
-#: Longest name of a picture that is made up from files and signals.
+#: Longest made-up name of a picture.
 _LONGEST = 100
 
 
@@ -61,19 +61,20 @@ def command(
     files are drawn over each other, in the units of the first.
     """
     from mbsim.cli.messages import print_json, warn
+    from mbsim.errors import ModelError
     from mbsim.results.curves import Choice, collect
     from mbsim.results.drawing import check_target, draw, need_matplotlib, save
     from mbsim.results.reading import open_results
 
     paths, names = _sorted_out(arguments)
     if events and (over.strip("/") != "time" or len(paths) > 1 or minus is not None):
-        raise click.UsageError("--events goes with one result file over time only")
+        raise ModelError("--events goes with one result file over time only")
     need_matplotlib()
     choice = Choice(names, over.strip("/"), start, end, log, events)
     with ExitStack() as stack:
         files = [stack.enter_context(open_results(path)) for path in paths]
         if not names:
-            raise click.UsageError(_no_names(files[0]))
+            raise ModelError(_no_names(files[0]))
         other = None if minus is None else stack.enter_context(open_results(minus))
         # before the numbers are read: a long run takes a while
         target = output or Path(_made_up(paths, choice, minus))
@@ -91,6 +92,8 @@ def command(
 
 def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:
     """Return result files and names, each once, in their order."""
+    from mbsim.errors import ModelError
+
     files: dict[Path, None] = {}
     names: dict[str, None] = {}
     for argument in arguments:
@@ -99,7 +102,7 @@ def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:
         else:
             names[argument.strip("/")] = None
     if not files:
-        raise click.UsageError("no result file given: mbsim plot RESULT.h5 NAME...")
+        raise ModelError("no result file given: mbsim plot RESULT.h5 NAME...")
     return list(files), tuple(names)
 
 
@@ -115,7 +118,8 @@ def _made_up(paths: Sequence[Path], choice: Choice, minus: Path | None) -> str:
     """Return a name for a picture, in the current directory, that says what is in it."""
     words = ["+".join(path.stem for path in paths)]
     words += [f"minus-{minus.stem}"] if minus is not None else []
-    words += choice.names
+    words += choice.names[:2]
+    words += [f"and-{len(choice.names) - 2}-more"] if len(choice.names) > 2 else []
     words += [] if choice.over == "time" else [f"over-{choice.over}"]
     words += ["log"] if choice.log else []
     text = re.sub(r"[^\w.+-]+", "-", "-".join(words).replace("*", "all"))

@@ -181,7 +181,7 @@ class _Track:
         time = self._rows_of(results, "time", TIME)
         if not len(time):
             raise ResultsError(f"{self.path}: has no output rows ({results.status})")
-        self.last_time = float(time[-1])
+        self.first_time, self.last_time = float(time[0]), float(time[-1])
         self.rows = np.flatnonzero(_between(time, choice.start, choice.end))
         self.minus = minus
         if minus is not None:
@@ -250,10 +250,11 @@ def _span(tracks: Sequence[_Track], choice: Choice) -> tuple[float, float] | Non
     """Return the range of time that is drawn, None if it is not the axis."""
     drawn = [track.x for track in tracks if len(track.x)]
     if not drawn:
-        there = f"0 .. {max(track.last_time for track in tracks):.6g}"
-        first = min(float(track.results["time"][0]) for track in tracks)
-        there = there.replace("0", f"{first:.6g}", 1)
-        raise ModelError(f"--from, --to: no output row in this range; rows are in {there}")
+        first = min(track.first_time for track in tracks)
+        last = max(track.last_time for track in tracks)
+        raise ModelError(
+            f"--from, --to: no output row in this range; rows go from {first:.6g} to {last:.6g}"
+        )
     if not tracks[0].over_time:
         return None
     low = min(float(x[0]) for x in drawn) if choice.start is None else choice.start
@@ -419,6 +420,8 @@ def _source(track: _Track) -> str:
         f"tol {about['tol']:g}" if isinstance(about.get("tol"), float) else "",
         f"{len(track.rows)} rows",
     ]
+    if track.from_units != track.units:
+        facts.append(f"converted to {track.units.summary}")
     if track.minus is not None and track.left_out:
         facts.append(f"{track.left_out} without a row at their time in {track.minus.path}")
     return " · ".join(filter(None, facts))

@@ -38,7 +38,7 @@ _WIDTH = 7.5  # [inch]
 _FONT = 10.0  # [pt]
 _LINE = 0.19  # height of a line of text [inch]
 #: Letters of a legend that fit beside each other; a sample and its gaps take _SAMPLE of them.
-_LETTERS, _SAMPLE = 92, 6
+_LETTERS, _SAMPLE = 100, 6
 #: Most entries of a legend; more would be a page of their own.
 _ENTRIES = 24
 
@@ -53,10 +53,9 @@ _STYLE: dict[str, Any] = {
     "grid.linewidth": 0.7,
     "axes.axisbelow": True,
     "axes.xmargin": 0.0,
-    "lines.linewidth": 1.5,
     "axes.formatter.useoffset": False,
     "axes.formatter.use_mathtext": True,
-    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.limits": (-3, 5),
     "agg.path.chunksize": 10000,  # a path of a million points is drawn in pieces
     "svg.fonttype": "none",  # text stays text
     "svg.hashsalt": "mbsim",  # the same picture is the same file
@@ -163,11 +162,20 @@ def _fill(axis: Axes, picture: Picture, panel: Panel) -> None:
 
 
 def _line(axis: Axes, picture: Picture, panel: Panel, curve: Curve) -> Line2D:
-    """Draw one curve; few points are marked, one alone would not be seen."""
+    """Draw one curve; one point alone is marked, it would not be seen."""
     colour, dashes = _look(picture, panel, curve)
-    marker = "o" if np.isfinite(curve.y).sum() <= 1 else ""
+    marker = "o" if np.isfinite(curve.y).sum() == 1 else ""
+    # a wide pale first run stays in sight under others that agree with it
+    under = len(picture.files) > 1 and curve.file == 0
     (line,) = axis.plot(
-        curve.x, curve.y, color=colour, linestyle=dashes, marker=marker, markersize=4
+        curve.x,
+        curve.y,
+        color=colour,
+        linestyle=dashes,
+        linewidth=3.5 if under else 1.5,
+        alpha=0.45 if under else 1.0,
+        marker=marker,
+        markersize=4,
     )
     line.set_gid(_plain(curve.name))
     return line
@@ -226,12 +234,14 @@ def _marks(axis: Axes, picture: Picture) -> list[Line2D]:
 
 
 def _entries(picture: Picture, panel: Panel) -> list[str]:
-    """Return the texts of a panel's legend: curves, then kinds of events."""
+    """Return the texts of a panel's legend: curves; in the first one also kinds of events."""
     several = len(picture.files) > 1
     texts = [
         f"{picture.files[curve.file]}: {curve.label}" if several else curve.label
         for curve in panel.curves
     ]
+    if panel is not picture.panels[0]:
+        return texts
     return texts + [f"{kind} ({len(times)})" for kind, times in picture.events.items()]
 
 
@@ -257,7 +267,7 @@ def _legend(axis: Axes, picture: Picture, panel: Panel, lines: Sequence[Line2D])
         # matplotlib leaves out what begins with "_"
         [" " + _plain(text) if text.startswith("_") else _plain(text) for text in shown],
         loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        bbox_to_anchor=(0.01, 1.0),
         borderaxespad=0.2,
         borderpad=0.1,
         ncols=_columns(shown),

@@ -117,15 +117,19 @@ class UnitSystem:
         words = str(results.attributes.get("units", "")).split()
         return cls(words[0], words[2], words[3]) if len(words) == 4 else cls()
 
+    @property
+    def summary(self) -> str:
+        """Return the units in short: ``N, m, s``."""
+        return ", ".join(SYMBOLS.get(n, n.lower()) for n in (self.force, self.length, self.time))
+
     def text(self, quantity: Quantity) -> str:
         """Return the unit of a quantity as it stands on an axis; empty if it has none."""
         force, length, time = (
             SYMBOLS.get(name, name.lower()) for name in (self.force, self.length, self.time)
         )
-        if quantity.force == quantity.length == 1 and quantity.name == "Energy":
-            # the joule is the N m of energies, torques keep theirs
-            if (force, length) == ("N", "m"):
-                return "J"
+        # torques keep their N m
+        if quantity == _ENERGY and (force, length) == ("N", "m"):
+            return "J"
         powers = [
             (force, quantity.force),
             ("rad", quantity.angle),

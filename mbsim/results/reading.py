@@ -26,6 +26,7 @@ class Results:
     def __init__(self, file: h5py.File, path: Path | None) -> None:
         self._file = file
         self.path = path
+        self._signals: dict[str, int] | None = None  # once they were looked up
 
     def __enter__(self) -> Results:
         return self
@@ -85,6 +86,8 @@ class Results:
 
     def signals(self) -> dict[str, int]:
         """Return what has a value at every output time: names, sorted -> numbers of columns."""
+        if self._signals is not None:
+            return self._signals
         file, found = self._open(), {}
         rows = len(file["time"]) if "time" in file else 0
         for name in self.keys():
@@ -95,6 +98,7 @@ class Results:
             columns = 1 if item.ndim == 1 else item.shape[1]
             if not name.startswith("state/") and item.ndim <= 2 and columns in (1, *PARTS):
                 found[name] = columns
+        self._signals = found
         return found
 
     def find(self, name: str) -> list[str]:
