@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -14,6 +16,30 @@ from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, o
 
 if TYPE_CHECKING:
     import h5py
+
+#: What h5py raises where a file is damaged.
+_DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
+_Read = TypeVar("_Read", bound=Callable[..., Any])
+
+
+def _reads(method: _Read) -> _Read:
+    """Turn what h5py raises of a damaged file into one `ResultsError` that names the file."""
+
+    @functools.wraps(method)
+    def reading(self: Results, *arguments: Any) -> Any:
+        try:
+            return method(self, *arguments)
+        except _DAMAGE as error:
+            raise ResultsError(f"{self._where}: {_damage(error)}") from None
+
+    return cast(_Read, reading)
+
+
+def _damage(error: BaseException) -> str:
+    """Return what to say of a file that h5py cannot read."""
+    text = " ".join(str(error.args[0] if error.args else error).split())
+    return f"cannot be read, the file is damaged: {text or type(error).__name__}"
+
 
 class Results:
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
@@ -55,6 +81,7 @@ class Results:
         return self._file
 
     @property
+    @_reads
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file: version, model, units, settings, status."""
         return {name: _plain(value) for name, value in self._open().attrs.items()}
@@ -65,12 +92,14 @@ class Results:
         return str(self.attributes.get("status", "unknown"))
 
     @property
+    @_reads
     def stats(self) -> dict[str, Any]:
         """Counters and times of the run; empty if it was killed."""
         if "stats" not in self._open():
             return {}
         return {name: _plain(value) for name, value in self._open()["stats"].attrs.items()}
 
+    @_reads
     def keys(self) -> list[str]:
         """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
         import h5py
@@ -84,6 +113,7 @@ class Results:
         self._open().visititems(note)
         return sorted(names, key=order)
 
+    @_reads
     def signals(self) -> dict[str, int]:
         """Return what has a value at every output time: names, sorted -> numbers of columns."""
         if self._signals is not None:
@@ -127,11 +157,13 @@ class Results:
             raise UnknownSignal(f"{self._where}: {name} is no signal over time{self._there()}")
         return found
 
+    @_reads
     def label(self, name: str) -> str:
         """Return what the deck calls a body, contact or request: ``bodies/2``; else nothing."""
         item = self._open().get(name)
         return str(_plain(item.attrs.get("label", ""))) if item is not None else ""
 
+    @_reads
     def attribute(self, name: str, attribute: str) -> Any:
         """Return an attribute of a dataset or group, None if it has none."""
         item = self._open().get(name)
@@ -139,10 +171,12 @@ class Results:
         return value.tolist() if hasattr(value, "tolist") else value
 
     @property
+    @_reads
     def has_checkpoint(self) -> bool:
         """Whether a run can go on from here."""
         return "checkpoint" in self._open()
 
+    @_reads
     def tables(self, group: str) -> dict[str, Any]:
         """Return all datasets under a group as arrays, by their names in it."""
         import h5py
@@ -156,6 +190,7 @@ class Results:
         self._open()[group].visititems(note)
         return found
 
+    @_reads
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
         return sorted(int(id) for id in self._open().get(group, ()))
@@ -174,16 +209,18 @@ class Results:
         found = self._find(name)
         if found is None:
             raise UnknownSignal(self._missing(name))
-        try:
-            dataset, part = found
-            if part is None:
-                return _plain(dataset[()])
-            if part == "mag":
-                return np.linalg.norm(dataset[()], axis=1)
-            return dataset[:, PARTS[dataset.shape[1]][part]]
-        except OSError as error:
-            raise ResultsError(f"{self.path}: {name} cannot be read: {error}") from None
+        return self._values(*found)
 
+    @_reads
+    def _values(self, dataset: h5py.Dataset, part: str | None) -> Any:
+        """Return a signal or a part of it."""
+        if part is None:
+            return _plain(dataset[()])
+        if part == "mag":
+            return np.linalg.norm(dataset[()], axis=1)
+        return dataset[:, PARTS[dataset.shape[1]][part]]
+
+    @_reads
     def _find(self, name: str) -> tuple[h5py.Dataset, str | None] | None:
         """Return the dataset of a name and the part of it asked for."""
         import h5py
@@ -276,7 +313,12 @@ def open_results(path: str | Path) -> Results:
     except OSError as error:
         reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
         raise ResultsError(f"{file}: cannot be read: {reason}") from None
-    if "mbsim_version" not in opened.attrs:
+    try:
+        ours = "mbsim_version" in opened.attrs
+    except _DAMAGE as error:
+        opened.close()
+        raise ResultsError(f"{file}: {_damage(error)}") from None
+    if not ours:
         opened.close()
         raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
     return Results(opened, file)
