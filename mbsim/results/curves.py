@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
-from mbsim.results.names import PARTS, parts_of
+from mbsim.results.names import PARTS
 from mbsim.results.quantities import TIME, Quantity, UnitSystem, quantity_of
 from mbsim.results.reading import Results
 
@@ -234,7 +234,8 @@ class _Track:
         if component.name not in self.minus:
             # says what there is
             self.minus.find(component.name)
-        return values - self._rows_of(self.minus, component.name, quantity)[self.other_rows]
+        others = self._rows_of(self.minus, component.name, quantity)[self.other_rows]
+        return np.asarray(values - others)
 
 
 def _between(time: Array, start: float | None, end: float | None) -> Array:
@@ -322,9 +323,7 @@ def _describe(panel: Panel, units: UnitSystem, difference: bool, log: bool) -> N
         what = f"Δ {what.lower()}"
         if log:
             what = f"|{what}|"
-            panel.curves = [
-                Curve(c.file, c.name, c.label, c.x, np.abs(c.y)) for c in panel.curves
-            ]
+            panel.curves = [Curve(c.file, c.name, c.label, c.x, np.abs(c.y)) for c in panel.curves]
     panel.axis = with_unit(what, panel.unit)
 
 

@@ -12,7 +12,7 @@ import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _style() -> Iterator[None]:
 
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_STYLE)
+        matplotlib.rcParams.update(cast(Any, _STYLE))
         yield
 
 
@@ -225,7 +225,7 @@ def _marks(axis: Axes, picture: Picture) -> list[Line2D]:
             1.0,
             transform=axis.get_xaxis_transform(),
             colors="0.6",
-            linestyles=[dashes],
+            linestyles=dashes,
             linewidths=0.7,
             zorder=0.9,
         )

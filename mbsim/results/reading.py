@@ -167,8 +167,8 @@ class Results:
     def attribute(self, name: str, attribute: str) -> Any:
         """Return an attribute of a dataset or group, None if it has none."""
         item = self._open().get(name)
-        value = item.attrs.get(attribute) if item is not None else None
-        return value.tolist() if hasattr(value, "tolist") else value
+        value: Any = item.attrs.get(attribute) if item is not None else None
+        return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
     @property
     @_reads
