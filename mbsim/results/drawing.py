@@ -19,6 +19,7 @@ import numpy as np
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.curves import Curve, Panel, Picture
 from mbsim.results.files import sync
+from mbsim.results.quantities import INCIDENTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,8 +38,8 @@ _EVENT_DASHES: dict[str, Any] = {"touch": "-", "leave": (0, (4, 3)), "stick": (0
 _WIDTH = 7.5  # [inch]
 _FONT = 10.0  # [pt]
 _LINE = 0.19  # height of a line of text [inch]
-#: Letters of a legend that fit beside each other; a sample and its gaps take _SAMPLE of them.
-_LETTERS, _SAMPLE = 100, 6
+#: What legends have beside tick labels [pt]; a sample and its gaps take _SAMPLE [em].
+_LEGEND, _SAMPLE = 470.0, 5.2
 #: Most entries of a legend; more would be a page of their own.
 _ENTRIES = 24
 
@@ -149,11 +150,16 @@ def _panel_heights(count: int, legend_rows: Sequence[int]) -> list[float]:
 
 def _fill(axis: Axes, picture: Picture, panel: Panel) -> None:
     """Draw one panel."""
+    from matplotlib.ticker import MaxNLocator
+
     lines = [_line(axis, picture, panel, curve) for curve in panel.curves]
     if picture.log:
         axis.set_yscale("log")
+        _number_decades(axis)
     else:
         _widen(axis, panel)
+        if panel.quantity == INCIDENTS:
+            axis.yaxis.set_major_locator(MaxNLocator(integer=True))
         # above the ticks, where the legend does not reach
         axis.yaxis.get_offset_text().set_horizontalalignment("right")
     axis.set_ylabel(_plain(panel.axis))
@@ -212,6 +218,23 @@ def _widen(axis: Axes, panel: Panel) -> None:
         axis.set_ylim(middle - 0.05 * size, middle + 0.05 * size)
 
 
+def _number_decades(axis: Axes) -> None:
+    """Write plain numbers on a log axis of less than two decades, and give it a finer grid."""
+    from matplotlib.ticker import LogFormatter
+
+    class Plain(LogFormatter):
+        """Numbers as %g where matplotlib would write powers, and none where it writes none."""
+
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return f"{x:.6g}" if super().__call__(x, pos) else ""
+
+    low, high = axis.get_ylim()
+    if high < 100.0 * low:
+        axis.yaxis.set_major_formatter(Plain())
+        axis.yaxis.set_minor_formatter(Plain(minor_thresholds=(2.0, 0.5)))
+        axis.grid(which="minor", axis="y", linewidth=0.4)
+
+
 def _marks(axis: Axes, picture: Picture) -> list[Line2D]:
     """Draw events as faint lines across the panel; return samples for the legend."""
     from matplotlib.lines import Line2D
@@ -247,8 +270,15 @@ def _entries(picture: Picture, panel: Panel) -> list[str]:
 
 def _columns(texts: Sequence[str]) -> int:
     """Return how many entries fit beside each other."""
-    longest = max(map(len, texts))
-    return max(1, min(len(texts), _LETTERS // (longest + _SAMPLE)))
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextToPath
+
+    size = _STYLE["legend.fontsize"]
+    font, measure = FontProperties(size=size), TextToPath()
+    widths = [measure.get_text_width_height_descent(text, font, ismath=False)[0] for text in texts]
+    most = max(1, int(_LEGEND / (max(widths) + _SAMPLE * size)))
+    # no more columns than the rows need, so that they are filled evenly
+    return math.ceil(len(texts) / math.ceil(len(texts) / most))
 
 
 def _legend_rows(picture: Picture, panel: Panel) -> int:
@@ -275,6 +305,7 @@ def _legend(axis: Axes, picture: Picture, panel: Panel, lines: Sequence[Line2D])
         handlelength=2.8,
         columnspacing=1.6,
         labelspacing=0.3,
+        title_fontsize=_STYLE["legend.fontsize"],
         title=f"the first {len(shown)} of {len(texts)} curves" if more else None,
         alignment="left",
     )

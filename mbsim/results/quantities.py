@@ -58,6 +58,7 @@ class Quantity:
 
 
 TIME = Quantity("Time", time=1)
+INCIDENTS = Quantity("Number of incidents")
 _POSITION = Quantity("Position", length=1)
 _VELOCITY = Quantity("Velocity", length=1, time=-1)
 _ACCELERATION = Quantity("Acceleration", length=1, time=-2)
@@ -76,7 +77,7 @@ _BY_NAME = {
     "torque": Quantity("Torque", force=1, length=1),
     "penetration": Quantity("Penetration", length=1),
     "slip_speed": Quantity("Slip speed", length=1, time=-1),
-    "incidents": Quantity("Number of incidents"),
+    "incidents": INCIDENTS,
     "area": Quantity("Contact area", length=2),
     "kinetic": _ENERGY,
     "potential": _ENERGY,

@@ -267,6 +267,23 @@ def test_log_axis_leaves_out_what_it_cannot_show(files):
         picture(files[0], names=("bodies/2/position/y",), log=True)
 
 
+def test_a_log_axis_of_few_decades_has_plain_numbers(files):
+    figure = draw(picture(files[0], names=("bodies/3/position/z",), log=True))
+    formatter = figure.axes[0].yaxis.get_minor_formatter()
+    formatter.set_locs(figure.axes[0].yaxis.get_minorticklocs())
+    assert formatter(0.3) == "0.3"
+
+
+def test_legends_stay_inside(files, here):
+    figure = draw(picture(*files, names=("bodies/*/quaternion", "requests/7")))
+    save(figure, here / "a.png")
+    right = figure.bbox.x1
+    for axis in figure.axes:
+        assert axis.get_legend().get_window_extent().x1 <= right
+        # and the panel has most of the width
+        assert axis.get_window_extent().width > 0.8 * right
+
+
 def test_events_are_marked(files):
     drawn = picture(files[0], names=("bodies/2/position/z",), events=True)
     with open_results(files[0]) as results:
