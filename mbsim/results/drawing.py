@@ -168,11 +168,11 @@ def _fill(axis: Axes, picture: Picture, panel: Panel) -> None:
 
 
 def _line(axis: Axes, picture: Picture, panel: Panel, curve: Curve) -> Line2D:
-    """Draw one curve; one point alone is marked, it would not be seen."""
+    """Draw one curve; points without neighbours, which no line shows, are marked."""
     colour, dashes = _look(picture, panel, curve)
-    marker = "o" if np.isfinite(curve.y).sum() == 1 else ""
     # a wide pale first run stays in sight under others that agree with it
     under = len(picture.files) > 1 and curve.file == 0
+    alone = _isolated(curve)
     (line,) = axis.plot(
         curve.x,
         curve.y,
@@ -180,11 +180,19 @@ def _line(axis: Axes, picture: Picture, panel: Panel, curve: Curve) -> Line2D:
         linestyle=dashes,
         linewidth=3.5 if under else 1.5,
         alpha=0.45 if under else 1.0,
-        marker=marker,
+        marker="o" if alone else "",
+        markevery=alone,
         markersize=4,
     )
     line.set_gid(_plain(curve.name))
     return line
+
+
+def _isolated(curve: Curve) -> list[int]:
+    """Return which points have a gap, or nothing, on both sides."""
+    there = np.isfinite(np.concatenate([[np.nan], curve.x + curve.y, [np.nan]]))
+    alone: list[int] = np.flatnonzero(there[1:-1] & ~there[:-2] & ~there[2:]).tolist()
+    return alone
 
 
 def _look(picture: Picture, panel: Panel, curve: Curve) -> tuple[str, Any]:

@@ -274,6 +274,13 @@ def test_a_log_axis_of_few_decades_has_plain_numbers(files):
     assert formatter(0.3) == "0.3"
 
 
+def test_points_between_gaps_are_marked(files):
+    drawn = picture(files[0], names=("energy/kinetic",))
+    drawn.panels[0].curves[0].y[[3, 5, 6, 7]] = np.nan
+    (line,) = draw(drawn).axes[0].get_lines()
+    assert (line.get_marker(), line.get_markevery()) == ("o", [4])
+
+
 def test_legends_stay_inside(files, here):
     figure = draw(picture(*files, names=("bodies/*/quaternion", "requests/7")))
     save(figure, here / "a.png")
