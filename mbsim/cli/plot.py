@@ -116,8 +116,11 @@ def _no_names(results: Results) -> str:
 
 def _made_up(paths: Sequence[Path], choice: Choice, minus: Path | None) -> str:
     """Return a name for a picture, in the current directory, that says what is in it."""
-    words = ["+".join(path.stem for path in paths)]
-    words += [f"minus-{minus.stem}"] if minus is not None else []
+    from mbsim.results.curves import names_of
+
+    called = names_of([*paths, *([] if minus is None else [minus])])
+    words = ["+".join(called[: len(paths)])]
+    words += [f"minus-{called[-1]}"] if minus is not None else []
     words += choice.names[:2]
     words += [f"and-{len(choice.names) - 2}-more"] if len(choice.names) > 2 else []
     words += [] if choice.over == "time" else [f"over-{choice.over}"]

@@ -144,17 +144,24 @@ def collect(files: Sequence[Results], choice: Choice, minus: Results | None = No
     # one row of `tracks` a file; all are in the units of the first
     units = UnitSystem.of(files[0])
     tracks = [_Track(results, units, choice, minus) for results in files]
-    called = names_of([track.path for track in tracks])
+    # the run that is taken off is not drawn, but whoever judges must know of it too
+    others = [] if minus is None else [_Track(minus, units, Choice(choice.names), None)]
+    runs = [*tracks, *others]
+    called = names_of([track.path for track in runs])
     picture = Picture(
-        title=_title(files, minus),
-        files=called,
+        title=_title(called[: len(tracks)], called[len(tracks) :]),
+        files=called[: len(tracks)],
         axis=tracks[0].axis,
         log=choice.log,
         span=_span(tracks, choice),
-        warnings=[text for track in tracks if (text := _unfinished(track, called, units))],
+        warnings=[
+            f"{name}: {text}" if len(runs) > 1 else text
+            for track, name in zip(runs, called, strict=True)
+            if (text := _unfinished(track, units))
+        ],
     )
     for name in choice.names:
-        _add(picture, tracks, name, difference=minus is not None)
+        _add(picture, tracks, name)
     for panel in picture.panels:
         _describe(panel, units, minus is not None, choice.log)
     if minus is None and choice.start is None and choice.end is None:
@@ -163,7 +170,7 @@ def collect(files: Sequence[Results], choice: Choice, minus: Results | None = No
         picture.events = _events(tracks[0], choice)
     if choice.log:
         _keep_positive(picture)
-    picture.notes += [_source(track) for track in tracks]
+    picture.notes += [_source(track, name) for track, name in zip(runs, called, strict=True)]
     return picture
 
 
@@ -263,7 +270,7 @@ def _span(tracks: Sequence[_Track], choice: Choice) -> tuple[float, float] | Non
     return low, high
 
 
-def _add(picture: Picture, tracks: Sequence[_Track], name: str, difference: bool) -> None:
+def _add(picture: Picture, tracks: Sequence[_Track], name: str) -> None:
     """Add the curves of one name; files that do not have it are noted, if others do."""
     missing: list[tuple[int, UnknownSignal]] = []
     for k, track in enumerate(tracks):
@@ -334,20 +341,20 @@ def names_of(paths: Sequence[Path]) -> list[str]:
     while True:
         short = ["/".join((*path.parts[-depth:-1], path.stem)) for path in paths]
         if len(set(short)) == len(short) or depth >= deepest:
-            return short
+            break
         depth += 1
+    # runs of one model in several folders: the folders say it all
+    same = depth > 1 and len({path.stem for path in paths}) == 1
+    return [name.rpartition("/")[0] or name for name in short] if same else short
 
 
-def _title(files: Sequence[Results], minus: Results | None) -> str:
+def _title(files: Sequence[str], minus: Sequence[str]) -> str:
     """Return the names of the runs."""
-    paths = [results.path or Path("in memory") for results in (*files, *filter(None, (minus,)))]
-    short = names_of(paths)
-    last = short.pop() if minus is not None else ""
-    text = ", ".join(short[:3]) + (f" and {len(short) - 3} more" if len(short) > 3 else "")
-    return f"{text} minus {last}" if last else text
+    text = ", ".join(files[:3]) + (f" and {len(files) - 3} more" if len(files) > 3 else "")
+    return " minus ".join([text, *minus])
 
 
-def _unfinished(track: _Track, called: Sequence[str], units: UnitSystem) -> str:
+def _unfinished(track: _Track, units: UnitSystem) -> str:
     """Return what a reader must know of a run that did not come to its end."""
     status = track.results.status
     if status == "finished":
@@ -357,8 +364,7 @@ def _unfinished(track: _Track, called: Sequence[str], units: UnitSystem) -> str:
     text = f"{what} at {track.last_time:.6g}"
     if isinstance(end, (int, float)):
         text += f" of {end * track.from_units.factor_to(units, TIME):.6g}"
-    text = f"{text} {units.text(TIME)}"
-    return f"{names_of([track.path])[0]}: {text}" if len(called) > 1 else text
+    return f"{text} {units.text(TIME)}"
 
 
 def _peaks(picture: Picture, tracks: Sequence[_Track]) -> list[str]:
@@ -409,11 +415,11 @@ def _keep_positive(picture: Picture) -> None:
         ]
 
 
-def _source(track: _Track) -> str:
+def _source(track: _Track, called: str) -> str:
     """Return where the numbers are from."""
     about = track.results.attributes
     facts = [
-        track.path.name,
+        track.path.name if called == track.path.stem else f"{called}: {track.path.name}",
         f"mbsim {about.get('mbsim_version', '')}".strip(),
         str(about.get("integrator", "")),
         f"tol {about['tol']:g}" if isinstance(about.get("tol"), float) else "",
