@@ -6,6 +6,7 @@ MbsimError
 ├── SolverError       3  the integrator gave up: time, reason, element
 ├── PluginError       4  a user subroutine failed while the run went on
 ├── ResultsError      5  results could not be written
+│   └── UnknownSignal 2  a name that a result file does not have
 └── Interrupted     130  the user stopped the run; results up to there are kept
 """
 
@@ -68,6 +69,12 @@ class ResultsError(MbsimError):
     """A result file could not be written or read."""
 
     exit_code = 5
+
+
+class UnknownSignal(ResultsError):
+    """A name is not one of a result file's signals; the message says which there are."""
+
+    exit_code = 2
 
 
 class Interrupted(MbsimError):

@@ -26,6 +26,8 @@ def command(file: Path, as_json: bool) -> None:
 
         with open_results(file) as results:
             about = _about_results(results)
+            if not as_json:
+                _shorten(about, results)
     else:
         from mbsim.reader.xml import read_model
 
@@ -125,20 +127,37 @@ def _about_results(results: Results) -> dict[str, Any]:
     return plain
 
 
+def _shorten(about: dict[str, Any], results: Results) -> None:
+    """List signals as `plot` takes them, ids together, with parts and units; then the tables."""
+    from mbsim.results.names import compact, parts_of
+    from mbsim.results.quantities import UnitSystem, quantity_of
+
+    columns, units = results.signals(), UnitSystem.of(results)
+    about["signals"] = {}
+    for short, names in compact(columns).items():
+        measured = [quantity_of(results, names[0], k) for k in range(columns[names[0]])]
+        unit = ", ".join(dict.fromkeys(filter(None, map(units.text, measured))))
+        parts = " ".join(f"/{part}" for part in parts_of(columns[names[0]]))
+        about["signals"][short] = f"{parts:<32} {unit}".rstrip() or "-"
+    others = [name for name in results.keys() if name not in columns]
+    about["other data"] = list(compact(others))
+
+
 def _show(about: dict[str, Any]) -> None:
     """Print nested facts with indentation."""
     lines: list[str] = []
 
-    def add(name: str, value: Any, depth: int) -> None:
+    def add(name: str, value: Any, depth: int, width: int) -> None:
         pad = "  " * depth
         if isinstance(value, dict):
             if value:
                 lines.append(f"{pad}{name}")
+            inner = max([26 - len(pad), *map(len, value)])
             for key, item in value.items():
-                add(str(key), item, depth + 1)
+                add(str(key), item, depth + 1, inner)
         elif isinstance(value, list) and value and all(isinstance(v, (int, float)) for v in value):
             numbers = " ".join(f"{v:.9g}" for v in value)
-            lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {numbers}")
+            lines.append(f"{pad}{name:<{width}} {numbers}")
         elif isinstance(value, list):
             if value:
                 lines.append(f"{pad}{name}")
@@ -148,9 +167,9 @@ def _show(about: dict[str, Any]) -> None:
                 lines.append(f"{pad}  {inside or item}")
         elif value not in ("", None):
             shown = f"{value:.9g}" if isinstance(value, float) else value
-            lines.append(f"{pad}{name:<{max(1, 28 - len(pad))}} {shown}")
+            lines.append(f"{pad}{name:<{width}} {shown}")
 
     for key, value in about.items():
-        add(key, value, 0)
+        add(key, value, 0, 28)
     # in one piece: a pager that closes early breaks the pipe only once
     click.echo("\n".join(lines))

@@ -85,7 +85,9 @@ def first_step(p, m, t, span, order):
 @jitable
 def stable(p, m, t, h_max):
     """Return the step of a method without error estimate."""
-    return min(h_max, call_float(p.stable, (p.context, t, m.memory[TOL], m.y, m.k[0])))
+    if p.stable == 0:
+        return h_max
+    return quantised(min(h_max, call_float(p.stable, (p.context, t, m.memory[TOL], m.y, m.k[0]))))
 
 
 @jitable
@@ -113,7 +115,8 @@ def length(p, m, steps, t, t_end, h_max, floor):
     h = min(m.memory[STEP], h_max)
     if steps.order > 0.0:
         h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
-    h = max(quantised(h), floor)
+    # what the problem or the user said is not changed
+    h = max(quantised(h) if steps.order > 0.0 else h, floor)
     # no sliver of a step before the end
     return t_end - t if t + 1.01 * h >= t_end else h
 

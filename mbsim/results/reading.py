@@ -2,25 +2,43 @@
 
 from __future__ import annotations
 
-import difflib
+import functools
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from mbsim.errors import ResultsError
+from mbsim.errors import ResultsError, UnknownSignal
+from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 
 if TYPE_CHECKING:
     import h5py
 
-#: What may follow a name, by the number of columns of the signal.
-_PARTS = {
-    3: {"x": 0, "y": 1, "z": 2},
-    4: {"w": 0, "x": 1, "y": 2, "z": 3},
-    8: {f"F{k}": k - 1 for k in range(1, 9)},
-}
+#: What h5py raises where a file is damaged.
+_DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
+_Read = TypeVar("_Read", bound=Callable[..., Any])
+
+
+def _reads(method: _Read) -> _Read:
+    """Turn what h5py raises of a damaged file into one `ResultsError` that names the file."""
+
+    @functools.wraps(method)
+    def reading(self: Results, *arguments: Any) -> Any:
+        try:
+            return method(self, *arguments)
+        except _DAMAGE as error:
+            raise ResultsError(f"{self._where}: {_damage(error)}") from None
+
+    return cast(_Read, reading)
+
+
+def _damage(error: BaseException) -> str:
+    """Return what to say of a file that h5py cannot read."""
+    text = " ".join(str(error.args[0] if error.args else error).split())
+    return f"cannot be read, the file is damaged: {text or type(error).__name__}"
 
 
 class Results:
@@ -34,6 +52,7 @@ class Results:
     def __init__(self, file: h5py.File, path: Path | None) -> None:
         self._file = file
         self.path = path
+        self._signals: dict[str, int] | None = None  # once they were looked up
 
     def __enter__(self) -> Results:
         return self
@@ -62,6 +81,7 @@ class Results:
         return self._file
 
     @property
+    @_reads
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file: version, model, units, settings, status."""
         return {name: _plain(value) for name, value in self._open().attrs.items()}
@@ -72,12 +92,14 @@ class Results:
         return str(self.attributes.get("status", "unknown"))
 
     @property
+    @_reads
     def stats(self) -> dict[str, Any]:
         """Counters and times of the run; empty if it was killed."""
         if "stats" not in self._open():
             return {}
         return {name: _plain(value) for name, value in self._open()["stats"].attrs.items()}
 
+    @_reads
     def keys(self) -> list[str]:
         """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
         import h5py
@@ -89,13 +111,72 @@ class Results:
                 names.append(name)
 
         self._open().visititems(note)
-        return sorted(names, key=_order)
+        return sorted(names, key=order)
+
+    @_reads
+    def signals(self) -> dict[str, int]:
+        """Return what has a value at every output time: names, sorted -> numbers of columns."""
+        if self._signals is not None:
+            return self._signals
+        file, found = self._open(), {}
+        rows = len(file["time"]) if "time" in file else 0
+        for name in self.keys():
+            item = file[name]
+            # /state is the solver's own, in its own layout
+            if item.shape[:1] != (rows,) or item.dtype.kind not in "iuf":
+                continue
+            columns = 1 if item.ndim == 1 else item.shape[1]
+            if not name.startswith("state/") and item.ndim <= 2 and columns in (1, *PARTS):
+                found[name] = columns
+        self._signals = found
+        return found
+
+    def find(self, name: str) -> list[str]:
+        """Return the names of signals that a name stands for; a plain one stands for itself.
+
+        Parameters
+        ----------
+        name : str
+            May have wildcards between its slashes: ``bodies/*/velocity/mag``.
+
+        Raises
+        ------
+        UnknownSignal
+            If there is none, or what is there is no signal over output times.
+        """
+        signals = self.signals()
+        if is_pattern(name):
+            found = matching(name, signals)
+        else:
+            # written once, whatever the slashes around it
+            found = [name.strip("/")] if name in self else []
+        if not found:
+            raise UnknownSignal(self._missing(name))
+        whole = found[0] if found[0] in signals else found[0].rpartition("/")[0]
+        if whole not in signals:
+            raise UnknownSignal(f"{self._where}: {name} is no signal over time{self._there()}")
+        return found
+
+    @_reads
+    def label(self, name: str) -> str:
+        """Return what the deck calls a body, contact or request: ``bodies/2``; else nothing."""
+        item = self._open().get(name)
+        return str(_plain(item.attrs.get("label", ""))) if item is not None else ""
+
+    @_reads
+    def attribute(self, name: str, attribute: str) -> Any:
+        """Return an attribute of a dataset or group, None if it has none."""
+        item = self._open().get(name)
+        value: Any = item.attrs.get(attribute) if item is not None else None
+        return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
     @property
+    @_reads
     def has_checkpoint(self) -> bool:
         """Whether a run can go on from here."""
         return "checkpoint" in self._open()
 
+    @_reads
     def tables(self, group: str) -> dict[str, Any]:
         """Return all datasets under a group as arrays, by their names in it."""
         import h5py
@@ -109,6 +190,7 @@ class Results:
         self._open()[group].visititems(note)
         return found
 
+    @_reads
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
         return sorted(int(id) for id in self._open().get(group, ()))
@@ -121,22 +203,24 @@ class Results:
 
         Raises
         ------
-        ResultsError
-            If there is none of this name; the message says what is near.
+        UnknownSignal
+            If there is none of this name; the message says what is near and what there is.
         """
         found = self._find(name)
         if found is None:
-            raise ResultsError(self._missing(name))
-        try:
-            dataset, part = found
-            if part is None:
-                return _plain(dataset[()])
-            if part == "mag":
-                return np.linalg.norm(dataset[()], axis=1)
-            return dataset[:, _PARTS[dataset.shape[1]][part]]
-        except OSError as error:
-            raise ResultsError(f"{self.path}: {name} cannot be read: {error}") from None
+            raise UnknownSignal(self._missing(name))
+        return self._values(*found)
 
+    @_reads
+    def _values(self, dataset: h5py.Dataset, part: str | None) -> Any:
+        """Return a signal or a part of it."""
+        if part is None:
+            return _plain(dataset[()])
+        if part == "mag":
+            return np.linalg.norm(dataset[()], axis=1)
+        return dataset[:, PARTS[dataset.shape[1]][part]]
+
+    @_reads
     def _find(self, name: str) -> tuple[h5py.Dataset, str | None] | None:
         """Return the dataset of a name and the part of it asked for."""
         import h5py
@@ -151,28 +235,33 @@ class Results:
         item = file.get(whole) if whole else None
         if not isinstance(item, h5py.Dataset) or item.ndim != 2:
             return None
-        parts = _PARTS.get(item.shape[1], {})
-        if part in parts or (part == "mag" and item.shape[1] == 3):
-            return item, part
-        return None
+        return (item, part) if part in parts_of(item.shape[1]) else None
+
+    @property
+    def _where(self) -> str:
+        return str(self.path or "results in memory")
 
     def _missing(self, name: str) -> str:
-        """Return what to say of a name that is not there."""
+        """Return what to say of a name that is not there: nearest first, then what there is."""
         import h5py
 
-        where, asked = str(self.path or "results in memory"), name.strip("/")
+        asked = name.strip("/")
         item = self._open().get(asked) if asked else None
         if isinstance(item, h5py.Group):
-            inside = ", ".join(sorted(item, key=_order)[:12])
-            return f"{where}: {name} is a group, not a signal; it has {inside or 'nothing'}"
-        near = difflib.get_close_matches(asked, self.keys(), n=3, cutoff=0.5)
-        hint = f"; did you mean {' or '.join(near)}?" if near else "; see `mbsim info`"
-        return f"{where}: no signal {name!r}{hint}"
+            inside = ", ".join(sorted(item, key=order)[:12])
+            return f"{self._where}: {name} is a group, not a signal; it has {inside or 'nothing'}"
+        signals = self.signals()
+        whole, _, part = asked.rpartition("/")
+        if whole in signals and not is_pattern(part):
+            parts = ", ".join(parts_of(signals[whole])) or "no parts"
+            return f"{self._where}: no signal {name!r}; {whole} has {parts}"
+        near = nearest(asked, self.keys())
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        return f"{self._where}: no signal {name!r}{hint}{self._there()}"
 
-
-def _order(name: str) -> list[tuple[int, int, str]]:
-    """Return a sorting key that puts body 2 before body 10."""
-    return [(0, int(p), "") if p.isdigit() else (1, 0, p) for p in name.split("/")]
+    def _there(self) -> str:
+        """Return all signals, with ids taken together, as the end of a message."""
+        return f"; there is {', '.join(compact(self.signals())) or 'nothing'}"
 
 
 def _plain(value: Any) -> Any:
@@ -224,7 +313,12 @@ def open_results(path: str | Path) -> Results:
     except OSError as error:
         reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
         raise ResultsError(f"{file}: cannot be read: {reason}") from None
-    if "mbsim_version" not in opened.attrs:
+    try:
+        ours = "mbsim_version" in opened.attrs
+    except _DAMAGE as error:
+        opened.close()
+        raise ResultsError(f"{file}: {_damage(error)}") from None
+    if not ours:
         opened.close()
         raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
     return Results(opened, file)

@@ -242,7 +242,7 @@ class Recorder:
         stale = status == "finished" or self._rows_since_flush > 0
         self._store.update(
             values=peaks,
-            attributes={**self._columns(), "stats": stats, "/": {"status": status}},
+            attributes={"stats": stats, "/": {"status": status}},
             remove=["checkpoint"] if stale else [],
         )
         in_memory = self._store.finish()
@@ -266,7 +266,9 @@ class Recorder:
             self._blocks = [_nothing(self.system)]
         block = _joined(self._blocks)
         self._blocks, self._bytes = [], 0
-        self._store.update(rows=dict(self._signals(block)), last=last)
+        # with the first rows, so that a run that dies has them too
+        columns = {} if self._started else self._columns()
+        self._store.update(rows=dict(self._signals(block)), attributes=columns, last=last)
         self._started = True
         self._incidents += len(block.incidents)
 

@@ -13,7 +13,7 @@ import pytest
 from decks import added
 from fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system
 
-from mbsim.errors import ModelError, ResultsError
+from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
 from mbsim.results.log import MOST_LINES, RunLog
 from mbsim.results.reading import Results, finite, open_results
@@ -186,6 +186,9 @@ def test_killed_between_flushes(tmp_path: Path) -> None:
         assert results.status == "running"
         np.testing.assert_array_equal(results["bodies/2/position/x"], np.arange(10))
         assert results.tables("checkpoint")["stage"] == 10
+        # what plot labels curves with
+        assert results.attribute("requests/7", "type") == "MARKER_DISPLACEMENT"
+        assert results.label("requests/7") == "ball"
 
     # and the run can go on, right after the rows that belong to the checkpoint
     system = fake_system(tmp_path / "deck")
@@ -365,6 +368,19 @@ def test_missing_names(tmp_path: Path) -> None:
         for name in ("", "/", "nothing/like/it", "time/x", "bodies/2/position/y/z"):
             with pytest.raises(ResultsError):
                 results[name]
+
+
+def test_find_resolves_names_as_reading_does(tmp_path: Path) -> None:
+    with recorded(tmp_path) as results:
+        assert results.find("/bodies/2/position/") == ["bodies/2/position"]
+        for name in results.find("bodies/*/*/*") + results.find("requests/7/*"):
+            assert results[name].shape == results["time"].shape
+        assert results.find("energy/[kp]*") == ["energy/kinetic", "energy/potential"]
+        assert results.signals()["bodies/2/quaternion"] == 4
+        for name in ("bodies/*", "events", "state/y", "contacts/301/peak_force", ""):
+            with pytest.raises(UnknownSignal) as raised:
+                results.find(name)
+            assert raised.value.exit_code == 2
 
 
 def test_bad_files(tmp_path: Path) -> None:
