@@ -70,6 +70,13 @@ class _GroupAttribute(AttributeTemplate):
         return group.fields[name][0] if name in group.fields else None
 
 
+def _constant_word(builder: Any, table: Any, word: int) -> Any:
+    """Return a word of a table, which nothing changes: it is read once, not after every store."""
+    read = builder.load(builder.gep(table, [ir.Constant(_WORD, word)]))
+    read.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return read
+
+
 @lower_getattr_generic(GroupType)
 def _lower_field(context: Any, builder: Any, group: Any, value: Any, name: str) -> Any:
     """Return a field of a packed group: the table of an inner group, or the array."""
@@ -77,10 +84,7 @@ def _lower_field(context: Any, builder: Any, group: Any, value: Any, name: str) 
     if isinstance(target, GroupType):
         return builder.add(value, ir.Constant(_WORD, 8 * word))
     table = builder.inttoptr(value, _WORD.as_pointer())
-    read = [
-        builder.load(builder.gep(table, [ir.Constant(_WORD, word + k)]))
-        for k in range(1 + target.ndim)
-    ]
+    read = [_constant_word(builder, table, word + k) for k in range(1 + target.ndim)]
     itemsize = context.get_abi_sizeof(context.get_data_type(target.dtype))
     array = arrayobj.make_array(target)(context, builder)
     shape = read[1:]

@@ -48,6 +48,15 @@ def boxes_meet(scene, i, j):
 
 
 @jitable
+def balls_meet(scene, i, j, skin):
+    """Return whether the balls around two graphics are nearer than the skin."""
+    a, b = scene.work.frames[i], scene.work.frames[j]
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    together = scene.graphics.reach[i] + scene.graphics.reach[j] + skin
+    return dx * dx + dy * dy + dz * dz < together * together
+
+
+@jitable
 def above_plane(scene, plane, g, skin):
     """Return whether a shape is farther than the skin above a plane."""
     frame = scene.work.frames[plane]
@@ -65,7 +74,7 @@ def near(scene, i, j, skin):
             # where a plane that moves will be is not followed
             moves = scene.graphics.body[plane] != ground
             return moves or not above_plane(scene, plane, other, skin)
-    return boxes_meet(scene, i, j)
+    return boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin)
 
 
 @jitable
@@ -233,7 +242,7 @@ def search(scene, crowd, skin):
                     j = order[m]
                     if crowds.same[crowd] == 1 and j <= i:
                         continue
-                    if boxes_meet(scene, i, j):
+                    if boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin):
                         add_pair(scene, crowd, i, j)
 
 
