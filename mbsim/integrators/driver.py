@@ -195,7 +195,7 @@ def choose_next(m, steps, h, h_max):
         m.memory[STEP] = h_max
         return
     error = m.memory[LAST_ERROR]
-    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, False)
+    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, steps.memory, False)
     m.memory[STEP] = h * (min(factor, 1.0) if m.memory[AFTER_REJECTION] == 1.0 else factor)
     m.memory[ERROR_BEFORE] = max(error, 1e-4)
     m.memory[AFTER_REJECTION] = 0.0
@@ -245,7 +245,9 @@ def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
             continue
         m.counts[FAILURES] = 0
         if not error <= 1.0:
-            shrink = next_factor(error, 1.0, steps.order, True) if math.isfinite(error) else 0.2
+            shrink = 0.2
+            if math.isfinite(error):
+                shrink = next_factor(error, 1.0, steps.order, steps.memory, True)
             reject(p, m, t, max(shrink * h, floor), BY_ERROR)
             m.memory[AFTER_REJECTION] = 1.0
             if h <= floor:
