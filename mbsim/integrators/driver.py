@@ -155,6 +155,25 @@ def outputs(p, m, times):
 
 
 @jitable
+def attempt(p, m, steps, t, h, times):
+    """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
+
+    A step that fails is not checked. The dense output of one that will be taken is fitted
+    before the problem is committed, while its hooks still know the step's begin.
+    """
+    code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
+    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+        return code, 1.0, -1.0
+    part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
+    if part < 1.0:
+        return 0.0, part, -1.0
+    asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
+    if asked >= 0.0 or output_within(m, times, t + h):
+        code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+    return code, 1.0, asked
+
+
+@jitable
 def look_inside(p, m, asked):
     """Let the problem look at inner points of the last step; return 0 or its code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
@@ -226,14 +245,8 @@ def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
         h = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
-        code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
-        error, part, asked = m.memory[LAST_ERROR], 1.0, -1.0
-        if code == 0.0 and error <= 1.0:
-            part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
-            if part >= 1.0:
-                asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-                if asked >= 0.0 or output_within(m, times, t + h):
-                    code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+        code, part, asked = attempt(p, m, steps, t, h, times)
+        error = m.memory[LAST_ERROR]
         if code != 0.0:
             if gives_up(m, code, h, floor):
                 m.counts[CODE] = int(code)
