@@ -354,7 +354,7 @@ def simulate(
     end_time, print_interval : float, optional
         Instead of the deck's [T].
     integrator : str, optional
-        "DOPRI5" (order 5) or "DOP853" (order 8, for tolerances of 1e-8 and less).
+        "DOPRI5" (order 5) or "DOP853" (order 8); default: the deck's, else the first.
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default 1e-5.
     plugins : sequence of path

@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbsim.integrators.catalog import METHODS
+
 if TYPE_CHECKING:
     from mbsim.errors import MbsimError
     from mbsim.results.reading import Results
+
+_METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
 
 
 @click.command("run")
@@ -39,7 +43,9 @@ if TYPE_CHECKING:
     help="Change an attribute of the deck, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
 )
 @click.option(
-    "--integrator", metavar="NAME", help="DOPRI5, or a MotionSolve name, which runs DOPRI5."
+    "--integrator",
+    metavar="NAME",
+    help=f"{_METHODS}; MotionSolve's names run the first.  [default: the deck's, else the first]",
 )
 @click.option(
     "--tol",

@@ -12,18 +12,21 @@ GROW = 3.0
 
 
 @jitable
-def next_factor(error, before, order, rejected):
+def next_factor(error, before, order, memory, rejected):
     """Return the factor from this step to the next, for error / tol now and in the step before.
 
-    PI control with exponents 0.7/k and 0.4/k, k = order of the error's step power: the
-    memory of the last error keeps the step from thrashing at a stability limit.
-    Source: K. Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533.
+    PI control with exponents (1 - 3 b/4)/k and b/k, k = order of the error's step power, b =
+    `memory` (0 to 0.4): the memory of the last error keeps the step from thrashing at a
+    stability limit, and slows its growth after a kink.
+    Source: K. Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533; E. Hairer, G. Wanner, Solving
+    ODEs II (1996), section IV.2.
     """
     if error == 0.0:
         return GROW
     if rejected:
         return max(SHRINK, SAFETY * error ** (-1.0 / order))
-    factor = SAFETY * error ** (-0.7 / order) * max(before, 1e-4) ** (0.4 / order)
+    growth = error ** (-(1.0 - 0.75 * memory) / order)
+    factor = SAFETY * growth * max(before, 1e-4) ** (memory / order)
     return min(GROW, max(SHRINK, factor))
 
 

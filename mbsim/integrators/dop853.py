@@ -189,4 +189,4 @@ def _fit_dense(context, t, h, a, b):
     return fit_dense(problem, method, t, h)
 
 
-SCHEME = Scheme(_attempt, _fit_dense, stages=16, last=12, dense=8, order=8.0)
+SCHEME = Scheme(_attempt, _fit_dense, stages=16, last=12, dense=8, order=8.0, memory=0.2)

@@ -111,4 +111,4 @@ def _fit_dense(context, t, h, a, b):
     return 0.0
 
 
-SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=6, dense=5, order=5.0)
+SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=6, dense=5, order=5.0, memory=0.4)

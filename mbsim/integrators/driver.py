@@ -165,6 +165,28 @@ def outputs(p, m, times):
 
 
 @jitable
+def attempt(p, m, steps, t, h, times):
+    """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
+
+    A step that fails is not checked. The dense output of one that will be taken is fitted
+    before the problem is committed, while its hooks still know the step's begin. Single impacts
+    are not guarded, nor their peaks looked for, by a method whose step is the problem's bound.
+    """
+    code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
+    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+        return code, 1.0, -1.0
+    asked = -1.0
+    if steps.order > 0.0:
+        part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
+        if part < 1.0:
+            return 0.0, part, -1.0
+        asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
+    if asked >= 0.0 or output_within(m, times, t + h):
+        code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+    return code, 1.0, asked
+
+
+@jitable
 def look_inside(p, m, asked):
     """Let the problem look at inner points of the last step; return 0 or its code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
@@ -205,7 +227,7 @@ def choose_next(m, steps, h, h_max):
         m.memory[STEP] = h
         return
     error = m.memory[LAST_ERROR]
-    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, False)
+    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, steps.memory, False)
     m.memory[STEP] = h * (min(factor, 1.0) if m.memory[AFTER_REJECTION] == 1.0 else factor)
     m.memory[ERROR_BEFORE] = max(error, 1e-4)
     m.memory[AFTER_REJECTION] = 0.0
@@ -238,16 +260,8 @@ def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
         h = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
-        code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
-        error, part, asked = m.memory[LAST_ERROR], 1.0, -1.0
-        if code == 0.0 and error <= 1.0:
-            if steps.order > 0.0:
-                part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
-            if part >= 1.0:
-                if steps.order > 0.0:
-                    asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-                if asked >= 0.0 or output_within(m, times, t + h):
-                    code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+        code, part, asked = attempt(p, m, steps, t, h, times)
+        error = m.memory[LAST_ERROR]
         if code != 0.0:
             if gives_up(m, code, h, floor):
                 m.counts[CODE] = int(code)
@@ -259,7 +273,9 @@ def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
             continue
         m.counts[FAILURES] = 0
         if not error <= 1.0:
-            shrink = next_factor(error, 1.0, steps.order, True) if math.isfinite(error) else 0.2
+            shrink = 0.2
+            if math.isfinite(error):
+                shrink = next_factor(error, 1.0, steps.order, steps.memory, True)
             reject(p, m, t, max(shrink * h, floor), BY_ERROR)
             m.memory[AFTER_REJECTION] = 1.0
             if h <= floor:

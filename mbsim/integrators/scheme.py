@@ -51,6 +51,7 @@ class Scheme(NamedTuple):
     last: int  # row of k with f at the trial point
     dense: int  # coefficients of the dense output
     order: float  # power of h in the error of a step; 0: no estimate, fixed steps
+    memory: float = 0.0  # how much the last error counts in step control (`control.next_factor`)
 
 
 class Method(NamedTuple):
@@ -81,6 +82,7 @@ class Steps(NamedTuple):
     fit_dense: int
     last: int
     order: float
+    memory: float
 
 
 def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
@@ -110,7 +112,8 @@ def bind(scheme: Scheme, problem: Problem, method: Method) -> tuple[Steps, Any]:
     table = pack(bench)
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
-    return Steps(context, attempt, fit_dense, scheme.last, scheme.order), (table, bench)
+    steps = Steps(context, attempt, fit_dense, scheme.last, scheme.order, scheme.memory)
+    return steps, (table, bench)
 
 
 @jitable

@@ -5,6 +5,7 @@ python -m pytest -m bench -s tests/bench/test_accuracy.py
 
 from __future__ import annotations
 
+import functools
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -15,8 +16,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from decks_io import GROUND, USERFUNCS, contact, run_deck, run_model, sphere
+from models.reference import angle_between, top_attitude
 from models.test_models import rotation_matrices
 from validation.test_contact_physics import RESTITUTION
+
+from mbsim.integrators.catalog import METHODS
 
 pytestmark = pytest.mark.bench
 
@@ -59,6 +63,45 @@ def test_against_closed_forms(tmp_path):
         f"m and mm: {metres.stats['steps']} and {millimetres.stats['steps']} steps, {apart:.1e} m"
     )
     assert np.isfinite([drift, energy, apart]).all()
+
+
+def _cost(results_of, error_of):
+    """Print error, steps, evaluations and time of the loop, best of 5, of both methods."""
+    for method in METHODS:
+        for tol in 10.0 ** -np.arange(4, 15):
+            runs = [results_of(tol=tol, integrator=method) for _ in range(6)][1:]
+            error, stats = error_of(runs[0]), runs[0].stats
+            time = 1e3 * min(run.stats["loop_s"] for run in runs)
+            print(
+                f"{method} tol {tol:.0e}: error {error:.1e}, {stats['steps']} steps, "
+                f"{stats['rhs_evaluations']} evaluations, {time:.2f} ms"
+            )
+            assert np.isfinite(error)
+
+
+def test_run_time_against_error_of_tops():
+    for scene, w0, end, parts in (
+        ("S1", (0.01, 10, 0.02), 10.0, 300),
+        ("S10c", (1, 1000, 1), 1.0, 3000),
+    ):
+        exact = top_attitude((0.010, 0.020, 0.025), w0, end, parts)
+        spin = [f"Body_Rigid[2].w_ic_{axis}={w}" for axis, w in zip("xyz", w0, strict=True)]
+        settings = {"overrides": spin, "end_time": end, "print_interval": end}
+        print(f"\n{scene}: angle [rad] of the attitude at {end:g} s")
+        _cost(
+            functools.partial(run_model, "free_top.xml", **settings),
+            lambda run, exact=exact: angle_between(run["bodies/2/quaternion"][-1], exact),
+        )
+
+
+def test_run_time_against_error_of_a_bouncing_sphere():
+    # the two methods agree to 1e-11; references.json is exact to 1.2e-8
+    exact = run_model("bouncing_sphere.xml", tol=1e-14)["bodies/2/position/z"]
+    print("\nS2a: largest error of z [m] in 301 samples of 3 s, against DOPRI5 at 1e-14")
+    _cost(
+        functools.partial(run_model, "bouncing_sphere.xml"),
+        lambda run: np.abs(run["bodies/2/position/z"] - exact).max(),
+    )
 
 
 def test_error_over_tolerance():

@@ -321,6 +321,19 @@ def test_a_stiff_integrator_is_replaced_with_a_word(tmp_path):
     assert "run by DOPRI5" in done.stderr
 
 
+def test_a_run_loads_only_the_method_that_it_uses(tmp_path):
+    deck = write_deck(tmp_path, BOUNCE, end_time=0.01)
+    code = (
+        "import sys, mbsim; mbsim.simulate(mbsim.read_model(sys.argv[1]), integrator=sys.argv[2]); "
+        "print([n for n in sys.modules if n.startswith('mbsim.integrators.dop')])"
+    )
+    for method in ("DOPRI5", "DOP853"):
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(deck), method], capture_output=True, text=True
+        )
+        assert done.stdout.strip() == f"['mbsim.integrators.{method.lower()}']", done.stderr
+
+
 def test_two_methods_in_one_run_are_refused(tmp_path):
     deck = write_deck(tmp_path, BOUNCE, end_time=0.1)
     one, two = (

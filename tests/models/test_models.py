@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -11,8 +12,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from decks_io import MODELS, USERFUNCS, run_model
-from models.reference import drop_height
+from models.reference import angle_between, drop_height, top_attitude
 
+REFERENCES = Path(__file__).resolve().parents[3] / "shared/data/references.json"
 BOTH = pytest.mark.parametrize("detector", ["auto", "fcl"])
 
 
@@ -128,6 +130,60 @@ def test_free_top():
         [-7.081532693947116e-05, -0.0438360516206641, 0.00013368533928130632, -0.9990387268228045]
     )
     assert min(np.abs(q[-1] - reference).max(), np.abs(q[-1] + reference).max()) < 1e-10
+
+
+TOP = (0.010, 0.020, 0.025)
+METHODS = pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
+
+
+def test_attitude_of_the_top_by_series_is_the_reference():
+    if not REFERENCES.is_file():
+        pytest.skip(f"no reference data at {REFERENCES}")
+    references = json.loads(REFERENCES.read_text(encoding="utf-8"))
+    series = top_attitude(TOP, (0.01, 10, 0.02), 10, 300)
+    # DOP853 at 1e-13, self-consistent to 2e-11 (scene S1)
+    assert angle_between(np.array(references["S1"]["q"]), series) < 2e-11
+    series = top_attitude(TOP, (1, 1000, 1), 1, 3000)
+    assert angle_between(np.array(references["S10c"]["q"]), series) < 1e-7
+
+
+@METHODS
+def test_free_top_at_the_tightest_tolerances(method):
+    # errors of the start grow by exp(4.47 /s * 10 s), held back as the top turns over
+    exact = top_attitude(TOP, (0.01, 10, 0.02), 10, 300)
+    for tol, most in ((1e-8, 5e-8), (1e-13, 1e-11)):
+        results = run_model("free_top.xml", tol=tol, integrator=method)
+        assert angle_between(results["bodies/2/quaternion"][-1], exact) < most
+
+
+@METHODS
+def test_fast_top_at_the_tightest_tolerances(method):
+    # a change of the energy in its last digit turns the top by 1e-8 within the second
+    exact = top_attitude(TOP, (1, 1000, 1), 1, 3000)
+    fast = [f"Body_Rigid[2].w_ic_{axis}={w}" for axis, w in zip("xyz", (1, 1000, 1), strict=True)]
+    results = run_model("free_top.xml", tol=1e-12, integrator=method, end_time=1.0, overrides=fast)
+    assert angle_between(results["bodies/2/quaternion"][-1], exact) < 5e-7
+
+
+def test_both_methods_agree_on_the_bouncing_sphere():
+    # ten bounces; the force is only finitely smooth at touch, at dmax and where it is cut off
+    one, other = (
+        run_model("bouncing_sphere.xml", tol=1e-13, integrator=method)
+        for method in ("DOPRI5", "DOP853")
+    )
+    z = one["bodies/2/position/z"]
+    assert np.abs(z - other["bodies/2/position/z"]).max() < 2e-9
+    assert one["events"]["kind"].tolist() == other["events"]["kind"].tolist()
+    assert np.abs(one["events"]["time"] - other["events"]["time"]).max() < 2e-9
+    for peak, apart in (("peak_penetration", 1e-8), ("peak_force", 1e-3)):
+        # a damped force peaks before the depth does; it is looked at in a few points there
+        assert other[f"contacts/301/{peak}"] == pytest.approx(
+            one[f"contacts/301/{peak}"], rel=apart
+        )
+    if REFERENCES.is_file():
+        # scene S2a, self-consistent to 6e-9; heights of the lowest point
+        reference = json.loads(REFERENCES.read_text(encoding="utf-8"))["S2"]["impact"]["z"]
+        assert np.abs(z - 0.1 - reference).max() < 2e-8
 
 
 def rotation_matrices(q):
