@@ -259,5 +259,10 @@ def s7_positions(count: int) -> np.ndarray:
     across = (np.arange(side) - (side - 1) / 2) * S7.pitch
     up = (np.arange(side) + 0.5) * S7.pitch
     grid = np.stack(np.meshgrid(across, across, up, indexing="ij"), axis=-1).reshape(-1, 3)
-    jitter = np.random.RandomState(0).uniform(-S7.jitter, S7.jitter, grid.shape)  # noqa: NPY002
+    jitter = np.random.RandomState(0).uniform(-S7.jitter, S7.jitter, grid.shape)
     return grid + jitter
+
+
+def s7_sample(count: int) -> float:
+    """Time between the stored rows of S7 (s): short of 100 MB of rows at any count."""
+    return SAMPLE if count <= 1000 else 0.1
