@@ -1,0 +1,126 @@
+"""Our side: decks through `read_model` and `simulate`, as a user runs them."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mbsim import __version__
+from mbsim.bench.measurement import OURS, Measurement, failed, measured
+from mbsim.bench.outcome import Outcome
+from mbsim.bench.scene import Scene, Variation
+from mbsim.errors import Interrupted, MbsimError
+
+if TYPE_CHECKING:
+    from mbsim.model.elements import Model
+    from mbsim.results.reading import Results
+
+_STATE = ("position", "quaternion", "velocity", "angular_velocity")
+_COUNTS = ("steps", "rejected", "rhs_evaluations")
+
+
+class Setting(NamedTuple):
+    """Integrator, tolerance and what the scene varies."""
+
+    integrator: str
+    tol: float
+    variation: Variation
+
+    @property
+    def text(self) -> str:
+        """As in the tables."""
+        varied = "".join(f" {name}={value:g}" for name, value in self.variation.items())
+        return f"{self.integrator} tol={self.tol:g}{varied}"
+
+
+def settings(scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]) -> list[Setting]:
+    """Return all settings of a scene; no `tolerances` means the scene's own."""
+    return [
+        Setting(integrator, tol, variation)
+        for variation in scene.variations
+        for integrator in integrators
+        for tol in (tolerances or scene.tolerances)
+    ]
+
+
+def deck_file(scene: Scene, variation: Variation, folder: Path) -> Path:
+    """Write the deck of a scene, so that `mbsim run` runs it too, and return its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    varied = "".join(f"_{name}_{value:g}" for name, value in variation.items())
+    path = folder / f"{scene.name}{varied}.xml"
+    path.write_text(scene.deck(variation), encoding="utf-8")
+    return path
+
+
+def run(deck: Model, setting: Setting, repeats: int) -> Outcome:
+    """Run a deck and return its outcome with the median time of `repeats`.
+
+    The time is `loop_s`: all calls of the compiled stepping loop, which also writes the rows.
+    """
+    from mbsim.simulation import simulate
+
+    walls = []
+    for _ in range(repeats):
+        results = simulate(deck, integrator=setting.integrator, tol=setting.tol)
+        walls.append(float(results.stats["loop_s"]))
+    return outcome(results, statistics.median(walls))
+
+
+def outcome(results: Results, wall_s: float) -> Outcome:
+    """Return results as an outcome, bodies by id."""
+    bodies = sorted(results.ids("bodies"))
+    state = [
+        np.stack([results[f"bodies/{body}/{name}"] for body in bodies], axis=1) for name in _STATE
+    ]
+    extra = {name: float(results.stats[name]) for name in _COUNTS if name in results.stats}
+    contacts = results.ids("contacts")
+    if contacts:
+        depths = [float(results[f"contacts/{contact}/peak_penetration"]) for contact in contacts]
+        extra["peak_penetration"] = max(depths)
+        last = [float(results[f"contacts/{contact}/incidents"][-1]) for contact in contacts]
+        extra["incidents_end"] = sum(last)
+    return Outcome(wall_s, results["time"], *state, extra, "")
+
+
+def measure(
+    scene: Scene,
+    integrators: Sequence[str],
+    tolerances: Sequence[float],
+    repeats: int,
+    folder: Path,
+) -> Iterator[Measurement]:
+    """Yield a measurement for every setting; a run that fails says why in its note."""
+    from mbsim.reader.xml import read_model
+
+    warm: set[tuple[Path, str]] = set()
+    for setting in settings(scene, integrators, tolerances):
+        path = deck_file(scene, setting.variation, folder)
+        try:
+            deck = read_model(path)
+            if (path, setting.integrator) not in warm:
+                # what this deck needs is compiled or loaded; its first millisecond is enough
+                simulate_once(deck, setting)
+                warm.add((path, setting.integrator))
+            yield measured(
+                scene,
+                OURS,
+                __version__,
+                setting.text,
+                lambda count, deck=deck, setting=setting: run(deck, setting, count),  # type: ignore[misc]
+                repeats,
+            )
+        except Interrupted:
+            raise
+        except MbsimError as error:
+            yield failed(scene, OURS, __version__, setting.text, str(error).splitlines()[0])
+
+
+def simulate_once(deck: Model, setting: Setting) -> None:
+    """Run the first millisecond of a deck."""
+    from mbsim.simulation import simulate
+
+    simulate(deck, integrator=setting.integrator, tol=setting.tol, end_time=1e-3)
