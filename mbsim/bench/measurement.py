@@ -57,14 +57,14 @@ def measured(
     done, outcome = 1, run(1)
     if outcome.wall_s < LONG_RUN and wanted > 1:
         done, outcome = wanted, run(wanted)
-    simulated = float(outcome.time[-1])
-    complete = abs(simulated - scene.end_time) < 1e-6 * scene.end_time
-    # long runs may be cut off where their measure is a largest value so far
+    reached = float(outcome.time[-1])
+    complete = abs(reached - scene.end_time) < 1e-6 * scene.end_time
+    # a run may be cut short where its measure is a largest value so far
     judged = complete or scene.pass_below is not None
     errors = scene.errors(outcome, scene.variant(outcome.note)) if judged else {}
-    notes = [outcome.note] if outcome.note else []
-    if not complete:
-        notes.append(f"stopped at {simulated:.4g} s")
+    note = outcome.note
+    if not judged:
+        note = "; ".join(filter(None, (note, f"ended at {reached:.4g} s, not judged")))
     return Measurement(
         scene.name,
         engine,
@@ -72,16 +72,14 @@ def measured(
         setting,
         done,
         outcome.wall_s,
-        outcome.wall_s / simulated if simulated > 0.0 else math.nan,
+        outcome.wall_s / scene.end_time,
         errors,
         outcome.extra,
-        "; ".join(notes),
+        note,
     )
 
 
 def failed(scene: Scene, engine: str, version: str, setting: str, reason: str) -> Measurement:
     """Return the line of a run that gave nothing."""
     note = f"failed: {reason}"
-    return Measurement(
-        scene.name, engine, version, setting, 0, math.nan, math.nan, {}, {}, note
-    )
+    return Measurement(scene.name, engine, version, setting, 0, math.nan, math.nan, {}, {}, note)

@@ -37,7 +37,9 @@ class Setting(NamedTuple):
         return f"{self.integrator} tol={self.tol:g}{varied}"
 
 
-def settings(scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]) -> list[Setting]:
+def settings(
+    scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]
+) -> list[Setting]:
     """Return all settings of a scene; no `tolerances` means the scene's own."""
     return [
         Setting(integrator, tol, variation)

@@ -13,7 +13,8 @@ class Outcome(NamedTuple):
     Attributes
     ----------
     wall_s
-        Seconds spent in the stepping loop alone, warm, storing of the rows included.
+        Seconds spent in the stepping loop alone, warm, storing of the rows included; scaled to
+        the whole scene where a long run was cut short.
     time
         (n,) times of the rows, s; every 10 ms unless the scene says otherwise.
     position

@@ -17,6 +17,7 @@ COMMANDS = {
     "run": "mbsim.cli.run",
     "check": "mbsim.cli.check",
     "info": "mbsim.cli.info",
+    "bench": "mbsim.cli.bench",
 }
 
 
