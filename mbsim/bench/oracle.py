@@ -18,6 +18,9 @@ from mbsim.bench import parameters as p
 Force = Callable[[float, float], float]
 
 RELATIVE, ABSOLUTE = 1e-13, 1e-17
+#: Longest step over the longest contact, so that no kink of a law is stepped over: halving it moves
+#: the ten bounces of S2a by 2e-9 m.
+SHARE = 1.0 / 4000.0
 
 
 class Flight(NamedTuple):
@@ -111,7 +114,7 @@ def _touch(
         method="DOP853",
         rtol=RELATIVE,
         atol=[ABSOLUTE, 1e-13],
-        max_step=limit / 500.0,
+        max_step=limit * SHARE,
         dense_output=True,
         events=apart,
     )
@@ -129,7 +132,8 @@ def _linear_noclip(law: p.LinearLaw) -> Force:
 
 def _soft_constraint(law: p.LinearLaw, mass: float) -> Force:
     # the limit of a soft constraint: it also carries the weight while in contact
-    return lambda d, v: law.k * d + law.c * v + mass * p.GRAVITY if d > 0.0 else 0.0
+    weight = mass * p.GRAVITY
+    return lambda d, v: max(0.0, law.k * d + law.c * v + weight) if d > 0.0 else 0.0
 
 
 def _impact(law: p.ImpactLaw) -> Force:

@@ -14,12 +14,12 @@ from mbsim.bench.measurement import OURS, Measurement, failed, measured
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scene import Scene, Variation
 from mbsim.errors import Interrupted, MbsimError
+from mbsim.settings import settle
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
-_STATE = ("position", "quaternion", "velocity", "angular_velocity")
 _COUNTS = ("steps", "rejected", "rhs_evaluations")
 
 
@@ -75,9 +75,10 @@ def run(deck: Model, setting: Setting, repeats: int) -> Outcome:
 def outcome(results: Results, wall_s: float) -> Outcome:
     """Return results as an outcome, bodies by id."""
     bodies = sorted(results.ids("bodies"))
-    state = [
-        np.stack([results[f"bodies/{body}/{name}"] for body in bodies], axis=1) for name in _STATE
-    ]
+
+    def rows(name: str) -> np.ndarray:
+        return np.stack([results[f"bodies/{body}/{name}"] for body in bodies], axis=1)
+
     extra = {name: float(results.stats[name]) for name in _COUNTS if name in results.stats}
     contacts = results.ids("contacts")
     if contacts:
@@ -85,7 +86,16 @@ def outcome(results: Results, wall_s: float) -> Outcome:
         extra["peak_penetration"] = max(depths)
         last = [float(results[f"contacts/{contact}/incidents"][-1]) for contact in contacts]
         extra["incidents_end"] = sum(last)
-    return Outcome(wall_s, results["time"], *state, extra, "")
+    return Outcome(
+        wall_s,
+        results["time"],
+        rows("position"),
+        rows("quaternion"),
+        rows("velocity"),
+        rows("angular_velocity"),
+        extra,
+        note="",
+    )
 
 
 def measure(
@@ -103,6 +113,11 @@ def measure(
         path = deck_file(scene, setting.variation, folder)
         try:
             deck = read_model(path)
+        except MbsimError as error:
+            yield failed(scene, OURS, __version__, setting.text, _first_line(error))
+            continue
+        settle(deck, integrator=setting.integrator, tol=setting.tol)  # a wrong tol ends it all
+        try:
             if (path, setting.integrator) not in warm:
                 # what this deck needs is compiled or loaded; its first millisecond is enough
                 simulate_once(deck, setting)
@@ -118,7 +133,12 @@ def measure(
         except Interrupted:
             raise
         except MbsimError as error:
-            yield failed(scene, OURS, __version__, setting.text, str(error).splitlines()[0])
+            yield failed(scene, OURS, __version__, setting.text, _first_line(error))
+
+
+def _first_line(error: MbsimError) -> str:
+    """Return what a table says of an error."""
+    return str(error).splitlines()[0]
 
 
 def simulate_once(deck: Model, setting: Setting) -> None:

@@ -45,8 +45,9 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
         _series(axes, shown, f"mbsim {name}", style | {"linewidth": 2.0})
         _label_ends(axes, front(shown), str(style["color"]))
         if scene.second is not None:
-            second = front(points(chosen, scene.second))
-            _line(axes, second, f"mbsim {name}, {scene.second}", style | {"linestyle": "--"})
+            measure, label = scene.second
+            dashed = style | {"linestyle": "--"}
+            _line(axes, front(points(chosen, measure)), f"mbsim {name}, {label}", dashed)
     _targets(axes, scene, front(points(peers, scene.measure)))
     axes.set(xscale="log", yscale="log", title=f"{scene.name}: {scene.title}")
     axes.set_xlabel(f"{scene.unit}   (better: left)")

@@ -14,6 +14,7 @@ from mbsim.bench.measurement import Measurement, failed, measured
 from mbsim.bench.scene import Scene
 from mbsim.bench.scenes import all_scenes
 from mbsim.errors import ModelError
+from mbsim.settings import INTEGRATORS
 
 Tell = Callable[[str], None]
 
@@ -50,6 +51,20 @@ def choose_scenes(names: Sequence[str]) -> list[Scene]:
         if name.lower() not in by_lower:
             raise ModelError(f"scene {name}: not known; there are {', '.join(known)}")
     return [by_lower[name.lower()] for name in names] or list(known.values())
+
+
+def choose_integrators(names: Sequence[str]) -> list[str]:
+    """Return integrators by name, whatever the case; all of them if there is no name.
+
+    Raises
+    ------
+    ModelError
+        If there is no such integrator; other names that a deck may use are run by one of these.
+    """
+    for name in names:
+        if name.upper() not in INTEGRATORS:
+            raise ModelError(f"integrator={name} is not known; there are {', '.join(INTEGRATORS)}")
+    return [name.upper() for name in names] or list(INTEGRATORS)
 
 
 def run(options: Options, folder: Path, tell: Tell) -> Report:

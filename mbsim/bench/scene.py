@@ -46,7 +46,7 @@ class Scene:
     variants
         Laws that engines may solve here, ours first; a peer names its own in its note.
     second
-        A further measure of our runs that belongs into the plot, dashed.
+        A further measure of our runs that belongs into the plot, dashed, and its label.
     pass_below
         Where set, runs are compared by the time of the fastest one with a smaller error.
     tolerances, repeats
@@ -63,7 +63,7 @@ class Scene:
     targets: tuple[Target, ...] = ()
     variations: tuple[Variation, ...] = ({},)
     variants: tuple[str, ...] = ("",)
-    second: str | None = None
+    second: tuple[str, str] | None = None
     pass_below: float | None = None
     tolerances: tuple[float, ...] = TOLERANCES
     repeats: int | None = None

@@ -68,15 +68,14 @@ def command(
     """
     from mbsim.bench import peers, plot, report, runner
     from mbsim.cli.messages import print_json
-    from mbsim.settings import INTEGRATORS
 
     installed = [] if no_peers else peers.available()
     missing = [] if no_peers else [name for name in peers.ENGINES if name not in installed]
     if missing:
         _say(f"not installed, so not compared: {', '.join(missing)}; mbsim-contact[bench] has them")
     chosen = runner.choose_scenes(scenes)
-    known = integrators or INTEGRATORS
-    options = runner.Options(chosen, known, tolerances, repeats, installed)
+    methods = runner.choose_integrators(integrators)
+    options = runner.Options(chosen, methods, tolerances, repeats, installed)
     report.write_text(output / "bench.csv", "")  # now, not after minutes, if DIR cannot be used
     done = runner.run(options, output, _say)
     text = report.markdown(

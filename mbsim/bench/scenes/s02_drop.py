@@ -71,7 +71,7 @@ SCENES = (
         errors=_errors,
         targets=(Target(1 / 20),),
         variants=("impact",),
-        second="z_max",
+        second=("z_max", "up to 3 s (six to ten bounces)"),
     ),
     Scene(
         name="S2b",
@@ -83,7 +83,7 @@ SCENES = (
         errors=_errors,
         targets=(Target(1 / 20),),
         variants=("linear", "linear_noclip", "mujoco"),
-        second="z_max",
+        second=("z_max", "up to 3 s (six to ten bounces)"),
     ),
     Scene(
         name="S2c",
@@ -95,6 +95,6 @@ SCENES = (
         errors=_errors,
         targets=(Target(1 / 20),),
         variants=("hc",),
-        second="z_max",
+        second=("z_max", "up to 3 s (six to ten bounces)"),
     ),
 )

@@ -92,6 +92,6 @@ SCENES = (
         deck=_deck,
         errors=_errors,
         targets=(Target(1 / 20, up_to=2e-4), Target(1 / 2)),
-        second="x_law",
+        second=("x_law", "against its own law"),
     ),
 )
