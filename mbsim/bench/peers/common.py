@@ -74,11 +74,11 @@ def silence() -> Iterator[None]:
 def measure(once: Callable[[], tuple[float, Any]], repeats: int) -> tuple[float, Any]:
     """Median wall time (s) of `repeats` runs after one that is thrown away, and the last run.
 
-    `once` returns the wall time of its stepping loop and what it stored. A run of more than 20 s
+    `once` returns the wall time of its stepping loop and what it stored. A run of more than 10 s
     is not repeated: its own noise is small beside it, and a warm-up changes nothing.
     """
     wall, stored = once()
-    if wall > 20.0:
+    if wall > 10.0:
         return wall, stored
     walls = []
     for _ in range(repeats):
