@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mbsim.bench.front import Cell, Point, front, points, time_at
 from mbsim.bench.measurement import OURS, Measurement
+from mbsim.bench.parameters import SAMPLE
 from mbsim.bench.scene import Scene
 from mbsim.errors import ResultsError
 
@@ -130,8 +131,13 @@ def _cell_line(cell: Cell) -> list[str]:
         "not reached" if cell.ours_s is None else f"{cell.ours_s:.3g}",
         "" if cell.ratio is None else _ratio(cell.ratio),
         "" if cell.target is None else _ratio(cell.target),
-        verdict,
+        verdict + _rows_note(cell.rows_ms),
     ]
+
+
+def _rows_note(rows_ms: float) -> str:
+    """Return what to say where a peer stores fewer rows than we do."""
+    return f" (peer's rows {rows_ms:.3g} ms apart)" if rows_ms > 1e3 * SAMPLE * 1.001 else ""
 
 
 def _ratio(value: float) -> str:

@@ -109,6 +109,14 @@ def test_targets_are_met_lost_or_not_reached():
     assert "not reached" in shown
 
 
+def test_a_peer_that_stores_fewer_rows_is_marked():
+    rows = [row(OURS, 1e-3, 1.0)]
+    rows.append(row("a", 1e-3, 1.0)._replace(counts={"rows_ms": 50.0}))
+    assert "peer's rows 50 ms apart" in report.comparison(compare(scene(), rows))
+    rows[1] = rows[1]._replace(counts={"rows_ms": 10.0})
+    assert "apart" not in report.comparison(compare(scene(), rows))
+
+
 def test_without_target_or_without_our_run_nothing_is_judged():
     rows = [row(OURS, 1e-3, 1.0), row("a", 1e-3, 1.0)]
     assert compare(scene(), rows)[0].met is None
@@ -141,6 +149,7 @@ def test_a_run_that_ended_early_is_not_judged():
     early = measured(scene(), "a", "1", "s", lambda count: outcome(end_time=1.0), 1)
     assert early.errors == {}
     assert "ended at 1 s" in early.note
+    assert early.counts == {"rows_ms": 250.0}
     assert measured(scene(), "a", "1", "s", lambda count: outcome(), 1).wall_per_sim_s == 0.05
 
 
@@ -266,7 +275,9 @@ def test_deepest_of_spheres_floor_and_walls():
     near = np.array([[0.0, 0.0, 2 * r], [0.0, 1.9 * r, 2 * r]])
     assert s07_grains.deepest(near, 1.0) == pytest.approx(0.1)
     assert s07_grains.deepest(apart - np.array([0.0, 0.0, 1.3 * r]), 1.0) == pytest.approx(0.3)
-    assert s07_grains.deepest(apart + np.array([0.5, 0.0, 0.0]), 0.5 + 0.8 * r) == pytest.approx(0.2)
+    assert s07_grains.deepest(apart + np.array([0.5, 0.0, 0.0]), 0.5 + 0.8 * r) == pytest.approx(
+        0.2
+    )
 
 
 # --- whole runs
