@@ -42,7 +42,7 @@ def write_csv(
     main = {scene.name: scene.measure for scene in scenes}
     lines = []
     for row in rows:
-        values = row._asdict() | machine | {"measure": main[row.scene]}
+        values = {**row._asdict(), **machine, "measure": main[row.scene]}
         values |= {name: _number(value) for name, value in (row.counts | row.errors).items()}
         values |= {name: _number(values[name]) for name in ("wall_s", "wall_per_sim_s")}
         lines.append([values.get(name, "") for name in header])
