@@ -141,7 +141,8 @@ def _impact(law: p.ImpactLaw) -> Force:
         if d <= 0.0:
             return 0.0
         s = min(d / law.dmax, 1.0)
-        return max(0.0, law.k * d**law.e + law.c * s * s * (3.0 - 2.0 * s) * v)
+        damper = law.c * s * s * (3.0 - 2.0 * s) * v
+        return max(0.0, law.k * math.pow(d, law.e) + damper)
 
     return force
 
@@ -178,4 +179,4 @@ def s10a_rebound(variant: str) -> float:
     phases = bounces(p.S10A, S10A_FORCES[variant], 1e-4).phases
     first = phases[2]
     assert isinstance(first, Flight)
-    return first.velocity**2 / (2.0 * p.GRAVITY * p.S10A.gap)
+    return float(first.velocity**2 / (2.0 * p.GRAVITY * p.S10A.gap))

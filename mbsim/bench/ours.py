@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
     from mbsim.results.reading import Results
 
 _COUNTS = ("steps", "rejected", "rhs_evaluations")
+
+
+#: A run of ours that takes longer than this [s] is given up, and its line says so.
+LIMIT = 120.0
+
+
+class TookTooLong(MbsimError):
+    """A run was given up after `LIMIT` seconds."""
 
 
 class Setting(NamedTuple):
@@ -67,9 +76,22 @@ def run(deck: Model, setting: Setting, repeats: int) -> Outcome:
 
     walls = []
     for _ in range(repeats):
-        results = simulate(deck, integrator=setting.integrator, tol=setting.tol)
+        results = simulate(
+            deck, integrator=setting.integrator, tol=setting.tol, progress=_stop_after(LIMIT)
+        )
         walls.append(float(results.stats["loop_s"]))
     return outcome(results, statistics.median(walls))
+
+
+def _stop_after(limit: float) -> Callable[[float, float, float], None]:
+    """Return a progress function that ends a run after `limit` seconds."""
+    began = time.perf_counter()
+
+    def progress(t: float, step: float, end_time: float) -> None:
+        if time.perf_counter() - began > limit:
+            raise TookTooLong(f"given up after {limit:g} s at time {t:.4g} of {end_time:g}")
+
+    return progress
 
 
 def outcome(results: Results, wall_s: float) -> Outcome:

@@ -323,6 +323,18 @@ def test_a_scene_end_to_end(tmp_path):
     assert "Not compared: mujoco" in (tmp_path / "out/bench.md").read_text(encoding="utf-8")
 
 
+def test_a_run_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
+    # negative: whenever progress is told, the limit has passed
+    monkeypatch.setattr("mbsim.bench.ours.LIMIT", -1.0)
+    done = call(
+        *("S4stick", "--no-peers", "--tol", "1e-4", "--integrator", "DOPRI5"),
+        *("--repeats", 1, "-o", tmp_path, "--json"),
+    )
+    assert done.exit_code == 0, done.stderr
+    notes = {row["note"].split(" at time")[0] for row in json.loads(done.stdout)["rows"]}
+    assert notes == {"failed: given up after -1 s"}
+
+
 def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(peers, "available", lambda: [])
     done = call("S10a", "--tol", "1e-3", "--repeats", 1, "-o", tmp_path)
