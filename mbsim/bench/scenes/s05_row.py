@@ -26,7 +26,7 @@ def _deck(variation: Variation) -> str:
     law = text.impact(p.S5.k, p.S5.e, 0.0, 0.0)
     contacts = [
         text.contact(301 + k, [200 + 100 * k], [300 + 100 * k], **law)
-        for k in range(p.S5.count - 1)
+        for k in range(len(places) - 1)
     ]
     return text.deck(
         "A ball flies at a row of balls that touch",
