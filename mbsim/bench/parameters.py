@@ -6,6 +6,7 @@ Source of every number: ``reference/scenes.md`` and the ``params`` of ``data/ref
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -87,7 +88,8 @@ class TiltedBox(NamedTuple):
     slip_end_x: float  # m, reference
 
 
-class BallRow(NamedTuple):
+@dataclass(frozen=True)  # a NamedTuple has a method `count` of its own
+class BallRow:
     """S5: the first ball flies at the others, which touch; no gravity, no damping."""
 
     count: int
@@ -238,7 +240,7 @@ def s5_positions() -> np.ndarray:
 
 def s7_side(count: int) -> int:
     """Spheres along one edge of the grid; `count` must be a cube."""
-    side = round(count ** (1 / 3))
+    side: int = round(count ** (1 / 3))
     if side**3 != count:
         raise ValueError(f"count = {count}: must be a cube (1, 8, 27, ...)")
     return side

@@ -298,6 +298,8 @@ def _stiff_drop() -> Cases:
 
     def build(law: bool, bullet: Any) -> list[int]:
         bullet.setGravity(0.0, 0.0, -p.GRAVITY)
+        # a contact that is foreseen loses its restitution: foresee less
+        bullet.setPhysicsEngineParameter(contactBreakingThreshold=1e-5)
         place = (0.0, 0.0, drop.gap + drop.radius)
         body = _body(bullet, drop.mass, _sphere(bullet, drop.radius), place)
         for one in (_plane(bullet), body):
@@ -341,7 +343,7 @@ def _grains(count: int) -> Cases:
         return bodies
 
     note = "rigid; sphere on wall has sqrt(mu): pybullet multiplies the coefficients of a pair"
-    for dt in (5e-3, TICK, 2e-3, 1e-3):
+    for dt in (TICK, 1e-3) if count > 1000 else (5e-3, TICK, 2e-3, 1e-3):
         end, sample = p.S7.end_time, p.s7_sample(count)
         yield (
             f"maximal=1 dt={dt:.4g}",
