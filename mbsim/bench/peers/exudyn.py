@@ -107,7 +107,7 @@ def _run(case: Case, repeats: int) -> Outcome:
         wall = time.perf_counter() - start
         solver.FinalizeSolver(system, options)
         rows = _rows(*store.coordinates(len(nodes)), _places(exu, system, nodes))
-        return wall, (rows, solver.it.currentStepIndex)
+        return wall, (rows, solver.it.currentStepIndex - 1)  # it counts from 1
 
     wall, (rows, steps) = common.measure(once, repeats)
     if case.solver.tol and case.grid:
@@ -667,7 +667,7 @@ def _grains(count: int) -> Cases:
             [(-h, h, 0.0), (h, h, 0.0), (h, h, top), (-h, h, top)],
         ):
             contact.rectangle(ground, corners)
-        contact.search((side, side, 2 * side), (-h, -h, 0.0), (h, h, top))
+        contact.search((side, side, side), (-h, -h, 0.0), (h, h, 2.5 * h))
         return nodes
 
     note = "linear_noclip; GeneralContact, friction linear below 1e-3 m/s, one thread"

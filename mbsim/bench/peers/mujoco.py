@@ -202,18 +202,18 @@ def _compiled(case: Case, data: Any) -> Any:
 
     body = on_plane if case.gap == "plane" else on_balls
     signature = numba.types.void(numba.types.voidptr, numba.types.voidptr)
-    return _Keep(numba.cfunc(signature)(body)).function
+    return _keep(numba.cfunc(signature)(body))
 
 
-class _Keep:
-    """A compiled callback whose memory outlives the wrapper that made it."""
+#: Machine code must not be freed while MuJoCo may call it.
+_kept: list[Any] = []
 
-    _alive: list[Any] = []  # noqa: RUF012  (machine code must not be freed while MuJoCo holds it)
 
-    def __init__(self, compiled: Any) -> None:
-        self._alive.append(compiled)
-        prototype = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-        self.function = prototype(compiled.address)
+def _keep(compiled: Any) -> Any:
+    """A compiled callback as the ctypes function that MuJoCo takes."""
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(compiled.address)
+    _kept.append((compiled, function))
+    return function
 
 
 @functools.cache
