@@ -322,6 +322,7 @@ def _stiff_drop() -> Cases:
 
 def _grains(count: int) -> Cases:
     half = p.s7_half_width(count)
+    friction = math.sqrt(p.S7.mu)  # coefficients of a pair are multiplied
 
     def build(bullet: Any) -> list[int]:
         bullet.setGravity(0.0, 0.0, -p.GRAVITY)
@@ -332,9 +333,8 @@ def _grains(count: int) -> Cases:
             ((0, 1, 0), (0.0, -half, 0.0)),
             ((0, -1, 0), (0.0, half, 0.0)),
         ):
-            bullet.changeDynamics(_plane(bullet, normal, through), -1, lateralFriction=1.0)
+            bullet.changeDynamics(_plane(bullet, normal, through), -1, lateralFriction=friction)
         shape = _sphere(bullet, p.S7.radius)
-        friction = math.sqrt(p.S7.mu)  # coefficients of a pair are multiplied
         bodies = []
         for place in p.s7_positions(count):
             body = _body(bullet, p.S7.mass, shape, place)
@@ -342,7 +342,7 @@ def _grains(count: int) -> Cases:
             bodies.append(body)
         return bodies
 
-    note = "rigid; sphere on wall has sqrt(mu): pybullet multiplies the coefficients of a pair"
+    note = "rigid, no restitution"
     for dt in (TICK, 1e-3) if count > 1000 else (5e-3, TICK, 2e-3, 1e-3):
         end, sample = p.S7.end_time, p.s7_sample(count)
         yield (
