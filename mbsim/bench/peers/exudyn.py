@@ -190,10 +190,12 @@ class _Steps:
         data = system.systemData
 
         def after_step(_: Any, t: float) -> bool:
-            if t - self._times[-1] > every:
-                self._times.append(t)
-                self._x.append(np.array(data.GetODE2Coordinates()))
-                self._v.append(np.array(data.GetODE2Coordinates_t()))
+            if t - self._times[-1] < every:
+                return True
+            self._times.append(t)
+            self._x.append(np.array(data.GetODE2Coordinates()))
+            self._v.append(np.array(data.GetODE2Coordinates_t()))
+            # stops at a row only, so that wall time and reached time belong together
             return time.perf_counter() - self.start < common.WALL_CAP
 
         system.SetPostStepUserFunction(after_step)
