@@ -80,12 +80,11 @@ def _line(axes: Any, shown: list[Point], label: str, style: dict[str, Any]) -> N
 
 def _label_ends(axes: Any, shown: list[Point], colour: str) -> None:
     """Write the settings at both ends of our front."""
-    for point in {shown[0], shown[-1]} if shown else ():
+    for point, away in zip(shown[:1] + shown[1:][-1:], (-14, 8), strict=False):
         text = point.setting.split(" ", 1)[1]
         place = (_clipped(point.error), point.time)
-        axes.annotate(
-            text, place, (0, -12), textcoords="offset points", ha="center", fontsize=8, color=colour
-        )
+        style = {"textcoords": "offset points", "ha": "center", "fontsize": 8, "color": colour}
+        axes.annotate(text, place, (0, away), **style)
 
 
 def _targets(axes: Any, scene: Scene, peers: list[Point]) -> None:

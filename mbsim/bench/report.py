@@ -137,7 +137,7 @@ def _cell_line(cell: Cell) -> list[str]:
 
 def _rows_note(rows_ms: float) -> str:
     """Return what to say where a peer stores fewer rows than we do."""
-    return f" (peer's rows {rows_ms:.3g} ms apart)" if rows_ms > 1e3 * SAMPLE * 1.001 else ""
+    return f" (peer's rows {rows_ms:.3g} ms apart)" if rows_ms > 1.1e3 * SAMPLE else ""
 
 
 def _ratio(value: float) -> str:

@@ -14,8 +14,9 @@ from mbsim.bench.scene import Scene, Target, Variation
 
 #: Penetration over radius below which a run counts.
 PASS = 0.05
-#: dmax of IMPACT's damper and transition velocity of friction.
-DMAX, TRANSITION = 1e-5, 1e-2
+#: dmax of IMPACT's damper [m] and transition velocity of friction [m/s], which the scene leaves open;
+#: a tenth of the transition takes 1.6 times as many steps and does not change the penetration.
+DMAX, TRANSITION = 1e-5, 0.1
 
 #: Walls by name: Euler angles psi, theta that turn z into the inward normal, and its direction.
 _WALLS = (
@@ -111,7 +112,7 @@ def _scene(count: int, targets: tuple[Target, ...]) -> Scene:
         errors=partial(_errors, count),
         targets=targets,
         pass_below=PASS,
-        tolerances=(1e-3, 1e-4, 1e-5),
+        tolerances=(1e-2, 1e-3, 1e-4),
         repeats=1,
     )
 
