@@ -14,7 +14,7 @@ from mbsim.bench.scene import Scene, Target, Variation
 
 #: Penetration over radius below which a run counts.
 PASS = 0.05
-#: dmax of IMPACT's damper [m] and transition velocity of friction [m/s], which the scene leaves open;
+#: dmax of IMPACT's damper [m] and transition velocity of friction [m/s], left open by the scene;
 #: a tenth of the transition takes 1.6 times as many steps and does not change the penetration.
 DMAX, TRANSITION = 1e-5, 0.1
 
