@@ -278,6 +278,8 @@ def _box(mu: float, end_time: float, dts: tuple[float, ...]) -> Cases:
 
 def _row() -> Cases:
     def build(bullet: Any) -> list[int]:
+        # by default contacts slower than 0.2 m/s have no restitution
+        bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0)
         shape = _sphere(bullet, p.S5.radius)
         bodies = []
         for x in p.s5_positions():
