@@ -29,7 +29,7 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
     from matplotlib.figure import Figure
 
     mine = [row for row in rows if row.scene == scene.name and row.errors]
-    figure = Figure(figsize=(8.0, 5.2), layout="constrained")
+    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
     axes = figure.add_subplot()
     peers = [row for row in mine if row.engine != OURS]
     for engine in dict.fromkeys(row.engine for row in peers):
@@ -54,7 +54,7 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
     axes.set_ylabel("wall seconds per simulated second   (better: down)")
     axes.grid(True, which="major", alpha=0.3)
     if mine:
-        axes.legend(loc="best", fontsize=8)
+        figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     figure.savefig(path, dpi=110)
 
 

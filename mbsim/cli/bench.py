@@ -49,7 +49,8 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     type=click.IntRange(min=1),
     default=5,
     show_default=True,
-    help="The time is their median; runs of more than 2 s are not repeated.",
+    help="The time is their median; runs below 10 ms are repeated three times as often, "
+    "those above 2 s not at all.",
 )
 @click.option("--no-peers", is_flag=True, help="Run only mbsim, whatever is installed.")
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as one JSON object.")

@@ -145,6 +145,12 @@ def test_long_runs_are_not_repeated():
     assert asked == [1, 1, 5]
 
 
+def test_short_runs_are_repeated_more_often():
+    short = measured(scene(), "a", "1", "s", lambda count: outcome(wall_s=1e-3), 5)
+    assert short.repeats == 15
+    assert measured(scene(), "a", "1", "s", lambda count: outcome(wall_s=1e-3), 1).repeats == 1
+
+
 def test_a_run_that_ended_early_is_not_judged():
     early = measured(scene(), "a", "1", "s", lambda count: outcome(end_time=1.0), 1)
     assert early.errors == {}
