@@ -18,6 +18,7 @@ COMMANDS = {
     "check": "mbsim.cli.check",
     "info": "mbsim.cli.info",
     "plot": "mbsim.cli.plot",
+    "bench": "mbsim.cli.bench",
 }
 
 

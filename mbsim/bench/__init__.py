@@ -1,0 +1,1 @@
+"""Work against precision: mbsim and other engines on the same scenes."""

@@ -1,0 +1,270 @@
+"""The constants of the benchmark scenes and the small reference numbers; all SI, z up.
+
+Source of every number: ``reference/scenes.md`` and the ``params`` of ``data/references.json``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+GRAVITY = 9.81  # m/s^2, along -z unless the scene tilts it
+SAMPLE = 0.01  # s, rows are stored at multiples of this
+
+
+class ImpactLaw(NamedTuple):
+    """F = max(0, k d^e + STEP(d, 0, 0, dmax, c) d') for a penetration d > 0."""
+
+    k: float  # N/m^e
+    e: float
+    c: float  # N s/m
+    dmax: float  # m
+
+
+class LinearLaw(NamedTuple):
+    """F = max(0, k d + c d') for a penetration d > 0."""
+
+    k: float  # N/m
+    c: float  # N s/m
+
+
+class HuntCrossleyLaw(NamedTuple):
+    """F = k d max(0, 1 + dissipation d') for a penetration d > 0."""
+
+    k: float  # N/m
+    dissipation: float  # s/m
+
+
+class FreeBody(NamedTuple):
+    """S1 and S10c: a body free of forces, principal axes along the body's own, q(0) = 1."""
+
+    mass: float  # kg
+    inertia: tuple[float, float, float]  # kg m^2
+    spin: tuple[float, float, float]  # rad/s, in the body's axes (= global at t = 0)
+    end_time: float  # s
+    end_quaternion: tuple[float, float, float, float]  # reference attitude, w first
+    end_spin: tuple[float, float, float]  # reference, rad/s, body axes
+
+
+class Drop(NamedTuple):
+    """S2 and S10a: a sphere at rest a gap above the plane z = 0."""
+
+    mass: float  # kg
+    radius: float  # m
+    gap: float  # m
+    end_time: float  # s
+    first_bounce: float  # s, rows up to here make the error of the first bounce
+
+
+class RollingSphere(NamedTuple):
+    """S3: a solid sphere sliding along x on the plane until it rolls."""
+
+    mass: float  # kg
+    radius: float  # m
+    mu: float
+    speed: float  # m/s
+    end_time: float  # s
+    law: LinearLaw
+    roll_time: float  # s, reference: 2 v0 / (7 mu g)
+    roll_speed: float  # m/s, reference: 5/7 v0
+    end_x: float  # m, reference
+
+
+class TiltedBox(NamedTuple):
+    """S4: a box on the plane z = 0 under tilted gravity g (sin, 0, -cos)."""
+
+    mass: float  # kg
+    size: tuple[float, float, float]  # m, full edges
+    tilt: float  # rad
+    mu_stick: float
+    mu_slip: float
+    stick_end_time: float  # s
+    slip_end_time: float  # s
+    law: LinearLaw  # of each of the four corners
+    slip_acceleration: float  # m/s^2, reference: g (sin - mu cos)
+    slip_end_x: float  # m, reference
+
+
+@dataclass(frozen=True)  # a NamedTuple has a method `count` of its own
+class BallRow:
+    """S5: the first ball flies at the others, which touch; no gravity, no damping."""
+
+    count: int
+    mass: float  # kg
+    radius: float  # m
+    speed: float  # m/s, of the first ball
+    first_gap: float  # m, in front of the first ball
+    k: float  # N/m^e, ball on ball
+    e: float
+    end_time: float  # s
+    end_x: tuple[float, ...]  # m, reference for this law
+    end_v: tuple[float, ...]  # m/s, reference for this law
+
+
+class Grains(NamedTuple):
+    """S7: N equal spheres fall from a jittered grid into an open box."""
+
+    radius: float  # m
+    density: float  # kg/m^3
+    mu: float
+    pitch: float  # m
+    jitter: float  # m
+    end_time: float  # s
+    law: LinearLaw
+
+    @property
+    def mass(self) -> float:
+        """Mass of one sphere (kg)."""
+        return self.density * 4 / 3 * math.pi * self.radius**3
+
+
+S1 = FreeBody(
+    mass=1.0,
+    inertia=(0.010, 0.020, 0.025),
+    spin=(0.01, 10.0, 0.02),
+    end_time=10.0,
+    end_quaternion=(
+        -7.081532693947116e-05,
+        -0.0438360516206641,
+        0.00013368533928130632,
+        -0.9990387268228045,
+    ),
+    end_spin=(-0.0029866949792797704, -10.000006830971534, 0.01808690900998162),
+)
+
+S10C = FreeBody(
+    mass=1.0,
+    inertia=(0.010, 0.020, 0.025),
+    spin=(1.0, 1000.0, 1.0),
+    end_time=1.0,
+    end_quaternion=(
+        0.05574650739694432,
+        -0.8198895729027286,
+        -0.0899873397381129,
+        -0.5626505965919535,
+    ),
+    end_spin=(172.33779595514244, -977.4717520868892, 154.14425948357953),
+)
+
+S2 = Drop(mass=1.0, radius=0.1, gap=0.5, end_time=3.0, first_bounce=0.86)
+S2A_LAW = ImpactLaw(k=1e8, e=1.5, c=200.0, dmax=1e-4)
+S2B_LAW = LinearLaw(k=1e6, c=60.0)
+S2C_LAW = HuntCrossleyLaw(k=1e6, dissipation=0.05)
+S2D_RESTITUTION = 0.8
+
+#: S2: time (s), speed in and speed out (m/s) of the first impact under each law (reference).
+S2_FIRST_IMPACT = {
+    "impact": (0.3192754284070505, 3.132091952673165, 2.6520805198611317),
+    "linear": (0.3192754284070505, 3.132091952673165, 2.8542720561550787),
+    "linear_noclip": (0.3192754284070505, 3.132091952673165, 2.8491348490201176),
+    "hc": (0.3192754284070505, 3.132091952673165, 2.8336454763561956),
+    "mujoco": (0.3192754284070505, 3.132091952673165, 2.854828365360823),
+}
+
+S10A = Drop(mass=0.1, radius=0.05, gap=0.5, end_time=1.0, first_bounce=0.64)
+S10A_LAW = LinearLaw(k=1e9, c=10.0)
+#: S10a: restitution of a linear spring and damper, so the rebound is its square times the drop.
+S10A_RESTITUTION = 0.9984304365320034
+
+S3 = RollingSphere(
+    mass=5.0,
+    radius=0.108,
+    mu=0.2,
+    speed=5.0,
+    end_time=2.0,
+    law=LinearLaw(k=1e6, c=2e3),
+    roll_time=0.7281199941750399,
+    roll_speed=3.5714285714285716,
+    end_x=7.662942852982171,
+)
+
+S4 = TiltedBox(
+    mass=1.0,
+    size=(0.2, 0.2, 0.1),
+    tilt=math.radians(20.0),
+    mu_stick=0.5,
+    mu_slip=0.2,
+    stick_end_time=10.0,
+    slip_end_time=2.0,
+    law=LinearLaw(k=1e5, c=30.0),
+    slip_acceleration=1.5115406840428576,
+    slip_end_x=3.023081368085715,
+)
+
+S5 = BallRow(
+    count=5,
+    mass=1.0,
+    radius=0.1,
+    speed=1.0,
+    first_gap=0.1,
+    k=1e8,
+    e=1.5,
+    end_time=0.3,
+    end_x=(
+        -0.013352269032807569,
+        0.194823521076034,
+        0.3979813105880331,
+        0.6257797489121226,
+        0.9947676884583373,
+    ),
+    end_v=(
+        -0.07108501708615696,
+        -0.030273764096839205,
+        -0.014463629032061102,
+        0.12704498609327733,
+        0.9887774241217804,
+    ),
+)
+
+S7 = Grains(
+    radius=0.02,
+    density=2500.0,
+    mu=0.3,
+    pitch=0.05,
+    jitter=0.002,
+    end_time=2.0,
+    law=LinearLaw(k=1e5, c=20.0),
+)
+S7_COUNTS = (125, 1000, 8000)
+
+
+def s5_positions() -> np.ndarray:
+    """Centres of the balls of S5 along x at t = 0 (m), shape (5,); ball 2 at 0.2."""
+    touching = 2 * S5.radius * np.arange(S5.count, dtype=float)
+    touching[0] -= S5.first_gap
+    return touching
+
+
+def s7_side(count: int) -> int:
+    """Spheres along one edge of the grid; `count` must be a cube."""
+    side: int = round(count ** (1 / 3))
+    if side**3 != count:
+        raise ValueError(f"count = {count}: must be a cube (1, 8, 27, ...)")
+    return side
+
+
+def s7_half_width(count: int) -> float:
+    """Half the inner width of the open box of S7 (m): the walls touch the grid's cells."""
+    return s7_side(count) * S7.pitch / 2
+
+
+def s7_positions(count: int) -> np.ndarray:
+    """Centres of the spheres of S7 at t = 0 (m), shape (count, 3), z fastest.
+
+    A cubic grid of cells of one pitch, the lowest cells on the floor z = 0, the box's axis through
+    x = y = 0; each centre moved by a uniform jitter drawn by ``RandomState(0)``.
+    """
+    side = s7_side(count)
+    across = (np.arange(side) - (side - 1) / 2) * S7.pitch
+    up = (np.arange(side) + 0.5) * S7.pitch
+    grid = np.stack(np.meshgrid(across, across, up, indexing="ij"), axis=-1).reshape(-1, 3)
+    jitter = np.random.RandomState(0).uniform(-S7.jitter, S7.jitter, grid.shape)
+    return grid + jitter
+
+
+def s7_sample(count: int) -> float:
+    """Time between the stored rows of S7 (s): short of 100 MB of rows at any count."""
+    return SAMPLE if count <= 1000 else 0.1

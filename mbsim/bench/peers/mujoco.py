@@ -1,0 +1,508 @@
+"""MuJoCo: soft constraints by convex optimisation, or a law of ours through ``mjcb_passive``.
+
+Each setting is the dynamics' options and a step. Rows are copies of ``qpos`` and ``qvel``; between
+two rows the steps run in compiled code (``mj_step`` with ``nstep``, or the ``rollout`` module where
+every step is a row).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import itertools
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mbsim.bench import parameters as p
+from mbsim.bench.outcome import Outcome
+from mbsim.bench.peers import common
+
+NAME = "mujoco"
+
+Law = Callable[[float, float], float]
+
+
+class Case(NamedTuple):
+    """A scene under one setting; free bodies only, in the order of the scene."""
+
+    xml: str
+    dt: float  # s
+    end_time: float  # s
+    velocity: np.ndarray  # (bodies, 6): linear in the global frame, angular in the body's
+    note: str = ""
+    law: Law | None = None  # force (N) of penetration (m) and its rate, through mjcb_passive
+    compiled: bool = False
+    gap: str = "plane"  # what the law acts on: the "plane" z = 0 or "balls" in a row along x
+    radius: float = 0.0  # m
+    sample: float = p.SAMPLE  # s
+    cap: float = float("inf")  # s of wall time
+    settle: bool = False  # start at the rest that gravity's part along z leads to
+
+
+def _engine() -> Any:
+    import mujoco
+
+    return mujoco
+
+
+def version() -> str:
+    """The engine's version."""
+    return str(_engine().__version__)
+
+
+def settings(scene: str) -> list[str]:
+    """Settings of one scene, coarse to fine; empty if the scene is not known."""
+    return list(_cases(scene))
+
+
+def run(scene: str, setting: str, repeats: int) -> Outcome:
+    """Run `scene` under `setting`; the wall time is the median of `repeats` loops."""
+    case = _cases(scene)[setting]()
+    with common.silence():
+        return _run(case, repeats)
+
+
+def _run(case: Case, repeats: int) -> Outcome:
+    mujoco = _engine()
+    warnings: list[str] = []
+    mujoco.set_mju_user_warning(warnings.append)  # else it writes a file where one stands
+    model = mujoco.MjModel.from_xml_string(case.xml)
+    data = mujoco.MjData(model)
+    steps = common.plan(case.dt, case.end_time, case.sample)
+    rollout = steps.steps_per_row == 1 and case.law is None and case.cap == float("inf")
+    march = _rollout if rollout else _march
+    height = _rest_height(model, data) if case.settle else None
+
+    def once() -> tuple[float, Any]:
+        mujoco.mj_resetData(model, data)
+        if height is not None:
+            data.qpos[2] = height
+        data.qvel[:] = case.velocity.ravel()
+        return march(model, data, steps, case.cap)
+
+    try:
+        mujoco.set_mjcb_passive(_callback(case, data))
+        wall, (qpos, qvel) = common.measure(once, repeats)
+    finally:
+        mujoco.set_mjcb_passive(None)
+        mujoco.set_mju_user_warning(None)
+    rows = _rows(steps, qpos, qvel)
+    note = f"{case.note}; {len(warnings)} warnings" if warnings else case.note
+    extra = {"steps": float((len(qpos) - 1) * steps.steps_per_row)}
+    if case.cap != float("inf"):
+        extra |= common.s7_measures(rows.position)
+    return common.outcome(wall, rows, note.lstrip("; "), case.end_time, extra)
+
+
+def _rest_height(model: Any, data: Any) -> float:
+    """Height of the one body (m) where its soft contact holds it; gravity is put back after."""
+    along = np.array(model.opt.gravity[:2])
+    model.opt.gravity[:2] = 0.0
+    _engine().mj_step(model, data, round(2.0 / model.opt.timestep))
+    model.opt.gravity[:2] = along
+    return float(data.qpos[2])
+
+
+# ---------------------------------------------------------------------------------------------
+# Stepping
+
+
+def _march(model: Any, data: Any, steps: common.Plan, cap: float) -> tuple[float, Any]:
+    """Rows by ``mj_step`` with the steps between two rows in one call."""
+    step, count, clock = _engine().mj_step, steps.steps_per_row, time.perf_counter
+    now_q, now_v = data.qpos, data.qvel
+    qpos = np.empty((steps.rows + 1, len(now_q)))
+    qvel = np.empty((steps.rows + 1, len(now_v)))
+    qpos[0], qvel[0] = now_q, now_v
+    done = 0
+    start = clock()
+    for done in range(1, steps.rows + 1):
+        step(model, data, count)
+        qpos[done] = now_q
+        qvel[done] = now_v
+        if clock() - start > cap:
+            break
+    wall = clock() - start
+    return wall, (qpos[: done + 1], qvel[: done + 1])
+
+
+def _rollout(model: Any, data: Any, steps: common.Plan, cap: float) -> tuple[float, Any]:
+    """Rows by the ``rollout`` module, which stores every step without Python between."""
+    from mujoco import rollout
+
+    del cap  # only short scenes have a row a step
+    mujoco = _engine()
+    spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.empty(mujoco.mj_stateSize(model, spec))
+    mujoco.mj_getState(model, data, state, spec)
+    with rollout.Rollout(nthread=0) as roll:
+        start = time.perf_counter()
+        stored, _ = roll.rollout(model, data, state, nstep=steps.rows)
+        wall = time.perf_counter() - start
+    states = np.vstack([state, stored[0]])[:, 1:]  # column 0 is the time
+    return wall, (states[:, : model.nq], states[:, model.nq : model.nq + model.nv])
+
+
+def _rows(steps: common.Plan, qpos: np.ndarray, qvel: np.ndarray) -> common.Rows:
+    """Rows of free joints: qpos is place and quaternion; the spin is in the body's frame."""
+    n = len(qpos)
+    pose, twist = qpos.reshape(n, -1, 7), qvel.reshape(n, -1, 6)
+    quaternion = pose[..., 3:]
+    spin = common.rotate(quaternion, twist[..., 3:])
+    return common.Rows(steps.times[:n], pose[..., :3], quaternion, twist[..., :3], spin)
+
+
+# ---------------------------------------------------------------------------------------------
+# A law of ours, in Python or compiled
+
+
+def _callback(case: Case, data: Any) -> Any:
+    """What ``mjcb_passive`` calls: a Python function, a compiled one, or nothing."""
+    if case.law is None:
+        return None
+    if case.compiled:
+        return _compiled(case, data)
+    law, radius = case.law, case.radius
+    position, velocity, force = data.qpos, data.qvel, data.qfrc_passive
+
+    def passive(model: Any, data: Any) -> None:
+        depth = radius - position[2]
+        if depth > 0.0:
+            force[2] += law(depth, -velocity[2])
+
+    return passive
+
+
+def _compiled(case: Case, data: Any) -> Any:
+    """The law as a C function on the addresses of qpos, qvel and qfrc_passive."""
+    import numba
+
+    law = numba.njit(case.law)
+    pointer = _pointer()
+    q, v, f = (int(a.ctypes.data) for a in (data.qpos, data.qvel, data.qfrc_passive))
+    radius, balls = case.radius, len(case.velocity)
+
+    def on_plane(model: Any, data: Any) -> None:
+        position, velocity, force = pointer(q), pointer(v), pointer(f)
+        depth = radius - position[2]
+        if depth > 0.0:
+            force[2] += law(depth, -velocity[2])
+
+    def on_balls(model: Any, data: Any) -> None:
+        position, velocity, force = pointer(q), pointer(v), pointer(f)
+        for i in range(balls - 1):
+            depth = 2 * radius - (position[7 * i + 7] - position[7 * i])
+            if depth > 0.0:
+                push = law(depth, velocity[6 * i] - velocity[6 * i + 6])
+                force[6 * i] -= push
+                force[6 * i + 6] += push
+
+    body = on_plane if case.gap == "plane" else on_balls
+    signature = numba.types.void(numba.types.voidptr, numba.types.voidptr)
+    return _keep(numba.cfunc(signature)(body))
+
+
+#: Machine code must not be freed while MuJoCo may call it.
+_kept: list[Any] = []
+
+
+def _keep(compiled: Any) -> Any:
+    """A compiled callback as the ctypes function that MuJoCo takes."""
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(compiled.address)
+    _kept.append((compiled, function))
+    return function
+
+
+@functools.cache
+def _pointer() -> Any:
+    """A compiled function from an address to a pointer to float64."""
+    from numba import types
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def pointer(context: Any, address: Any) -> Any:
+        result = types.CPointer(types.float64)
+
+        def make(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(result))
+
+        return result(types.int64), make
+
+    return pointer
+
+
+def _impact(depth: float, rate: float) -> float:
+    s = min(depth / p.S2A_LAW.dmax, 1.0)
+    damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
+    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
+
+
+def _linear(depth: float, rate: float) -> float:
+    return max(0.0, p.S2B_LAW.k * depth + p.S2B_LAW.c * rate)
+
+
+def _hunt_crossley(depth: float, rate: float) -> float:
+    return p.S2C_LAW.k * depth * max(0.0, 1.0 + p.S2C_LAW.dissipation * rate)
+
+
+def _stiff(depth: float, rate: float) -> float:
+    return max(0.0, p.S10A_LAW.k * depth + p.S10A_LAW.c * rate)
+
+
+def _hertz(depth: float, rate: float) -> float:
+    return p.S5.k * depth**p.S5.e
+
+
+# ---------------------------------------------------------------------------------------------
+# Scenes
+
+
+def _cases(scene: str) -> dict[str, Callable[[], Case]]:
+    """Settings of a scene and what builds each."""
+    if scene.startswith("S7_"):
+        return dict(_grains(int(scene[3:])))
+    scenes: dict[str, Callable[[], Iterator[tuple[str, Callable[[], Case]]]]] = {
+        "S1": lambda: _free(p.S1),
+        "S2a": lambda: _callback_drop(p.S2, _impact, "impact"),
+        "S2b": _soft_drop,
+        "S2c": lambda: _callback_drop(p.S2, _hunt_crossley, "hc"),
+        "S3": _rolling,
+        "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (1e-2, 2e-3, 5e-4)),
+        "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (1e-2, 2e-3, 5e-4, 1e-4)),
+        "S5": _row,
+        "S10a": _stiff_drop,
+        "S10c": lambda: _free(p.S10C),
+    }
+    return dict(scenes[scene]()) if scene in scenes else {}
+
+
+def _xml(option: str, world: str, flags: str = "", head: str = "") -> str:
+    return (
+        f"<mujoco>{head}<option {option}><flag {flags}/></option>"
+        f"<worldbody>{world}</worldbody></mujoco>"
+    )
+
+
+def _sphere(at: tuple[float, float, float], radius: float, mass: float, more: str = "") -> str:
+    place = " ".join(repr(float(x)) for x in at)
+    return (
+        f'<body pos="{place}"><freejoint/>'
+        f'<geom type="sphere" size="{radius!r}" mass="{mass!r}" {more}/></body>'
+    )
+
+
+def _still(bodies: int) -> np.ndarray:
+    return np.zeros((bodies, 6))
+
+
+def _free(top: p.FreeBody) -> Iterator[tuple[str, Callable[[], Case]]]:
+    steps = {
+        "Euler": (1e-2, 1e-3, 1e-4),
+        "implicit": (1e-2, 1e-3, 1e-4),
+        "RK4": (1e-2, 1e-3, 1e-4) if top is p.S1 else (1e-3, 1e-4, 1e-5),
+    }
+    inertia = " ".join(map(repr, top.inertia))
+    body = (
+        "<body><freejoint/>"
+        f'<inertial pos="0 0 0" mass="{top.mass!r}" diaginertia="{inertia}"/></body>'
+    )
+    velocity = np.array([[0.0, 0.0, 0.0, *top.spin]])
+
+    def case(integrator: str, dt: float) -> Case:
+        option = f'timestep="{dt!r}" integrator="{integrator}" gravity="0 0 0"'
+        flags = 'contact="disable" constraint="disable"'
+        return Case(_xml(option, body, flags), dt, top.end_time, velocity)
+
+    for integrator, dts in steps.items():
+        for dt in dts:
+            yield f"{integrator} dt={dt:g}", functools.partial(case, integrator, dt)
+
+
+def _callback_drop(
+    drop: p.Drop, law: Law, variant: str, dts: tuple[float, ...] = (1e-4, 3e-5, 1e-5, 3e-6)
+) -> Iterator[tuple[str, Callable[[], Case]]]:
+    """The sphere and a law through mjcb_passive, first in Python, then compiled."""
+    steps = tuple(p.SAMPLE / round(p.SAMPLE / dt) for dt in dts)
+    world = _sphere((0.0, 0.0, drop.gap + drop.radius), drop.radius, drop.mass)
+
+    def case(integrator: str, dt: float, compiled: bool) -> Case:
+        option = f'timestep="{dt!r}" integrator="{integrator}" gravity="0 0 {-p.GRAVITY}"'
+        flags = 'contact="disable" constraint="disable"'
+        note = f"{variant}; law through mjcb_passive, {'compiled' if compiled else 'Python'}"
+        xml = _xml(option, world, flags)
+        velocity = _still(1)
+        return Case(xml, dt, drop.end_time, velocity, note, law, compiled, "plane", drop.radius)
+
+    runs = [(kind, dt) for dt in steps for kind in ("Euler", "RK4")]
+    for compiled, (integrator, dt) in itertools.product((False, True), runs):
+        if compiled or dt in (steps[0], steps[-1]):
+            name = f"mjcb_passive{' compiled' if compiled else ''} {integrator} dt={dt:.4g}"
+            yield name, functools.partial(case, integrator, dt, compiled)
+
+
+def _drop_xml(drop: p.Drop, dt: float, integrator: str, soft: str, flags: str = "") -> str:
+    """Sphere above the plane, frictionless, with the contact's softness on both geoms."""
+    contact = f'condim="1" {soft}'
+    world = f'<geom type="plane" size="0 0 1" {contact}/>' + _sphere(
+        (0.0, 0.0, drop.gap + drop.radius), drop.radius, drop.mass, contact
+    )
+    option = f'timestep="{dt!r}" integrator="{integrator}" gravity="0 0 {-p.GRAVITY}"'
+    return _xml(option, world, flags)
+
+
+def _soft(k: float, c: float, mass: float) -> str:
+    """Softness whose limit is the acceleration (k d + c d')/m in contact, see S2b."""
+    return f'solref="{-k / mass!r} {-c / mass!r}" solimp=".9999 .9999 .001 .5 2"'
+
+
+def _soft_drop() -> Iterator[tuple[str, Callable[[], Case]]]:
+    def case(integrator: str, dt: float) -> Case:
+        soft = _soft(p.S2B_LAW.k, p.S2B_LAW.c, p.S2.mass)
+        xml = _drop_xml(p.S2, dt, integrator, soft)
+        return Case(xml, dt, p.S2.end_time, _still(1), "mujoco")
+
+    for integrator in ("Euler", "RK4"):
+        for dt in (1e-3, 1e-4, 1e-5):
+            yield f"soft {integrator} dt={dt:g}", functools.partial(case, integrator, dt)
+    yield from _callback_drop(p.S2, _linear, "linear")
+
+
+def _stiff_drop() -> Iterator[tuple[str, Callable[[], Case]]]:
+    def case(dt: float, direct: bool) -> Case:
+        soft = _soft(p.S10A_LAW.k, p.S10A_LAW.c, p.S10A.mass) if direct else ""
+        note = (
+            "mujoco; soft constraint with k/m and c/m, refsafe off"
+            if direct
+            else "mujoco; default solref, which forgets k and c: critically damped"
+        )
+        flags = 'refsafe="disable"' if direct else ""
+        xml = _drop_xml(p.S10A, dt, "Euler", soft, flags)
+        return Case(xml, dt, p.S10A.end_time, _still(1), note)
+
+    for dt in (1e-2, 1e-3):
+        yield f"default solref dt={dt:g}", functools.partial(case, dt, False)
+    for dt in (1e-3, 1e-4, 1e-5, 1e-6):
+        yield f"solref -k/m -c/m dt={dt:g}", functools.partial(case, dt, True)
+    yield from _callback_drop(p.S10A, _stiff, "linear", (1e-5, 1e-6))
+
+
+def _rolling() -> Iterator[tuple[str, Callable[[], Case]]]:
+    velocity = np.array([[p.S3.speed, 0.0, 0.0, 0.0, 0.0, 0.0]])
+
+    def case(cone: str, impratio: int, dt: float) -> Case:
+        friction = f'friction="{p.S3.mu} 0 0" condim="3"'
+        world = f'<geom type="plane" size="0 0 1" {friction}/>' + _sphere(
+            (0.0, 0.0, p.S3.radius), p.S3.radius, p.S3.mass, friction
+        )
+        option = f'timestep="{dt!r}" cone="{cone}" impratio="{impratio}" gravity="0 0 {-p.GRAVITY}"'
+        note = "mujoco; default soft contact, from its static penetration"
+        return Case(_xml(option, world), dt, p.S3.end_time, velocity, note, settle=True)
+
+    for cone, impratio in (("pyramidal", 1), ("elliptic", 1)):
+        for dt in (1e-2, 2e-3, 1e-3, 5e-4, 1e-4):
+            name = f"{cone} impratio={impratio} dt={dt:g}"
+            yield name, functools.partial(case, cone, impratio, dt)
+
+
+def _box(
+    mu: float, end_time: float, dts: tuple[float, ...]
+) -> Iterator[tuple[str, Callable[[], Case]]]:
+    half = " ".join(repr(edge / 2) for edge in p.S4.size)
+    pull = (p.GRAVITY * np.sin(p.S4.tilt), 0.0, -p.GRAVITY * np.cos(p.S4.tilt))
+
+    def case(cone: str, impratio: int, noslip: int, dt: float) -> Case:
+        friction = f'friction="{mu} 0 0" condim="3"'
+        world = (
+            f'<geom type="plane" size="0 0 1" {friction}/>'
+            f'<body pos="0 0 {p.S4.size[2] / 2}"><freejoint/>'
+            f'<geom type="box" size="{half}" mass="{p.S4.mass}" {friction}/></body>'
+        )
+        gravity = " ".join(repr(float(g)) for g in pull)
+        option = (
+            f'timestep="{dt!r}" cone="{cone}" impratio="{impratio}" '
+            f'noslip_iterations="{noslip}" gravity="{gravity}"'
+        )
+        note = "mujoco; box collider, default soft contact, from its static penetration"
+        return Case(_xml(option, world), dt, end_time, _still(1), note, settle=True)
+
+    kinds = (
+        ("pyramidal", 1, 0),
+        ("elliptic", 1, 0),
+        ("elliptic", 100, 0),
+        ("elliptic", 10000, 0),
+        ("elliptic", 1, 5),
+        ("elliptic", 100, 20),
+    )
+    for (cone, impratio, noslip), dt in itertools.product(kinds, dts):
+        name = f"{cone} impratio={impratio} noslip={noslip} dt={dt:g}"
+        yield name, functools.partial(case, cone, impratio, noslip, dt)
+
+
+def _row() -> Iterator[tuple[str, Callable[[], Case]]]:
+    velocity = _still(p.S5.count)
+    velocity[0, 0] = p.S5.speed
+
+    def world(more: str) -> str:
+        places = p.s5_positions()
+        return "".join(_sphere((x, 0.0, 0.0), p.S5.radius, p.S5.mass, more) for x in places)
+
+    def soft(solref: str, dt: float) -> Case:
+        option = f'timestep="{dt!r}" gravity="0 0 0"'
+        balls = world(f'condim="1" solref="{solref}"')
+        note = "mujoco; a soft constraint knows no Hertz law"
+        return Case(_xml(option, balls), dt, p.S5.end_time, velocity, note)
+
+    def law(integrator: str, dt: float) -> Case:
+        option = f'timestep="{dt!r}" integrator="{integrator}" gravity="0 0 0"'
+        xml = _xml(option, world(""), 'contact="disable" constraint="disable"')
+        note = "hertz; law through mjcb_passive, compiled"
+        end, radius = p.S5.end_time, p.S5.radius
+        return Case(xml, dt, end, velocity, note, _hertz, True, "balls", radius)
+
+    for solref in ("0.002 0.01", "-1e7 0"):
+        for dt in (1e-3, 1e-4, 1e-5):
+            yield f"solref {solref} dt={dt:g}", functools.partial(soft, solref, dt)
+    pairs = (("Euler", (1e-4, 1e-5, 1e-6)), ("RK4", (1e-4, 3e-5, 1e-5, 1e-6)))
+    for integrator, dts in pairs:
+        for dt in dts:
+            exact = p.SAMPLE / round(p.SAMPLE / dt)
+            name = f"mjcb_passive compiled {integrator} dt={exact:.4g}"
+            yield name, functools.partial(law, integrator, exact)
+
+
+def _grains(count: int) -> Iterator[tuple[str, Callable[[], Case]]]:
+    def case(solver: str, solref: str, dt: float) -> Case:
+        more = f'condim="3" friction="{p.S7.mu} 0 0" {solref}'
+        half = p.s7_half_width(count)
+        walls = "".join(
+            f'<geom type="plane" size="0 0 1" pos="{x!r} {y!r} 0" zaxis="{a} {b} {c}" {more}/>'
+            for x, y, a, b, c in (
+                (0.0, 0.0, 0, 0, 1),
+                (-half, 0.0, 1, 0, 0),
+                (half, 0.0, -1, 0, 0),
+                (0.0, -half, 0, 1, 0),
+                (0.0, half, 0, -1, 0),
+            )
+        )
+        spheres = "".join(
+            _sphere(tuple(at), p.S7.radius, p.S7.mass, more) for at in p.s7_positions(count)
+        )
+        option = f'timestep="{dt!r}" solver="{solver}" gravity="0 0 {-p.GRAVITY}"'
+        xml = _xml(option, walls + spheres, head='<size memory="2G"/>')
+        note = f"mujoco; soft contacts, {solref or 'default solref'}, pyramidal cone"
+        end, sample = p.S7.end_time, p.s7_sample(count)
+        return Case(xml, dt, end, _still(count), note, sample=sample, cap=common.WALL_CAP)
+
+    stiff = 'solref="0.004 1"'
+    few = count > 1000  # where each run takes as long as it may
+    for solver, solref, dts in (
+        ("CG", "", (5e-3,) if few else (5e-3, 2e-3, 5e-4)),
+        ("Newton", "", (5e-3, 2e-3) if count <= 125 else ()),
+        ("CG", stiff, (2e-3,) if few else (2e-3, 5e-4)),
+    ):
+        for dt in dts:
+            name = f"{solver}{' stiff' if solref else ''} dt={dt:g}"
+            yield name, functools.partial(case, solver, solref, dt)

@@ -1,0 +1,222 @@
+"""What a benchmark leaves: `bench.csv`, and tables that a reader and a terminal can show."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from mbsim.bench.front import Cell, Point, front, points, time_at
+from mbsim.bench.measurement import OURS, Measurement
+from mbsim.bench.parameters import SAMPLE
+from mbsim.bench.scene import Scene
+from mbsim.errors import ResultsError
+
+#: Columns of `bench.csv` before those of the error measures and counts.
+FIRST_COLUMNS = ("scene", "engine", "version", "setting", "repeats", "wall_s", "wall_per_sim_s")
+#: Columns after them.
+LAST_COLUMNS = ("note", "date", "cpu", "python")
+
+#: Errors at which our own times are listed.
+DECADES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file, or raise why not as `ResultsError`."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def write_csv(
+    path: Path, machine: Mapping[str, str], scenes: Iterable[Scene], rows: Sequence[Measurement]
+) -> None:
+    """Write one line a measurement; measures that a scene does not have stay empty."""
+    measures = _names(row.errors for row in rows)
+    # an engine's own count of what is an error measure anyway is not listed twice
+    counts = [name for name in _names(row.counts for row in rows) if name not in measures]
+    header = [*FIRST_COLUMNS, "measure", *measures, *counts, *LAST_COLUMNS]
+    main = {scene.name: scene.measure for scene in scenes}
+    lines = []
+    for row in rows:
+        values = {**row._asdict(), **machine, "measure": main[row.scene]}
+        values |= {name: _number(value) for name, value in (row.counts | row.errors).items()}
+        values |= {name: _number(values[name]) for name in ("wall_s", "wall_per_sim_s")}
+        lines.append([values.get(name, "") for name in header])
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([header, *lines])
+    except OSError as error:
+        raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _names(tables: Iterable[Mapping[str, float]]) -> list[str]:
+    """Return all keys in the order of their first use."""
+    return list(dict.fromkeys(name for table in tables for name in table))
+
+
+def _number(value: float) -> str:
+    """Return six digits; empty where there is no number."""
+    return "" if math.isnan(value) else f"{value:.6g}"
+
+
+def line(scene: Scene, row: Measurement) -> str:
+    """Return a measurement as one line for people."""
+    name = f"{row.scene} {row.engine} {row.setting}"
+    if not row.errors:
+        return f"{name}: {row.note}"
+    error = row.errors[scene.measure]
+    return f"{name}: {row.wall_per_sim_s:.3g} s per simulated second, {scene.measure} {error:.2g}"
+
+
+def table(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table whose columns also line up on a terminal."""
+    cells = [list(header), *(list(entry) for entry in lines)]
+    widths = [max(len(entry[k]) for entry in cells) for k in range(len(header))]
+    first, *rest = (
+        "| "
+        + " | ".join(text.ljust(width) for text, width in zip(entry, widths, strict=True))
+        + " |"
+        for entry in cells
+    )
+    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+    return "\n".join([first, rule, *rest])
+
+
+def markdown(
+    machine: Mapping[str, str],
+    scenes: Sequence[Scene],
+    rows: Sequence[Measurement],
+    cells: Sequence[Cell],
+    absent: Sequence[str],
+) -> str:
+    """Return the whole report as text."""
+    versions = dict.fromkeys(f"{row.engine} {row.version}" for row in rows)
+    where = (
+        f"{', '.join(versions)}; Python {machine['python']}; {machine['cpu']}; {machine['date']}"
+    )
+    parts = ["# Run time against error", where]
+    if absent:
+        parts.append(f"Not compared: {', '.join(absent)}.")
+    parts += ["Times are wall seconds of the stepping loop per simulated second."]
+    if cells:
+        parts += ["## Time to reach the error of the best peer", comparison(cells)]
+        parts.append(_summary(cells))
+    parts += ["## Our time to reach an error", own_times(scenes, rows)]
+    parts += [_scaling(rows)] if _scaling(rows) else []
+    for scene in scenes:
+        parts += [f"## {scene.name}: {scene.title}", front_table(scene, rows)]
+    troubles = _troubles(rows)
+    parts += ["## Runs without a result", troubles] if troubles else []
+    return "\n\n".join(parts) + "\n"
+
+
+def comparison(cells: Sequence[Cell]) -> str:
+    """Return the table of comparisons: our time to each error on the peers' front."""
+    header = ("scene", "error", "best peer", "peer [s]", "ours [s]", "ours / peer", "target", "")
+    return table(header, [_cell_line(cell) for cell in cells])
+
+
+def _cell_line(cell: Cell) -> list[str]:
+    """Return one comparison as text."""
+    verdict = {True: "met", False: "lost", None: ""}[cell.met]
+    return [
+        cell.scene,
+        f"{cell.error:.1e}",
+        f"{cell.peer} {cell.setting}",
+        f"{cell.peer_s:.3g}",
+        "not reached" if cell.ours_s is None else f"{cell.ours_s:.3g}",
+        "" if cell.ratio is None else _ratio(cell.ratio),
+        "" if cell.target is None else _ratio(cell.target),
+        verdict + _rows_note(cell.rows_ms),
+    ]
+
+
+def _rows_note(rows_ms: float) -> str:
+    """Return what to say where a peer stores fewer rows than we do."""
+    return f" (peer's rows {rows_ms:.3g} ms apart)" if rows_ms > 1.1e3 * SAMPLE else ""
+
+
+def _ratio(value: float) -> str:
+    """Return a ratio below one as 1/n."""
+    return f"1/{1.0 / value:.3g}" if 0.0 < value < 1.0 else f"{value:.3g}"
+
+
+def _summary(cells: Sequence[Cell]) -> str:
+    """Return how many targets are met."""
+    judged = [cell for cell in cells if cell.met is not None]
+    met = sum(cell.met is True for cell in judged)
+    return f"{met} of {len(judged)} targets met."
+
+
+def own_times(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
+    """Return our time for every decade of error, between measured points."""
+    lines = []
+    for scene in scenes:
+        ours = _front(scene, rows, ours=True)
+        times = [time_at(ours, error) for error in DECADES]
+        shown = ["" if time is None else f"{time:.3g}" for time in times]
+        lines.append([scene.name, scene.measure, *shown])
+    return table(("scene", "measure", *(f"{error:.0e}" for error in DECADES)), lines)
+
+
+def front_table(scene: Scene, rows: Sequence[Measurement]) -> str:
+    """Return our front with all measures, then the peers'."""
+    mine = [row for row in rows if row.scene == scene.name]
+    measures = [scene.measure]
+    measures += [name for name in _names(row.errors for row in mine) if name != scene.measure]
+    keys = {
+        (point.engine, point.setting)
+        for ours in (True, False)
+        for point in _front(scene, rows, ours)
+    }
+    chosen = [row for row in mine if (row.engine, row.setting) in keys]
+    chosen.sort(key=lambda row: (row.engine != OURS, row.wall_per_sim_s))
+    return table(
+        ("engine", "setting", "time [s]", *measures),
+        [
+            [
+                row.engine,
+                row.setting,
+                f"{row.wall_per_sim_s:.3g}",
+                *(f"{row.errors[name]:.2g}" if name in row.errors else "" for name in measures),
+            ]
+            for row in chosen
+        ],
+    )
+
+
+def _front(scene: Scene, rows: Sequence[Measurement], ours: bool) -> list[Point]:
+    """Return our front of a scene, or that of all peers together."""
+    mine = [row for row in rows if row.scene == scene.name and (row.engine == OURS) == ours]
+    return front(points(mine, scene.measure))
+
+
+def _scaling(rows: Sequence[Measurement]) -> str:
+    """Return our time per step and (body + incident) of the scenes with many spheres."""
+    lines = []
+    for row in rows:
+        if row.engine != OURS or not row.scene.startswith("S7_") or not row.errors:
+            continue
+        bodies = int(row.scene.removeprefix("S7_"))
+        things = bodies + row.counts["incidents_end"]
+        each = 1e9 * row.wall_s / (row.counts["steps"] * things)
+        lines.append([row.scene, row.setting, f"{things:.0f}", f"{each:.0f}"])
+    header = ("scene", "setting", "bodies + contacts at the end", "ns each a step")
+    return table(header, lines) if lines else ""
+
+
+def _troubles(rows: Sequence[Measurement]) -> str:
+    """Return what failed, each reason once."""
+    reasons: dict[tuple[str, str, str], int] = {}
+    for row in rows:
+        if not row.errors:
+            key = (row.scene, row.engine, row.note)
+            reasons[key] = reasons.get(key, 0) + 1
+    return "\n".join(
+        f"- {scene}, {engine}, {count} settings: {note}"
+        for (scene, engine, note), count in reasons.items()
+    )

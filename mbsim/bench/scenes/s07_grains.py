@@ -1,0 +1,120 @@
+"""S7: many spheres fall into an open box; a fast run that lets them tunnel does not count."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+
+from mbsim.bench import deck as text
+from mbsim.bench import parameters as p
+from mbsim.bench.outcome import Outcome
+from mbsim.bench.scene import Scene, Target, Variation
+
+#: Penetration over radius below which a run counts.
+PASS = 0.05
+#: dmax of IMPACT's damper [m] and transition velocity of friction [m/s], left open by the scene;
+#: a tenth of the transition takes 1.6 times as many steps and does not change the penetration.
+DMAX, TRANSITION = 1e-5, 0.1
+
+#: Walls by name: Euler angles psi, theta that turn z into the inward normal, and its direction.
+_WALLS = (
+    (-0.5 * math.pi, (-1.0, 0.0)),
+    (0.5 * math.pi, (1.0, 0.0)),
+    (0.0, (0.0, -1.0)),
+    (math.pi, (0.0, 1.0)),
+)
+
+
+def _walls(half: float) -> list[str]:
+    """Return floor and four walls as planes whose normal, the marker's z, points inward.
+
+    R = Rz(psi) Rx(theta) with theta = -90 degrees takes z to (-sin psi, cos psi, 0).
+    """
+    out = [text.FLOOR]
+    for k, (psi, side) in enumerate(_WALLS):
+        marker = text.attributes(
+            id=11 + k,
+            body_id=1,
+            pos_x=half * side[0],
+            pos_y=half * side[1],
+            psi=psi,
+            theta=-0.5 * math.pi,
+        )
+        out.append(f'<Reference_Marker {marker}/>\n<Post_Graphic id="{101 + k}" ')
+        out[-1] += f'type="Plane" rm_id="{11 + k}"/>'
+    return out
+
+
+def _deck(count: int, variation: Variation) -> str:
+    """Return the deck: one contact of all spheres with each other, one with the box."""
+    places = p.s7_positions(count)
+    spheres = [text.sphere(2 + k, p.S7.mass, p.S7.radius, x) for k, x in enumerate(places)]
+    ids = [100 * (2 + k) for k in range(count)]
+    law = text.impact(p.S7.law.k, 1.0, p.S7.law.c, DMAX) | text.coulomb(p.S7.mu, TRANSITION)
+    box = list(range(100, 105))
+    return text.deck(
+        f"{count} spheres fall into an open box",
+        [
+            text.GROUND,
+            *_walls(p.s7_half_width(count)),
+            *spheres,
+            text.contact(301, ids, ids, **law),
+            text.contact(302, ids, box, **law),
+            text.gravity(),
+        ],
+        p.S7.end_time,
+    )
+
+
+def deepest(centres: np.ndarray, half: float) -> float:
+    """Return the largest penetration over radius among spheres, floor and walls, one row (n, 3)."""
+    from scipy.spatial import cKDTree
+
+    r = p.S7.radius
+    depth = float(max(r - centres[:, 2].min(), r + np.abs(centres[:, :2]).max() - half, 0.0))
+    pairs = cKDTree(centres).query_pairs(2.0 * r, output_type="ndarray")
+    if len(pairs):
+        gaps = np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1)
+        depth = max(depth, float(2.0 * r - gaps.min()))
+    return depth / r
+
+
+def _errors(count: int, outcome: Outcome, variant: str) -> dict[str, float]:
+    """Return penetration over radius, largest and at the end, and how many spheres escaped.
+
+    The largest is over all steps where the engine counts it, else over the rows.
+    """
+    half, r = p.s7_half_width(count), p.S7.radius
+    rows = outcome.position
+    whole = np.isfinite(rows).all()
+    sampled = max(deepest(row, half) for row in rows) if whole else math.nan
+    counted = outcome.extra.get("pen_max_over_r", outcome.extra.get("peak_penetration", 0.0) / r)
+    end = rows[-1]
+    outside = (np.abs(end[:, :2]).max(axis=1) > half) | (end[:, 2] < 0.0)
+    return {
+        "pen_max_over_r": max(sampled, counted) if whole else math.nan,
+        "pen_end_over_r": deepest(end, half) if whole else math.nan,
+        "escaped": float(np.count_nonzero(outside)),
+    }
+
+
+def _scene(count: int, targets: tuple[Target, ...]) -> Scene:
+    """Return the scene with `count` spheres."""
+    return Scene(
+        name=f"S7_{count}",
+        title=f"{count} spheres fall into an open box, 2 s",
+        end_time=p.S7.end_time,
+        measure="pen_max_over_r",
+        unit="largest penetration over radius",
+        deck=partial(_deck, count),
+        errors=partial(_errors, count),
+        targets=targets,
+        pass_below=PASS,
+        tolerances=(1e-2, 1e-3, 1e-4),
+        repeats=1,
+    )
+
+
+SCENES = tuple(_scene(count, (Target(1 / 2),) if count == 1000 else ()) for count in p.S7_COUNTS)

@@ -1,0 +1,123 @@
+"""`mbsim bench`: run time against error, and peers where they are installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from mbsim.bench.runner import Options, Report
+
+
+def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> list[float]:
+    """Return a list of numbers separated by commas."""
+    try:
+        return [float(text) for text in value.split(",")] if value else []
+    except ValueError:
+        raise click.BadParameter(f"{value}: numbers separated by commas, e.g. 1e-4,1e-8") from None
+
+
+@click.command("bench")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    default=Path("bench"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for bench.csv, bench.md, a picture a scene, and the decks.",
+)
+@click.option(
+    "--tol",
+    "tolerances",
+    callback=_numbers,
+    metavar="X,X,...",
+    help="Our tolerances; default: the scene's, mostly 1e-3 to 1e-12.",
+)
+@click.option(
+    "--integrator",
+    "integrators",
+    multiple=True,
+    metavar="NAME",
+    help="Ours; may be repeated; default: all there are.",
+)
+@click.option(
+    "--repeats",
+    type=click.IntRange(min=1),
+    default=5,
+    show_default=True,
+    help="The time is their median; runs below 10 ms are repeated three times as often, "
+    "those above 2 s not at all.",
+)
+@click.option("--no-peers", is_flag=True, help="Run only mbsim, whatever is installed.")
+@click.option("--json", "as_json", is_flag=True, help="Print all numbers as one JSON object.")
+def command(
+    scenes: tuple[str, ...],
+    output: Path,
+    tolerances: list[float],
+    integrators: tuple[str, ...],
+    repeats: int,
+    no_peers: bool,
+    as_json: bool,
+) -> None:
+    """Run SCENEs (default: all) here and on the peers that are installed.
+
+    Writes DIR/bench.csv, bench.md and, with matplotlib, one PNG a scene.
+    """
+    from mbsim.bench import peers, plot, report, runner
+    from mbsim.cli.messages import print_json
+
+    installed = [] if no_peers else peers.available()
+    missing = [] if no_peers else [name for name in peers.ENGINES if name not in installed]
+    if missing:
+        _say(f"not installed, so not compared: {', '.join(missing)}; mbsim-contact[bench] has them")
+    chosen = runner.choose_scenes(scenes)
+    methods = runner.choose_integrators(integrators)
+    options = runner.Options(chosen, methods, tolerances, repeats, installed)
+    report.write_text(output / "bench.csv", "")  # now, not after minutes, if DIR cannot be used
+    done = runner.run(options, output, _say)
+    text = report.markdown(
+        done.machine, chosen, done.rows, done.cells, peers.ENGINES if no_peers else missing
+    )
+    report.write_text(output / "bench.md", text)
+    pictures = _draw(options, done, output) if plot.available() else []
+    if not plot.available():
+        _say("no pictures: matplotlib is not installed; mbsim-contact[plot] has it")
+    if as_json:
+        print_json(_as_json(done, output, pictures))
+    else:
+        click.echo(text, nl=False)
+    _say(f"{len(done.rows)} measurements in {output / 'bench.csv'}")
+
+
+def _say(text: str) -> None:
+    """Print a line for people, not for pipes."""
+    click.echo(f"mbsim: {text}", err=True)
+
+
+def _draw(options: Options, done: Report, output: Path) -> list[str]:
+    """Draw every scene that has a result, and return the files."""
+    from mbsim.bench import plot
+
+    drawn = []
+    for scene in options.scenes:
+        if any(row.scene == scene.name and row.errors for row in done.rows):
+            path = output / f"{scene.name}.png"
+            plot.draw(scene, done.rows, path)
+            drawn.append(str(path))
+    return drawn
+
+
+def _as_json(done: Report, output: Path, pictures: list[str]) -> dict[str, object]:
+    """Return the report as JSON has it; what is no number is null."""
+    from mbsim.results.reading import finite
+
+    return {
+        "machine": done.machine,
+        "rows": [finite(row._asdict()) for row in done.rows],
+        "cells": [finite(cell._asdict()) for cell in done.cells],
+        "files": [str(output / "bench.csv"), str(output / "bench.md"), *pictures],
+    }

@@ -1,0 +1,371 @@
+"""The benchmark: its arithmetic on made-up numbers, its references, and one scene end to end."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mbsim.bench import oracle, peers, report, runner
+from mbsim.bench import parameters as p
+from mbsim.bench.front import Point, compare, front, time_at
+from mbsim.bench.measurement import OURS, Measurement, measured
+from mbsim.bench.outcome import Outcome
+from mbsim.bench.scene import Scene, Target
+from mbsim.bench.scenes import all_scenes, s01_top, s03_rolling, s07_grains, s10_hard_ball
+from mbsim.cli.main import main
+from mbsim.model.frames import marker_frames
+from mbsim.reader.xml import read_model
+
+REFERENCES = next(
+    (
+        file
+        for folder in Path(__file__).resolve().parents
+        if (file := folder / "shared" / "data" / "references.json").is_file()
+    ),
+    None,
+)
+MACHINE = {"date": "2026-01-01", "cpu": "none", "python": "3"}
+
+
+def scene(**changes):
+    """Return a scene whose only measure is `error`."""
+    values = {
+        "name": "T",
+        "title": "made up",
+        "end_time": 2.0,
+        "measure": "error",
+        "unit": "1",
+        "deck": lambda variation: "",
+        "errors": lambda outcome, variant: {"error": 0.5},
+    }
+    return Scene(**(values | changes))
+
+
+def row(engine, error, time, setting="s", **errors):
+    """Return a measurement of the made-up scene."""
+    found = {} if math.isnan(error) else {"error": error, **errors}
+    return Measurement("T", engine, "1", setting, 3, 2.0 * time, time, found, {"steps": 7.0}, "")
+
+
+def outcome(wall_s=0.1, end_time=2.0, note=""):
+    """Return an outcome of one body at rest."""
+    time = np.linspace(0.0, end_time, 5)
+    nothing = np.zeros((5, 1, 3))
+    turn = np.zeros((5, 1, 4))
+    turn[..., 0] = 1.0
+    return Outcome(wall_s, time, nothing, turn, nothing, nothing, {}, note)
+
+
+def ours(*pairs):
+    """Return points of ours."""
+    return [Point(error, time, OURS, "s") for error, time in pairs]
+
+
+# --- fronts
+
+
+def test_front_keeps_what_nothing_beats():
+    kept = front(ours((1e-2, 1.0), (1e-3, 2.0), (5e-3, 3.0), (1e-4, 2.5), (2e-2, 0.5)))
+    assert [point.error for point in kept] == [2e-2, 1e-2, 1e-3, 1e-4]
+
+
+def test_time_is_interpolated_in_logarithms_and_never_extrapolated():
+    line = front(ours((1e-2, 1.0), (1e-4, 100.0)))
+    assert time_at(line, 1e-3) == pytest.approx(10.0)
+    assert time_at(line, 1e-2) == 1.0
+    assert time_at(line, 1e-4) == pytest.approx(100.0)
+    # a looser error is reached by the cheapest run, which is better than asked
+    assert time_at(line, 0.5) == 1.0
+    assert time_at(line, 9e-5) is None
+    assert time_at([], 1.0) is None
+
+
+def test_an_exact_run_is_not_interpolated():
+    assert time_at(front(ours((1e-2, 1.0), (0.0, 3.0))), 1e-3) == 3.0
+
+
+def test_targets_are_met_lost_or_not_reached():
+    rows = [row(OURS, 1e-3, 0.04), row(OURS, 1e-5, 0.4)]
+    rows += [row("a", 5e-3, 1.0), row("b", 1e-5, 2.0), row("a", 1e-6, 9.0), row("a", 0.5, 0.01)]
+    cells = compare(scene(targets=(Target(1 / 20, up_to=1e-4), Target(1 / 2))), rows)
+    assert [(cell.error, cell.met) for cell in cells] == [
+        (5e-3, True),
+        (1e-5, False),
+        (1e-6, False),
+    ]
+    assert cells[0].ratio == pytest.approx(0.04)
+    assert cells[1].target == 1 / 20
+    assert cells[1].ratio == pytest.approx(0.2)
+    assert cells[2].ours_s is None
+    shown = report.comparison(cells)
+    assert "1/25" in shown
+    assert "not reached" in shown
+
+
+def test_a_peer_that_stores_fewer_rows_is_marked():
+    rows = [row(OURS, 1e-3, 1.0)]
+    rows.append(row("a", 1e-3, 1.0)._replace(counts={"rows_ms": 50.0}))
+    assert "peer's rows 50 ms apart" in report.comparison(compare(scene(), rows))
+    rows[1] = rows[1]._replace(counts={"rows_ms": 10.0})
+    assert "apart" not in report.comparison(compare(scene(), rows))
+
+
+def test_without_target_or_without_our_run_nothing_is_judged():
+    rows = [row(OURS, 1e-3, 1.0), row("a", 1e-3, 1.0)]
+    assert compare(scene(), rows)[0].met is None
+    assert compare(scene(targets=(Target(0.5),)), rows[1:])[0].met is None
+    assert compare(scene(), rows[:1]) == []
+
+
+def test_a_threshold_compares_the_fastest_runs_below_it():
+    rows = [row(OURS, 0.2, 0.1), row(OURS, 0.01, 2.0), row("a", 0.3, 0.5), row("b", 0.049, 4.4)]
+    (cell,) = compare(scene(targets=(Target(1 / 2),), pass_below=0.05), rows)
+    assert (cell.peer, cell.peer_s, cell.ours_s, cell.met) == ("b", 4.4, 2.0, True)
+
+
+# --- measurements
+
+
+def test_long_runs_are_not_repeated():
+    asked = []
+
+    def run(count):
+        asked.append(count)
+        return outcome(wall_s=5.0 if len(asked) == 1 else 0.1)
+
+    assert measured(scene(), "a", "1", "s", run, 5).repeats == 1
+    assert measured(scene(), "a", "1", "s", run, 5).repeats == 5
+    assert asked == [1, 1, 5]
+
+
+def test_short_runs_are_repeated_more_often():
+    short = measured(scene(), "a", "1", "s", lambda count: outcome(wall_s=1e-3), 5)
+    assert short.repeats == 15
+    assert measured(scene(), "a", "1", "s", lambda count: outcome(wall_s=1e-3), 1).repeats == 1
+
+
+def test_a_run_that_ended_early_is_not_judged():
+    early = measured(scene(), "a", "1", "s", lambda count: outcome(end_time=1.0), 1)
+    assert early.errors == {}
+    assert "ended at 1 s" in early.note
+    assert early.counts == {"rows_ms": 250.0}
+    assert measured(scene(), "a", "1", "s", lambda count: outcome(), 1).wall_per_sim_s == 0.05
+
+
+def test_a_note_names_the_variant_of_the_law():
+    s2b = all_scenes()["S2b"]
+    assert s2b.variant("") == "linear"
+    assert s2b.variant("linear_noclip: springs in series") == "linear_noclip"
+    assert s2b.variant("mujoco, soft constraint") == "mujoco"
+
+
+def test_a_peer_that_fails_has_a_line(tmp_path, monkeypatch):
+    def broken(scene, setting, count):
+        raise RuntimeError("no convergence\nand more")
+
+    engine = SimpleNamespace(version=lambda: "9", settings=lambda scene: ["x"], run=broken)
+    monkeypatch.setattr(peers, "load", lambda name: engine)
+    made_up = scene(deck=s10_hard_ball.SCENES[0].deck)
+    options = runner.Options([made_up], ["DOPRI5"], [1e-3], 1, ["mujoco"])
+    done = runner.run(options, tmp_path, lambda line: None)
+    assert done.rows[-1].note == "failed: no convergence"
+    assert done.cells == []
+    # a deck of 1 s in a scene of 2 s: not judged either
+    text = report.markdown(done.machine, [made_up], done.rows, done.cells, [])
+    assert "- T, mujoco, 1 settings: failed: no convergence" in text
+
+
+# --- files
+
+
+def test_csv_has_one_line_a_run_and_empty_cells_for_what_is_not_there(tmp_path):
+    rows = [row(OURS, 1e-3, 0.5, second=2.0), row("a", math.nan, math.nan)]
+    report.write_csv(tmp_path / "bench.csv", MACHINE, [scene()], rows)
+    with (tmp_path / "bench.csv").open(encoding="utf-8") as file:
+        first, second = csv.DictReader(file)
+    assert list(first) == [
+        *report.FIRST_COLUMNS,
+        *("measure", "error", "second", "steps"),
+        *report.LAST_COLUMNS,
+    ]
+    assert (first["wall_s"], first["error"], first["second"]) == ("1", "0.001", "2")
+    assert (second["wall_s"], second["error"], second["cpu"]) == ("", "", "none")
+
+
+def test_table_lines_up():
+    lines = report.table(("a", "long"), [("1", "2"), ("333", "4")]).splitlines()
+    assert lines[1] == "|-----|------|"
+    assert len({len(line) for line in lines}) == 1
+
+
+# --- references
+
+
+def test_first_impacts_are_those_of_the_parameters():
+    for variant, (start, speed_in, speed_out) in p.S2_FIRST_IMPACT.items():
+        flight, touch, after = oracle.s2(variant).phases[:3]
+        assert touch.start == pytest.approx(start, abs=1e-14)
+        assert flight.velocity - p.GRAVITY * touch.start == pytest.approx(-speed_in, abs=1e-12)
+        assert after.velocity == pytest.approx(speed_out, abs=1e-9)
+
+
+def test_heights_are_continuous_where_phases_meet():
+    bounces = oracle.s2("impact")
+    meets = np.array([phase.start for phase in bounces.phases[1:]])
+    assert np.abs(bounces.height(meets)).max() < 1e-12
+    assert np.abs(bounces.height(np.nextafter(meets, 0.0))).max() < 1e-12
+
+
+def test_rebound_of_the_hard_ball():
+    # e = exp(-pi zeta / sqrt(1 - zeta^2)) without weight and clipping, which change it by 1e-6
+    for variant in oracle.S10A_FORCES:
+        assert oracle.s10a_rebound(variant) == pytest.approx(p.S10A_RESTITUTION**2, abs=2e-5)
+
+
+def test_rolling_tends_to_rigid_friction():
+    # a smoothing of 0.02 m/s adds 2/7 of the way slipped late: 4.3e-6 m
+    late = 0.02**2 / (3.5 * p.S3.mu * p.GRAVITY)
+    late *= math.log((math.sqrt(3.0) + 1.0) / (math.sqrt(3.0) - 1.0)) / math.sqrt(3.0) - 0.5
+    x = s03_rolling.law_solution(p.S3.radius)
+    assert x - p.S3.end_x == pytest.approx(2.0 / 7.0 * late, rel=1e-4)
+
+
+@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+def test_references_are_those_of_the_shared_file():
+    shared = json.loads(REFERENCES.read_text(encoding="utf-8"))
+    for top, name in ((p.S1, "S1"), (p.S10C, "S10c")):
+        assert (
+            s01_top.attitude_error(np.array(shared[name]["q"]), np.array(top.end_quaternion))
+            < 1e-15
+        )
+    times = np.array(shared["S2"]["t"])
+    for variant in p.S2_FIRST_IMPACT:
+        heights = np.array(shared["S2"][variant]["z"])
+        assert np.abs(oracle.s2(variant).height(times) - heights).max() < 1.5e-8
+    assert shared["S3"]["x_end"] == pytest.approx(p.S3.end_x, abs=1e-14)
+    assert shared["S5"]["v"] == pytest.approx(p.S5.end_v, abs=1e-14)
+    assert shared["S10"]["a_e"] == pytest.approx(p.S10A_RESTITUTION, abs=1e-14)
+
+
+# --- error measures
+
+
+def test_angle_between_attitudes():
+    half = 0.5 * 1e-9
+    turned = np.array([math.cos(half), 0.0, math.sin(half), 0.0])
+    unit = np.array([1.0, 0.0, 0.0, 0.0])
+    assert s01_top.attitude_error(turned, unit) == pytest.approx(1e-9, rel=1e-9)
+    assert s01_top.attitude_error(-turned, unit) == pytest.approx(1e-9, rel=1e-9)
+    assert s01_top.attitude_error(np.array([0.0, 1.0, 0.0, 0.0]), unit) == pytest.approx(math.pi)
+
+
+def test_apex_between_rows_is_met():
+    time = np.arange(101) * 0.01
+    height = 0.49 - 0.5 * p.GRAVITY * (time - 0.6371) ** 2
+    flight = outcome()._replace(time=time, position=np.zeros((101, 1, 3)))
+    flight.position[:, 0, 2] = height + p.S10A.radius
+    assert s10_hard_ball.rebound(flight) == pytest.approx(0.98, abs=1e-12)
+
+
+def test_deepest_of_spheres_floor_and_walls():
+    r = p.S7.radius
+    apart = np.array([[0.0, 0.0, 2 * r], [0.0, 0.0, 5 * r]])
+    assert s07_grains.deepest(apart, 1.0) == 0.0
+    near = np.array([[0.0, 0.0, 2 * r], [0.0, 1.9 * r, 2 * r]])
+    assert s07_grains.deepest(near, 1.0) == pytest.approx(0.1)
+    assert s07_grains.deepest(apart - np.array([0.0, 0.0, 1.3 * r]), 1.0) == pytest.approx(0.3)
+    assert s07_grains.deepest(apart + np.array([0.5, 0.0, 0.0]), 0.5 + 0.8 * r) == pytest.approx(
+        0.2
+    )
+
+
+# --- whole runs
+
+
+def test_every_scene_writes_xml():
+    from lxml import etree
+
+    for made in all_scenes().values():
+        for variation in made.variations:
+            root = etree.fromstring(made.deck(variation).encode())
+            assert root.find("Command/Simulate").get("end_time") == repr(made.end_time)
+
+
+def test_walls_of_the_grains_look_inward(tmp_path):
+    text = all_scenes()["S7_125"].deck({})
+    planes = text[: text.index('<Body_Rigid id="2"')] + "</Model></MotionSolve>"
+    (tmp_path / "walls.xml").write_text(planes, encoding="utf-8")
+    frames = marker_frames(read_model(tmp_path / "walls.xml"))
+    for marker in range(11, 15):
+        side, normal = frames[marker].p, frames[marker].R[:, 2]
+        assert normal @ side == pytest.approx(-p.s7_half_width(125))
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, ["bench", *map(str, arguments)])
+
+
+def test_a_scene_end_to_end(tmp_path):
+    done = call(
+        *("S10a", "--no-peers", "--tol", "1e-4,1e-8", "--integrator", "DOPRI5"),
+        *("--repeats", 1, "-o", tmp_path / "out", "--json"),
+    )
+    assert done.exit_code == 0, done.stderr
+    said = json.loads(done.stdout)
+    loose, tight = said["rows"]
+    assert tight["errors"]["rebound_error"] < 1e-6 < loose["errors"]["rebound_error"] < 1e-2
+    assert tight["errors"]["rebound_over_drop"] == pytest.approx(0.99686, abs=1e-5)
+    assert said["cells"] == []
+    for name in said["files"]:
+        assert Path(name).stat().st_size > 0
+    assert (tmp_path / "out/decks/S10a.xml").is_file()
+    assert "Not compared: mujoco" in (tmp_path / "out/bench.md").read_text(encoding="utf-8")
+
+
+def test_a_run_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
+    # negative: whenever progress is told, the limit has passed
+    monkeypatch.setattr("mbsim.bench.ours.LIMIT", -1.0)
+    done = call(
+        *("S4stick", "--no-peers", "--tol", "1e-4", "--integrator", "DOPRI5"),
+        *("--repeats", 1, "-o", tmp_path, "--json"),
+    )
+    assert done.exit_code == 0, done.stderr
+    notes = {row["note"].split(" at time")[0] for row in json.loads(done.stdout)["rows"]}
+    assert notes == {"failed: given up after -1 s"}
+
+
+def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(peers, "available", lambda: [])
+    done = call("S10a", "--tol", "1e-3", "--repeats", 1, "-o", tmp_path)
+    assert done.exit_code == 0
+    (line,) = [line for line in done.stderr.splitlines() if "not installed" in line]
+    assert "mujoco, exudyn, pybullet" in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("S99",), 2, "scene S99: not known; there are S1, "),
+        (("S1", "--tol", "x"), 2, "numbers separated by commas"),
+        (("S1", "--tol", "-1"), 2, "tol=-1 is not allowed"),
+        (("S1", "--integrator", "EULER"), 2, "integrator=EULER is not known"),
+    ],
+)
+def test_wrong_usage(tmp_path, arguments, code, said):
+    done = call(*arguments, "--no-peers", "-o", tmp_path)
+    assert done.exit_code == code
+    assert said in done.stderr
+
+
+def test_a_folder_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = call("S1", "--no-peers", "-o", tmp_path / "file")
+    assert done.exit_code == 5
+    assert "cannot be written" in done.stderr
