@@ -75,7 +75,7 @@ class Pairs(NamedTuple):
     slot: I1  # (np + 1,) first slot
     kernel: I1  # (np,) address, 0 where FCL does it
     watched: I1  # (np,) 0 where no distance can be known (a plane that moves)
-    regroups: I1  # (np,) 1 where points may appear deep in a contact: FCL chooses them anew
+    regroups: I1  # (np,) 1 where points may appear deep in a contact that goes on
     thickness: F1  # (np,) what a step may not jump over
     noise: F1  # (np,) scatter of the normals that its detector gives
 

@@ -28,7 +28,12 @@ class PairPlan:
     @property
     def may_need_fcl(self) -> bool:
         """Whether the closed form holds only far from edges."""
-        return self.closed_form in ("BOX-BOX", "CYLINDER-BOX")
+        return self.closed_form == "CYLINDER-BOX"
+
+    @property
+    def regroups(self) -> bool:
+        """Whether points may appear deep in a contact: a corner becomes two crossings, or FCL's."""
+        return self.closed_form in ("", "BOX-BOX") or self.may_need_fcl
 
     @property
     def detector(self) -> str:
@@ -46,9 +51,7 @@ def _plan(contact: Contact, i: Graphic, j: Graphic, detector: str) -> PairPlan:
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{a.shape}-{b.shape}"
         if name in PAIRS and detector != "fcl":
-            # a box over a box may have to fall back on FCL, whose points need places too
-            slots = max(PAIRS[name].slots, fcl_slots)
-            return PairPlan(contact.id, a.id, b.id, swapped, name, slots)
+            return PairPlan(contact.id, a.id, b.id, swapped, name, PAIRS[name].slots)
     return PairPlan(contact.id, i.id, j.id, False, "", fcl_slots)
 
 
