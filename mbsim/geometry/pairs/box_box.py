@@ -5,15 +5,22 @@ along J's axis j. Along a unit axis n that points from J into I the boxes overla
 
     overlap(n) = sum_k hi_k |i_k . n| + sum_k hj_k |j_k . n| - |t . n|
 
-and are apart where some overlap is negative. The least overlap is the depth, its axis the
-normal. Where several axes are least within `BAND`, the normal is their weighted mean, so that
-it turns and never flips while one axis takes over from another.
+and are apart where some overlap is negative.  The direction n along which the boxes
+are looked at is the axis of least overlap; where several are least within `BAND`, their weighted
+mean, so that n turns and never flips while one axis takes over from another.
 
 The face of each box that looks most against the other is projected along n. The vertices of the
-two faces' common polygon are the points; the depth of one is how far the two faces overlap
-there along n. A corner of a box has share 1; where an edge of I crosses one of J the share is the
-polygon's exterior angle over a right angle, so that a corner that passes over an edge of the
-other box becomes two crossings with shares that add up to 1, and all shares add up to 4.
+two faces' common polygon are the points; each keeps the normal and the depth of the features
+that meet there, so that its force has a potential:
+
+    corner of I on J's face   normal of J's face, depth below that face
+    corner of J on I's face   the same with I's face
+    edge of I on edge of J    normal u x e of the edges, distance of their lines
+
+A corner has share 1; a crossing of two edges has the polygon's exterior angle over a right
+angle, so that a corner that passes over an edge of the other box becomes two crossings with
+shares that add up to 1, and all shares add up to 4. At that moment the normals differ by the
+tilt of the faces against each other, as they do for rigid boxes; depths differ by its square.
 """
 
 from __future__ import annotations
@@ -34,7 +41,7 @@ from mbsim.geometry.polygon import CAPACITY, TAG, X, Y, clip
 #: another face of its box takes over.
 BOX_BOX_SLOTS = 12
 #: Axes whose overlap is up to this much (relative) above the least take part in the normal.
-BAND = 0.1
+BAND = 0.02
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
 #: Sine squared of the angle of two edges at which their axis counts half as much as a face's.
@@ -153,6 +160,51 @@ def _diagonal(k, sign, a, b):
 
 
 @jitable
+def _corner_of_i(k, sign, corner):
+    """Return the diagonal of I's corner 0..3 of the polygon: (-p, -q), (p, -q), (p, q), (-p, q)."""
+    # q = -sign i_o
+    return _diagonal(
+        k,
+        sign,
+        1.0 if corner == 1 or corner == 2 else -1.0,
+        -sign if corner >= 2 else sign,
+    )
+
+
+@jitable
+def _corner_of_j(k, sign, side):
+    """Return the diagonal of J's corner behind side 0..3: (a, b), (-a, b), (-a, -b), (a, -b)."""
+    return _diagonal(
+        k,
+        sign,
+        1.0 if side == 0 or side == 3 else -1.0,
+        sign if side <= 1 else -sign,
+    )
+
+
+@jitable
+def _edge_normal(u, side, na, nb, nn):
+    """Return the unit normal of an edge along u and a side of J, on the side of n."""
+    # sides 0 and 2 run along b, 1 and 3 along a
+    g = (-u[2], 0.0, u[0]) if side == 0 or side == 2 else (0.0, u[2], -u[1])
+    length = norm(g)
+    along = g[0] * na + g[1] * nb + g[2] * nn
+    if length * length <= PARALLEL:
+        # edges that lie on each other have no share either
+        return (na, nb, nn)
+    return scale((1.0 if along >= 0.0 else -1.0) / length, g)
+
+
+@jitable
+def _to_global(frame_j, d, m, o, k, sign):
+    """Return a vector along a, b and J's normal in global axes."""
+    return add(
+        scale(d[0], axis(frame_j, m)),
+        add(scale(sign * d[1], axis(frame_j, o)), scale(sign * d[2], axis(frame_j, k))),
+    )
+
+
+@jitable
 def _turned_over(slope):
     """Return how far a face has given way to its neighbour beyond an edge, 0 to 1/2.
 
@@ -170,8 +222,7 @@ def _crossing_share(exterior, turned_i, turned_j):
     2 - exterior. Where faces meet faces only their angle counts; at an edge on an edge with
     both boxes tilted by 45 degrees the four choices are alike and the share is 1.
     """
-    if exterior <= -1.0:
-        exterior += 4.0
+    exterior -= 4.0 * math.floor(0.25 * (exterior + 1.0))
     exterior = max(0.0, min(2.0, exterior))
     other = turned_i + turned_j - 2.0 * turned_i * turned_j
     return (1.0 - other) * exterior + other * (2.0 - exterior)
@@ -246,58 +297,42 @@ def _manifold(frame_j, hi, hj, s, n, points):
     before = int(polygon[count - 1, TAG])
     for k in range(count):
         x, y, after = polygon[k, X], polygon[k, Y], int(polygon[k, TAG])
+        depth = depth_0 + slope_x * x + slope_y * y
         share = 1.0
-        if before < 4:
-            # an edge of I comes to its end: at the corner where edge before + 1 begins
-            corner = (before + 1) % 4
-        else:
-            corner = after
         if before >= 4 and after >= 4:
-            side = before - 4
-            row = 8 + _diagonal(
-                kj,
-                sj,
-                1.0 if side == 0 or side == 3 else -1.0,
-                sj if side <= 1 else -sj,
-            )
+            row = 8 + _corner_of_j(kj, sj, before - 4)
+            # against I's face
+            g = (-ma, -mb, -mk)
+        elif before < 4 and after < 4:
+            row = 2 * _corner_of_i(ki, si, (before + 1) % 4)
+            # against J's face
+            g = (0.0, 0.0, 1.0)
         else:
-            row = 2 * _diagonal(
-                ki,
-                si,
-                1.0 if corner == 1 or corner == 2 else -1.0,
-                -si if corner >= 2 else si,
-            )
-            if before >= 4:
-                row += 1
-        if (before < 4) != (after < 4):
             edge, side = (before, after - 4) if before < 4 else (after, before - 4)
+            # an edge of I comes to its end where edge before + 1 begins
+            ends = before < 4
+            corner = (before + 1) % 4 if ends else after
+            row = 2 * _corner_of_i(ki, si, corner) + (0 if ends else 1)
+            u = (pa, pb, pk) if edge == 0 or edge == 2 else (qa, qb, qk)
+            g = _edge_normal(u, side, na, nb, nn)
             # side 0 of J runs along b: a right angle from a
             angle = twist + edge - (side + 1.0)
-            angle -= 4.0 * math.floor(0.25 * angle + 0.5)
             # outward of I's edges: -q, p, q, -p; of J's sides: a, b, -a, -b
             tilt_i = nq if edge == 0 or edge == 2 else np_
             tilt_i = -tilt_i if edge == 1 or edge == 2 else tilt_i
             tilt_j = na if side == 0 or side == 2 else nb
             tilt_j = -tilt_j if side >= 2 else tilt_j
             share = _crossing_share(
-                -angle if before < 4 else angle,
+                -angle if ends else angle,
                 _turned_over(tilt_i / -nm),
                 _turned_over(tilt_j / nn),
             )
-        depth = depth_0 + slope_x * x + slope_y * y
-        # the midpoint, from J's centre in J's axes, then in the global frame
-        u, v, w = x - 0.5 * depth * na, y - 0.5 * depth * nb, hj[kj] - 0.5 * depth * nn
-        p = add(
-            vector(frame_j),
-            add(
-                scale(u, axis(frame_j, mj)),
-                add(scale(sj * v, axis(frame_j, oj)), scale(sj * w, axis(frame_j, kj))),
-            ),
-        )
-        points[row, 0] = depth
-        points[row, 1], points[row, 2], points[row, 3] = p[0], p[1], p[2]
-        points[row, 7] = share
         before = after
+        # the midpoint, from J's centre in J's axes
+        middle = (x - 0.5 * depth * na, y - 0.5 * depth * nb, hj[kj] - 0.5 * depth * nn)
+        depth *= g[0] * na + g[1] * nb + g[2] * nn
+        p = add(vector(frame_j), _to_global(frame_j, middle, mj, oj, kj, sj))
+        put_point(points[row], depth, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
 
 
 @pair("BOX", "BOX", slots=BOX_BOX_SLOTS)
