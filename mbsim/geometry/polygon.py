@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from mbsim.core.jitable import jitable
 
-#: Vertices that a scratch polygon holds; two convex quadrilaterals cross in 8 at most.
-CAPACITY = 16
 X, Y, TAG = range(3)
 
 
@@ -21,7 +19,8 @@ def clip(polygon, count, out, nx, ny, limit, tag):
 
     Parameters
     ----------
-    polygon, out : ndarray, shape (CAPACITY, 3)
+    polygon, out : ndarray, shape (capacity, 3)
+        Two convex polygons of m and n corners have m + n in common at most.
     count : int
         Vertices of `polygon`.
     nx, ny, limit : float
@@ -29,16 +28,16 @@ def clip(polygon, count, out, nx, ny, limit, tag):
     tag : float
         Of the edge that the half-plane's border becomes.
     """
-    kept = 0
+    kept, capacity = 0, len(out)
     for k in range(count):
         after = k + 1 if k + 1 < count else 0
         here = nx * polygon[k, X] + ny * polygon[k, Y] - limit
         there = nx * polygon[after, X] + ny * polygon[after, Y] - limit
-        if here <= 0.0 and kept < CAPACITY:
+        if here <= 0.0 and kept < capacity:
             out[kept, X], out[kept, Y] = polygon[k, X], polygon[k, Y]
             out[kept, TAG] = polygon[k, TAG]
             kept += 1
-        if (here <= 0.0) != (there <= 0.0) and kept < CAPACITY:
+        if (here <= 0.0) != (there <= 0.0) and kept < capacity:
             part = here / (here - there)
             out[kept, X] = polygon[k, X] + part * (polygon[after, X] - polygon[k, X])
             out[kept, Y] = polygon[k, Y] + part * (polygon[after, Y] - polygon[k, Y])

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from mbsim.errors import DeckError, Fault
 from mbsim.geometry.catalog import PAIRS
+from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, hull_slots
+from mbsim.model import hull
 from mbsim.model.elements import Contact, Graphic, Model
 
 #: Shapes with flat sides: FCL gives several points for two of them, one for all others.
@@ -33,7 +35,7 @@ class PairPlan:
     @property
     def regroups(self) -> bool:
         """Whether points may appear deep in a contact: a corner becomes two crossings, or FCL's."""
-        return self.closed_form in ("", "BOX-BOX") or self.may_need_fcl
+        return self.closed_form in ("", "BOX-BOX", "MESH-BOX", "MESH-MESH") or self.may_need_fcl
 
     @property
     def detector(self) -> str:
@@ -44,13 +46,34 @@ class PairPlan:
         return f"closed form {self.closed_form}{near_edges}"
 
 
+def _convex(*graphics: Graphic) -> bool:
+    """Whether every mesh among the graphics is convex: the closed forms know no others."""
+    return all(graphic.shape != "MESH" or graphic.hull is not None for graphic in graphics)
+
+
+def _mesh_slots(i: Graphic, j: Graphic) -> int:
+    """Return the rows of a pair with convex meshes, 0 where it is too large for a closed form."""
+    assert i.hull is not None
+    if j.shape == "PLANE":
+        return int(i.hull[hull.ROWS])
+    other = CUBE if j.hull is None else j.hull
+    slots = hull_slots(i.hull, other)
+    edges = i.hull[hull.EDGES] * other[hull.EDGES]
+    return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
+
+
 def _plan(contact: Contact, i: Graphic, j: Graphic, detector: str) -> PairPlan:
     """Return the plan of one pair."""
     flat = i.shape in _FLAT and j.shape in _FLAT
     fcl_slots = FCL_SLOTS if flat else 1
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{a.shape}-{b.shape}"
-        if name in PAIRS and detector != "fcl":
+        if name in PAIRS and detector != "fcl" and _convex(a, b):
+            if "MESH" in name:
+                slots = _mesh_slots(a, b)
+                if slots == 0:
+                    break
+                return PairPlan(contact.id, a.id, b.id, swapped, name, slots)
             return PairPlan(contact.id, a.id, b.id, swapped, name, PAIRS[name].slots)
     return PairPlan(contact.id, i.id, j.id, False, "", fcl_slots)
 
@@ -129,6 +152,9 @@ def kernel_size(graphic: Graphic) -> tuple[float, float, float]:
         return (graphic.size[0], 0.5 * graphic.size[1], 0.0)
     if graphic.shape == "SPHERE":
         return (graphic.size[0], 0.0, 0.0)
+    if graphic.hull is not None:
+        # the model keeps the polyhedron for as long as the scene lives
+        return (float(graphic.hull.ctypes.data), float(len(graphic.hull)), 0.0)
     if graphic.shape in ("PLANE", "MESH"):
         return (0.0, 0.0, 0.0)
     return half_extent(graphic)

@@ -5,9 +5,8 @@ along J's axis j. Along a unit axis n that points from J into I the boxes overla
 
     overlap(n) = sum_k hi_k |i_k . n| + sum_k hj_k |j_k . n| - |t . n|
 
-and are apart where some overlap is negative.  The direction n along which the boxes
-are looked at is the axis of least overlap; where several are least within `BAND`, their weighted
-mean, so that n turns and never flips while one axis takes over from another.
+and are apart where some overlap is negative.  The axis of least overlap is the
+direction n along which the boxes are looked at; axes of edges have to be less by `FACES_FIRST`.
 
 The face of each box that looks most against the other is projected along n. The vertices of the
 two faces' common polygon are the points; each keeps the normal and the depth of the features
@@ -33,19 +32,20 @@ from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
-from mbsim.geometry.polygon import CAPACITY, TAG, X, Y, clip
+from mbsim.geometry.polygon import TAG, X, Y, clip
 
 #: Rows: for each of I's four diagonals its corner or the crossing where the edge that comes to
 #: it ends, and the crossing where the edge that leaves it begins; then a corner of J for each of
 #: J's diagonals. A face has one corner of every diagonal, so a corner keeps its row when
 #: another face of its box takes over.
 BOX_BOX_SLOTS = 12
-#: Axes whose overlap is up to this much (relative) above the least take part in the normal.
-BAND = 0.02
+#: An axis of two edges must overlap less than a face's by this part: where edges are parallel
+#: rounding makes both alike.
+FACES_FIRST = 1e-6
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
-#: Sine squared of the angle of two edges at which their axis counts half as much as a face's.
-NEARLY_PARALLEL = 1e-4
+#: Vertices a scratch polygon holds: 8, and some for what rounding may add.
+CAPACITY = 12
 # scratch: R (9), t (3), the overlap along each axis (15)
 _T, _OVERLAP, _AXES = 9, 12, 15
 
@@ -109,38 +109,32 @@ def _edge_overlaps(hi, hj, s):
 
 @jitable
 def _direction(s, a):
-    """Return axis a of the 15 from J into I (not of unit length), and its weight."""
-    weight = 1.0
+    """Return axis a of the 15 as a unit vector from J into I, in J's axes."""
     if a < 3:
         n = (1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0, 1.0 if a == 2 else 0.0)
     elif a < 6:
-        i = a - 3
-        n = (s[3 * i], s[3 * i + 1], s[3 * i + 2])
+        n = vector(s[3 * (a - 3) :])
     else:
-        i, j = (a - 6) // 3, (a - 6) % 3
-        u = (s[3 * i], s[3 * i + 1], s[3 * i + 2])
+        u, j = vector(s[3 * ((a - 6) // 3) :]), (a - 6) % 3
         if j == 0:
             n = (0.0, u[2], -u[1])
         elif j == 1:
             n = (-u[2], 0.0, u[0])
         else:
             n = (u[1], -u[0], 0.0)
-        square = dot(n, n)
-        # where edges are parallel their axis may point anywhere
-        weight = square / ((square + NEARLY_PARALLEL) * math.sqrt(square))
-    return (n, weight) if dot(n, vector(s[_T:])) >= 0.0 else (scale(-1.0, n), weight)
+        n = scale(1.0 / norm(n), n)
+    return n if dot(n, vector(s[_T:])) >= 0.0 else scale(-1.0, n)
 
 
 @jitable
-def _normal(s, least):
-    """Return the mean of the axes of least overlap, from J into I, in J's axes."""
-    n = (0.0, 0.0, 0.0)
-    for a in range(_AXES):
-        above = (s[_OVERLAP + a] - least) / (BAND * least)
-        if above < 1.0:
-            d, weight = _direction(s, a)
-            n = add(n, scale(weight * (1.0 - above) * (1.0 - above), d))
-    return scale(1.0 / norm(n), n)
+def _least(s):
+    """Return the axis of least overlap."""
+    best = 0
+    for a in range(1, _AXES):
+        worth = 1.0 + FACES_FIRST if a >= 6 and best < 6 else 1.0
+        if s[_OVERLAP + a] * worth < s[_OVERLAP + best]:
+            best = a
+    return best
 
 
 @jitable
@@ -346,7 +340,7 @@ def box_box(frame_i, size_i, frame_j, size_j, points):
     least = min(least, _edge_overlaps(size_i, size_j, s))
     if least <= 0.0:
         return _apart(points, -least)
-    n = _normal(s, least)
+    n = _direction(s, _least(s))
     j0, j1, j2 = axis(frame_j, 0), axis(frame_j, 1), axis(frame_j, 2)
     normal = add(scale(n[0], j0), add(scale(n[1], j1), scale(n[2], j2)))
     for row in range(BOX_BOX_SLOTS):

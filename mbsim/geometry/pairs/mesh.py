@@ -1,0 +1,85 @@
+"""Convex meshes on a plane, on a box and on each other.
+
+`size` of a mesh is address and length of its packed polyhedron (`model.hull`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, hull_slots, moved, overlapping, to_global
+from mbsim.model.hull import (
+    AT_CORNERS,
+    AT_DATA,
+    AT_PLANES,
+    AT_SHARES,
+    CORNERS,
+    FACES,
+    MOST_ROWS,
+    ROWS,
+)
+
+
+@pair("MESH", "PLANE", slots=MOST_ROWS)
+def mesh_plane(frame_i, size_i, frame_j, size_j, points):
+    """Every corner below the plane is a point; of a patch of corners its deepest one."""
+    hull = floats_at(size_i[0], size_i[1])
+    n = axis(frame_j, 2)
+    height = dot(sub(vector(frame_i), vector(frame_j)), n)
+    local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
+    rows = int(hull[ROWS])
+    corners, data = int(hull[AT_CORNERS]), int(hull[AT_DATA])
+    shares = int(hull[AT_SHARES])
+    for row in range(rows):
+        points[row, 0] = -math.inf
+    for k in range(int(hull[CORNERS])):
+        row = int(hull[data + 3 * k + 2])
+        depth = -height - dot(vector(hull[corners + 3 * k :]), local)
+        if depth > points[row, 0]:
+            # remember which corner; its place follows once
+            points[row, 0], points[row, 1] = depth, k
+    for row in range(rows):
+        depth, k = points[row, 0], int(points[row, 1])
+        p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, hull[shares + row])
+    return rows
+
+
+@jitable
+def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
+    """Write the points of two polyhedra; rows without a point hold the gap, 0 in overlap."""
+    rows = hull_slots(hull_i, hull_j)
+    for row in range(rows):
+        put_point(points[row], 0.0, vector(frame_j), (0.0, 0.0, 1.0))
+    gap = overlapping(moved(hull_i, frame_i, frame_j), hull_j, frame_j, points)
+    if gap > 0.0:
+        for row in range(rows):
+            points[row, 0] = -gap
+    return rows
+
+
+@pair("MESH", "MESH", slots=HULL_SLOTS)
+def mesh_mesh(frame_i, size_i, frame_j, size_j, points):
+    """The common polygon of the two faces that look at each other."""
+    hull_i, hull_j = floats_at(size_i[0], size_i[1]), floats_at(size_j[0], size_j[1])
+    return _two_hulls(frame_i, hull_i, frame_j, hull_j, points)
+
+
+@pair("MESH", "BOX", slots=HULL_SLOTS)
+def mesh_box(frame_i, size_i, frame_j, size_j, points):
+    """A box is a polyhedron too."""
+    box = CUBE.copy()
+    corners, planes = int(box[AT_CORNERS]), int(box[AT_PLANES])
+    for k in range(int(box[CORNERS])):
+        for c in range(3):
+            box[corners + 3 * k + c] *= size_j[c]
+    for f in range(int(box[FACES])):
+        reach = 0.0
+        for c in range(3):
+            reach += abs(box[planes + 4 * f + c]) * size_j[c]
+        box[planes + 4 * f + 3] = reach
+    return _two_hulls(frame_i, floats_at(size_i[0], size_i[1]), frame_j, box, points)
