@@ -223,10 +223,10 @@ def _crossing_share(exterior, turned_i, turned_j):
 
 
 @jitable
-def _apart(points, distance):
+def _apart(points, frame_j, distance):
     """Write the same lower bound of the distance into every row."""
     for row in range(BOX_BOX_SLOTS):
-        put_point(points[row], -distance, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        put_point(points[row], -distance, vector(frame_j), axis(frame_j, 2))
     return BOX_BOX_SLOTS
 
 
@@ -336,10 +336,10 @@ def box_box(frame_i, size_i, frame_j, size_j, points):
     _relative_pose(frame_i, frame_j, s)
     least = _face_overlaps(size_i, size_j, s)
     if least <= 0.0:
-        return _apart(points, -least)
+        return _apart(points, frame_j, -least)
     least = min(least, _edge_overlaps(size_i, size_j, s))
     if least <= 0.0:
-        return _apart(points, -least)
+        return _apart(points, frame_j, -least)
     n = _direction(s, _least(s))
     j0, j1, j2 = axis(frame_j, 0), axis(frame_j, 1), axis(frame_j, 2)
     normal = add(scale(n[0], j0), add(scale(n[1], j1), scale(n[2], j2)))

@@ -54,7 +54,7 @@ def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
     """Write the points of two polyhedra; rows without a point hold the gap, 0 in overlap."""
     rows = hull_slots(hull_i, hull_j)
     for row in range(rows):
-        put_point(points[row], 0.0, vector(frame_j), (0.0, 0.0, 1.0))
+        put_point(points[row], 0.0, vector(frame_j), axis(frame_j, 2))
     gap = overlapping(moved(hull_i, frame_i, frame_j), hull_j, frame_j, points)
     if gap > 0.0:
         for row in range(rows):
