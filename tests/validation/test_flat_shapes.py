@@ -98,7 +98,7 @@ def test_a_box_lies_across_the_edge_of_another(tmp_path):
     results = run_deck(tmp_path, model, end_time=0.1)
     assert results["contacts/301/incidents"][-1] == 2
     assert results["contacts/301/force/z"][-1] == pytest.approx(9.81, rel=1e-6)
-    assert np.abs(results["bodies/2/velocity"]).max() < 1e-6
+    assert np.abs(results["bodies/2/velocity"]).max() < 1e-5
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_box_lies_across_the_edge_of_another(tmp_path):
         # edge on edge, crossed at right angles
         ((np.pi / 2, np.pi / 4, 0.0), (0.0, np.pi / 4, 0.0), 1e-6),
         # a face on an edge
-        ((0.3, 0.0, 0.0), (0.0, np.pi / 4, 0.0), 1e-4),
+        ((0.3, 0.0, 0.0), (0.0, np.pi / 4, 0.0), 3e-4),
         # face on face, tilted: corners and crossings
         ((0.3, 0.01, 0.0), (0.0, 0.0, 0.0), 1e-3),
         # corner on face
