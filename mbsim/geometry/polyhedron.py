@@ -46,6 +46,8 @@ FACE_OF_J, FACE_OF_I, EDGES_MEET = range(3)
 #: Rows of two polyhedra at most, and pairs of their edges; larger ones go through FCL.
 HULL_SLOTS = 64
 MOST_EDGE_PAIRS = 4096
+#: Edges of a polyhedron under a sphere at most.
+MOST_EDGES = 512
 
 
 def _cube() -> Array:
@@ -343,3 +345,48 @@ def crossing_share(u, e, n, ends, turned_i, turned_j):
 def hull_slots(a, b):
     """Return the rows of two polyhedra: two a colour of I, one a colour of J."""
     return 2 * int(a[COLOURS]) + int(b[COLOURS])
+
+
+@jitable
+def nearest_on_face(hull, f, c):
+    """Return the point of face f that is nearest to c."""
+    m = plane(hull, f)
+    height = dot(m, c) - hull[int(hull[AT_PLANES]) + 4 * f + 3]
+    inside, best, found = True, math.inf, c
+    starts, loops = int(hull[AT_STARTS]), int(hull[AT_LOOPS])
+    first, last = int(hull[starts + f]), int(hull[starts + f + 1])
+    before = corner(hull, hull[loops + 2 * (last - 1)])
+    for at in range(first, last):
+        after = corner(hull, hull[loops + 2 * at])
+        e, d = sub(after, before), sub(c, before)
+        if dot(cross(e, d), m) < 0.0:
+            inside = False
+            part = max(0.0, min(1.0, dot(d, e) / dot(e, e)))
+            q = add(before, scale(part, e))
+            away = sub(c, q)
+            if dot(away, away) < best:
+                best, found = dot(away, away), q
+        before = after
+    return sub(c, scale(height, m)) if inside else found
+
+
+@jitable
+def way_out(hull, c):
+    """Return the signed distance of point c from a polyhedron (< 0 inside) and the unit way out."""
+    top, face = -math.inf, 0
+    at = int(hull[AT_PLANES])
+    for f in range(int(hull[FACES])):
+        height = dot(vector(hull[at + 4 * f :]), c) - hull[at + 4 * f + 3]
+        if height > top:
+            top, face = height, f
+    if top <= 0.0:
+        return top, plane(hull, face)
+    least, n = math.inf, plane(hull, face)
+    for f in range(int(hull[FACES])):
+        # the nearest point is on a face that c is above
+        if dot(vector(hull[at + 4 * f :]), c) > hull[at + 4 * f + 3]:
+            away = sub(c, nearest_on_face(hull, f, c))
+            distance = norm(away)
+            if distance < least and distance > 0.0:
+                least, n = distance, scale(1.0 / distance, away)
+    return least, n

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mbsim.errors import DeckError, Fault
 from mbsim.geometry.catalog import PAIRS
-from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, hull_slots
+from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
 from mbsim.model import hull
 from mbsim.model.elements import Contact, Graphic, Model
 
@@ -53,7 +53,9 @@ def _convex(*graphics: Graphic) -> bool:
 
 def _mesh_slots(i: Graphic, j: Graphic) -> int:
     """Return the rows of a pair with convex meshes, 0 where it is too large for a closed form."""
-    assert i.hull is not None
+    if i.hull is None:
+        assert j.hull is not None
+        return 1 if j.hull[hull.EDGES] <= MOST_EDGES else 0
     if j.shape == "PLANE":
         return int(i.hull[hull.ROWS])
     other = CUBE if j.hull is None else j.hull

@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from decks_io import GROUND, contact, write_deck
 from test_pairs import frame, random_rotation
 
+import mbsim
 from mbsim.geometry.catalog import PAIRS, POINT
 from mbsim.model import hull as packed
 from mbsim.model.hull import polyhedron_of
 from mbsim.system.build import pair_address
+from mbsim.system.pairing import plan_pairs
 
 POINTER = ctypes.c_void_p
 COUNTS = [1000, pytest.param(100_000, marks=pytest.mark.slow)]
@@ -364,3 +368,57 @@ def test_a_fine_mesh_has_a_row_for_each_patch_and_its_deepest_corner():
         assert len(points) == packed.MOST_ROWS
         low = (ball.vertices @ fi[3:].reshape(3, 3).T + fi[:3])[:, 2].min()
         assert points[:, 0].max() == pytest.approx(-low, abs=1e-13)
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_a_sphere_on_the_mesh_of_a_box_is_one_on_a_box(plain):
+    rng = np.random.default_rng(10)
+    ball = Shape("SPHERE", [0.15, 0.0, 0.0])
+    touching = 0
+    for _ in range(300):
+        half = rng.uniform(0.1, 0.4, 3)
+        fi = frame(rng.uniform(-0.5, 0.5, 3), random_rotation(rng))
+        fj = frame(rng.uniform(-0.1, 0.1, 3), random_rotation(rng))
+        on_box = points_of(ball, fi, box(half), fj)
+        on_mesh = points_of(ball, fi, mesh(*box_mesh(half, 2)), fj, plain)
+        np.testing.assert_allclose(on_mesh, on_box, atol=1e-9)
+        touching += on_box[0, 0] > 0.0
+    assert touching > 100
+
+
+def test_detector_names_are_what_is_used(tmp_path):
+    nodes = " ".join(repr(float(x)) for x in TETRAHEDRON[0].ravel())
+    convex = "0 1 2 0 3 1 0 2 3 1 3 2"
+    # the same solid with a corner pushed in through its middle face
+    vertices, faces = box_mesh(CUBE, 2)
+    vertices[np.abs(vertices).sum(axis=1).argmin()] *= 0.5
+    dent = " ".join(repr(float(x)) for x in vertices.ravel())
+    dented = " ".join(map(str, faces.ravel()))
+    body = '<Body_Rigid id="{0}" cg_id="{0}0" mass="1" inertia_xx="1" inertia_yy="1" '
+    body += 'inertia_zz="1"/><Reference_Marker id="{0}0" body_id="{0}" pos_z="{0}"/>'
+    shapes = (
+        (body.format(2) + f'<Post_Graphic id="200" type="TriaMesh" rm_id="20"><Nodes>{nodes}')
+        + f"</Nodes><Faces>{convex}</Faces></Post_Graphic>"
+        + (body.format(3) + f'<Post_Graphic id="300" type="TriaMesh" rm_id="30"><Nodes>{dent}')
+        + f"</Nodes><Faces>{dented}</Faces></Post_Graphic>"
+        + body.format(4)
+        + '<Post_Graphic id="400" type="Sphere" center_marker_id="40" radius=".1"/>'
+        + body.format(5)
+        + '<Post_Graphic id="500" type="BoxDefinedFromCenter" center_marker_id="50" '
+        + 'length_x=".1" length_y=".1" length_z=".1"/>'
+    )
+    wanted = {
+        (200, 100): ("closed form MESH-PLANE", 4),
+        (100, 200): ("closed form MESH-PLANE", 4),
+        (300, 100): ("FCL", 1),
+        (400, 200): ("closed form SPHERE-MESH", 1),
+        (500, 200): ("closed form MESH-BOX", 12),
+        (200, 300): ("FCL", 1),
+        (500, 300): ("FCL", 1),
+        (300, 400): ("FCL", 1),
+    }
+    model = GROUND + shapes
+    for k, (i, j) in enumerate(wanted):
+        model += contact(i, j, id=k + 1)
+    plans = plan_pairs(mbsim.read_model(write_deck(tmp_path, model)))
+    assert [(plan.detector, plan.slots) for plan in plans] == list(wanted.values())

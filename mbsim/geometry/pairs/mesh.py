@@ -1,4 +1,4 @@
-"""Convex meshes on a plane, on a box and on each other.
+"""Convex meshes on a plane, on a box and on each other; a sphere on a convex mesh.
 
 `size` of a mesh is address and length of its packed polyhedron (`model.hull`).
 """
@@ -11,7 +11,15 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
-from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, hull_slots, moved, overlapping, to_global
+from mbsim.geometry.polyhedron import (
+    CUBE,
+    HULL_SLOTS,
+    hull_slots,
+    moved,
+    overlapping,
+    to_global,
+    way_out,
+)
 from mbsim.model.hull import (
     AT_CORNERS,
     AT_DATA,
@@ -83,3 +91,16 @@ def mesh_box(frame_i, size_i, frame_j, size_j, points):
             reach += abs(box[planes + 4 * f + c]) * size_j[c]
         box[planes + 4 * f + 3] = reach
     return _two_hulls(frame_i, floats_at(size_i[0], size_i[1]), frame_j, box, points)
+
+
+@pair("SPHERE", "MESH", slots=1)
+def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
+    """The nearest point of the mesh to the centre; inside, the way out through the nearest face."""
+    hull = floats_at(size_j[0], size_j[1])
+    apart = sub(vector(frame_i), vector(frame_j))
+    c = (dot(apart, axis(frame_j, 0)), dot(apart, axis(frame_j, 1)), dot(apart, axis(frame_j, 2)))
+    distance, n = way_out(hull, c)
+    n = to_global(frame_j, n)
+    depth = size_i[0] - distance
+    put_point(points[0], depth, sub(vector(frame_i), scale(size_i[0] - 0.5 * depth, n)), n)
+    return 1
