@@ -42,6 +42,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 PARALLEL = 1e-16
 #: Two edges must overlap less than a face by this part, as between boxes.
 FACES_FIRST = 1e-6
+#: A point with a smaller share is none: it would be an incident without force.
+LEAST_SHARE = 1e-6
 FACE_OF_J, FACE_OF_I, EDGES_MEET = range(3)
 #: Rows of two polyhedra at most, and pairs of their edges; larger ones go through FCL.
 HULL_SLOTS = 64
@@ -314,6 +316,8 @@ def common_polygon(a, fi, b, fj, n, frame_j, points):
             else:
                 g = scale((1.0 if dot(g, n) >= 0.0 else -1.0) / math.sqrt(square), g)
         before = after
+        if share <= LEAST_SHARE:
+            continue
         middle = sub(p, scale(0.5 * depth, n))
         put_point(
             points[row],

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from mbsim.core.blend import step
 from mbsim.model.elements import Array
 from mbsim.model.mesh import Faces, solid_fault
 
@@ -25,8 +26,9 @@ MOST_ROWS = 64
 #: Numbers of the header: corners, faces, edges, colours, rows, most corners of a face, then
 #: where these begin: corners (3), planes (4: outward normal, offset), first of each face in the
 #: loops (faces + 1), loops (2: corner, face beyond the edge that starts there), edges (4:
-#: corners, faces), corner data (3: share, colour, row), share of each row.
-HEADER = 13
+#: corners, faces), corner data (3: share, colour, row), share of each row, how far each face is a
+#: side that the body can lie on (0 to 1).
+HEADER = 14
 (
     CORNERS,
     FACES,
@@ -41,6 +43,7 @@ HEADER = 13
     AT_EDGES,
     AT_DATA,
     AT_SHARES,
+    AT_SIDES,
 ) = range(HEADER)
 
 
@@ -143,6 +146,17 @@ def _patches(corners: Array) -> Array:
     return row
 
 
+def _side(corners: Array, loop: list[int], m: Array, beyond: Array) -> float:
+    """Return 1 for a face that a body can lie on, 0 for a facet of a round surface.
+
+    A side is over 0.6 of the mesh's size wide (facets: below 0.3), or makes 25 degrees with all
+    its neighbours (facets: 10). `m` is its normal, `beyond` (n, 3) those of its neighbours.
+    """
+    wide = np.ptp(corners[loop], axis=0).max() / np.ptp(corners, axis=0).max()
+    bend = float(np.degrees(np.arccos(np.clip((beyond @ m).max(), -1.0, 1.0))))
+    return float(max(step(float(wide), 0.3, 0.0, 0.6, 1.0), step(bend, 10.0, 0.0, 25.0, 1.0)))
+
+
 def polyhedron_of(vertices: Array, faces: Faces) -> Array | None:
     """Return a convex mesh as a packed polyhedron, None if it is not convex.
 
@@ -211,6 +225,12 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         for loop in loops
         for k, corner in enumerate(loop)
     ]
+    normals = np.array(planes)[:, :3]
+    beside = [
+        [beyond[loop[(k + 1) % len(loop)], corner] for k, corner in enumerate(loop)]
+        for loop in loops
+    ]
+    sides = [_side(corners, loop, normals[f], normals[beside[f]]) for f, loop in enumerate(loops)]
     parts = [
         corners,
         np.array(planes),
@@ -219,6 +239,7 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         np.array(edges),
         np.column_stack([share, colour, row]),
         np.array([share[row == k].mean() for k in range(rows)]),
+        np.array(sides),
     ]
     head = [len(corners), len(loops), len(edges), max(colour) + 1, rows, max(map(len, loops))]
     at = HEADER + np.cumsum([0, *[part.size for part in parts]])

@@ -354,7 +354,7 @@ def test_what_is_convex():
     assert polyhedron_of(vertices, faces[:, ::-1]) is None
     hull = polyhedron_of(*TETRAHEDRON)
     assert hull is not None
-    np.testing.assert_allclose(hull[int(hull[packed.AT_SHARES]) :], 4 / 3, atol=1e-12)
+    np.testing.assert_allclose(hull[int(hull[packed.AT_SHARES]) :][:4], 4 / 3, atol=1e-12)
 
 
 def test_a_fine_mesh_has_a_row_for_each_patch_and_its_deepest_corner():
@@ -363,11 +363,35 @@ def test_a_fine_mesh_has_a_row_for_each_patch_and_its_deepest_corner():
     i = mesh(np.array(ball.vertices), np.array(ball.faces, dtype=np.int64))
     rng = np.random.default_rng(9)
     for _ in range(50):
-        fi = frame(rng.uniform(-0.1, 0.1, 3) + np.array([0, 0, 0.95]), random_rotation(rng))
+        fi = frame(rng.uniform(-0.1, 0.1, 3) + np.array([0, 0, 0.85]), random_rotation(rng))
         points = points_of(i, fi, PLANE, frame(np.zeros(3), np.eye(3)))
         assert len(points) == packed.MOST_ROWS
         low = (ball.vertices @ fi[3:].reshape(3, 3).T + fi[:3])[:, 2].min()
         assert points[:, 0].max() == pytest.approx(-low, abs=1e-13)
+        shares = points[points[:, 0] > 0.0, 7]
+        assert (shares > 0.0).all()
+        # facets of a ball are no sides: its deepest corner carries
+        assert shares.tolist() == [1.0]
+
+
+def test_a_fine_cylinder_of_triangles_stands_on_its_rim():
+    n = 100
+    angle = 2 * np.pi * np.arange(n) / n
+    rim = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
+    vertices = np.vstack([np.column_stack([rim, np.full(n, z)]) for z in (-0.2, 0.2)])
+    faces = [[0, k + 1, k] for k in range(1, n - 1)]
+    faces += [[n, n + k, n + k + 1] for k in range(1, n - 1)]
+    for k in range(n):
+        after = (k + 1) % n
+        faces += [[k, after, n + after], [k, n + after, n + k]]
+    i = mesh(vertices, np.array(faces))
+    ground = frame(np.zeros(3), np.eye(3))
+    standing = points_of(i, frame([0, 0, 0.1999], np.eye(3)), PLANE, ground)
+    down = standing[standing[:, 0] > 0.0]
+    assert down[:, 7].sum() == pytest.approx(4.0, abs=1e-12)
+    np.testing.assert_allclose(down[:, 7] @ down[:, 1:3], 0.0, atol=0.01)
+    tilted = points_of(i, frame([0, 0, 0.21], rotation([0.3, 0.0, 0.0])), PLANE, ground)
+    assert tilted[tilted[:, 0] > 0.0, 7].sum() == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("plain", [False, True])

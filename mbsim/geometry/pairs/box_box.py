@@ -44,6 +44,8 @@ BOX_BOX_SLOTS = 12
 FACES_FIRST = 1e-6
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
+#: A point with a smaller share is none: it would be an incident without force.
+LEAST_SHARE = 1e-6
 #: Vertices a scratch polygon holds: 8, and some for what rounding may add.
 CAPACITY = 12
 # scratch: R (9), t (3), the overlap along each axis (15)
@@ -322,6 +324,8 @@ def _manifold(frame_j, hi, hj, s, n, points):
                 _turned_over(tilt_j / nn),
             )
         before = after
+        if share <= LEAST_SHARE:
+            continue
         # the midpoint, from J's centre in J's axes
         middle = (x - 0.5 * depth * na, y - 0.5 * depth * nb, hj[kj] - 0.5 * depth * nn)
         depth *= g[0] * na + g[1] * nb + g[2] * nn

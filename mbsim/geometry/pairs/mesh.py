@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, scale, sub, vector
@@ -14,6 +15,7 @@ from mbsim.geometry.catalog import axis, pair, put_point
 from mbsim.geometry.polyhedron import (
     CUBE,
     HULL_SLOTS,
+    LEAST_SHARE,
     hull_slots,
     moved,
     overlapping,
@@ -23,18 +25,57 @@ from mbsim.geometry.polyhedron import (
 from mbsim.model.hull import (
     AT_CORNERS,
     AT_DATA,
+    AT_LOOPS,
     AT_PLANES,
     AT_SHARES,
+    AT_SIDES,
+    AT_STARTS,
     CORNERS,
     FACES,
     MOST_ROWS,
     ROWS,
 )
 
+#: Cosines of the tilt at which a face of a fine mesh begins to lie (6 degrees) and lies (2).
+LEANS, LIES = 0.9945, 0.9994
+
+
+@jitable
+def _shares_of_patches(hull, local, points):
+    """Fill the shares of the patches of a fine mesh over a plane of normal `local`.
+
+    The corners of a side that lies share 4 among them, as those of a box do; as far as none
+    lies, the deepest corner has a share of 1. Facets of a round surface are no sides.
+    """
+    rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
+    planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
+    loops, data = int(hull[AT_LOOPS]), int(hull[AT_DATA])
+    for row in range(rows):
+        points[row, 7] = 0.0
+        if points[row, 0] > points[deepest, 0]:
+            deepest = row
+    for f in range(int(hull[FACES])):
+        lies = step(-dot(vector(hull[planes + 4 * f :]), local), LEANS, 0.0, LIES, 1.0)
+        if lies > 0.0:
+            lies *= hull[int(hull[AT_SIDES]) + f]
+            flat, total = max(flat, lies), total + lies
+            first, last = int(hull[starts + f]), int(hull[starts + f + 1])
+            for at in range(first, last):
+                corner = int(hull[loops + 2 * at])
+                points[int(hull[data + 3 * corner + 2]), 7] += 4.0 * lies / (last - first)
+    if total > 0.0:
+        for row in range(rows):
+            points[row, 7] *= flat / total
+    points[deepest, 7] += 1.0 - flat
+
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
 def mesh_plane(frame_i, size_i, frame_j, size_j, points):
-    """Every corner below the plane is a point; of a patch of corners its deepest one."""
+    """Every corner below the plane is a point; of a patch of corners its deepest one.
+
+    A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
+    the whole force, unless a face lies flat (see `_shares_of_patches`).
+    """
     hull = floats_at(size_i[0], size_i[1])
     n = axis(frame_j, 2)
     height = dot(sub(vector(frame_i), vector(frame_j)), n)
@@ -50,10 +91,18 @@ def mesh_plane(frame_i, size_i, frame_j, size_j, points):
         if depth > points[row, 0]:
             # remember which corner; its place follows once
             points[row, 0], points[row, 1] = depth, k
+    if int(hull[CORNERS]) > rows:
+        _shares_of_patches(hull, local, points)
+    else:
+        for row in range(rows):
+            points[row, 7] = hull[shares + row]
     for row in range(rows):
         depth, k = points[row, 0], int(points[row, 1])
         p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
-        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, hull[shares + row])
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, 7])
+        if points[row, 7] <= LEAST_SHARE:
+            # a point without force is none
+            points[row, 0] = min(depth, 0.0)
     return rows
 
 
