@@ -15,13 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import carray, types
 from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import intrinsic, register_model
+from numba.extending import intrinsic, overload, register_model
 from numba.np import arrayobj
+
+from mbsim.core.memory import floats_at
 
 _WORD = ir.IntType(64)
 
@@ -160,3 +162,24 @@ def call_int(typingctx: Any, address: Any, arguments: Any) -> Any:
 def call_float(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Call the C function at `address` with a tuple of arguments; it returns a double."""
     return _call(types.float64, ir.DoubleType(), arguments)
+
+
+@intrinsic
+def _float_pointer(typingctx: Any, address: Any) -> Any:
+    """Return an integer address as a pointer to doubles."""
+    target = types.CPointer(types.float64)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], context.get_value_type(target))
+
+    return target(types.int64), codegen
+
+
+@overload(floats_at)
+def _floats_at(address: Any, count: Any) -> Any:
+    """Give compiled code its form of `floats_at`."""
+
+    def compiled(address: Any, count: Any) -> Any:
+        return carray(_float_pointer(np.int64(address)), (np.int64(count),))
+
+    return compiled

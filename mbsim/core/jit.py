@@ -29,6 +29,7 @@ from numba.core import event
 from numba.core.caching import CacheImpl, _CacheLocator
 from numba.extending import register_jitable
 
+import mbsim.core.address  # noqa: F401  (compiled forms of core.memory)
 from mbsim.core.jitable import take_marked
 
 PACKAGE = Path(__file__).resolve().parent.parent

@@ -4,13 +4,15 @@ A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count
 arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
-* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing;
+* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing | of a
+  convex mesh the address and length of its polyhedron (`model.hull`);
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   and its share of the law's force (1 unless a manifold splits the force of one corner over
   several points, so that the sum does not jump when a corner passes over an edge).
 
-It fills every one of its `slots` rows and returns their number, or `NOT_MINE` where the
+It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
+their number, or `NOT_MINE` where the
 closed form does not hold for this pose: the pair then goes through FCL. A slot's identity
 over time is its row (a corner of a box keeps its row).
 The largest depth, where negative, is a lower bound of the distance of the two shapes.

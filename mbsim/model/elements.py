@@ -94,6 +94,7 @@ class Graphic:
     vertices: Array | None = None  # (n, 3)
     faces: npt.NDArray[np.int64] | None = None  # (m, 3), zero-based
     mesh_file: str = ""
+    hull: Array | None = None  # of a convex mesh: its polyhedron, packed as in model.hull
     is_material_inside: bool = True
     source: Source = Source()
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from mbsim.errors import ModelError
 from mbsim.model import elements as el
+from mbsim.model.hull import polyhedron_of
 from mbsim.model.mesh import load_mesh, merge_vertices
 from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
 from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, REAL_NO_EXPRESSION, TEXT, keyword
@@ -103,6 +104,8 @@ def _build_graphic(entry: Entry) -> None:
     offset = [sum(f * s for f, s in zip(row, size, strict=True)) for row in shape.offset]
     vertices, faces, file = _mesh(entry) if shape.shape == "MESH" else (None, None, "")
 
+    convex = None if vertices is None or faces is None else polyhedron_of(vertices, faces)
+
     id = entry.get("id")
     if id in entry.draft.display_graphics:
         entry.fault("id already used; ids are unique per statement", "id")
@@ -118,6 +121,7 @@ def _build_graphic(entry: Entry) -> None:
         vertices=vertices,
         faces=faces,
         mesh_file=file,
+        hull=convex,
         is_material_inside=entry.get("is_material_inside", True),
         source=entry.source,
     )

@@ -19,6 +19,7 @@ from mbsim.results.reading import Results, open_results
 from mbsim.results.requests import COLUMNS, evaluate
 from mbsim.results.store import Store, Value
 from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.system.pairing import shape_class
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -322,12 +323,17 @@ def _nothing(system: System) -> Block:
     return Block(*(getattr(rows, field)[:0].copy() for field in fields))
 
 
+def _without_size(graphics: Any) -> list[Table]:
+    """Return the graphics' arrays but `size`, which holds addresses where meshes are."""
+    return [array for array in graphics if array is not graphics.size]
+
+
 def _digests(system: System) -> dict[str, Value]:
     """Return digests of the model as it is run (--set included) and of users' files."""
     scene = system.scene
     arrays = [
         *scene.bodies,
-        *scene.graphics,
+        *_without_size(scene.graphics),
         scene.contacts.id,
         scene.contacts.normal_par,
         scene.contacts.friction_par,
@@ -339,6 +345,7 @@ def _digests(system: System) -> dict[str, Value]:
     # addresses are left out: they are others in every process
     text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
     text += [repr(system.plans)]
+    text += [f"{g.id} {shape_class(g)} {g.size}" for g in system.model.graphics.values()]
     text += [repr(request) for request in system.model.requests.values()]
     model = hashlib.sha256("\n".join(text).encode())
     for array in arrays:

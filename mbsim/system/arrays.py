@@ -79,7 +79,7 @@ class Kinds(NamedTuple):
     kernel: I1  # (nk,) address, 0 where FCL does it
     slots: I1  # (nk,) points it gives at most
     swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
-    regroups: I1  # (nk,) 1 where points may appear deep in a contact: FCL chooses them anew
+    regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
     noise: F1  # (nk,) scatter of the normals that its detector gives
 
 

@@ -31,6 +31,7 @@ from mbsim.system.pairing import (
     kernel_size,
     plan_pairs,
     reach,
+    shape_class,
     thinnest,
 )
 
@@ -130,7 +131,7 @@ def _graphics(
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
         made.thin[g] = thinnest(graphic)
-        made.shape[g] = shapes.index(graphic.shape)
+        made.shape[g] = shapes.index(shape_class(graphic))
         made.marker_p[g] = marker.p_B
         made.marker_R[g] = marker.R_B
     return made
@@ -144,7 +145,7 @@ def _kinds(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
         kernel=np.array([known.get(k.closed_form, 0) for k in kinds], dtype=np.int64),
         slots=np.array([k.slots for k in kinds], dtype=np.int64),
         swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
-        regroups=np.array([not k.closed_form or k.may_need_fcl for k in kinds], dtype=np.int64),
+        regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
         noise=np.array(
             [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),
@@ -456,7 +457,7 @@ def build(
     listed = [g for plan in plans.pairs for g in (plan.graphic_i, plan.graphic_j)]
     crowded = [g for crowd in plans.crowds for g in (*crowd.i, *crowd.j)]
     graphic_ids = list(dict.fromkeys([*listed, *crowded]))
-    shapes = sorted({model.graphics[g].shape for g in graphic_ids})
+    shapes = sorted({shape_class(model.graphics[g]) for g in graphic_ids})
     contact_list = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
     contact_ids = [contact.id for contact in contact_list]
     contact_row = {contact_id: k for k, contact_id in enumerate(contact_ids)}

@@ -8,11 +8,14 @@ with itself: each pair once, none on one body.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
 
 from mbsim.errors import DeckError, Fault
 from mbsim.geometry.catalog import PAIRS
+from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
+from mbsim.model import hull
 from mbsim.model.elements import Contact, Graphic, Model
 
 #: Shapes with flat sides: FCL gives several points for two of them, one for all others.
@@ -37,7 +40,12 @@ class Kind:
     @property
     def may_need_fcl(self) -> bool:
         """Whether the closed form holds only far from edges."""
-        return self.closed_form in ("BOX-BOX", "CYLINDER-BOX")
+        return self.closed_form == "CYLINDER-BOX"
+
+    @property
+    def regroups(self) -> bool:
+        """Whether points may appear deep in a contact: a corner becomes two crossings, or FCL's."""
+        return self.closed_form in ("", "BOX-BOX", "MESH-BOX", "MESH-MESH") or self.may_need_fcl
 
     @property
     def detector(self) -> str:
@@ -59,7 +67,7 @@ class PairPlan:
 
 @dataclass(frozen=True)
 class CrowdPlan:
-    """A contact of many graphics (ids), with its kinds by shape of the contact's I and J."""
+    """A contact of many graphics (ids), with its kinds by shape class of the contact's I and J."""
 
     contact: int
     i: tuple[int, ...]
@@ -89,17 +97,45 @@ class Plans:
         return list(dict.fromkeys([*listed, *crowded]))
 
 
+def _convex(*graphics: Graphic) -> bool:
+    """Whether every mesh among the graphics is convex: the closed forms know no others."""
+    return all(graphic.shape != "MESH" or graphic.hull is not None for graphic in graphics)
+
+
+def _mesh_slots(i: Graphic, j: Graphic) -> int:
+    """Return the rows of a pair with convex meshes, 0 where it is too large for a closed form."""
+    if i.hull is None:
+        assert j.hull is not None
+        return 1 if j.hull[hull.EDGES] <= MOST_EDGES else 0
+    if j.shape == "PLANE":
+        return int(i.hull[hull.ROWS])
+    other = CUBE if j.hull is None else j.hull
+    slots = hull_slots(i.hull, other)
+    edges = i.hull[hull.EDGES] * other[hull.EDGES]
+    return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
+
+
 def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
     """Return how graphics like these two are tested."""
     flat = i.shape in _FLAT and j.shape in _FLAT
     fcl_slots = FCL_SLOTS if flat else 1
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{a.shape}-{b.shape}"
-        if name in PAIRS and detector != "fcl":
-            # a box over a box may have to fall back on FCL, whose points need places too
-            slots = max(PAIRS[name].slots, fcl_slots)
-            return Kind(contact, a.shape, b.shape, swapped, name, slots)
+        if name in PAIRS and detector != "fcl" and _convex(a, b):
+            if "MESH" in name:
+                slots = _mesh_slots(a, b)
+                if slots == 0:
+                    break
+                return Kind(contact, a.shape, b.shape, swapped, name, slots)
+            return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
     return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
+
+
+def shape_class(graphic: Graphic) -> str:
+    """Return what graphics have in common that are tested in the same way."""
+    if graphic.vertices is None:
+        return graphic.shape
+    return f"{graphic.shape} {hashlib.sha256(graphic.vertices.tobytes()).hexdigest()[:12]}"
 
 
 def _two_planes(model: Model, contact: Contact, i: int, j: int) -> Fault:
@@ -123,7 +159,7 @@ def _crowd(
     first: list[dict[str, int]] = [{}, {}]
     for side, ids in zip(first, (i_ids, j_ids), strict=True):
         for id in ids:
-            side.setdefault(model.graphics[id].shape, id)
+            side.setdefault(shape_class(model.graphics[id]), id)
     for shape_i, i in first[0].items():
         for shape_j, j in first[1].items():
             if shape_i == shape_j == "PLANE":
@@ -221,6 +257,9 @@ def kernel_size(graphic: Graphic) -> tuple[float, float, float]:
         return (graphic.size[0], 0.5 * graphic.size[1], 0.0)
     if graphic.shape == "SPHERE":
         return (graphic.size[0], 0.0, 0.0)
+    if graphic.hull is not None:
+        # the model keeps the polyhedron for as long as the scene lives
+        return (float(graphic.hull.ctypes.data), float(len(graphic.hull)), 0.0)
     if graphic.shape in ("PLANE", "MESH"):
         return (0.0, 0.0, 0.0)
     return half_extent(graphic)

@@ -53,7 +53,8 @@ def candidates(name, frame_i, frame_j):
     return count, points
 
 
-@pytest.fixture(params=list(PAIRS))
+# pairs of meshes have their own tests: their rows depend on the mesh
+@pytest.fixture(params=[name for name in PAIRS if "MESH" not in name])
 def name(request):
     return request.param
 
@@ -68,8 +69,8 @@ def test_fills_every_row_with_numbers_and_unit_normals(name):
         assert count == PAIRS[name].slots
         assert np.isfinite(points).all()
         np.testing.assert_allclose(np.linalg.norm(points[:, 4:7], axis=1), 1.0, atol=1e-12)
-    # boxes at random near each other are seldom over the middle of a face
-    assert used > 0 or name in ("BOX-BOX", "CYLINDER-BOX")
+    # a cylinder at random near a box is seldom over the middle of a face
+    assert used > 0 or name == "CYLINDER-BOX"
 
 
 def test_compiled_equals_plain(name):
@@ -186,30 +187,19 @@ def test_upright_cylinder_has_isotropic_stiffness_against_tilting():
 def test_box_over_the_middle_of_a_face_is_a_box_on_a_plane():
     slab = frame([0.0, 0.0, -0.5], np.eye(3))
     small = np.array([0.1, 0.1, 0.1])
-    points = np.zeros((8, POINT))
+    points = np.zeros((PAIRS["BOX-BOX"].slots, POINT))
     count = PAIRS["BOX-BOX"].points(
         frame([0.3, 0.2, 0.099], np.eye(3)), small, slab, np.array([2.0, 2.0, 0.5]), points
     )
-    assert count == 8
+    assert count == len(points)
     down = points[points[:, 0] > 0]
     assert len(down) == 4
     np.testing.assert_allclose(down[:, 0], 1e-3, atol=1e-15)
     np.testing.assert_allclose(down[:, 4:7], [[0, 0, 1]] * 4)
+    np.testing.assert_array_equal(down[:, 7], 1.0)
     # the other way round the normal still points from J into I
     count = PAIRS["BOX-BOX"].points(
         slab, np.array([2.0, 2.0, 0.5]), frame([0.3, 0.2, 0.099], np.eye(3)), small, points
     )
-    assert count == 8
+    assert count == len(points)
     np.testing.assert_allclose(points[points[:, 0] > 0][:, 4:7], [[0, 0, -1]] * 4)
-
-
-def test_box_near_an_edge_is_left_to_fcl():
-    points = np.zeros((8, POINT))
-    count = PAIRS["BOX-BOX"].points(
-        frame([1.95, 0.0, 0.099], np.eye(3)),
-        np.array([0.1, 0.1, 0.1]),
-        frame([0.0, 0.0, -0.5], np.eye(3)),
-        np.array([2.0, 2.0, 0.5]),
-        points,
-    )
-    assert count == NOT_MINE

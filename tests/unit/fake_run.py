@@ -70,7 +70,7 @@ def fake_system_of(model: Model) -> Any:
     )
     scene = SimpleNamespace(
         bodies=(np.array([body.mass for body in bodies]),),
-        graphics=(),
+        graphics=a.Graphics(*[np.zeros(0)] * len(a.Graphics._fields)),
         contacts=contacts,
         world=SimpleNamespace(gravity=np.array(model.gravity.g), scale=np.ones(2)),
         log=a.Log(log, np.zeros(a.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 3), np.int64)),

@@ -1,4 +1,4 @@
-"""A box or a cylinder on a plane, and on the face of a box far from that face's edges."""
+"""A box or a cylinder on a plane, a cylinder on the face of a box far from its edges."""
 
 from __future__ import annotations
 
@@ -86,28 +86,6 @@ def face_below(frame_j, size_j, centre, radius):
         if inside and abs(height) > size_j[k]:
             return k, 1.0 if height > 0.0 else -1.0
     return NOT_MINE, 0.0
-
-
-@pair("BOX", "BOX", slots=BOX_SLOTS)
-def box_box(frame_i, size_i, frame_j, size_j, points):
-    """A box over a face of the other, far from its edges; the normal points from J into I."""
-    radius_i = math.sqrt(size_i[0] ** 2 + size_i[1] ** 2 + size_i[2] ** 2)
-    k, sign = face_below(frame_j, size_j, vector(frame_i), radius_i)
-    if k >= 0:
-        n = scale(sign, axis(frame_j, k))
-        origin = add(vector(frame_j), scale(size_j[k], n))
-        return box_on_plane(frame_i, size_i, origin, n, points)
-    radius_j = math.sqrt(size_j[0] ** 2 + size_j[1] ** 2 + size_j[2] ** 2)
-    k, sign = face_below(frame_i, size_i, vector(frame_j), radius_j)
-    if k < 0:
-        return NOT_MINE
-    n = scale(sign, axis(frame_i, k))
-    origin = add(vector(frame_i), scale(size_i[k], n))
-    count = box_on_plane(frame_j, size_j, origin, n, points)
-    for row in range(count):
-        for column in range(4, 7):
-            points[row, column] = -points[row, column]
-    return count
 
 
 @pair("CYLINDER", "BOX", slots=CYLINDER_SLOTS)

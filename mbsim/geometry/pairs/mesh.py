@@ -1,0 +1,155 @@
+"""Convex meshes on a plane, on a box and on each other; a sphere on a convex mesh.
+
+`size` of a mesh is address and length of its packed polyhedron (`model.hull`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.blend import step
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.geometry.polyhedron import (
+    CUBE,
+    HULL_SLOTS,
+    LEAST_SHARE,
+    hull_slots,
+    moved,
+    overlapping,
+    to_global,
+    way_out,
+)
+from mbsim.model.hull import (
+    AT_CORNERS,
+    AT_DATA,
+    AT_LOOPS,
+    AT_PLANES,
+    AT_SHARES,
+    AT_SIDES,
+    AT_STARTS,
+    CORNERS,
+    FACES,
+    MOST_ROWS,
+    ROWS,
+)
+
+#: Cosines of the tilt at which a face of a fine mesh begins to lie (6 degrees) and lies (2).
+LEANS, LIES = 0.9945, 0.9994
+
+
+@jitable
+def _shares_of_patches(hull, local, points):
+    """Fill the shares of the patches of a fine mesh over a plane of normal `local`.
+
+    The corners of a side that lies share 4 among them, as those of a box do; as far as none
+    lies, the deepest corner has a share of 1. Facets of a round surface are no sides.
+    """
+    rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
+    planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
+    loops, data = int(hull[AT_LOOPS]), int(hull[AT_DATA])
+    for row in range(rows):
+        points[row, 7] = 0.0
+        if points[row, 0] > points[deepest, 0]:
+            deepest = row
+    for f in range(int(hull[FACES])):
+        lies = step(-dot(vector(hull[planes + 4 * f :]), local), LEANS, 0.0, LIES, 1.0)
+        if lies > 0.0:
+            lies *= hull[int(hull[AT_SIDES]) + f]
+            flat, total = max(flat, lies), total + lies
+            first, last = int(hull[starts + f]), int(hull[starts + f + 1])
+            for at in range(first, last):
+                corner = int(hull[loops + 2 * at])
+                points[int(hull[data + 3 * corner + 2]), 7] += 4.0 * lies / (last - first)
+    if total > 0.0:
+        for row in range(rows):
+            points[row, 7] *= flat / total
+    points[deepest, 7] += 1.0 - flat
+
+
+@pair("MESH", "PLANE", slots=MOST_ROWS)
+def mesh_plane(frame_i, size_i, frame_j, size_j, points):
+    """Every corner below the plane is a point; of a patch of corners its deepest one.
+
+    A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
+    the whole force, unless a face lies flat (see `_shares_of_patches`).
+    """
+    hull = floats_at(size_i[0], size_i[1])
+    n = axis(frame_j, 2)
+    height = dot(sub(vector(frame_i), vector(frame_j)), n)
+    local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
+    rows = int(hull[ROWS])
+    corners, data = int(hull[AT_CORNERS]), int(hull[AT_DATA])
+    shares = int(hull[AT_SHARES])
+    for row in range(rows):
+        points[row, 0] = -math.inf
+    for k in range(int(hull[CORNERS])):
+        row = int(hull[data + 3 * k + 2])
+        depth = -height - dot(vector(hull[corners + 3 * k :]), local)
+        if depth > points[row, 0]:
+            # remember which corner; its place follows once
+            points[row, 0], points[row, 1] = depth, k
+    if int(hull[CORNERS]) > rows:
+        _shares_of_patches(hull, local, points)
+    else:
+        for row in range(rows):
+            points[row, 7] = hull[shares + row]
+    for row in range(rows):
+        depth, k = points[row, 0], int(points[row, 1])
+        p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, 7])
+        if points[row, 7] <= LEAST_SHARE:
+            # a point without force is none
+            points[row, 0] = min(depth, 0.0)
+    return rows
+
+
+@jitable
+def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
+    """Write the points of two polyhedra; rows without a point hold the gap, 0 in overlap."""
+    rows = hull_slots(hull_i, hull_j)
+    for row in range(rows):
+        put_point(points[row], 0.0, vector(frame_j), axis(frame_j, 2))
+    gap = overlapping(moved(hull_i, frame_i, frame_j), hull_j, frame_j, points)
+    if gap > 0.0:
+        for row in range(rows):
+            points[row, 0] = -gap
+    return rows
+
+
+@pair("MESH", "MESH", slots=HULL_SLOTS)
+def mesh_mesh(frame_i, size_i, frame_j, size_j, points):
+    """The common polygon of the two faces that look at each other."""
+    hull_i, hull_j = floats_at(size_i[0], size_i[1]), floats_at(size_j[0], size_j[1])
+    return _two_hulls(frame_i, hull_i, frame_j, hull_j, points)
+
+
+@pair("MESH", "BOX", slots=HULL_SLOTS)
+def mesh_box(frame_i, size_i, frame_j, size_j, points):
+    """A box is a polyhedron too."""
+    box = CUBE.copy()
+    corners, planes = int(box[AT_CORNERS]), int(box[AT_PLANES])
+    for k in range(int(box[CORNERS])):
+        for c in range(3):
+            box[corners + 3 * k + c] *= size_j[c]
+    for f in range(int(box[FACES])):
+        reach = 0.0
+        for c in range(3):
+            reach += abs(box[planes + 4 * f + c]) * size_j[c]
+        box[planes + 4 * f + 3] = reach
+    return _two_hulls(frame_i, floats_at(size_i[0], size_i[1]), frame_j, box, points)
+
+
+@pair("SPHERE", "MESH", slots=1)
+def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
+    """The nearest point of the mesh to the centre; inside, the way out through the nearest face."""
+    hull = floats_at(size_j[0], size_j[1])
+    apart = sub(vector(frame_i), vector(frame_j))
+    c = (dot(apart, axis(frame_j, 0)), dot(apart, axis(frame_j, 1)), dot(apart, axis(frame_j, 2)))
+    distance, n = way_out(hull, c)
+    n = to_global(frame_j, n)
+    depth = size_i[0] - distance
+    put_point(points[0], depth, sub(vector(frame_i), scale(size_i[0] - 0.5 * depth, n)), n)
+    return 1
