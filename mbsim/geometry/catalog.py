@@ -4,7 +4,8 @@ A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count
 arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
-* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing;
+* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | bottom radius,
+  top radius, half length of a frustum | nothing;
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   and its share of the law's force (1 unless a manifold splits the force of one corner over

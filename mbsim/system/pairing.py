@@ -28,7 +28,7 @@ class PairPlan:
     @property
     def may_need_fcl(self) -> bool:
         """Whether the closed form holds only far from edges."""
-        return self.closed_form in ("BOX-BOX", "CYLINDER-BOX")
+        return self.closed_form == "BOX-BOX"
 
     @property
     def detector(self) -> str:
@@ -99,6 +99,9 @@ def half_extent(graphic: Graphic) -> tuple[float, float, float]:
         return (0.5 * size[0], 0.5 * size[1], 0.5 * size[2])
     if graphic.shape == "CYLINDER":
         return (size[0], size[0], 0.5 * size[1])
+    if graphic.shape == "FRUSTUM":
+        widest = max(size[0], size[1])
+        return (widest, widest, 0.5 * size[2])
     if graphic.shape == "PLANE":
         return (math.inf, math.inf, math.inf)
     assert graphic.vertices is not None
@@ -114,6 +117,8 @@ def reach(graphic: Graphic) -> float:
         return max(graphic.size)
     if graphic.shape == "CYLINDER":
         return math.hypot(graphic.size[0], 0.5 * graphic.size[1])
+    if graphic.shape == "FRUSTUM":
+        return math.hypot(max(graphic.size[:2]), 0.5 * graphic.size[2])
     if graphic.shape == "MESH":
         assert graphic.vertices is not None
         return float((graphic.vertices**2).sum(axis=1).max() ** 0.5)
@@ -124,6 +129,8 @@ def kernel_size(graphic: Graphic) -> tuple[float, float, float]:
     """Return the three numbers that the closed forms take (see `geometry.catalog`)."""
     if graphic.shape == "CYLINDER":
         return (graphic.size[0], 0.5 * graphic.size[1], 0.0)
+    if graphic.shape == "FRUSTUM":
+        return (graphic.size[0], graphic.size[1], 0.5 * graphic.size[2])
     if graphic.shape == "SPHERE":
         return (graphic.size[0], 0.0, 0.0)
     if graphic.shape in ("PLANE", "MESH"):
