@@ -36,17 +36,19 @@ class Pair(NamedTuple):
     name: str
     points: Callable[..., int]
     slots: int
+    #: Whether a contact that goes on may begin another row (a corner that passes over an edge).
+    regroups: bool = False
 
 
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 
 
-def pair(shape_i: str, shape_j: str, slots: int) -> Any:
+def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
     def register(points: Callable[..., int]) -> Callable[..., int]:
         name = f"{shape_i}-{shape_j}"
-        PAIRS.put(name, Pair(name, jitable(points), slots))
+        PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
         return points
 
     return register

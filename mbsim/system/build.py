@@ -134,9 +134,7 @@ def _pairs(
         slot=np.concatenate([[0], np.cumsum([plan.slots for plan in plans])]).astype(np.int64),
         kernel=np.zeros(n, dtype=np.int64),
         watched=np.ones(n, dtype=np.int64),
-        regroups=np.array(
-            [not plan.closed_form or plan.may_need_fcl for plan in plans], dtype=np.int64
-        ),
+        regroups=np.array([plan.regroups for plan in plans], dtype=np.int64),
         thickness=np.zeros(n),
         noise=np.zeros(n),
     )

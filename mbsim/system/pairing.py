@@ -31,6 +31,13 @@ class PairPlan:
         return self.closed_form == "BOX-BOX"
 
     @property
+    def regroups(self) -> bool:
+        """Whether a contact that goes on may begin another slot, which is then no impact."""
+        if not self.closed_form or self.may_need_fcl:
+            return True
+        return PAIRS[self.closed_form].regroups
+
+    @property
     def detector(self) -> str:
         """How `mbsim check` names it."""
         if not self.closed_form:
