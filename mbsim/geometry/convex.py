@@ -145,51 +145,76 @@ def between_round(i, j, n, far_apart):
 
 
 @jitable
-def along_circle(i, j, c, gamma, start):
-    """Return (f, n) of least overlap on the circle of unit vectors n with n.c = gamma.
+def on_circle(base, u, v, k, p):
+    """Return base + k (u cos p + v sin p)."""
+    return add(base, add(scale(k * math.cos(p), u), scale(k * math.sin(p), v)))
 
-    n(p) = gamma c + sqrt(1 - gamma^2) (u cos p + v sin p); f' = n'.d. Seven directions within a
-    half circle around `start` bracket the minimum, then the root of f' is closed in on.
+
+@jitable
+def slope_at(i, j, base, u, v, k, p):
+    """Return n(p), f and f'(p) = n'.d on a circle of normals."""
+    n = on_circle(base, u, v, k, p)
+    f, d = overlap(i, j, n)
+    return n, f, k * (math.cos(p) * dot(v, d) - math.sin(p) * dot(u, d))
+
+
+@jitable
+def along_circle(i, j, c, gamma, known, n_known):
+    """Return the better of (known, n_known) and the least overlap on the circle n.c = gamma.
+
+    n(p) = gamma c + sqrt(1 - gamma^2) (u cos p + v sin p). Twelve directions bracket the
+    minimum, then the root of f' is closed in on. On an edge's circle (gamma 0) f is a
+    sum of support functions, f'' + f >= 0, so f(p + s) >= f cos s + f' sin s: a bracket that cannot
+    beat what is known is left.
     """
-    u = sub(start, scale(dot(start, c), c))
-    length = norm(u)
-    u = scale(1.0 / length, u) if length > 1e-9 else any_tangent(c)
+    u = any_tangent(c)
     v = cross(c, u)
     k = math.sqrt(max(0.0, 1.0 - gamma * gamma))
     base = scale(gamma, c)
     best, low = 0, math.inf
-    for m in range(-3, 4):
-        p = m * math.pi / 6.0
-        n = add(base, add(scale(k * math.cos(p), u), scale(k * math.sin(p), v)))
-        f, _ = overlap(i, j, n)
+    width = math.pi / 6.0
+    for m in range(12):
+        f, _ = overlap(i, j, on_circle(base, u, v, k, m * width))
         if f < low:
             best, low = m, f
-    a, b = (best - 1) * math.pi / 6.0, (best + 1) * math.pi / 6.0
-    fa, fb = -1.0, 1.0
-    known_a, known_b = False, False
+    a, b = (best - 1) * width, (best + 1) * width
+    n, f, fa = slope_at(i, j, base, u, v, k, a)
+    _, g, fb = slope_at(i, j, base, u, v, k, b)
+    if fa >= 0.0 or fb <= 0.0:
+        # a hump beside the bracket: only halving is safe at first
+        fa, fb = -1e-300, 1e-300
+    elif gamma == 0.0:
+        # both bounds meet at s from a
+        w = b - a
+        p, q = f - g * math.cos(w) + fb * math.sin(w), fa - g * math.sin(w) - fb * math.cos(w)
+        s = math.atan2(p, -q)
+        if 0.0 < s < w and f * math.cos(s) + fa * math.sin(s) >= known:
+            return known, n_known
     side = 0
-    n = add(base, u)
-    f = low
-    for step in range(80):
-        # Illinois rule, halving as long as an end has no slope or it goes slowly
-        if known_a and known_b and step % 4 != 3:
-            p = (a * fb - b * fa) / (fb - fa)
-        else:
-            p = 0.5 * (a + b)
-        n = add(base, add(scale(k * math.cos(p), u), scale(k * math.sin(p), v)))
-        f, d = overlap(i, j, n)
-        slope = k * (math.cos(p) * dot(v, d) - math.sin(p) * dot(u, d))
-        if abs(slope) <= 1e-16 * norm(d) or b - a < 4e-16:
+    for step in range(60):
+        # Illinois rule, with a halving in between
+        p = (
+            0.5 * (a + b)
+            if step % 5 == 4 or fb < 1e-290 or fa > -1e-290
+            else (a * fb - b * fa) / (fb - fa)
+        )
+        n, f, slope = slope_at(i, j, base, u, v, k, p)
+        if slope == 0.0 or b - a < 1e-15:
             break
         if slope < 0.0:
-            a, fa, known_a = p, slope, True
+            # the other end stays: halve its weight if it stayed before
+            moved = p - a
+            a, fa = p, slope
             fb = 0.5 * fb if side == -1 else fb
             side = -1
         else:
-            b, fb, known_b = p, slope, True
+            moved = b - p
+            b, fb = p, slope
             fa = 0.5 * fa if side == 1 else fa
             side = 1
-    return f, n
+        if moved < 1e-15:
+            break
+    return (f, n) if f < known else (known, n_known)
 
 
 @jitable
@@ -246,6 +271,21 @@ def meeting(i, j, a, ga, b, gb, f, n):
         if g < f:
             f, n = g, m
     return f, n
+
+
+@jitable
+def shallow(i, j):
+    """Return the overlap up to which a direction of locally least overlap is the least of all.
+
+    A twentieth of the smallest size: another one as shallow needs shapes that thin.
+    """
+    least = math.inf
+    for k in range(3):
+        for shape in (i, j):
+            # the tip of a cone has no size
+            if shape[5][k] > 0.0:
+                least = min(least, shape[5][k])
+    return 0.05 * least
 
 
 @jitable

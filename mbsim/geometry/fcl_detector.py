@@ -104,7 +104,9 @@ class FclDetector:
         n = _SIDES
         angle = 2.0 * np.pi * np.arange(n) / n
         ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / n)
-        ends = [np.column_stack([r * ring, np.full(n, z)]) for r, z in ((bottom, -half), (top, half))]
+        ends = [
+            np.column_stack([r * ring, np.full(n, z)]) for r, z in ((bottom, -half), (top, half))
+        ]
         vertices = np.vstack([*ends, [[0.0, 0.0, -half], [0.0, 0.0, half]]])
         k = np.arange(n)
         m = (k + 1) % n

@@ -11,7 +11,16 @@ from mbsim.errors import ModelError
 from mbsim.model import elements as el
 from mbsim.model.mesh import load_mesh, merge_vertices
 from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
-from mbsim.reader.kinds import FLAG, ID, NOT_NEGATIVE, POSITIVE, REAL, REAL_NO_EXPRESSION, TEXT, keyword
+from mbsim.reader.kinds import (
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    REAL_NO_EXPRESSION,
+    TEXT,
+    keyword,
+)
 from mbsim.reader.parse import Node
 from mbsim.reader.statement import Entry, Spec, Statement
 
@@ -146,7 +155,7 @@ def _check_attributes(entry: Entry, shape: Shape) -> None:
             allowed = (NOT_NEGATIVE if name in _RADII else POSITIVE).allowed
             entry.fault(f"{name}: missing; must be {allowed} for type {shape.type}")
     if shape.shape == "FRUSTUM" and all(entry.get(name, 1.0) == 0.0 for name in _RADII):
-        entry.fault('must be > 0 where bottom_radius is 0: a line has no volume', "top_radius")
+        entry.fault("must be > 0 where bottom_radius is 0: a line has no volume", "top_radius")
     for name in _BOUNDS:
         if entry.given(name) and shape.shape == "PLANE":
             entry.note("contact uses the whole plane, the half-space z <= 0", name)

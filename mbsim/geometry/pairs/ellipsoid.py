@@ -16,6 +16,7 @@ from mbsim.geometry.convex import (
     line_of_centres,
     overlap,
     placed,
+    shallow,
     slant,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
@@ -123,7 +124,7 @@ def over_face(i, j):
         a = j[2] if k == 0 else (j[3] if k == 1 else j[4])
         if abs(dot(a, n)) > 0.5 or abs(dot(d, a)) <= j[5][k]:
             inside += 1
-    return f, n, inside == 3
+    return f, n, inside == 3 and f < shallow(i, j)
 
 
 @pair("ELLIPSOID", "BOX", slots=1)
@@ -137,9 +138,7 @@ def ellipsoid_box(frame_i, size_i, frame_j, size_j, points):
     start = n
     for k in range(3):
         edge = j[2] if k == 0 else (j[3] if k == 1 else j[4])
-        g, m = along_circle(i, j, edge, 0.0, line_of_centres(i, j))
-        if g < f:
-            f, n = g, m
+        f, n = along_circle(i, j, edge, 0.0, f, n)
     # against a corner; from the best edge and from the line of centres
     g, m = between_round(i, j, n, 0.1 * smallest(i[5]))
     if g < f:
@@ -162,11 +161,14 @@ def ellipsoid_on_solid(i, j, points):
         return put_under(i, f, n, points)
     start = n
     centres = line_of_centres(i, j)
-    g, m = along_circle(i, j, j[4], slant(j[5]), centres)
-    if g < f:
-        f, n = g, m
+    side, m = along_circle(i, j, j[4], slant(j[5]), 1e300, n)
+    # the normals of a rim lie between those of the end and of the side
+    between = add(start, m)
+    if side < f:
+        f, n = side, m
+    between = scale(1.0 / max(norm(between), 1e-9), between)
     for k in range(3):
-        g, m = between_round(i, j, n if k == 0 else (centres if k == 1 else start), limit)
+        g, m = between_round(i, j, n if k == 0 else (centres if k == 1 else between), limit)
         if g < f:
             f, n = g, m
     return put_under(i, f, n, points)

@@ -13,9 +13,9 @@ from mbsim.geometry.convex import (
     along_circle,
     far,
     flat,
-    line_of_centres,
     meeting,
     placed,
+    shallow,
     slant,
 )
 from mbsim.geometry.manifold import (
@@ -69,7 +69,7 @@ def over(i, j, n):
 def least(i, j):
     """Return (f, n) of the least overlap of a solid of revolution I and a box J."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
-    if f < 0.0 or over(i, j, n):
+    if f < 0.0 or (f < shallow(i, j) and over(i, j, n)):
         return f, n
     f, n = flat(i, j, i, -1.0, f, n)
     # n points into I: the outward normal of I is -n
@@ -78,15 +78,12 @@ def least(i, j):
         f, n = meeting(i, j, edge_axis(j, k), 0.0, i[4], gamma, f, n)
     if f < 0.0:
         return f, n
-    start = n
     for k in range(4):
         # rims on edges, then corners on the side
         if k < 3:
-            g, m = along_circle(i, j, edge_axis(j, k), 0.0, start)
+            f, n = along_circle(i, j, edge_axis(j, k), 0.0, f, n)
         else:
-            g, m = along_circle(i, j, i[4], gamma, line_of_centres(i, j))
-        if g < f:
-            f, n = g, m
+            f, n = along_circle(i, j, i[4], gamma, f, n)
         if f < 0.0:
             break
     return f, n
