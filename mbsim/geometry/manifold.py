@@ -43,26 +43,44 @@ def fade(x):
 
 
 @jitable
-def half_sector(start, length):
-    """Return (angle, nearest) that an arc has within [0, 60 degrees].
+def half_sector(arcs, count, begin, sign):
+    """Return (angle, c, s) of what arcs leave of the 60 degrees from `begin` on.
 
-    `start` in [0, 2 pi) and `length` are its angles; `nearest` is the least angle of it there.
+    `sign` 1 looks to the left, -1 to the right; c, s are cosine and sine of the place that stands
+    for it, times the angle: `begin` itself where some tenths of a radian are left there, else
+    the mean of where the arcs come nearest to it.
     """
     width = TURN / 6.0
-    angle, nearest = 0.0, math.inf
-    if start < width:
-        angle = min(length, width - start)
-        nearest = start
-    # past a full turn it comes back to 0
-    if start + length > TURN:
-        angle += min(start + length - TURN, width)
-        nearest = 0.0
-    return min(angle, width), nearest
+    near, rest, c, s = 0.0, 0.0, 0.0, 0.0
+    for m in range(count):
+        start, length = arcs[m, 0], arcs[m, 1]
+        if length <= 0.0:
+            continue
+        # angles from begin, counted towards the half
+        first = (start - begin) % TURN if sign > 0.0 else (begin - start - length) % TURN
+        if first + length > TURN:
+            near = max(near, min(first + length - TURN, width))
+        if first == 0.0:
+            near = max(near, min(length, width))
+        elif first < width:
+            angle = min(length, width - first)
+            rest += angle
+            c += angle * math.cos(begin + sign * first)
+            s += angle * math.sin(begin + sign * first)
+    total = near + rest
+    if near > 0.0:
+        # all of it, the more the rim is whole around `begin`
+        part = fade(near / 0.3)
+        c, s = (1.0 - part) * c, (1.0 - part) * s
+        weight = near + part * rest
+        c += weight * math.cos(begin)
+        s += weight * math.sin(begin)
+    return total, c, s
 
 
 @jitable
 def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
-    """Write three points for what is left of a rim; return nothing.
+    """Write three points for what is left of a rim.
 
     The rim is cut into three sectors around `reference` and +-120 degrees. A sector's
     point is the rim's point in its middle as long as that is left, else the mean of the points
@@ -82,30 +100,15 @@ def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
     centre, u, v, r, depth0, rise = disc
     for k in range(3):
         middle = reference + k * TURN / 3.0
-        right, left, to_right, to_left = 0.0, 0.0, math.inf, math.inf
-        for m in range(count):
-            start, length = arcs[m, 0], arcs[m, 1]
-            if length <= 0.0:
-                continue
-            angle, nearest = half_sector((start - middle) % TURN, length)
-            right += angle
-            to_right = min(to_right, nearest)
-            angle, nearest = half_sector((middle - start - length) % TURN, length)
-            left += angle
-            to_left = min(to_left, nearest)
-        if right + left <= 0.0:
+        left, x, y = half_sector(arcs, count, middle, 1.0)
+        right, c, s = half_sector(arcs, count, middle, -1.0)
+        angle = left + right
+        if angle <= 0.0:
             continue
-        x, y = 0.0, 0.0
-        if right > 0.0:
-            x += right * math.cos(middle + to_right)
-            y += right * math.sin(middle + to_right)
-        if left > 0.0:
-            x += left * math.cos(middle - to_left)
-            y += left * math.sin(middle - to_left)
-        x, y = r * x / (right + left), r * y / (right + left)
+        x, y = r * (x + c) / angle, r * (y + s) / angle
         depth = depth0 + rise * x
         p = add(centre, add(scale(x, u), scale(y, v)))
-        share = weight * (right + left) / TURN
+        share = weight * angle / TURN
         put_share(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, share)
 
 

@@ -58,6 +58,13 @@ def side_distance(shape, p):
 
 
 @jitable
+def pointed(shape, d):
+    """Return how far d is from the normals of ends and side, where no single point is farthest."""
+    c = dot(shape[4], d)
+    return min(abs(c - slant(shape[5])), 1.0 - abs(c))
+
+
+@jitable
 def widest(size):
     """Return the larger radius."""
     return max(size[0], size[1])

@@ -311,14 +311,22 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ("Force_Contact[301]", 'i_graphics_id="200"', "Parasolid", "not built"),
     ),
     "frustum without bottom": (
-        deck(('type="Sphere" center_marker_id="20" radius="0.108"',
-              'type="Frustum" center_marker_id="20" top_radius="1" length="1"')),
+        deck(
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="Frustum" center_marker_id="20" top_radius="1" length="1"',
+            )
+        ),
         SPHERE_LINE,
         ("Post_Graphic[200]", "bottom_radius: missing", ">= 0"),
     ),
     "frustum without radii": (
-        deck(('type="Sphere" center_marker_id="20" radius="0.108"',
-              'type="Frustum" center_marker_id="20" bottom_radius="0" top_radius="0" length="1"')),
+        deck(
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="Frustum" center_marker_id="20" bottom_radius="0" top_radius="0" length="1"',
+            )
+        ),
         SPHERE_LINE,
         ("Post_Graphic[200]", 'top_radius="0', "line has no volume"),
     ),

@@ -188,7 +188,9 @@ def test_a_tumbling_solid_keeps_its_energy(tmp_path, graphic, ground):
 def test_a_cylinder_tilted_on_a_box_falls_back_without_gaining_energy(tmp_path):
     # let go at 0.1 rad on its rim it rocks from rim to rim and comes to rest
     t = 0.1
-    axes = f'a00="{math.cos(t)!r}" a20="{-math.sin(t)!r}" a02="{math.sin(t)!r}" a22="{math.cos(t)!r}"'
+    axes = (
+        f'a00="{math.cos(t)!r}" a20="{-math.sin(t)!r}" a02="{math.sin(t)!r}" a22="{math.cos(t)!r}"'
+    )
     z = 0.1 * (math.cos(t) + math.sin(t))
     model = BOX_GROUND + body(SOLID, z=z, x=0.93, axes=axes) + contact(**LAW) + GRAVITY
     results = run_deck(tmp_path, model, end_time=2.0)

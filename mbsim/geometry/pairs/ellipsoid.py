@@ -122,7 +122,7 @@ def over_face(i, j):
     inside = 0
     for k in range(3):
         a = j[2] if k == 0 else (j[3] if k == 1 else j[4])
-        if abs(dot(a, n)) > 0.5 or abs(dot(d, a)) <= j[5][k]:
+        if abs(dot(a, n)) > 0.5 or abs(dot(d, a)) <= j[5][k] - max(f, 0.0):
             inside += 1
     return f, n, inside == 3 and f < shallow(i, j)
 

@@ -30,7 +30,7 @@ from mbsim.geometry.manifold import (
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
-from mbsim.geometry.rotor import end_disc, end_facing, side_distance, side_line, widest
+from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
 #: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
 #: or its corner; where it leaves); of a line its bottom and top end and a crossing.
@@ -55,12 +55,15 @@ def first_two(box, n):
 
 
 @jitable
-def over(i, j, n):
-    """Return whether the lowest point of solid I lies over the face of box J with normal n."""
+def over(i, j, n, margin):
+    """Return whether I's lowest point lies over J's face with normal n, by `margin` from its edges.
+
+    With a margin of the depth no way out to the side is shorter.
+    """
     d = sub(far(i, scale(-1.0, n)), j[1])
     for k in range(3):
         a = edge_axis(j, k)
-        if abs(dot(a, n)) < 0.5 and abs(dot(d, a)) > j[5][k]:
+        if abs(dot(a, n)) < 0.5 and abs(dot(d, a)) > j[5][k] - margin:
             return False
     return True
 
@@ -69,7 +72,7 @@ def over(i, j, n):
 def least(i, j):
     """Return (f, n) of the least overlap of a solid of revolution I and a box J."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
-    if f < 0.0 or (f < shallow(i, j) and over(i, j, n)):
+    if f < 0.0 or (f < shallow(i, j) and over(i, j, n, f)):
         return f, n
     f, n = flat(i, j, i, -1.0, f, n)
     # n points into I: the outward normal of I is -n
@@ -333,6 +336,9 @@ def solid_on_box(i, j, points):
         done = disc_on_face(i, j, end, k, n, f, points)
     elif on_face:
         done = line_on_face(i, j, k, n, points)
+        if not done:
+            # it leaves the face where it crosses an edge
+            done = side_on_edge(i, j, axes, n, f, points)
     elif end == 0:
         done = side_on_edge(i, j, axes, n, f, points)
     else:
@@ -347,14 +353,14 @@ def solid_on_box(i, j, points):
     for row in range(BOX_ROWS):
         deepest = max(deepest, points[row, 0])
     if not done or deepest < 0.5 * f:
-        put_single(i, j, n, f, on_face, points)
+        put_single(i, j, n, f, points)
     return BOX_ROWS
 
 
 @jitable
-def put_single(i, j, n, f, on_face, points):
-    """Write one point: below the solid where it lies on a face, else at the box's corner."""
-    if on_face:
+def put_single(i, j, n, f, points):
+    """Write one point: that of the rim where one is lowest, else at the box's corner."""
+    if pointed(i, scale(-1.0, n)) > 1e-6:
         p = add(far(i, scale(-1.0, n)), scale(0.5 * f, n))
     else:
         p = sub(far(j, n), scale(0.5 * f, n))

@@ -32,32 +32,32 @@ from mbsim.geometry.manifold import (
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
-from mbsim.geometry.rotor import end_disc, end_facing, side_distance, side_line, widest
+from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
 #: Rows: 6 for each rim, 2 where the rims cross; of a line its two ends and a crossing.
 PAIR_ROWS = 2 * ARC_ROWS + 2
 
 
 @jitable
-def lies_on_end(shape, o, p):
-    """Return whether p lies over the end disc of a solid with outward normal o."""
+def lies_on_end(shape, o, p, margin):
+    """Return whether p lies over the end disc with outward normal o, by `margin` from its rim."""
     d = sub(p, shape[1])
     across = sub(d, scale(dot(d, o), o))
     r = shape[5][1] if dot(o, shape[4]) > 0.0 else shape[5][0]
-    return norm(across) <= r
+    return norm(across) <= r - margin
 
 
 @jitable
 def least(i, j):
     """Return (f, n) of the least overlap of two solids of revolution."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
-    if f < 0.0 or (f < shallow(i, j) and lies_on_end(j, n, far(i, scale(-1.0, n)))):
+    if f < 0.0 or (f < shallow(i, j) and lies_on_end(j, n, far(i, scale(-1.0, n)), f)):
         return f, n
     f, n = flat(i, j, i, -1.0, f, n)
     if f < 0.0:
         return f, n
     m = scale(-1.0, n)
-    if f < shallow(i, j) and abs(dot(m, i[4])) > 1.0 - 1e-12 and lies_on_end(i, m, far(j, n)):
+    if f < shallow(i, j) and abs(dot(m, i[4])) > 1.0 - 1e-12 and lies_on_end(i, m, far(j, n), f):
         return f, n
     start = n
     f, n = meeting(i, j, i[4], -slant(i[5]), j[4], slant(j[5]), f, n)
@@ -270,8 +270,8 @@ def solid_on_solid(i, j, points):
     for row in range(PAIR_ROWS):
         deepest = max(deepest, points[row, 0])
     if not done or deepest < 0.5 * f:
-        # a rim has one farthest point, an end its centre: take the side that is not along n
-        rim_i = end_i == 0 or abs(dot(i[4], n)) < 1.0 - 1e-9
+        # a rim has one farthest point, an end or a side many
+        rim_i = pointed(i, scale(-1.0, n)) > pointed(j, n)
         low, high = far(i, scale(-1.0, n)), far(j, n)
         p = add(low, scale(0.5 * f, n)) if rim_i else sub(high, scale(0.5 * f, n))
         put_point(points[0], f, p, n)
