@@ -167,7 +167,11 @@ def along_circle(i, j, c, gamma, known, n_known):
     sum of support functions, f'' + f >= 0, so f(p + s) >= f cos s + f' sin s: a bracket that cannot
     beat what is known is left.
     """
-    u = any_tangent(c)
+    # begun at the line of centres: the answer goes with the scene
+    apart = sub(i[1], j[1])
+    u = sub(apart, scale(dot(apart, c), c))
+    length = norm(u)
+    u = scale(1.0 / length, u) if length > 1e-9 * norm(apart) else any_tangent(c)
     v = cross(c, u)
     k = math.sqrt(max(0.0, 1.0 - gamma * gamma))
     base = scale(gamma, c)
