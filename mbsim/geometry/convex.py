@@ -98,6 +98,7 @@ def between_round(i, j, n, far_apart):
     """
     f, d = overlap(i, j, n)
     size = norm(d) + abs(f) + 1e-300
+    held = 0
     for _ in range(40):
         if f < -far_apart:
             break
@@ -123,7 +124,7 @@ def between_round(i, j, n, far_apart):
         length = math.sqrt(a * a + b * b)
         part = min(1.0, 0.7 / length)
         lower = False
-        for _ in range(25):
+        for _ in range(12):
             v = add(n, add(scale(part * a, t), scale(part * b, s)))
             v = scale(1.0 / norm(v), v)
             g, e = overlap(i, j, v)
@@ -135,11 +136,13 @@ def between_round(i, j, n, far_apart):
                 et, es = dot(e, t) - g * dot(v, t), dot(e, s) - g * dot(v, s)
                 lower = et * et + es * es < gt * gt + gs * gs
                 break
-            part *= 0.5
+            part *= 0.3
         if not lower:
             break
         n, f, d = v, g, e
-        if part * length < 1e-15:
+        # steps cut again and again: a ridge between two features, where Newton has no business
+        held = held + 1 if part < 0.5 else 0
+        if part * length < 1e-15 or held > 8:
             break
     return f, n
 
@@ -159,61 +162,102 @@ def slope_at(i, j, base, u, v, k, p):
 
 
 @jitable
-def along_circle(i, j, c, gamma, known, n_known):
-    """Return the better of (known, n_known) and the least overlap on the circle n.c = gamma.
+def bracket_near(i, j, base, u, v, k):
+    """Return (found, a, b): places on a circle of normals around a minimum of f, from 0 downhill.
 
-    n(p) = gamma c + sqrt(1 - gamma^2) (u cos p + v sin p). Twelve directions bracket the
-    minimum, then the root of f' is closed in on. On an edge's circle (gamma 0) f is a
-    sum of support functions, f'' + f >= 0, so f(p + s) >= f cos s + f' sin s: a bracket that cannot
-    beat what is known is left.
+    Shapes that barely overlap have one valley, and its floor is near what is known.
     """
-    # begun at the line of centres: the answer goes with the scene
-    apart = sub(i[1], j[1])
-    u = sub(apart, scale(dot(apart, c), c))
-    length = norm(u)
-    u = scale(1.0 / length, u) if length > 1e-9 * norm(apart) else any_tangent(c)
-    v = cross(c, u)
-    k = math.sqrt(max(0.0, 1.0 - gamma * gamma))
-    base = scale(gamma, c)
+    _, _, slope = slope_at(i, j, base, u, v, k, 0.0)
+    sign = -1.0 if slope > 0.0 else 1.0
+    here, step = 0.0, 0.01
+    for _ in range(7):
+        there = here + sign * step
+        _, _, slope = slope_at(i, j, base, u, v, k, there)
+        if sign * slope >= 0.0:
+            return True, min(here, there), max(here, there)
+        here, step = there, 2.0 * step
+    return False, here, here
+
+
+@jitable
+def bracket_all(i, j, base, u, v, k):
+    """Return (True, a, b): the neighbours of the lowest of twelve places on a circle."""
     best, low = 0, math.inf
     width = math.pi / 6.0
     for m in range(12):
         f, _ = overlap(i, j, on_circle(base, u, v, k, m * width))
         if f < low:
             best, low = m, f
-    a, b = (best - 1) * width, (best + 1) * width
+    return True, (best - 1) * width, (best + 1) * width
+
+
+@jitable
+def valley_bound(f, fa, g, fb, w):
+    """Return a lower bound of f between two places w apart with values f, g and slopes fa, fb.
+
+    On an edge's circle f is a support function: f(p + s) >= f cos s + f' sin s from both sides,
+    and the larger of both bounds is least where they meet.
+    """
+    p = f - g * math.cos(w) + fb * math.sin(w)
+    q = fa - g * math.sin(w) - fb * math.cos(w)
+    s = math.atan2(p, -q)
+    if 0.0 < s < w:
+        return f * math.cos(s) + fa * math.sin(s)
+    return -math.inf
+
+
+@jitable
+def along_circle(i, j, c, gamma, known, n_known):
+    """Return the better of (known, n_known) and the least overlap on the circle n.c = gamma.
+
+    n(p) = gamma c + sqrt(1 - gamma^2) (u cos p + v sin p). The minimum is bracketed, then the
+    root of f' is closed in on. On an edge's circle (gamma 0) a bracket is left when it cannot
+    beat what is known.
+    """
+    k = math.sqrt(max(0.0, 1.0 - gamma * gamma))
+    base = scale(gamma, c)
+    near = 0.0 < known < shallow(i, j)
+    # begun at what is known or at the line of centres: the answer goes with the scene
+    apart = n_known if near else sub(i[1], j[1])
+    u = sub(apart, scale(dot(apart, c), c))
+    length = norm(u)
+    if near and length < 1e-3:
+        return known, n_known
+    u = scale(1.0 / length, u) if length > 1e-9 * norm(apart) else any_tangent(c)
+    v = cross(c, u)
+    if near:
+        found, a, b = bracket_near(i, j, base, u, v, k)
+    else:
+        found, a, b = bracket_all(i, j, base, u, v, k)
+    if not found:
+        return known, n_known
     n, f, fa = slope_at(i, j, base, u, v, k, a)
     _, g, fb = slope_at(i, j, base, u, v, k, b)
-    if fa >= 0.0 or fb <= 0.0:
-        # a hump beside the bracket: only halving is safe at first
-        fa, fb = -1e-300, 1e-300
-    elif gamma == 0.0:
-        # both bounds meet at s from a
-        w = b - a
-        p, q = f - g * math.cos(w) + fb * math.sin(w), fa - g * math.sin(w) - fb * math.cos(w)
-        s = math.atan2(p, -q)
-        if 0.0 < s < w and f * math.cos(s) + fa * math.sin(s) >= known:
-            return known, n_known
+    # a hump beside the bracket: then only halving is safe
+    humps = fa >= 0.0 or fb <= 0.0
+    value_a, value_b, slope_a, slope_b = f, g, fa, fb
     side = 0
     for step in range(60):
+        if gamma == 0.0 and not humps and step % 3 == 0:
+            if valley_bound(value_a, slope_a, value_b, slope_b, b - a) >= known - 1e-14 * abs(
+                known
+            ):
+                return known, n_known
         # Illinois rule, with a halving in between
-        p = (
-            0.5 * (a + b)
-            if step % 5 == 4 or fb < 1e-290 or fa > -1e-290
-            else (a * fb - b * fa) / (fb - fa)
-        )
+        halve = humps or step % 5 == 4
+        p = 0.5 * (a + b) if halve else (a * fb - b * fa) / (fb - fa)
         n, f, slope = slope_at(i, j, base, u, v, k, p)
         if slope == 0.0 or b - a < 1e-15:
             break
         if slope < 0.0:
             # the other end stays: halve its weight if it stayed before
             moved = p - a
-            a, fa = p, slope
+            a, fa, value_a, slope_a = p, slope, f, slope
             fb = 0.5 * fb if side == -1 else fb
             side = -1
         else:
             moved = b - p
-            b, fb = p, slope
+            b, fb, value_b, slope_b = p, slope, f, slope
             fa = 0.5 * fa if side == 1 else fa
             side = 1
         if moved < 1e-15:
@@ -260,7 +304,15 @@ def meeting(i, j, a, ga, b, gb, f, n):
     across = cross(a, b)
     square = dot(across, across)
     if square < 1e-12:
-        return f, n
+        # parallel: the circles are one or none; the direction between both axes
+        apart = sub(i[1], j[1])
+        w = sub(apart, scale(dot(apart, a), a))
+        length = norm(w)
+        if length == 0.0 or abs(ga - gb * dot(a, b)) > 1e-6:
+            return f, n
+        m = add(scale(ga, a), scale(math.sqrt(1.0 - ga * ga) / length, w))
+        g, _ = overlap(i, j, m)
+        return (g, m) if g < f else (f, n)
     # m = p a + q b +- w across
     ab = dot(a, b)
     p, q = (ga - gb * ab) / square, (gb - ga * ab) / square

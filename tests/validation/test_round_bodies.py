@@ -14,10 +14,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck
 
 G = 9.81
-BOX_GROUND = """<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1" pos_z="-0.5"/>
+BOX_GROUND = """<Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1" pos_z="-0.5"/>
 <Post_Graphic id="100" type="BoxDefinedFromCenter" center_marker_id="10"
   length_x="2" length_y="2" length_z="1"/>"""
-DRUM = """<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1" pos_z="-0.5"/>
+DRUM = """<Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1" pos_z="-0.5"/>
 <Post_Graphic id="100" type="Cylinder" center_marker_id="10" radius="{r}" length="0.5"/>"""
 SOLID = 'type="Cylinder" radius="0.1" length="0.2"'
 CONE = 'type="Frustum" bottom_radius="0.12" top_radius="0.06" length="0.2"'
@@ -43,8 +45,11 @@ def along_y(x=1.0, z=0.0):
 
 def given(**values):
     """Return initial velocities as attributes."""
-    return " ".join(f'{k}_ic_{a}="{v!r}" {k}_ic_{a}_flag="TRUE"'
-                    for (k, a), v in ((key.split("_"), v) for key, v in values.items()))  # fmt: skip
+    words = []
+    for key, value in values.items():
+        kind, axis = key.split("_")
+        words.append(f'{kind}_ic_{axis}="{value!r}" {kind}_ic_{axis}_flag="TRUE"')
+    return " ".join(words)
 
 
 def rest_depth(share, weight=G, stiffness=1e5, exponent=1.5):
@@ -56,7 +61,8 @@ def rest_depth(share, weight=G, stiffness=1e5, exponent=1.5):
 @pytest.mark.parametrize(
     ("ground", "x", "share"),
     [(GROUND, 0.0, 3.0), (BOX_GROUND, 0.0, 3.0), (BOX_GROUND, 0.95, 3.5),
-     (DRUM.format(r=0.5), 0.0, 3.0), (DRUM.format(r=0.07), 0.02, 3.0), (DRUM.format(r=0.1), 0.05, 3.0)],
+     (DRUM.format(r=0.5), 0.0, 3.0), (DRUM.format(r=0.07), 0.02, 3.0),
+     (DRUM.format(r=0.1), 0.05, 3.0)],
     ids=["plane", "box", "over an edge", "wide drum", "thin drum", "drum off centre"],
 )  # fmt: skip
 def test_a_dropped_solid_comes_to_stand(tmp_path, graphic, ground, x, share):
@@ -118,13 +124,12 @@ def test_a_cylinder_rolls_down_an_incline(tmp_path, kind):
 
 
 @pytest.mark.parametrize("ground", [GROUND, BOX_GROUND], ids=["plane", "box"])
-def test_a_frustum_on_its_side_rolls_about_its_apex(tmp_path, ground):
-    # the cone's apex stays: on a plane the point (slant distance, 0) turns about it; the axis
-    # is tilted by the half angle
+def test_a_frustum_lies_on_its_side(tmp_path, ground):
+    # laid on its side it rests on the line between both rims
     fall, length = 0.06, 0.2
     half_angle = math.atan2(fall, length)
     c, s = math.cos(half_angle), math.sin(half_angle)
-    # axis horizontal but for the half angle: bottom to the left, top to the right and lower side flat
+    # the axis is the half angle off the horizontal, so that the lower side is flat
     mid = 0.09
     axes = (f'a00="{s!r}" a10="0" a20="{c!r}" a01="0" a11="-1" a21="0" '
             f'a02="{c!r}" a12="0" a22="{-s!r}"')  # fmt: skip

@@ -161,7 +161,10 @@ def ellipsoid_on_solid(i, j, points):
         return put_under(i, f, n, points)
     start = n
     centres = line_of_centres(i, j)
-    side, m = along_circle(i, j, j[4], slant(j[5]), 1e300, n)
+    if 0.0 < f < shallow(i, j):
+        side, m = along_circle(i, j, j[4], slant(j[5]), f, n)
+    else:
+        side, m = along_circle(i, j, j[4], slant(j[5]), 1e300, n)
     # the normals of a rim lie between those of the end and of the side
     between = add(start, m)
     if side < f:

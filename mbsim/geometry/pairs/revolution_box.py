@@ -93,13 +93,14 @@ def least(i, j):
 
 
 @jitable
-def face_corner(j, k, l, m, sk, quarter):
+def face_corner(j, k, sk, quarter):
     """Return corner 0..3 of the face of box J with outward normal sk times axis k."""
-    sl = 1.0 if quarter == 0 or quarter == 3 else -1.0
-    sm = 1.0 if quarter < 2 else -1.0
+    first, second = (k + 1) % 3, (k + 2) % 3
+    s1 = 1.0 if quarter == 0 or quarter == 3 else -1.0
+    s2 = 1.0 if quarter < 2 else -1.0
     p = add(j[1], scale(sk * j[5][k], edge_axis(j, k)))
-    p = add(p, scale(sl * j[5][l], edge_axis(j, l)))
-    return add(p, scale(sm * j[5][m], edge_axis(j, m)))
+    p = add(p, scale(s1 * j[5][first], edge_axis(j, first)))
+    return add(p, scale(s2 * j[5][second], edge_axis(j, second)))
 
 
 @jitable
@@ -168,7 +169,6 @@ def disc_on_face(i, j, end, k, n, f, points):
     n, a parallelogram. u points to where the disc is deepest.
     """
     centre, o, r = end_disc(i, end)
-    l, m = (k + 1) % 3, (k + 2) % 3
     face = edge_axis(j, k)
     sk = 1.0 if dot(face, n) >= 0.0 else -1.0
     face = scale(sk, face)
@@ -183,14 +183,14 @@ def disc_on_face(i, j, end, k, n, f, points):
     rise = tilt / nf
     disc = (centre, u, v, r, depth0, rise)
 
-    # the corners go round to the left, seen against o: o is along -n, the face's l, m, face
-    # are right-handed for sk = 1
+    # the corners go round to the left, seen against o, which is along -n; the face's axes and
+    # its normal are right-handed for sk = 1
     work = points[ARC_ROWS:]
     cuts, beyond, sum_x, sum_y = 0, False, 0.0, 0.0
     inside = True
     for e in range(4):
         first, second = ((4 - e) % 4, (3 - e) % 4) if sk > 0.0 else (e, (e + 1) % 4)
-        a, b = face_corner(j, k, l, m, sk, first), face_corner(j, k, l, m, sk, second)
+        a, b = face_corner(j, k, sk, first), face_corner(j, k, sk, second)
         # along n onto the plane of the disc
         a = sub(sub(a, scale(dot(sub(a, centre), o) / no, n)), centre)
         b = sub(sub(b, scale(dot(sub(b, centre), o) / no, n)), centre)
@@ -285,9 +285,9 @@ def side_on_edge(i, j, axes, n, f, points):
     Where they are parallel to within the depth the ends carry; the more they cross the more
     does the one point where they cross.
     """
-    k, l, m = axes
+    k, second, m = axes
     q = j[1]
-    for h in (k, l):
+    for h in (k, second):
         a = edge_axis(j, h)
         q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
     e, half = edge_axis(j, m), j[5][m]
@@ -351,6 +351,8 @@ def solid_on_box(i, j, points):
         done = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0)
     deepest = out
     for row in range(BOX_ROWS):
+        # nothing is deeper than the least overlap
+        points[row, 0] = min(points[row, 0], f)
         deepest = max(deepest, points[row, 0])
     if not done or deepest < 0.5 * f:
         put_single(i, j, n, f, points)

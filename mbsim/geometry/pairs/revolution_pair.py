@@ -48,6 +48,37 @@ def lies_on_end(shape, o, p, margin):
 
 
 @jitable
+def lines_meet(i, j, n):
+    """Return whether the straight lines of both sides along n cross, seen along n.
+
+    Parallel ones do where they have a part in common.
+    """
+    low_i, high_i, _ = side_line(i, scale(-1.0, n))
+    low_j, high_j, _ = side_line(j, n)
+    a, b = sub(high_i, low_i), sub(high_j, low_j)
+    apart = sub(low_j, low_i)
+    both = dot(cross(a, b), n)
+    if abs(both) < 1e-9 * norm(a) * norm(b):
+        square = dot(a, a)
+        s, t = dot(apart, a) / square, dot(sub(high_j, low_i), a) / square
+        return min(s, t) < 1.0 and max(s, t) > 0.0
+    s, t = dot(cross(apart, b), n) / both, dot(cross(apart, a), n) / both
+    return 0.0 < s < 1.0 and 0.0 < t < 1.0
+
+
+@jitable
+def rim_over_side(other, shape, d, p, margin):
+    """Return whether d is a normal of the side of `shape`, and p of `other` lies over that side.
+
+    Then no direction nearby overlaps less.
+    """
+    on_side = abs(dot(d, shape[4]) - slant(shape[5])) < 1e-12
+    z = dot(sub(p, shape[1]), shape[4])
+    # a single point has to lie there: a rim's, not one of a line's
+    return on_side and abs(z) < shape[5][2] - margin and pointed(other, scale(-1.0, d)) > 1e-9
+
+
+@jitable
 def least(i, j):
     """Return (f, n) of the least overlap of two solids of revolution."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
@@ -60,11 +91,17 @@ def least(i, j):
     if f < shallow(i, j) and abs(dot(m, i[4])) > 1.0 - 1e-12 and lies_on_end(i, m, far(j, n), f):
         return f, n
     start = n
+    g = f
     f, n = meeting(i, j, i[4], -slant(i[5]), j[4], slant(j[5]), f, n)
-    if f < 0.0:
+    if f < 0.0 or (f < g and f < shallow(i, j) and lines_meet(i, j, n)):
         return f, n
     f, n = along_circle(i, j, i[4], -slant(i[5]), f, n)
     f, n = along_circle(i, j, j[4], slant(j[5]), f, n)
+    if 0.0 < f < shallow(i, j) and (
+        rim_over_side(j, i, scale(-1.0, n), far(j, n), f)
+        or rim_over_side(i, j, n, far(i, scale(-1.0, n)), f)
+    ):
+        return f, n
     between = add(start, n)
     between = scale(1.0 / max(norm(between), 1e-9), between)
     for k in range(3):
@@ -112,7 +149,8 @@ def rims_cross(a, b, n, sign):
     # what a step along u, v of a is on b
     ux, uy = seen_on(b, add(b[0], a[3]), n)
     vx, vy = seen_on(b, add(b[0], a[4]), n)
-    for _ in range(6):
+    found = False
+    for _ in range(8):
         p = add(a[0], add(scale(x, a[3]), scale(y, a[4])))
         bx, by = seen_on(b, p, n)
         e, g = 0.5 * (x * x + y * y - ra * ra), 0.5 * (bx * bx + by * by - rb * rb)
@@ -122,9 +160,10 @@ def rims_cross(a, b, n, sign):
             break
         dx, dy = (e * gy - y * g) / det, (x * g - e * gx) / det
         x, y = x - dx, y - dy
-        if dx * dx + dy * dy < 1e-30 * ra * ra:
+        if dx * dx + dy * dy < 1e-20 * ra * ra:
+            found = True
             break
-    return True, add(a[0], add(scale(x, a[3]), scale(y, a[4])))
+    return found, add(a[0], add(scale(x, a[3]), scale(y, a[4])))
 
 
 @jitable
@@ -158,9 +197,10 @@ def end_on_end(i, j, end_i, end_j, n, f, points):
     """Write the patch of two end discs; return whether there is one."""
     a, b = plane_of(i, end_i), plane_of(j, end_j)
     crossed, start = rims_cross(a, b, n, -1.0)
-    _, stop = rims_cross(a, b, n, 1.0)
+    other, stop = rims_cross(a, b, n, 1.0)
     cx, cy = seen_on(a, b[0], n)
-    if not crossed and cx * cx + cy * cy > max(a[1], b[1]) ** 2:
+    # strongly tilted discs are no circles: then one point where they are deepest
+    if crossed != other or (not crossed and cx * cx + cy * cy > (a[1] - b[1]) ** 2):
         return False
     arcs = points[2 * ARC_ROWS :]
     out, centre = -a[1] - b[1], a[0]
@@ -268,6 +308,8 @@ def solid_on_solid(i, j, points):
         done = side_by_side(i, j, n, f, points)
     deepest = out
     for row in range(PAIR_ROWS):
+        # drawn with flat discs and straight sides; nothing is deeper than the least overlap
+        points[row, 0] = min(points[row, 0], f)
         deepest = max(deepest, points[row, 0])
     if not done or deepest < 0.5 * f:
         # a rim has one farthest point, an end or a side many
