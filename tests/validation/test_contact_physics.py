@@ -55,10 +55,12 @@ def test_bouncing_sphere_converges():
      ("ellipsoid_on_box.xml", "bodies/2/position/z")],
 )  # fmt: skip
 def test_models_converge(name, signal):
-    exact = run_model(name, tol=1e-12)[signal]
+    # the ellipsoid is here for FCL; its closed form is as smooth as the sphere's above
+    detector = "fcl" if name.startswith("ellipsoid") else "auto"
+    exact = run_model(name, tol=1e-12, detector=detector)[signal]
     errors = []
     for tol in 10.0 ** -np.arange(3, 10):
-        errors.append(np.abs(run_model(name, tol=tol)[signal] - exact).max())
+        errors.append(np.abs(run_model(name, tol=tol, detector=detector)[signal] - exact).max())
     convergence(np.array(errors))
 
 
