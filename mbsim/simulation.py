@@ -196,8 +196,6 @@ class Runner:
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
-                self.problem,
-                method,
                 self._steps,
                 simulation.end_time,
                 stage.tol,

@@ -26,7 +26,7 @@ def measure_pair(scene, pair):
     if kinds.kernel[kind] == 0:
         return False
     i, j, first = pairs.graphic_i[pair], pairs.graphic_j[pair], pairs.slot[pair]
-    count = call_int(
+    call_int(
         kinds.kernel[kind],
         (
             work.frames[i],
@@ -36,8 +36,6 @@ def measure_pair(scene, pair):
             work.points[first:],
         ),
     )
-    if count < 0:
-        return False
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(4, 7):

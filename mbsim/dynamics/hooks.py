@@ -78,7 +78,7 @@ def _limit(context, t, h, a, b):
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return longest_step(scene, carray(a, (n,)), carray(b, (n,)))
+    return longest_step(scene, carray(a, (n,)), carray(b, (n,)), h)
 
 
 def _output(context, t, h, a, b):

@@ -10,16 +10,21 @@ from mbsim.system.arrays import BODY_SIZE
 
 
 @jitable
+def place_body(scene, y, b):
+    """Fill R, v and w (global) of moving body b from y."""
+    work, at = scene.work, BODY_SIZE * b
+    matrix_from_quaternion(y[at + 3 : at + 7], work.R[b])
+    w = rotate(work.R[b], (y[at + 10], y[at + 11], y[at + 12]))
+    for k in range(3):
+        work.v[b, k] = y[at + 7 + k]
+        work.w[b, k] = w[k]
+
+
+@jitable
 def place_bodies(scene, y):
     """Fill R, v and w (global) of every moving body from y; the ground's rows stay as made."""
-    work = scene.work
     for b in range(len(scene.bodies.mass)):
-        at = BODY_SIZE * b
-        matrix_from_quaternion(y[at + 3 : at + 7], work.R[b])
-        w = rotate(work.R[b], (y[at + 10], y[at + 11], y[at + 12]))
-        for k in range(3):
-            work.v[b, k] = y[at + 7 + k]
-            work.w[b, k] = w[k]
+        place_body(scene, y, b)
 
 
 @jitable

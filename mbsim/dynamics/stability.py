@@ -100,7 +100,7 @@ def meeting(scene, pair, out):
 def stable_step(scene, tol, y, f):
     """Return the step that a method without error estimate is to take from the committed point."""
     work, bodies, pairs = scene.work, scene.bodies, scene.pairs
-    longest = longest_way(scene, y, f)
+    longest = longest_way(scene, y, f, 0.0)
     for b in range(len(bodies.mass)):
         for k in range(10):
             work.block[b, k] = 0.0

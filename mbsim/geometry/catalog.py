@@ -4,17 +4,16 @@ A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count
 arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
-* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | nothing | of a
-  convex mesh the address and length of its polyhedron (`model.hull`);
+* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | bottom radius, top
+  radius, half length of a frustum | nothing | of a convex mesh the address and length of its
+  polyhedron (`model.hull`);
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   and its share of the law's force (1 unless a manifold splits the force of one corner over
   several points, so that the sum does not jump when a corner passes over an edge).
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
-their number, or `NOT_MINE` where the
-closed form does not hold for this pose: the pair then goes through FCL. A slot's identity
-over time is its row (a corner of a box keeps its row).
+their number. A slot's identity over time is its row (a corner of a box keeps its row).
 The largest depth, where negative, is a lower bound of the distance of the two shapes.
 """
 
@@ -26,7 +25,6 @@ from typing import Any, NamedTuple
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 
-NOT_MINE = -1
 #: Numbers of one candidate: depth, point, normal, share.
 POINT = 8
 
@@ -37,17 +35,19 @@ class Pair(NamedTuple):
     name: str
     points: Callable[..., int]
     slots: int
+    #: Whether a contact that goes on may begin another row (a corner that passes over an edge).
+    regroups: bool = False
 
 
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 
 
-def pair(shape_i: str, shape_j: str, slots: int) -> Any:
+def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
     def register(points: Callable[..., int]) -> Callable[..., int]:
         name = f"{shape_i}-{shape_j}"
-        PAIRS.put(name, Pair(name, jitable(points), slots))
+        PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
         return points
 
     return register

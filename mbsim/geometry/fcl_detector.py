@@ -24,13 +24,15 @@ DETECTOR_FAILED = 4
 #: on ellipsoid pairs, given in its interface conventions).
 NORMAL_NOISE = 2e-6
 _MESH_CONTACTS = 100_000
+#: Sides of the polyhedron around a frustum: 3e-4 of its radius too wide at the edges.
+_SIDES = 128
 
 
 def states_noise(shape_i: str, shape_j: str) -> float:
     """Return the scatter of normals for a pair of shapes: 0 where they are made exact."""
     if shape_i in ROUND and shape_j in ROUND:
         return 0.0
-    iterative = {"ELLIPSOID", "CYLINDER"}
+    iterative = {"ELLIPSOID", "CYLINDER", "FRUSTUM"}
     both = {shape_i, shape_j}
     return NORMAL_NOISE if both & iterative and "PLANE" not in both else 0.0
 
@@ -79,6 +81,8 @@ class FclDetector:
             return fcl.Box(*(2.0 * size))
         if graphic.shape == "CYLINDER":
             return fcl.Cylinder(size[0], 2.0 * size[1])
+        if graphic.shape == "FRUSTUM":
+            return self._prism(*size)
         if graphic.shape == "PLANE":
             if flat_partner > 0.0:
                 return fcl.Box(8.0 * flat_partner, 8.0 * flat_partner, 8.0 * flat_partner)
@@ -90,6 +94,29 @@ class FclDetector:
         mesh.addSubModel(graphic.vertices, graphic.faces)
         mesh.endModel()
         return mesh
+
+    def _prism(self, bottom: float, top: float, half: float) -> Any:
+        """Return a frustum, which FCL does not have, as a polyhedron around it.
+
+        Its depth is made exact afterwards where the other shape is convex; against a mesh it is
+        too wide by at most r (1/cos(pi/n) - 1).
+        """
+        n = _SIDES
+        angle = 2.0 * np.pi * np.arange(n) / n
+        ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / n)
+        ends = [
+            np.column_stack([r * ring, np.full(n, z)]) for r, z in ((bottom, -half), (top, half))
+        ]
+        vertices = np.vstack([*ends, [[0.0, 0.0, -half], [0.0, 0.0, half]]])
+        k = np.arange(n)
+        m = (k + 1) % n
+        faces = np.vstack([
+            np.column_stack([k, m, n + m]), np.column_stack([k, n + m, n + k]),
+            np.column_stack([np.full(n, 2 * n), m, k]),
+            np.column_stack([np.full(n, 2 * n + 1), n + k, n + m]),
+        ])  # fmt: skip
+        rows = np.column_stack([np.full(len(faces), 3), faces]).ravel()
+        return self._fcl.Convex(vertices, len(faces), rows)
 
     def _object(self, pair: int, g: int, other: int) -> tuple[Any, float]:
         """Return the collision object of one side, and the size of its stand-in box or 0."""

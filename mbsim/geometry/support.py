@@ -15,7 +15,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Shapes whose support point is unique in every direction.
 ROUND = {"SPHERE", "ELLIPSOID"}
-CONVEX = {"SPHERE", "ELLIPSOID", "BOX", "CYLINDER"}
+CONVEX = {"SPHERE", "ELLIPSOID", "BOX", "CYLINDER", "FRUSTUM"}
 
 
 def support(shape: str, size: Array, p: Array, R: Array, d: Array) -> Array:
@@ -23,7 +23,7 @@ def support(shape: str, size: Array, p: Array, R: Array, d: Array) -> Array:
 
     Parameters
     ----------
-    shape : {"SPHERE", "ELLIPSOID", "BOX", "CYLINDER"}
+    shape : {"SPHERE", "ELLIPSOID", "BOX", "CYLINDER", "FRUSTUM"}
     size : ndarray, shape (3,)
         As in `geometry.catalog` [L].
     p, R : ndarray, shapes (3,), (3, 3)
@@ -40,8 +40,10 @@ def support(shape: str, size: Array, p: Array, R: Array, d: Array) -> Array:
     if shape == "BOX":
         return p + R @ (np.sign(local) * size)
     radial = np.hypot(local[0], local[1])
-    rim = size[0] / radial if radial > 0.0 else 0.0
-    return p + R @ np.array([rim * local[0], rim * local[1], np.sign(local[2]) * size[1]])
+    bottom, top, half = size if shape == "FRUSTUM" else (size[0], size[0], size[1])
+    upper = top * radial + half * local[2] >= bottom * radial - half * local[2]
+    rim = (top if upper else bottom) / radial if radial > 0.0 else 0.0
+    return p + R @ np.array([rim * local[0], rim * local[1], half if upper else -half])
 
 
 def _spread(shape: str, size: Array, R: Array, d: Array) -> Array:

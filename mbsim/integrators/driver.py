@@ -45,6 +45,7 @@ from mbsim.integrators.scheme import (
     STEPS,
     TIME,
     TOL,
+    on_bench,
 )
 
 #: A hook that fails is tried again at a tenth of the step, so many times.
@@ -114,9 +115,8 @@ def length(p, m, steps, t, t_end, h_max, floor):
     """Return the length of the step to try from t."""
     h = min(m.memory[STEP], h_max)
     if steps.order > 0.0:
-        h = min(h, call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
-    # what the problem or the user said is not changed
-    h = max(quantised(h) if steps.order > 0.0 else h, floor)
+        h = min(quantised(h), call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
+    h = max(h, floor)
     # no sliver of a step before the end
     return t_end - t if t + 1.01 * h >= t_end else h
 
@@ -233,11 +233,13 @@ def choose_next(m, steps, h, h_max):
     m.memory[AFTER_REJECTION] = 0.0
 
 
-def advance(p, m, steps, t_end, tol, h_max, h_min, times, budget):
+def advance(steps, t_end, tol, h_max, h_min, times, budget):
     """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
 
-    `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them.
+    `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
+    and method are taken from the bench: a group is one word wherever it is handed on.
     """
+    p, m = on_bench(steps.context)
     m.memory[TOL] = tol
     code = begin(p, m, steps, m.memory[TIME], t_end, h_max)
     if code != 0.0:

@@ -75,12 +75,13 @@ class Marker:
 
 @dataclass(frozen=True)
 class Graphic:
-    """Post_Graphic. `shape` is SPHERE, ELLIPSOID, BOX, CYLINDER, PLANE or MESH.
+    """Post_Graphic. `shape` is SPHERE, ELLIPSOID, BOX, CYLINDER, FRUSTUM, PLANE or MESH.
 
     `size` is (radius,) for a sphere, semi-axes for an ellipsoid, edge lengths for a
-    box, (radius, length) for a cylinder, empty for a plane and a mesh.
+    box, (radius, length) for a cylinder, (bottom radius, top radius, length) for a frustum,
+    empty for a plane and a mesh.
     `offset` is the shape's centre in the marker's frame: a box from its corner
-    and a cylinder (whose marker is the centre of its base) have one.
+    and a cylinder or frustum (whose marker is the centre of its base) have one.
     A plane is the half-space z <= 0 of its marker; a mesh has vertices and faces.
     """
 

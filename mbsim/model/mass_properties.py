@@ -54,6 +54,26 @@ def cylinder(radius: float, length: float) -> MassProperties:
     )
 
 
+def frustum(bottom: float, top: float, length: float) -> MassProperties:
+    """Return the properties of a cone cut off [L] along z, about the middle of its axis.
+
+    With r(z) from `bottom` to `top` over the length, s = z/length from 0 to 1:
+    V = pi l <r^2>, z_c = l <s r^2>/<r^2>, I_z = pi l <r^4>/2 and
+    I_x = I_z/2 + pi l^3 <s^2 r^2> - V z_c^2, <> the mean over s.
+    """
+    a, b = bottom, top
+    r2 = (a * a + a * b + b * b) / 3.0
+    s1 = (a * a + 2.0 * a * b + 3.0 * b * b) / 12.0
+    s2 = (a * a + 3.0 * a * b + 6.0 * b * b) / 30.0
+    r4 = (a**4 + a**3 * b + a * a * b * b + a * b**3 + b**4) / 5.0
+    volume = math.pi * length * r2
+    z = length * s1 / r2
+    axial = 0.5 * math.pi * length * r4
+    across = 0.5 * axial + math.pi * length**3 * s2 - volume * z * z
+    centre = np.array([0.0, 0.0, z - 0.5 * length])
+    return MassProperties(volume, centre, np.diag([across, across, axial]))
+
+
 def polyhedron(vertices: Array, faces: npt.NDArray[np.int64]) -> MassProperties:
     """Return the properties of the solid inside a closed mesh, exact up to rounding.
 
@@ -117,6 +137,8 @@ def of_graphic(graphic: Graphic) -> MassProperties:
         local = box(*graphic.size)
     elif graphic.shape == "CYLINDER":
         local = cylinder(*graphic.size)
+    elif graphic.shape == "FRUSTUM":
+        local = frustum(*graphic.size)
     else:
         raise ValueError(f"a {graphic.type} has no volume")
     return local._replace(centre=local.centre + np.array(graphic.offset))

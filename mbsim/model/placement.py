@@ -184,6 +184,11 @@ def _half_extent(graphic: Graphic, R: Array) -> Array:
         along = np.abs(R[:, 2])
         # a disc of normal n reaches r sqrt(1 - n_i^2) along axis i
         return radius * np.sqrt(np.maximum(0.0, 1.0 - along**2)) + 0.5 * length * along
+    if graphic.shape == "FRUSTUM":
+        # the cylinder around it
+        bottom, top, length = graphic.size
+        along = np.abs(R[:, 2])
+        return max(bottom, top) * np.sqrt(np.maximum(0.0, 1.0 - along**2)) + 0.5 * length * along
     axes = np.array(graphic.size * 3 if graphic.shape == "SPHERE" else graphic.size)
     # support function of an ellipsoid: |diag(a) R' e_i|
     reach: Array = np.sqrt(((R * axes) ** 2).sum(axis=1))

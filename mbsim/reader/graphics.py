@@ -12,7 +12,16 @@ from mbsim.model import elements as el
 from mbsim.model.hull import polyhedron_of
 from mbsim.model.mesh import load_mesh, merge_vertices
 from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
-from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, REAL_NO_EXPRESSION, TEXT, keyword
+from mbsim.reader.kinds import (
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    REAL_NO_EXPRESSION,
+    TEXT,
+    keyword,
+)
 from mbsim.reader.parse import Node
 from mbsim.reader.statement import Entry, Spec, Statement
 
@@ -33,6 +42,7 @@ class Shape:
 
 
 _LENGTHS = ("length_x", "length_y", "length_z")
+_RADII = ("bottom_radius", "top_radius")
 _BOUNDS = ("xmin", "xmax", "ymin", "ymax")
 _HALF = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5))
 SHAPES = (
@@ -50,6 +60,15 @@ SHAPES = (
         ("ends_type",),
         ((0.0, 0.0), (0.0, 0.0), (0.0, 0.5)),
     ),
+    # bottom_radius at the marker, top_radius at z = length
+    Shape(
+        "Frustum",
+        "FRUSTUM",
+        ("center_marker_id",),
+        ("bottom_radius", "top_radius", "length"),
+        ("ends_type",),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)),
+    ),
     Shape("Plane", "PLANE", ("rm_id", "center_marker_id"), (), _BOUNDS),
     Shape("TriaMesh", "MESH", ("rm_id",), (), ("file",)),
 )
@@ -57,7 +76,7 @@ _BY_TYPE = {fold(shape.type): shape for shape in SHAPES}
 
 # documented, not contact shapes here: kept as pictures, refused where a contact names them
 DISPLAY_TYPES = (
-    "Frustum Parasolid SPDP Outline Arc Circle LineMesh ParamCurve ParamSurface DeformCurve "
+    "Parasolid SPDP Outline Arc Circle LineMesh ParamCurve ParamSurface DeformCurve "
     "DeformSurface Point UserGra"
 ).split()
 _DISPLAY = {fold(name): name for name in DISPLAY_TYPES}
@@ -137,12 +156,15 @@ def _check_attributes(entry: Entry, shape: Shape) -> None:
             entry.fault(f"type {shape.type} has no such attribute; it has {allowed}", name)
     for name in shape.sizes:
         if not entry.given(name):
-            entry.fault(f"{name}: missing; must be {POSITIVE.allowed} for type {shape.type}")
+            allowed = (NOT_NEGATIVE if name in _RADII else POSITIVE).allowed
+            entry.fault(f"{name}: missing; must be {allowed} for type {shape.type}")
+    if shape.shape == "FRUSTUM" and all(entry.get(name, 1.0) == 0.0 for name in _RADII):
+        entry.fault("must be > 0 where bottom_radius is 0: a line has no volume", "top_radius")
     for name in _BOUNDS:
         if entry.given(name) and shape.shape == "PLANE":
             entry.note("contact uses the whole plane, the half-space z <= 0", name)
     if entry.get("ends_type", "CLOSED") != "CLOSED":
-        entry.note("contact takes the cylinder as closed at both ends", "ends_type")
+        entry.note("contact takes the solid as closed at both ends", "ends_type")
 
 
 def _marker_id(entry: Entry, shape: Shape) -> int:
@@ -229,6 +251,7 @@ POST_GRAPHIC = Statement(
         "rm_id": Spec(ID),
         "radius": Spec(POSITIVE),
         "length": Spec(POSITIVE),
+        **{name: Spec(NOT_NEGATIVE) for name in _RADII},
         **{name: Spec(POSITIVE) for name in (*_LENGTHS, "x_scale", "y_scale", "z_scale")},
         **{name: Spec(REAL_NO_EXPRESSION) for name in _BOUNDS},
         "ends_type": Spec(keyword(ENDS_TYPES)),

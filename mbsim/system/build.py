@@ -499,7 +499,7 @@ def build(
         work=_work(nb, graphics, len(pairs.slot), ns, len(contact_ids)),
         rows=_rows(len(y0), nb, len(contact_ids), ns),
     )
-    needs_fcl = any(not kind.closed_form or kind.may_need_fcl for kind in kinds)
+    needs_fcl = any(not kind.closed_form for kind in kinds)
     return System(
         model, placement, scene, y0, body_ids, graphic_ids, contact_ids, plans, user, needs_fcl
     )

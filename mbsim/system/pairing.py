@@ -38,22 +38,14 @@ class Kind:
     slots: int
 
     @property
-    def may_need_fcl(self) -> bool:
-        """Whether the closed form holds only far from edges."""
-        return self.closed_form == "CYLINDER-BOX"
-
-    @property
     def regroups(self) -> bool:
-        """Whether points may appear deep in a contact: a corner becomes two crossings, or FCL's."""
-        return self.closed_form in ("", "BOX-BOX", "MESH-BOX", "MESH-MESH") or self.may_need_fcl
+        """Whether a contact that goes on may begin another slot, which is then no impact."""
+        return not self.closed_form or PAIRS[self.closed_form].regroups
 
     @property
     def detector(self) -> str:
         """How `mbsim check` names it."""
-        if not self.closed_form:
-            return "FCL"
-        near_edges = ", FCL near edges" if self.may_need_fcl else ""
-        return f"closed form {self.closed_form}{near_edges}"
+        return f"closed form {self.closed_form}" if self.closed_form else "FCL"
 
 
 @dataclass(frozen=True)
@@ -230,6 +222,9 @@ def half_extent(graphic: Graphic) -> tuple[float, float, float]:
         return (0.5 * size[0], 0.5 * size[1], 0.5 * size[2])
     if graphic.shape == "CYLINDER":
         return (size[0], size[0], 0.5 * size[1])
+    if graphic.shape == "FRUSTUM":
+        widest = max(size[0], size[1])
+        return (widest, widest, 0.5 * size[2])
     if graphic.shape == "PLANE":
         return (math.inf, math.inf, math.inf)
     assert graphic.vertices is not None
@@ -245,6 +240,8 @@ def reach(graphic: Graphic) -> float:
         return max(graphic.size)
     if graphic.shape == "CYLINDER":
         return math.hypot(graphic.size[0], 0.5 * graphic.size[1])
+    if graphic.shape == "FRUSTUM":
+        return math.hypot(max(graphic.size[:2]), 0.5 * graphic.size[2])
     if graphic.shape == "MESH":
         assert graphic.vertices is not None
         return float((graphic.vertices**2).sum(axis=1).max() ** 0.5)
@@ -255,6 +252,8 @@ def kernel_size(graphic: Graphic) -> tuple[float, float, float]:
     """Return the three numbers that the closed forms take (see `geometry.catalog`)."""
     if graphic.shape == "CYLINDER":
         return (graphic.size[0], 0.5 * graphic.size[1], 0.0)
+    if graphic.shape == "FRUSTUM":
+        return (graphic.size[0], graphic.size[1], 0.5 * graphic.size[2])
     if graphic.shape == "SPHERE":
         return (graphic.size[0], 0.0, 0.0)
     if graphic.hull is not None:

@@ -161,7 +161,7 @@ class Run:
     def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
         advance = jit.function(driver.advance)
         times = np.array(times, dtype=float)
-        return advance(self.problem, self.state, self.steps, end, tol, h_max, 0.0, times, budget)
+        return advance(self.steps, end, tol, h_max, 0.0, times, budget)
 
 
 def observed(errors):

@@ -310,10 +310,30 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         END_OF_MODEL,
         ("Post_Request[1]", 'type="MARKER_FORCE"', "not built yet"),
     ),
-    "frustum in contact": (
-        deck(('type="Sphere" center_marker_id="20" radius="0.108"', 'type="Frustum"')),
+    "picture in contact": (
+        deck(('type="Sphere" center_marker_id="20" radius="0.108"', 'type="Parasolid"')),
         CONTACT_LINE,
-        ("Force_Contact[301]", 'i_graphics_id="200"', "Frustum", "not built"),
+        ("Force_Contact[301]", 'i_graphics_id="200"', "Parasolid", "not built"),
+    ),
+    "frustum without bottom": (
+        deck(
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="Frustum" center_marker_id="20" top_radius="1" length="1"',
+            )
+        ),
+        SPHERE_LINE,
+        ("Post_Graphic[200]", "bottom_radius: missing", ">= 0"),
+    ),
+    "frustum without radii": (
+        deck(
+            (
+                'type="Sphere" center_marker_id="20" radius="0.108"',
+                'type="Frustum" center_marker_id="20" bottom_radius="0" top_radius="0" length="1"',
+            )
+        ),
+        SPHERE_LINE,
+        ("Post_Graphic[200]", 'top_radius="0', "line has no volume"),
     ),
     "cavity in contact": (
         deck(('radius="0.108"', 'radius="0.108" is_material_inside="FALSE"')),

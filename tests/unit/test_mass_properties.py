@@ -92,6 +92,20 @@ def test_polyhedra_tend_to_the_closed_form() -> None:
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.01)
 
 
+def test_frustum() -> None:
+    agree(mp.frustum(1.3, 1.3, 2.0), mp.cylinder(1.3, 2.0), 1e-14)
+    # a cone: V = pi r^2 l/3, centre a quarter up, I_z = 3/10 m r^2, I_x = 3/80 m (4 r^2 + l^2)
+    cone = mp.frustum(1.0, 0.0, 2.0)
+    assert cone.volume == pytest.approx(2.0 * math.pi / 3.0, rel=1e-14)
+    assert cone.centre[2] == pytest.approx(-0.5, rel=1e-14)
+    moments = cone.volume * np.array([0.3, 0.3, 0.3])
+    np.testing.assert_allclose(np.diag(cone.inertia), moments, rtol=1e-14)
+    # and the polyhedron around any other tends to it
+    vertices, faces = cylinder_mesh(4096)
+    vertices[:, :2] *= np.where(vertices[:, 2:] > 0.0, 0.4, 0.9)
+    agree(mp.polyhedron(vertices, faces), mp.frustum(0.9, 0.4, 2.0), 2e-6)
+
+
 def test_agrees_with_trimesh_on_a_torus() -> None:
     import trimesh
 

@@ -307,7 +307,9 @@ GRAPHICS = f"""
 <Post_Graphic id="4" type="Ellipsoid" center_marker_id="20" x_scale="1" y_scale="2" z_scale="3"/>
 <Post_Graphic id="5" type="Plane" center_marker_id="10" xmin="-1" xmax="1"/>
 <Post_Graphic id="6" type="TriaMesh" rm_id="20">{TETRAHEDRON}</Post_Graphic>
-<Post_Graphic id="7" type="Frustum" center_marker_id="20" top_radius="1"/>
+<Post_Graphic id="7" type="Parasolid" center_marker_id="20" top_radius="1"/>
+<Post_Graphic id="8" type="Frustum" center_marker_id="20" bottom_radius="2" top_radius="0"
+ length="5"/>
 """
 
 
@@ -322,12 +324,13 @@ def test_graphics(tmp_path: Path) -> None:
     assert shapes[5] == ("PLANE", (), zero)
     assert shapes[6] == ("MESH", (), zero)
     assert 7 not in shapes
+    assert shapes[8] == ("FRUSTUM", (2.0, 0.0, 5.0), (0.0, 0.0, 2.5))
     mesh = model.graphics[6]
     assert mesh.vertices is not None
     assert mesh.faces is not None
     assert (mesh.vertices.shape, mesh.faces.shape) == ((4, 3), (4, 3))
     text = "\n".join(model.notes)
-    for word in ("color", "ends_type", "xmin", "Frustum"):
+    for word in ("color", "ends_type", "xmin", "Parasolid"):
         assert word in text
 
 

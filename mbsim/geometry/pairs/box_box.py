@@ -333,7 +333,7 @@ def _manifold(frame_j, hi, hj, s, n, points):
         put_point(points[row], depth, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
 
 
-@pair("BOX", "BOX", slots=BOX_BOX_SLOTS)
+@pair("BOX", "BOX", slots=BOX_BOX_SLOTS, regroups=True)
 def box_box(frame_i, size_i, frame_j, size_j, points):
     """The common polygon of two faces; apart, the largest gap along a face's or edges' axis."""
     s = np.empty(_OVERLAP + _AXES)

@@ -1,15 +1,12 @@
-"""A box or a cylinder on a plane, a cylinder on the face of a box far from its edges."""
+"""A box on a plane."""
 
 from __future__ import annotations
 
-import math
-
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import NOT_MINE, axis, pair, put_point
+from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.geometry.catalog import axis, pair, put_point
 
 BOX_SLOTS = 8
-CYLINDER_SLOTS = 6
 
 
 @jitable
@@ -29,72 +26,7 @@ def box_on_plane(frame_i, size_i, origin, n, points):
     return 8
 
 
-@jitable
-def cylinder_on_plane(frame_i, size_i, origin, n, points):
-    """On each rim its lowest point and those 120 degrees to both sides: row = rim, point.
-
-    Lying, the two lowest points carry; standing, the three of one rim. Three points at equal
-    angles have the same stiffness against tilting in every direction, so nothing jumps
-    where an upright cylinder has no lowest point.
-    """
-    centre = vector(frame_i)
-    a = axis(frame_i, 2)
-    down = sub(scale(dot(n, a), a), n)
-    length = norm(down)
-    down = scale(1.0 / length, down) if length > 1e-9 else axis(frame_i, 0)
-    side = cross(a, down)
-    for rim in range(2):
-        end = add(centre, scale((1.0 if rim else -1.0) * size_i[1], a))
-        for k in range(3):
-            # 0 and +-120 degrees
-            c = 1.0 if k == 0 else -0.5
-            s = 0.0 if k == 0 else (math.sqrt(0.75) if k == 1 else -math.sqrt(0.75))
-            radial = scale(size_i[0], add(scale(c, down), scale(s, side)))
-            p = add(end, radial)
-            depth = -dot(sub(p, origin), n)
-            put_point(points[3 * rim + k], depth, add(p, scale(0.5 * depth, n)), n)
-    return 6
-
-
 @pair("BOX", "PLANE", slots=BOX_SLOTS)
 def box_plane(frame_i, size_i, frame_j, size_j, points):
     """The corners of the box against the plane."""
     return box_on_plane(frame_i, size_i, vector(frame_j), axis(frame_j, 2), points)
-
-
-@pair("CYLINDER", "PLANE", slots=CYLINDER_SLOTS)
-def cylinder_plane(frame_i, size_i, frame_j, size_j, points):
-    """Three points of each rim against the plane."""
-    return cylinder_on_plane(frame_i, size_i, vector(frame_j), axis(frame_j, 2), points)
-
-
-@jitable
-def face_below(frame_j, size_j, centre, radius):
-    """Return (code, sign) of the face of box J on which a ball around `centre` stands alone.
-
-    `code` is the face's axis, or NOT_MINE where the ball's shadow reaches an edge of the
-    face or its centre is not outside of it: there the face is no plane.
-    """
-    apart = sub(centre, vector(frame_j))
-    for k in range(3):
-        height = dot(apart, axis(frame_j, k))
-        m, o = (k + 1) % 3, (k + 2) % 3
-        inside = (
-            abs(dot(apart, axis(frame_j, m))) + radius < size_j[m]
-            and abs(dot(apart, axis(frame_j, o))) + radius < size_j[o]
-        )
-        if inside and abs(height) > size_j[k]:
-            return k, 1.0 if height > 0.0 else -1.0
-    return NOT_MINE, 0.0
-
-
-@pair("CYLINDER", "BOX", slots=CYLINDER_SLOTS)
-def cylinder_box(frame_i, size_i, frame_j, size_j, points):
-    """A cylinder over a face of the box, far from its edges."""
-    radius = math.sqrt(size_i[0] ** 2 + size_i[1] ** 2)
-    k, sign = face_below(frame_j, size_j, vector(frame_i), radius)
-    if k < 0:
-        return NOT_MINE
-    n = scale(sign, axis(frame_j, k))
-    origin = add(vector(frame_j), scale(size_j[k], n))
-    return cylinder_on_plane(frame_i, size_i, origin, n, points)

@@ -119,14 +119,14 @@ def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
     return rows
 
 
-@pair("MESH", "MESH", slots=HULL_SLOTS)
+@pair("MESH", "MESH", slots=HULL_SLOTS, regroups=True)
 def mesh_mesh(frame_i, size_i, frame_j, size_j, points):
     """The common polygon of the two faces that look at each other."""
     hull_i, hull_j = floats_at(size_i[0], size_i[1]), floats_at(size_j[0], size_j[1])
     return _two_hulls(frame_i, hull_i, frame_j, hull_j, points)
 
 
-@pair("MESH", "BOX", slots=HULL_SLOTS)
+@pair("MESH", "BOX", slots=HULL_SLOTS, regroups=True)
 def mesh_box(frame_i, size_i, frame_j, size_j, points):
     """A box is a polyhedron too."""
     box = CUBE.copy()

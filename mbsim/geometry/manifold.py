@@ -1,0 +1,182 @@
+"""Where two shapes touch along a given normal: the points of a patch or of a line.
+
+What carries is spread by the exterior angle of the patch's border: an arc has its own angle,
+a corner the angle by which the border turns there. Their sum is 2 pi for every convex patch,
+so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 shares, a
+polygon of 4 corners 4. A line has 2 shares, fading to 1 as it shrinks to a point.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub
+from mbsim.geometry.catalog import put_point
+
+TURN = 2.0 * math.pi
+#: Shares below this are no incident.
+SMALL = 1e-6
+#: Rows that the arcs of one disc take.
+ARC_ROWS = 6
+
+
+@jitable
+def put_apart(points, first, last, depth, p, n):
+    """Write rows that do not touch."""
+    for row in range(first, last):
+        put_point(points[row], depth, p, n)
+
+
+@jitable
+def put_share(row, depth, p, n, share):
+    """Write one candidate, unless it carries nothing."""
+    if share > SMALL:
+        put_point(row, depth, p, n, share)
+
+
+@jitable
+def fade(x):
+    """Return the smooth step 3 x^2 - 2 x^3 from 0 to 1, constant outside."""
+    x = min(1.0, max(0.0, x))
+    return x * x * (3.0 - 2.0 * x)
+
+
+@jitable
+def half_sector(arcs, count, begin, sign):
+    """Return (angle, c, s) of what arcs leave of the 60 degrees from `begin` on.
+
+    `sign` 1 looks to the left, -1 to the right; c, s are cosine and sine of the place that stands
+    for it, times the angle: `begin` itself where some tenths of a radian are left there, else
+    the mean of where the arcs come nearest to it.
+    """
+    width = TURN / 6.0
+    near, rest, c, s = 0.0, 0.0, 0.0, 0.0
+    for m in range(count):
+        start, length = arcs[m, 0], arcs[m, 1]
+        if length <= 0.0:
+            continue
+        # angles from begin, counted towards the half
+        first = (start - begin) % TURN if sign > 0.0 else (begin - start - length) % TURN
+        if first + length > TURN:
+            near = max(near, min(first + length - TURN, width))
+        if first == 0.0:
+            near = max(near, min(length, width))
+        elif first < width:
+            angle = min(length, width - first)
+            rest += angle
+            c += angle * math.cos(begin + sign * first)
+            s += angle * math.sin(begin + sign * first)
+    total = near + rest
+    if near > 0.0:
+        # all of it, the more the rim is whole around `begin`
+        part = fade(near / 0.3)
+        c, s = (1.0 - part) * c, (1.0 - part) * s
+        weight = near + part * rest
+        c += weight * math.cos(begin)
+        s += weight * math.sin(begin)
+    return total, c, s
+
+
+@jitable
+def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
+    """Write three points for what is left of a rim.
+
+    The rim is cut into three sectors around `reference` and +-120 degrees. A sector's
+    point is the rim's point in its middle as long as that is left, else the mean of the points
+    next to it on both sides, each with its angle.
+
+    Parameters
+    ----------
+    arcs : ndarray, shape (>= count, >= 2)
+        Start and length of each arc [rad].
+    disc : tuple
+        Centre, u, v, radius, depth at the centre, rise of the depth along u.
+    side : float
+        1 where the disc is I's (its points go along n to the other surface), -1 where J's.
+    weight : float
+        Shares of a full turn.
+    """
+    centre, u, v, r, depth0, rise = disc
+    for k in range(3):
+        middle = reference + k * TURN / 3.0
+        left, x, y = half_sector(arcs, count, middle, 1.0)
+        right, c, s = half_sector(arcs, count, middle, -1.0)
+        angle = left + right
+        if angle <= 0.0:
+            continue
+        x, y = r * (x + c) / angle, r * (y + s) / angle
+        depth = depth0 + rise * x
+        p = add(centre, add(scale(x, u), scale(y, v)))
+        share = weight * angle / TURN
+        put_share(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, share)
+
+
+@jitable
+def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepest):
+    """Write up to six points for what is left of a rim, `total` [rad] in all.
+
+    Tilted, the sectors are set around the deepest point (u), so that it carries wherever the
+    tilt turns. Flat, the tilt has no direction: a rim that is cut is divided around its own
+    middle `own`, so that the centre of pressure does not turn with a tilt of 1e-9.
+    """
+    _, _, _, r, _, rise = disc
+    tilted = fade(2.0 * r * abs(rise) / max(deepest, 1e-300) - 0.5)
+    whole = fade(1.0 - (TURN - total) / 0.5)
+    around_deepest = tilted + whole - tilted * whole
+    put_arcs(points, first, arcs, count, disc, n, side, 0.0, weight * around_deepest)
+    put_arcs(points, first + 3, arcs, count, disc, n, side, own, weight * (1.0 - around_deepest))
+
+
+@jitable
+def turn_of(ax, ay, bx, by):
+    """Return the angle from a to b where it is to the left, else 0."""
+    return max(0.0, math.atan2(ax * by - ay * bx, ax * bx + ay * by))
+
+
+@jitable
+def line_share(length, radius):
+    """Return the share of each end of a line contact: 1, fading to 1/2 as it shrinks to a point."""
+    return 0.5 + 0.5 * fade(5.0 * length / radius)
+
+
+@jitable
+def segment_on_disc(points, first, a, b, disc, o, n, side):
+    """Write the ends of the part of segment a-b that lies over an end disc; return whether any.
+
+    `disc` is (centre, radius), `o` its outward normal, `side` 1 where the disc is I's and the
+    segment J's, else -1. Depth is measured along n.
+    """
+    centre, r = disc
+    no = dot(n, o)
+    depth_a = side * dot(sub(a, centre), o) / no
+    depth_b = side * dot(sub(b, centre), o) / no
+    # seen along n on the plane of the disc
+    qa = sub(sub(a, scale(side * depth_a, n)), centre)
+    way = sub(sub(b, scale(side * depth_b, n)), add(qa, centre))
+    # |qa + s way| = r
+    ww, qw = dot(way, way), dot(qa, way)
+    root = qw * qw - ww * (dot(qa, qa) - r * r)
+    if ww == 0.0 or root <= 0.0:
+        return False
+    root = math.sqrt(root)
+    low, high = max(0.0, (-qw - root) / ww), min(1.0, (root - qw) / ww)
+    if low >= high:
+        return False
+    share = line_share((high - low) * math.sqrt(ww), r)
+    for k in range(2):
+        s = low if k == 0 else high
+        depth = depth_a + s * (depth_b - depth_a)
+        x = add(a, scale(s, sub(b, a)))
+        put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, share)
+    return True
+
+
+@jitable
+def crossing_of(a, b, p, q, n):
+    """Return the place 0..1 on p-q where it crosses the line a-b, seen along n; 1/2 if parallel."""
+    across = cross(sub(b, a), n)
+    along = dot(sub(q, p), across)
+    if abs(along) < 1e-9 * norm(across) * norm(sub(q, p)):
+        return 0.5
+    return min(1.0, max(0.0, dot(sub(a, p), across) / along))

@@ -1,0 +1,383 @@
+"""A cylinder or a frustum on a box: standing, also over edges, lying, leaning, rolling over."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.geometry.catalog import pair, put_point
+from mbsim.geometry.convex import (
+    BOX,
+    ROTOR,
+    along_circle,
+    far,
+    flat,
+    meeting,
+    placed,
+    shallow,
+    slant,
+)
+from mbsim.geometry.manifold import (
+    ARC_ROWS,
+    TURN,
+    crossing_of,
+    line_share,
+    put_apart,
+    put_rim,
+    put_share,
+    segment_on_disc,
+    turn_of,
+)
+from mbsim.geometry.pairs.revolution import cylinder_size
+from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
+
+#: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
+#: or its corner; where it leaves); of a line its bottom and top end and a crossing.
+BOX_ROWS = ARC_ROWS + 8
+
+
+@jitable
+def edge_axis(box, k):
+    """Return axis k of a box."""
+    return box[2] if k == 0 else (box[3] if k == 1 else box[4])
+
+
+@jitable
+def first_two(box, n):
+    """Return the box's axes sorted by how much they are along n: the first two, and the third."""
+    a, b, c = abs(dot(box[2], n)), abs(dot(box[3], n)), abs(dot(box[4], n))
+    if a >= b and a >= c:
+        return (0, 1, 2) if b >= c else (0, 2, 1)
+    if b >= c:
+        return (1, 0, 2) if a >= c else (1, 2, 0)
+    return (2, 0, 1) if a >= b else (2, 1, 0)
+
+
+@jitable
+def over(i, j, n, margin):
+    """Return whether I's lowest point lies over J's face with normal n, by `margin` from its edges.
+
+    With a margin of the depth no way out to the side is shorter.
+    """
+    d = sub(far(i, scale(-1.0, n)), j[1])
+    for k in range(3):
+        a = edge_axis(j, k)
+        if abs(dot(a, n)) < 0.5 and abs(dot(d, a)) > j[5][k] - margin:
+            return False
+    return True
+
+
+@jitable
+def least(i, j):
+    """Return (f, n) of the least overlap of a solid of revolution I and a box J."""
+    f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
+    if f < 0.0 or (f < shallow(i, j) and over(i, j, n, f)):
+        return f, n
+    f, n = flat(i, j, i, -1.0, f, n)
+    # n points into I: the outward normal of I is -n
+    gamma = -slant(i[5])
+    for k in range(3):
+        f, n = meeting(i, j, edge_axis(j, k), 0.0, i[4], gamma, f, n)
+    if f < 0.0:
+        return f, n
+    for k in range(4):
+        # rims on edges, then corners on the side
+        if k < 3:
+            f, n = along_circle(i, j, edge_axis(j, k), 0.0, f, n)
+        else:
+            f, n = along_circle(i, j, i[4], gamma, f, n)
+        if f < 0.0:
+            break
+    return f, n
+
+
+@jitable
+def face_corner(j, k, sk, quarter):
+    """Return corner 0..3 of the face of box J with outward normal sk times axis k."""
+    first, second = (k + 1) % 3, (k + 2) % 3
+    s1 = 1.0 if quarter == 0 or quarter == 3 else -1.0
+    s2 = 1.0 if quarter < 2 else -1.0
+    p = add(j[1], scale(sk * j[5][k], edge_axis(j, k)))
+    p = add(p, scale(s1 * j[5][first], edge_axis(j, first)))
+    return add(p, scale(s2 * j[5][second], edge_axis(j, second)))
+
+
+@jitable
+def clip_edge(row, ax, ay, bx, by, r):
+    """Cut one edge a-b of the face with the circle of radius r around 0.
+
+    Writes into `row` enter x, y, leave x, y, on circle there (0/1 each), and returns
+    1 if some of it is within, 0 if not, -1 if the circle lies beyond the edge.
+    """
+    tx, ty = bx - ax, by - ay
+    length = math.sqrt(tx * tx + ty * ty)
+    tx, ty = tx / length, ty / length
+    # distance of the line in front of the circle's centre
+    h = ax * ty - ay * tx
+    if h <= -r:
+        return -1
+    if h >= r:
+        return 0
+    half = math.sqrt(r * r - h * h)
+    foot = -(ax * tx + ay * ty)
+    low, high = max(0.0, foot - half), min(length, foot + half)
+    if low >= high:
+        return 0 if h > 0.0 else -1
+    row[0], row[1] = ax + low * tx, ay + low * ty
+    row[2], row[3] = ax + high * tx, ay + high * ty
+    row[4] = 1.0 if foot - half > 0.0 else 0.0
+    row[5] = 1.0 if foot + half < length else 0.0
+    return 1
+
+
+@jitable
+def put_corners(work, disc, n, weight):
+    """Turn the cut edges in the rows of `work` into points where they enter and leave the disc."""
+    centre, u, v, r, depth0, rise = disc
+    turns = (work[1, 6], work[3, 6], work[5, 6], work[7, 6])
+    for e in range(4):
+        row = work[2 * e]
+        cut = row[7] == 1.0
+        place = (row[0], row[1], row[2], row[3])
+        enters, leaves = row[4] == 1.0, row[5] == 1.0
+        tx, ty = math.cos(turns[e]), math.sin(turns[e])
+        before = turns[e - 1]
+        for side in range(2):
+            x, y = place[2 * side], place[2 * side + 1]
+            if not cut or (side == 1 and not leaves):
+                # where an edge ends within the disc the next one has the corner
+                angle = 0.0
+            elif side == 1:
+                angle = turn_of(tx, ty, -y, x)
+            elif enters:
+                angle = turn_of(-y, x, tx, ty)
+            else:
+                angle = turn_of(math.cos(before), math.sin(before), tx, ty)
+            put_point(work[2 * e + side], -r, centre, n)
+            depth = depth0 + rise * x
+            p = add(centre, add(scale(x, u), scale(y, v)))
+            p = add(p, scale(0.5 * depth, n))
+            put_share(work[2 * e + side], depth, p, n, weight * angle / TURN)
+
+
+@jitable
+def disc_on_face(i, j, end, k, n, f, points):
+    """Write the patch of an end disc of I on face k of box J; return whether there is one.
+
+    All is drawn in the plane of the disc, where it is a circle and the face, seen along
+    n, a parallelogram. u points to where the disc is deepest.
+    """
+    centre, o, r = end_disc(i, end)
+    face = edge_axis(j, k)
+    sk = 1.0 if dot(face, n) >= 0.0 else -1.0
+    face = scale(sk, face)
+    nf, no = dot(n, face), dot(n, o)
+    u = sub(scale(dot(face, o), o), face)
+    tilt = norm(u)
+    u = scale(1.0 / tilt, u) if tilt > 1e-12 else i[2]
+    # with o = u x v a turn from u to v is a turn to the left seen against o
+    v = cross(o, u)
+    q = add(j[1], scale(j[5][k], face))
+    depth0 = dot(sub(q, centre), face) / nf
+    rise = tilt / nf
+    disc = (centre, u, v, r, depth0, rise)
+
+    # the corners go round to the left, seen against o, which is along -n; the face's axes and
+    # its normal are right-handed for sk = 1
+    work = points[ARC_ROWS:]
+    cuts, beyond, sum_x, sum_y = 0, False, 0.0, 0.0
+    inside = True
+    for e in range(4):
+        first, second = ((4 - e) % 4, (3 - e) % 4) if sk > 0.0 else (e, (e + 1) % 4)
+        a, b = face_corner(j, k, sk, first), face_corner(j, k, sk, second)
+        # along n onto the plane of the disc
+        a = sub(sub(a, scale(dot(sub(a, centre), o) / no, n)), centre)
+        b = sub(sub(b, scale(dot(sub(b, centre), o) / no, n)), centre)
+        ax, ay, bx, by = dot(a, u), dot(a, v), dot(b, u), dot(b, v)
+        if ax * by - ay * bx <= 0.0:
+            inside = False
+        work[2 * e + 1, 6] = math.atan2(by - ay, bx - ax)
+        work[2 * e, 7] = 0.0
+        code = clip_edge(work[2 * e], ax, ay, bx, by, r)
+        if code == 1:
+            cuts += 1
+            work[2 * e, 7] = 1.0
+            # the normal of the border adds up to 0 around it: what the chords lack the arcs have
+            sum_x -= work[2 * e, 3] - work[2 * e, 1]
+            sum_y += work[2 * e, 2] - work[2 * e, 0]
+        elif code == -1:
+            beyond = True
+    if cuts == 0 and (beyond or not inside):
+        return False
+
+    # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
+    arcs = work[1::2]
+    total = 0.0
+    if cuts == 0:
+        arcs[0, 0], arcs[0, 1] = 0.0, TURN
+        total = TURN
+        for e in range(1, 4):
+            arcs[e, 1] = 0.0
+    for e in range(4):
+        if cuts == 0:
+            break
+        arcs[e, 1] = 0.0
+        if work[2 * e, 7] == 0.0 or work[2 * e, 5] == 0.0:
+            continue
+        for step in range(1, 5):
+            g = (e + step) % 4
+            if work[2 * g, 7] == 1.0:
+                start = math.atan2(work[2 * e, 3], work[2 * e, 2])
+                stop = math.atan2(work[2 * g, 1], work[2 * g, 0])
+                length = (stop - start) % TURN
+                # a corner on the circle: rounding must not make it a whole turn
+                length = 0.0 if cuts > 1 and length > TURN - 1e-9 else length
+                arcs[e, 0], arcs[e, 1] = start, length
+                total += length
+                break
+    weight = 4.0 - total / TURN
+    own = math.atan2(sum_y, sum_x) if cuts > 0 else 0.0
+    put_rim(points, 0, arcs, 4, disc, n, 1.0, total, own, weight, f)
+    put_corners(work, disc, n, weight)
+    return True
+
+
+@jitable
+def line_on_face(i, j, k, n, points):
+    """Write the ends of the part of I's side line that lies over face k of box J."""
+    low, high, _ = side_line(i, scale(-1.0, n))
+    face = edge_axis(j, k)
+    face = scale(1.0 if dot(face, n) >= 0.0 else -1.0, face)
+    nf = dot(n, face)
+    q = add(j[1], scale(j[5][k], face))
+    depth_low, depth_high = dot(sub(q, low), face) / nf, dot(sub(q, high), face) / nf
+    way = sub(high, low)
+    # on the face, seen along n
+    start = sub(add(low, scale(depth_low, n)), j[1])
+    stop = sub(add(high, scale(depth_high, n)), j[1])
+    first, last = 0.0, 1.0
+    for step in range(1, 3):
+        m = (k + step) % 3
+        a, half = edge_axis(j, m), j[5][m]
+        y0, y1 = dot(start, a), dot(stop, a)
+        if abs(y1 - y0) < 1e-300:
+            if abs(y0) > half:
+                return False
+            continue
+        s0, s1 = (-half - y0) / (y1 - y0), (half - y0) / (y1 - y0)
+        first, last = max(first, min(s0, s1)), min(last, max(s0, s1))
+    if first >= last:
+        return False
+    share = line_share((last - first) * norm(way), widest(i[5]))
+    for row in range(2):
+        s = first if row == 0 else last
+        depth = depth_low + s * (depth_high - depth_low)
+        p = add(add(low, scale(s, way)), scale(0.5 * depth, n))
+        put_point(points[row], depth, p, n, share)
+    return True
+
+
+@jitable
+def side_on_edge(i, j, axes, n, f, points):
+    """Write the side of I on the edge of box J that faces it: both ends, or the crossing.
+
+    Where they are parallel to within the depth the ends carry; the more they cross the more
+    does the one point where they cross.
+    """
+    k, second, m = axes
+    q = j[1]
+    for h in (k, second):
+        a = edge_axis(j, h)
+        q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
+    e, half = edge_axis(j, m), j[5][m]
+    low, high, _ = side_line(i, scale(-1.0, n))
+    # the part of the edge between both ends of the solid
+    first, last = -half, half
+    z, rise, end = dot(sub(q, i[1]), i[4]), dot(e, i[4]), i[5][2]
+    if abs(rise) > 1e-12:
+        s0, s1 = (-end - z) / rise, (end - z) / rise
+        first, last = max(first, min(s0, s1)), min(last, max(s0, s1))
+    elif abs(z) > end:
+        return False
+    if first >= last:
+        return False
+    share = line_share(last - first, widest(i[5]))
+    x0, x1 = add(q, scale(first, e)), add(q, scale(last, e))
+    d0, n0 = side_distance(i, x0)
+    d1, n1 = side_distance(i, x1)
+    both = min(1.0, max(0.0, min(-d0, -d1) / max(f, 1e-300)))
+    # row 0 is towards the bottom of the solid
+    flip = rise < 0.0
+    put_share(points[1 if flip else 0], -d0, sub(x0, scale(0.5 * d0, n0)), scale(-1.0, n0),
+              share * both)  # fmt: skip
+    put_share(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
+              share * both)  # fmt: skip
+    x = add(x0, scale(crossing_of(low, high, x0, x1, n), sub(x1, x0)))
+    put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
+    return True
+
+
+@jitable
+def solid_on_box(i, j, points):
+    """Write the points of a solid of revolution I on a box J."""
+    f, n = least(i, j)
+    middle = scale(0.5, add(far(i, scale(-1.0, n)), far(j, n)))
+    if f <= 0.0:
+        put_apart(points, 0, BOX_ROWS, f, middle, n)
+        return BOX_ROWS
+    out = -(widest(i[5]) + i[5][2])
+    put_apart(points, 0, BOX_ROWS, out, middle, n)
+    axes = first_two(j, n)
+    k = axes[0]
+    end = end_facing(i, scale(-1.0, n))
+    on_face = abs(dot(edge_axis(j, k), n)) > math.sqrt(0.5)
+    if end != 0 and on_face:
+        done = disc_on_face(i, j, end, k, n, f, points)
+    elif on_face:
+        done = line_on_face(i, j, k, n, points)
+        if not done:
+            # it leaves the face where it crosses an edge
+            done = side_on_edge(i, j, axes, n, f, points)
+    elif end == 0:
+        done = side_on_edge(i, j, axes, n, f, points)
+    else:
+        centre, o, r = end_disc(i, end)
+        q = j[1]
+        for h in axes[:2]:
+            a = edge_axis(j, h)
+            q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
+        e = scale(j[5][axes[2]], edge_axis(j, axes[2]))
+        done = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0)
+    deepest = out
+    for row in range(BOX_ROWS):
+        # nothing is deeper than the least overlap
+        points[row, 0] = min(points[row, 0], f)
+        deepest = max(deepest, points[row, 0])
+    if not done or deepest < 0.5 * f:
+        put_single(i, j, n, f, points)
+    return BOX_ROWS
+
+
+@jitable
+def put_single(i, j, n, f, points):
+    """Write one point: that of the rim where one is lowest, else at the box's corner."""
+    if pointed(i, scale(-1.0, n)) > 1e-6:
+        p = add(far(i, scale(-1.0, n)), scale(0.5 * f, n))
+    else:
+        p = sub(far(j, n), scale(0.5 * f, n))
+    put_point(points[0], f, p, n)
+
+
+@pair("CYLINDER", "BOX", slots=BOX_ROWS, regroups=True)
+def cylinder_box(frame_i, size_i, frame_j, size_j, points):
+    """Standing, lying, leaning or rolling over an edge."""
+    i = placed(ROTOR, frame_i, cylinder_size(size_i))
+    return solid_on_box(i, placed(BOX, frame_j, vector(size_j)), points)
+
+
+@pair("FRUSTUM", "BOX", slots=BOX_ROWS, regroups=True)
+def frustum_box(frame_i, size_i, frame_j, size_j, points):
+    """Standing, lying, leaning or rolling over an edge."""
+    i = placed(ROTOR, frame_i, vector(size_i))
+    return solid_on_box(i, placed(BOX, frame_j, vector(size_j)), points)

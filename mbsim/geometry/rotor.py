@@ -1,0 +1,70 @@
+"""The features of a solid of revolution that face a given direction: end disc, side line."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, any_tangent, dot, norm, scale, sub
+from mbsim.geometry.convex import slant
+
+
+@jitable
+def end_facing(shape, d):
+    """Return -1, 0 or 1: the bottom end, the side or the top end is nearest to direction d.
+
+    The border lies half-way between the normal of the end and that of the side.
+    """
+    c = dot(shape[4], d)
+    side = math.acos(slant(shape[5]))
+    angle = math.acos(min(1.0, max(-1.0, c)))
+    if angle < 0.5 * side:
+        return 1
+    return -1 if angle > 0.5 * (math.pi + side) else 0
+
+
+@jitable
+def end_disc(shape, end):
+    """Return centre, outward normal and radius of the bottom (-1) or top (1) end."""
+    o = scale(float(end), shape[4])
+    return add(shape[1], scale(shape[5][2], o)), o, shape[5][1] if end > 0 else shape[5][0]
+
+
+@jitable
+def side_line(shape, d):
+    """Return bottom and top end of the straight line of the side that faces d, and its normal."""
+    _, centre, _, _, a, size = shape
+    w = sub(d, scale(dot(d, a), a))
+    length = norm(w)
+    w = scale(1.0 / length, w) if length > 1e-12 else any_tangent(a)
+    low = add(sub(centre, scale(size[2], a)), scale(size[0], w))
+    high = add(add(centre, scale(size[2], a)), scale(size[1], w))
+    c = slant(size)
+    return low, high, add(scale(math.sqrt(1.0 - c * c), w), scale(c, a))
+
+
+@jitable
+def side_distance(shape, p):
+    """Return the distance of p to the side taken as unlimited (< 0 inside), and its normal."""
+    _, centre, _, _, a, size = shape
+    d = sub(p, centre)
+    z = dot(d, a)
+    across = sub(d, scale(z, a))
+    r = norm(across)
+    w = scale(1.0 / r, across) if r > 1e-300 else any_tangent(a)
+    c = slant(size)
+    k = math.sqrt(1.0 - c * c)
+    return (r - size[0]) * k + (z + size[2]) * c, add(scale(k, w), scale(c, a))
+
+
+@jitable
+def pointed(shape, d):
+    """Return how far d is from the normals of ends and side, where no single point is farthest."""
+    c = dot(shape[4], d)
+    return min(abs(c - slant(shape[5])), 1.0 - abs(c))
+
+
+@jitable
+def widest(size):
+    """Return the larger radius."""
+    return max(size[0], size[1])

@@ -1,0 +1,78 @@
+"""Print what one call of a closed-form pair costs, at rest and apart, in a compiled loop."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from contracts.test_pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
+
+from mbsim.core.address import call_int
+from mbsim.geometry.catalog import PAIRS, POINT
+from mbsim.system.build import pair_address
+
+SHAPES = {
+    **SIZES,
+    "CYLINDER": ROLLER,
+    "BOX": SLAB[1],
+    "ELLIPSOID": np.array([0.1, 0.07, 0.05]),
+    "SPHERE": np.array([0.1, 0.0, 0.0]),
+}
+ORIGIN = frame(np.zeros(3), UPRIGHT)
+SIDE = frame(np.zeros(3), LYING)
+LEAN = turned((0.3, 1, 0), 1e-3)
+CALLS = 20_000
+CASES = [
+    ("sphere on the side of a cylinder", "SPHERE-CYLINDER", frame([0.199, 0, 0], UPRIGHT), ORIGIN),
+    ("cylinder on plane", "CYLINDER-PLANE", frame([0, 0, 0.099], LEAN), ORIGIN),
+    ("ellipsoid on plane", "ELLIPSOID-PLANE", frame([0, 0, 0.0499], LEAN), ORIGIN),
+    ("ellipsoid on ellipsoid", "ELLIPSOID-ELLIPSOID", frame([0.02, 0.01, 0.095], LEAN), ORIGIN),
+    ("ellipsoid on box", "ELLIPSOID-BOX", frame([0.02, 0.01, 0.0499], LEAN), SLAB[0]),
+    ("ellipsoid on the edge of a box", "ELLIPSOID-BOX", frame([1.06, 0.01, 0.02], LEAN), SLAB[0]),
+    ("cylinder stands on box", "CYLINDER-BOX", frame([0, 0, 0.099], LEAN), SLAB[0]),
+    ("cylinder stands over an edge", "CYLINDER-BOX", frame([0.95, 0, 0.099], LEAN), SLAB[0]),
+    ("cylinder lies on box", "CYLINDER-BOX", frame([0, 0, 0.099], LEAN @ LYING), SLAB[0]),
+    ("cylinder over box, apart", "CYLINDER-BOX", frame([0, 0, 0.3], LEAN @ LYING), SLAB[0]),
+    ("cylinder on cylinder", "CYLINDER-CYLINDER", frame([0.03, 0, 0.199], LEAN), ORIGIN),
+    ("cylinders side by side", "CYLINDER-CYLINDER", frame([0, 0.03, 0.199], LEAN @ LYING), SIDE),
+    ("cylinders crossed", "CYLINDER-CYLINDER",
+     frame([0, 0, 0.199], turned((0, 0, 1), 1.0) @ LYING), SIDE),
+    ("rim on rim", "CYLINDER-CYLINDER",
+     frame([0.15, 0.05, 0.18], turned((0.3, 1, 0), 0.6)), ORIGIN),
+    ("cylinders apart", "CYLINDER-CYLINDER", frame([0.4, 0, 0.3], LEAN), ORIGIN),
+]  # fmt: skip
+
+
+@njit
+def call_often(address, arrays, count):
+    """Call a pair `count` times."""
+    total = 0
+    for _ in range(count):
+        total += call_int(address, arrays)
+    return total
+
+
+def main():
+    for label, name, frame_i, frame_j in CASES:
+        size_i, size_j = (SHAPES[shape] for shape in name.split("-"))
+        points = np.zeros((PAIRS[name].slots, POINT))
+        arrays = (frame_i, size_i, frame_j, size_j, points)
+        address = pair_address(PAIRS[name])
+        call_often(address, arrays, 10)
+        times = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            call_often(address, arrays, CALLS)
+            times.append(time.perf_counter() - begin)
+        touching = int((points[:, 0] > 0.0).sum())
+        print(f"{label:34s}{min(times) / CALLS * 1e9:8.0f} ns, {touching} points touch")
+
+
+if __name__ == "__main__":
+    main()
