@@ -399,13 +399,13 @@ def step_to_leave(scene, f, s, h):
     if square < 0.0:
         return math.inf
     leave = 2.0 * depth / (math.sqrt(square) - rate)
-    if leave > h:
-        return math.inf
     pushes = state.normal[s] > 0.0
-    before, left = 0.0, 1.0
+    if leave > h and pushes_at(scene, c, h, depth, rate, bend) == pushes:
+        return math.inf
+    before, part = 0.0, 1.0
     for _ in range(SHALLOWEST):
-        left *= 0.5
-        after = leave * (1.0 - left)
+        part *= 0.5
+        after = min(h, leave * (1.0 - part))
         if pushes_at(scene, c, after, depth, rate, bend) != pushes:
             for _ in range(SHALLOWEST):
                 middle = 0.5 * (before + after)

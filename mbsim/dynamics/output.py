@@ -119,7 +119,7 @@ def beyond_noise(scene, b, h, dv, dw):
 
 @jitable
 def scaled_error(scene, h, e, y):
-    """Return the largest over bodies of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and X/L of incidents.
+    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and of incidents' X/L and energy.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
     step can do to a velocity is not chased. The worst body is left in `trouble[0]`.
@@ -147,6 +147,9 @@ def scaled_error(scene, h, e, y):
             if at >= 0:
                 square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
                 largest = max(largest, max(square, e[at + 2] ** 2))
+    # the energy balance closes as well as the motion
+    for c in range(len(e) - len(scene.contacts.id), len(e)):
+        largest = max(largest, (e[c] / scene.world.scale[2]) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

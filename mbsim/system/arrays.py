@@ -144,7 +144,7 @@ class World(NamedTuple):
     """What belongs to no element."""
 
     gravity: F1  # (3,)
-    scale: F1  # (2,) length L and speed V of the error norm
+    scale: F1  # (3,) length L, speed V and energy of the error norm
     doors: I1  # (1,) address of the FCL detector
     fixed_step: I1  # (1,) 1 for a method without error estimate
 

@@ -305,6 +305,13 @@ def _speed_scale(model: Model, placement: Placement, end_time: float) -> float:
     return max(fastest, math.sqrt(g * length), length / end_time if end_time > 0.0 else 0.0)
 
 
+def _scales(placement: Placement, speed: float) -> np.ndarray[Any, Any]:
+    """Return length, speed and energy of the error norm, all above 0."""
+    V = speed if speed > 0.0 else placement.L
+    heaviest = max((body.mass for body in placement.bodies.values()), default=1.0)
+    return np.array([placement.L, V, heaviest * V * V])
+
+
 def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.ndarray[Any, Any]:
     """Return the ODE vector at the start: X and dissipated energy are 0."""
     bodies = list(placement.bodies.values())
@@ -490,7 +497,7 @@ def build(
         slots=a.Slots(slot_pair, x),
         world=a.World(
             np.array(model.gravity.g, dtype=np.float64),
-            np.array([placement.L, speed if speed > 0.0 else placement.L]),
+            _scales(placement, speed),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
         ),
