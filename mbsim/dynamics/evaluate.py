@@ -56,14 +56,11 @@ def accelerate(scene, y, dy):
         torque = unrotate(work.R[b], vector(work.torque[b]))
         gyroscopic = cross(w, rotate(bodies.inertia[b], w))
         alpha = rotate(bodies.inverse[b], sub(torque, gyroscopic))
-        alpha_global = rotate(work.R[b], alpha)
         for k in range(3):
             a = work.force[b, k] / bodies.mass[b]
             dy[at + k] = y[at + 7 + k]
             dy[at + 7 + k] = a
             dy[at + 10 + k] = alpha[k]
-            work.accel[b, k] = a
-            work.accel[b, 3 + k] = alpha_global[k]
             total += a + alpha[k]
     return total
 

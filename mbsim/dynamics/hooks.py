@@ -85,10 +85,11 @@ def _output(context, t, h, a, b):
     """A row of results at an interpolated, projected state."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    f = carray(b, (n,))
+    code = evaluate(scene, t, h, carray(a, (n,)), f)
     if code != 0:
         return -float(code)
-    return 1.0 if write_row(scene, t, carray(a, (n,))) else 0.0
+    return 1.0 if write_row(scene, t, carray(a, (n,)), f) else 0.0
 
 
 def _reject(context, t, h, a, b):

@@ -76,16 +76,19 @@ def fill_incidents(scene, y):
 
 
 @jitable
-def write_row(scene, t, y):
-    """Append the row of (t, y), evaluated just before; return whether the table is now full."""
+def write_row(scene, t, y, f):
+    """Append the row of (t, y), y' = f evaluated just before; return whether the table is full."""
     rows, work = scene.rows, scene.work
     k = rows.used[0]
     rows.time[k] = t
     for j in range(len(y)):
         rows.y[k, j] = y[j]
     for b in range(len(scene.bodies.mass)):
-        for j in range(6):
-            rows.accel[k, 6 * b + j] = work.accel[b, j]
+        at = BODY_SIZE * b
+        alpha = rotate(work.R[b], (f[at + 10], f[at + 11], f[at + 12]))
+        for j in range(3):
+            rows.accel[k, 6 * b + j] = f[at + 7 + j]
+            rows.accel[k, 6 * b + 3 + j] = alpha[j]
     fill_contacts(scene, y, rows.contact[k])
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, y)

@@ -180,7 +180,6 @@ class Work(NamedTuple):
     w: F2  # (nb + 1, 3) angular velocity, global frame
     force: F2  # (nb + 1, 3)
     torque: F2  # (nb + 1, 3) about the cg
-    accel: F2  # (nb, 6) of the cg, and angular, global frame
     noise: F2  # (nb + 1, 2) force and torque that the detector's noise may be wrong by
     frames: F2  # (ng, 12)
     way: F1  # (ng,) how far any point may have moved since the committed state

@@ -374,7 +374,6 @@ def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
         w=w,
         force=np.full((nb + 1, 3), np.nan),
         torque=np.full((nb + 1, 3), np.nan),
-        accel=np.full((nb, 6), np.nan),
         noise=np.zeros((nb + 1, 2)),
         frames=frames,
         way=np.where(fixed, 0.0, np.nan),
