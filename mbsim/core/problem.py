@@ -48,6 +48,9 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
 
 
+#: Steps for which what `stable` says is believed.
+STABLE_EVERY = 16
+
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3
 #: Codes from here on end the run without another try.

@@ -11,7 +11,8 @@ from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.problem import BY_CHECK, HOOK, Problem
 from mbsim.dynamics.evaluate import evaluate
-from mbsim.dynamics.incidents import commit, first_depth, longest_step, reversal, watch_peaks
+from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
+from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import BODY_SIZE, Scene

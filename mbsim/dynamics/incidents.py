@@ -24,7 +24,7 @@ from mbsim.dynamics.contact import (
 )
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.detection import measure_pair
-from mbsim.dynamics.kinematics import place_body, place_graphic, position
+from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
 from mbsim.system.arrays import (
     APPROACH,
@@ -41,9 +41,6 @@ from mbsim.system.arrays import (
     TOUCH,
     TOUCHES,
 )
-
-#: Halvings of the way out in which a force is looked for, and of where it ends.
-SHALLOWEST = 12
 
 
 @jitable
@@ -305,10 +302,11 @@ def commit_slot(scene, t, h, y, s):
         state.depth[s] = work.slot[s, DEPTH]
         state.rate[s] = work.slot[s, RATE]
         state.normal[s] = work.slot[s, NORMAL]
-        for k in range(3):
-            state.p[s, k] = work.points[s, 1 + k]
-            state.n[s, k] = work.points[s, 4 + k]
-            state.t[s, k] = work.t[s, k]
+        if scene.world.fixed_step[0] == 0 or scene.contacts.framed[contact_of(scene, s)] == 1:
+            for k in range(3):
+                state.p[s, k] = work.points[s, 1 + k]
+                state.n[s, k] = work.points[s, 4 + k]
+                state.t[s, k] = work.t[s, k]
     return changed
 
 
@@ -367,180 +365,3 @@ def commit(scene, t, h, y):
     if len(scene.crowds.contact) > 0:
         follow(scene, y)
     return changed
-
-
-@jitable
-def pushes_at(scene, c, t, depth, rate, bend):
-    """Return whether contact c would push after a time t in which depth goes on as it does."""
-    out = scene.work.law_out
-    d = depth + t * (rate + 0.5 * t * bend)
-    par = scene.contacts.normal_par[c]
-    call_int(scene.contacts.normal_law[c], (d, rate + t * bend, par, out))
-    return out[0] > 0.0
-
-
-@jitable
-def step_to_leave(scene, f, s, h):
-    """Return the step that ends where the force of the parting slot s ends or comes back.
-
-    A step across such a place is one whose error estimate may vanish by chance, and those
-    that do are the ones that are taken. d + d' t + d'' t^2 / 2 = 0 when it leaves; the force
-    falls on the way, so this is too soon at first and exact at last. The damper of a fast
-    separation can outweigh the spring: then the force is 0 sooner, and as the damper fades with
-    depth it comes back just before the shapes part.
-    """
-    state, n, c = scene.state, vector(scene.state.n[s]), contact_of(scene, s)
-    gi, gj = sides(scene, s)
-    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    depth, rate = state.depth[s], state.rate[s]
-    bend = -dot(sub(thrust(scene, f, bi), thrust(scene, f, bj)), n)
-    square = rate * rate - 2.0 * bend * depth
-    if square < 0.0:
-        return math.inf
-    leave = 2.0 * depth / (math.sqrt(square) - rate)
-    pushes = state.normal[s] > 0.0
-    if leave > h and pushes_at(scene, c, h, depth, rate, bend) == pushes:
-        return math.inf
-    before, part = 0.0, 1.0
-    for _ in range(SHALLOWEST):
-        part *= 0.5
-        after = min(h, leave * (1.0 - part))
-        if pushes_at(scene, c, after, depth, rate, bend) != pushes:
-            for _ in range(SHALLOWEST):
-                middle = 0.5 * (before + after)
-                if pushes_at(scene, c, middle, depth, rate, bend) != pushes:
-                    after = middle
-                else:
-                    before = middle
-            leave = after
-            break
-        before = after
-    # a little more, so that it is over then
-    return 1.0001 * leave
-
-
-@jitable
-def longest_parting(scene, f, h):
-    """Return how much of a step h may be tried so that it does not leap over the end of a force."""
-    state, longest = scene.state, h
-    for k in range(state.hit[len(state.hit) - 1]):
-        if state.rate[state.hit[k]] < 0.0:
-            longest = min(longest, step_to_leave(scene, f, state.hit[k], longest))
-    return longest
-
-
-@jitable
-def time_for(way, speed, push):
-    """Return the time in which a shape can come `way` far: way = speed h + push h^2 / 2."""
-    if speed == 0.0 and push == 0.0:
-        return math.inf
-    return 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
-
-
-@jitable
-def place_side(scene, y, g):
-    """Place graphic g and its body at y."""
-    if scene.graphics.body[g] < len(scene.bodies.mass):
-        place_body(scene, y, scene.graphics.body[g])
-        place_graphic(scene, y, g)
-
-
-@jitable
-def thrust(scene, f, b):
-    """Return the acceleration of body b's cg."""
-    if b == len(scene.bodies.mass):
-        return (0.0, 0.0, 0.0)
-    at = BODY_SIZE * b + 7
-    return (f[at], f[at + 1], f[at + 2])
-
-
-@jitable
-def step_to_touch(scene, y, f, pair, h):
-    """Return the step that ends where a pair is about to touch, or begins its contact; else inf.
-
-    A step much longer than the contact would meet it with a force out of all proportion, and
-    be cut down by error control again and again. With the gap g, closing speed v and its rate
-    a at the committed point the pair touches after t, g = v t + a t^2 / 2. From
-    there the first step is a part of the contact time that the guard of `first_depth` allows.
-    """
-    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
-    gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
-    place_side(scene, y, gi)
-    place_side(scene, y, gj)
-    if not measure_pair(scene, pair):
-        return math.inf
-    s = pairs.slot[pair]
-    for k in range(s + 1, s + scene.kinds.slots[pairs.kind[pair]]):
-        if work.points[k, 0] > work.points[s, 0]:
-            s = k
-    gap, bi, bj = -work.points[s, 0], graphics.body[gi], graphics.body[gj]
-    if gap < 0.0:
-        return math.inf
-    p, n = vector(work.points[s, 1:4]), vector(work.points[s, 4:7])
-    if scene.kinds.swapped[pairs.kind[pair]] == 1:
-        bi, bj = bj, bi
-    v = dot(sub(velocity_at(scene, y, bj, p), velocity_at(scene, y, bi, p)), n)
-    a = dot(sub(thrust(scene, f, bj), thrust(scene, f, bi)), n)
-    square = v * v + 2.0 * a * gap
-    if square <= 0.0 or v + math.sqrt(square) <= 0.0:
-        return math.inf
-    speed = math.sqrt(square)
-    t = 2.0 * gap / (v + speed)
-    mass = effective_mass(scene, y, s)
-    contact_time = 3.0 * deepest_of_impact(scene, contact_of(scene, s), 0.5 * mass * square) / speed
-    if t > h or h < 0.1 * contact_time:
-        return math.inf
-    # the damper comes in over dmax
-    ramp = 0.33 * scene.contacts.dmax[contact_of(scene, s)] / speed
-    first = contact_time / 80.0
-    if ramp > 0.01 * first:
-        first = min(first, ramp)
-    return t + first if t < first else (1.0 - 1e-6) * t
-
-
-@jitable
-def longest_way(scene, y, f, h):
-    """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
-
-    Nor may a shape of a crowd leave where the list of near pairs holds. A step of length h, the
-    one intended, ends where a pair begins to touch.
-    """
-    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
-    longest = math.inf
-    for g in range(len(graphics.body)):
-        b = graphics.body[g]
-        if b < len(scene.bodies.mass):
-            reach = graphics.reach[g] + norm(vector(graphics.p[g]))
-            at = BODY_SIZE * b
-            turning = norm((y[at + 10], y[at + 11], y[at + 12]))
-            speed = norm((y[at + 7], y[at + 8], y[at + 9]))
-            # a plane, which has no reach, is never passed through
-            speed += turning * reach if reach < math.inf else 0.0
-            push = norm((f[at + 7], f[at + 8], f[at + 9]))
-            work.speed[g, 0], work.speed[g, 1] = speed, push
-            room = scene.crowds.room[g]
-            if room < math.inf:
-                longest = min(longest, time_for(0.9 * room, speed, push))
-    for k in range(pairs.count[LIVE]):
-        pair = pairs.live[k]
-        i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        # in touch the stages feel the force, and sliding along is no approach
-        if pairs.touches[pair] > 0:
-            continue
-        left = max(pairs.left[pair], 0.0)
-        speed = work.speed[i, 0] + work.speed[j, 0]
-        push = work.speed[i, 1] + work.speed[j, 1]
-        # half of the thinner shape: a step may bury it no deeper before it is seen; what a
-        # half-space has swallowed it still pushes out, so nothing passes through a plane
-        thin = 0.5 * min(graphics.thin[i], graphics.thin[j])
-        if not (math.isinf(graphics.thin[i]) or math.isinf(graphics.thin[j])):
-            longest = min(longest, time_for(left + thin, speed, push))
-        if time_for(left, speed, push) < min(h, longest):
-            longest = min(longest, step_to_touch(scene, y, f, pair, min(h, longest)))
-    return longest
-
-
-@jitable
-def longest_step(scene, y, f, h):
-    """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
-    return min(longest_parting(scene, f, h), longest_way(scene, y, f, h))

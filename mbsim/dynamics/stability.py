@@ -13,13 +13,17 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import STABLE_EVERY
 from mbsim.core.rotation import dot, norm, scale, sub, vector
 from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, SLIP, sides
-from mbsim.dynamics.incidents import deepest_of_impact, longest_way
+from mbsim.dynamics.incidents import deepest_of_impact
+from mbsim.dynamics.limits import longest_stay, time_for
 from mbsim.system.arrays import LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
+#: Largest h w; the bound of w is above the true one.
+LARGEST_PART = 1.6
 
 
 @jitable
@@ -100,7 +104,7 @@ def meeting(scene, pair, out):
 def stable_step(scene, tol, y, f):
     """Return the step that a method without error estimate is to take from the committed point."""
     work, bodies, pairs = scene.work, scene.bodies, scene.pairs
-    longest = longest_way(scene, y, f, 0.0)
+    longest = longest_stay(scene, y, f)
     for b in range(len(bodies.mass)):
         for k in range(10):
             work.block[b, k] = 0.0
@@ -115,11 +119,19 @@ def stable_step(scene, tol, y, f):
         square = max(square, math.sqrt(total) / bodies.mass[b])
         rate = max(rate, block[9] / bodies.mass[b])
     for k in range(pairs.count[LIVE]):
-        if pairs.touches[pairs.live[k]] == 0:
-            square = max(square, meeting(scene, pairs.live[k], work.law_out))
+        pair = pairs.live[k]
+        if pairs.touches[pair] > 0:
+            continue
+        square = max(square, meeting(scene, pair, work.law_out))
+        # the step is believed for a while: nothing is buried unseen by then
+        i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        way = max(pairs.left[pair], 0.0) + 0.5 * min(scene.graphics.thin[i], scene.graphics.thin[j])
+        speed = work.speed[i, 0] + work.speed[j, 0]
+        push = work.speed[i, 1] + work.speed[j, 1]
+        longest = min(longest, time_for(way, speed, push) / STABLE_EVERY)
 
-    # h w < 2 is the limit, half of it the step at a coarse tolerance; order 2 needs the root
-    part = min(1.0, math.sqrt(tol / COARSE))
+    # h w < 2 is the limit; order 2 needs the root of the tolerance
+    part = min(LARGEST_PART, math.sqrt(tol / COARSE))
     if square > 0.0:
         longest = min(longest, part / math.sqrt(square))
     # friction that turns within a step chatters but cannot grow beyond mu N: no shorter than this

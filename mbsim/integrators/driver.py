@@ -20,6 +20,7 @@ from mbsim.core.problem import (
     NOT_FINITE,
     PAUSED,
     ROWS_FULL,
+    STABLE_EVERY,
     STEP_TOO_SMALL,
 )
 from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
@@ -40,7 +41,6 @@ from mbsim.integrators.scheme import (
     NEXT_OUTPUT,
     OUTPUTS,
     REJECTED,
-    STABLE_EVERY,
     STEP,
     STEPS,
     TIME,

@@ -38,10 +38,6 @@ LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION = range(7, 12)
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 
 
-#: Steps for which a stable step is believed.
-STABLE_EVERY = 16
-
-
 class Scheme(NamedTuple):
     """A method: its two functions as hooks, and its numbers."""
 
