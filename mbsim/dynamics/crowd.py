@@ -265,6 +265,93 @@ def keep_near(scene, skin):
 
 
 @jitable
+def order_by_graphic(scene):
+    """Put the crowds' pairs into the order of their I graphics, near each other in memory."""
+    pairs, crowds = scene.pairs, scene.crowds
+    at = pairs.count[FIXED]
+    for g in range(len(crowds.head)):
+        pair = crowds.head[g]
+        while pair >= 0:
+            pairs.live[at] = pair
+            at += 1
+            pair = crowds.next[pair]
+
+
+@jitable
+def put_aside(scene, k, s, row):
+    """Copy all that belongs to the touching slot s into `row`, or with k = 1 back from it."""
+    state, work = scene.state, scene.work
+    at = 0
+    for group in (state.p, state.n, state.t, work.t):
+        for j in range(3):
+            if k == 0:
+                row[at] = group[s, j]
+            else:
+                group[s, j] = row[at]
+            at += 1
+    for values in (state.depth, state.rate, state.normal):
+        if k == 0:
+            row[at] = values[s]
+        else:
+            values[s] = row[at]
+        at += 1
+    for j in range(work.points.shape[1]):
+        if k == 0:
+            row[at] = work.points[s, j]
+        else:
+            work.points[s, j] = row[at]
+        at += 1
+    for j in range(work.slot.shape[1]):
+        if k == 0:
+            row[at] = work.slot[s, j]
+        else:
+            work.slot[s, j] = row[at]
+        at += 1
+
+
+@jitable
+def close_ranks(scene):
+    """Move the crowds' pairs to places in the order of the list, with their slots that touch.
+
+    An evaluation then walks through memory from front to back; pairs that come and go would
+    scatter them. Where a law carries X its places in y stay, so nothing is moved.
+    """
+    pairs, crowds, state, work = scene.pairs, scene.crowds, scene.state, scene.work
+    fixed, live, last = pairs.count[FIXED], pairs.count[LIVE], len(state.hit) - 1
+    if scene.slots.x[pairs.slot[fixed]] >= 0:
+        return
+    for k in range(fixed, live):
+        pair, row = pairs.live[k], crowds.moved[k]
+        crowds.moved[pair, 0] = k
+        row[1], row[2], row[3] = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
+        row[4] = pairs.touches[pair]
+        crowds.spare[k, 0], crowds.spare[k, 1] = pairs.gap[pair], pairs.left[pair]
+    for k in range(fixed, live):
+        row = crowds.moved[k]
+        pairs.kind[k], pairs.graphic_i[k], pairs.graphic_j[k] = row[1], row[2], row[3]
+        pairs.touches[k] = row[4]
+        pairs.gap[k], pairs.left[k] = crowds.spare[k, 0], crowds.spare[k, 1]
+        pairs.live[k] = k
+    places = len(pairs.live)
+    pairs.count[FREE] = places - live
+    for k in range(places - live):
+        pairs.free[k] = places - 1 - k
+
+    for h in range(state.hit[last]):
+        s = state.hit[h]
+        put_aside(scene, 0, s, crowds.spare[h])
+        state.touching[s] = work.touching[s] = 0
+    for h in range(state.hit[last]):
+        s = state.hit[h]
+        pair = scene.slots.pair[s]
+        if pair >= fixed:
+            s += pairs.slot[crowds.moved[pair, 0]] - pairs.slot[pair]
+        put_aside(scene, 1, s, crowds.spare[h])
+        state.touching[s] = work.touching[s] = 1
+        state.hit[h] = work.hit[h] = s
+
+
+@jitable
 def list_pairs(scene, y):
     """List the near pairs of all crowds at the committed state, and how long that holds."""
     crowds, pairs = scene.crowds, scene.pairs
@@ -283,6 +370,8 @@ def list_pairs(scene, y):
         # more than there are places for: look less far
         skin *= 0.5
         crowds.size[0] = skin
+    order_by_graphic(scene)
+    close_ranks(scene)
     for k in range(len(crowds.member)):
         g = crowds.member[k]
         b = scene.graphics.body[g]

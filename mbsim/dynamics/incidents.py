@@ -247,10 +247,11 @@ def bounding_gap(scene, pair):
 
 
 @jitable
-def measure_gap(scene, pair):
-    """Store how far apart the pair is at the accepted point."""
+def measure_gap(scene, pair, measured):
+    """Store how far apart the pair is at the accepted point, where it may be `measured` already."""
     pairs, work = scene.pairs, scene.work
-    if measure_pair(scene, pair):
+    closed_form = scene.kinds.kernel[pairs.kind[pair]] != 0
+    if (measured and closed_form) or measure_pair(scene, pair):
         first, deepest = pairs.slot[pair], -math.inf
         for s in range(first, first + scene.kinds.slots[pairs.kind[pair]]):
             deepest = max(deepest, work.points[s, 0])
@@ -339,10 +340,12 @@ def commit_gaps(scene):
             pairs.gap[pair] = pairs.left[pair] = 0.0
             continue
         way = work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]]
-        if way > 0.0 or pairs.gap[pair] <= 0.0:
+        if not way < pairs.left[pair]:
+            measure_gap(scene, pair, True)
+        elif way > 0.0:
             pairs.left[pair] -= way
             if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
-                measure_gap(scene, pair)
+                measure_gap(scene, pair, False)
 
 
 @jitable

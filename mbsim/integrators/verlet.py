@@ -26,10 +26,16 @@ def turn(y, f, h, at, w):
     x = y[at + 10] + 0.5 * h * f[at + 10]
     v = y[at + 11] + 0.5 * h * f[at + 11]
     z = y[at + 12] + 0.5 * h * f[at + 12]
-    half = 0.5 * h * math.sqrt(x * x + v * v + z * z)
-    # sin(half) / half, of a unit turn
-    s = 0.5 * h * (math.sin(half) / half if half > 1e-4 else 1.0 - half * half / 6.0)
-    c = math.cos(half)
+    # cosine of half the angle, and sine over half the angle
+    square = 0.25 * h * h * (x * x + v * v + z * z)
+    if square < 1e-3:
+        # the next terms are below 1e-17
+        c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)))
+        s = 1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0))
+    else:
+        half = math.sqrt(square)
+        c, s = math.cos(half), math.sin(half) / half
+    s *= 0.5 * h
     a, b, d = s * x, s * v, s * z
     qw, qx, qy, qz = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
     w[at + 3] = c * qw - qx * a - qy * b - qz * d

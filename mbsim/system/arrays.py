@@ -117,6 +117,8 @@ class Crowds(NamedTuple):
     start: I1  # (cells + 1,) where a cell begins in `order`
     head: I1  # (ng,) first place of a pair whose I is this graphic, -1 for none
     next: I1  # (np,) next place of the same I
+    moved: I2  # (np, 5) where a pair's place was put, and its kind, graphics and touches
+    spare: F2  # (ns, SPARE) what is moved with the slots that touch
 
 
 class Contacts(NamedTuple):
@@ -212,6 +214,7 @@ class Rows(NamedTuple):
 
 
 SLOT_COLUMNS = 12
+SPARE = 38
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 
 

@@ -199,6 +199,7 @@ def _crowds(
     shapes: list[str],
     contacts: dict[int, int],
     places: int,
+    slots: int,
 ) -> a.Crowds:
     """Return the contacts whose near pairs are found as they move."""
     n, ng = len(plans.crowds), len(graphics.body)
@@ -219,6 +220,8 @@ def _crowds(
         start=np.zeros(CELLS_EACH * ng + 64 if n else 0, dtype=np.int64),
         head=np.zeros(ng if n else 0, dtype=np.int64),
         next=np.zeros(places if n else 0, dtype=np.int64),
+        moved=np.zeros((places if n else 0, 5), dtype=np.int64),
+        spare=np.zeros((slots if n else 0, a.SPARE)),
     )
     at = 0
     for k, crowd in enumerate(plans.crowds):
@@ -491,7 +494,9 @@ def build(
         graphics=graphics,
         kinds=_kinds(kinds, contact_row),
         pairs=pairs,
-        crowds=_crowds(plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot)),
+        crowds=_crowds(
+            plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot), ns
+        ),
         contacts=contacts,
         slots=a.Slots(slot_pair, x),
         world=a.World(
