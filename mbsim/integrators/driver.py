@@ -41,6 +41,7 @@ from mbsim.integrators.scheme import (
     OUTPUTS,
     REJECTED,
     STABLE_EVERY,
+    STALE,
     STEP,
     STEPS,
     TIME,
@@ -89,6 +90,12 @@ def stable(p, m, t, h_max):
     if p.stable == 0:
         return h_max
     return quantised(min(h_max, call_float(p.stable, (p.context, t, m.memory[TOL], m.y, m.k[0]))))
+
+
+@jitable
+def bound_is_due(m):
+    """Return whether the stability bound is to be found anew."""
+    return m.counts[STEPS] % STABLE_EVERY == 0 or m.memory[STALE] == 1.0
 
 
 @jitable
@@ -208,6 +215,9 @@ def accept(p, m, steps, t, h, asked):
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
+    if word >= 4.0:
+        word -= 4.0
+        m.memory[STALE] = 1.0
     m.memory[LAST_TIME], m.memory[LAST_STEP] = t, h
     m.memory[TIME] = t + h
     m.memory[H_SMALLEST] = min(m.memory[H_SMALLEST], h)
@@ -257,8 +267,9 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             return PAUSED
         t = m.memory[TIME]
         floor = smallest_step(t, t_end, h_min)
-        if steps.order == 0.0 and m.counts[STEPS] % STABLE_EVERY == 0:
+        if steps.order == 0.0 and m.counts[FAILURES] == 0 and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
+            m.memory[STALE] = 0.0
         h = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
