@@ -23,7 +23,7 @@ from mbsim.system.arrays import LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
-#: Part of a contact's stored energy that its closing may bring and it still counts as at rest.
+#: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
 AT_REST = 0.1
 #: Substitutions that find the depth of an impact under a force to a few per cent.
 SUBSTITUTIONS = 6
@@ -44,6 +44,44 @@ def yielding(scene, b, arm, n):
     """Return n' J I^-1 J' n: how a unit force along n at `arm` from body b's cg turns the point."""
     turning = unrotate(scene.work.R[b], cross(arm, n))
     return dot(turning, rotate(scene.bodies.inverse[b], turning))
+
+
+@jitable
+def translation(scene, b):
+    """Return 1/m of body b, 0 for ground."""
+    return 1.0 / scene.bodies.mass[b] if b < len(scene.bodies.mass) else 0.0
+
+
+@jitable
+def turning(scene, g):
+    """Return a bound of n' J I^-1 J' n for a touch anywhere on graphic g: ground and planes 0.
+
+    With the box half edges a (from the cg) and D = I^-1 in its axes (r x n)' D (r x n) is at most
+    the two largest of D_k (a_i^2 + a_j^2), as the three (n_i^2 + n_j^2) are at most 1
+    and 2 together; products of inertia are left out.
+    """
+    graphics, b = scene.graphics, scene.graphics.body[g]
+    if b == len(scene.bodies.mass) or math.isinf(graphics.reach[g]):
+        return 0.0
+    R, p, inverse = graphics.R[g], graphics.p[g], scene.bodies.inverse[b]
+    is_round = graphics.turns[g] == 0
+    if is_round and p[0] == 0.0 and p[1] == 0.0 and p[2] == 0.0:
+        return 0.0
+    square = (0.0, 0.0, 0.0)
+    for k in range(3):
+        # a sphere's surface has its normal through the centre
+        a = abs(p[0] * R[0, k] + p[1] * R[1, k] + p[2] * R[2, k])
+        a += 0.0 if is_round else graphics.half[g, k]
+        square = (square[1], square[2], a * a)
+    total, least = 0.0, math.inf
+    for k in range(3):
+        column = (R[0, k], R[1, k], R[2, k])
+        part = dot(column, rotate(inverse, column)) * (
+            square[0] + square[1] + square[2] - square[k]
+        )
+        total += part
+        least = min(least, part)
+    return total - least
 
 
 @jitable
@@ -70,14 +108,13 @@ def add_touching(scene, y, s, out):
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     ground = len(bodies.mass)
     rate = state.rate[s] if state.touching[s] == 1 else 0.0
-    if rate > 0.0:
-        call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-        inverse = 0.0
-        for b in (bi, bj):
-            inverse += 1.0 / bodies.mass[b] if b < ground else 0.0
-        kinetic = 0.5 * rate * rate / (share * inverse)
-        if kinetic > AT_REST * out[2]:
-            depth = max(depth, depth_to_come(scene, c, kinetic + out[2], 0.0))
+    inverse = translation(scene, bi) + translation(scene, bj)
+    kinetic = 0.5 * rate * rate / (share * inverse)
+    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (share * inverse)
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    if kinetic + force * depth > AT_REST * out[2]:
+        energy = max(0.0, out[2] + kinetic - force * depth)
+        depth = max(depth, depth_to_come(scene, c, energy, force))
     k, damping = slopes(scene, c, depth, out)
     k *= share
     damping *= share
@@ -89,9 +126,9 @@ def add_touching(scene, y, s, out):
         for r in range(3):
             for q in range(3):
                 block[3 * r + q] += both * k * n[r] * n[q]
-        turning = yielding(scene, b, sub(p, position(scene, y, b)), n)
-        block[9] += both * k * turning
-        block[10] += both * damping * (1.0 / bodies.mass[b] + turning)
+        turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
+        block[9] += both * k * turn
+        block[10] += both * damping * (translation(scene, b) + turn)
 
 
 @jitable
@@ -100,19 +137,17 @@ def fast_pair(scene, pair, best):
 
     If so `best` becomes it: contact, its energy at touch, the force behind it, inverse mass.
     """
-    pairs, bodies, graphics = scene.pairs, scene.bodies, scene.graphics
+    pairs, graphics = scene.pairs, scene.graphics
     i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
     speed = scene.work.speed[i, 0] + scene.work.speed[j, 0]
     push = scene.work.speed[i, 1] + scene.work.speed[j, 1]
-    inverse = 0.0
-    for g in (i, j):
-        if graphics.body[g] < len(bodies.mass):
-            inverse += 1.0 / bodies.mass[graphics.body[g]]
+    inverse = translation(scene, graphics.body[i]) + translation(scene, graphics.body[j])
     if inverse == 0.0 or speed + push == 0.0:
         return False
     c = float(scene.kinds.contact[pairs.kind[pair]])
     force = push / inverse
     energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
+    inverse += turning(scene, i) + turning(scene, j)
     if c == best[0] and energy <= best[1] and force <= best[2] and inverse <= best[3]:
         return False
     best[0], best[1], best[2], best[3] = c, energy, force, inverse
