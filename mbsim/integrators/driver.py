@@ -153,10 +153,12 @@ def output_within(m, times, t):
 
 
 @jitable
-def outputs(p, m, times):
+def outputs(p, m, steps, times):
     """Write a row for every output time within the last step; return 0 or what stopped it."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
     t_new = m.memory[TIME]
+    # forces that depend on a fixed step are shown as they acted
+    within = h if steps.order == 0.0 else 0.0
     while m.counts[NEXT_OUTPUT] < len(times):
         when = times[m.counts[NEXT_OUTPUT]]
         if when > t_new:
@@ -165,7 +167,7 @@ def outputs(p, m, times):
         call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
         m.counts[OUTPUTS] += 1
         m.counts[NEXT_OUTPUT] += 1
-        code = call_float(p.output, (p.context, when, 0.0, m.trial, m.error))
+        code = call_float(p.output, (p.context, when, within, m.trial, m.error))
         if code != 0.0:
             return code
     return 0.0
@@ -257,7 +259,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         return FAILED
     # rows of the last step that found the table full
     if m.memory[LAST_STEP] > 0.0:
-        full = outputs(p, m, times)
+        full = outputs(p, m, steps, times)
         if full != 0.0:
             m.counts[CODE] = int(-full)
             return ROWS_FULL if full > 0.0 else FAILED
@@ -308,7 +310,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if word < 0.0:
             m.counts[CODE] = int(-word)
             return FAILED
-        full = outputs(p, m, times)
+        full = outputs(p, m, steps, times)
         if full < 0.0:
             m.counts[CODE] = int(-full)
             return FAILED
