@@ -48,7 +48,7 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
 
 
-#: Steps for which what `stable` says is believed.
+#: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
 
 # codes of an rhs; a problem may have others of its own

@@ -168,7 +168,7 @@ def cell_range(scene, crowd):
                 low = (min(low[0], x), min(low[1], y), min(low[2], z))
                 high = (max(high[0], x), max(high[1], y), max(high[2], z))
     if not low[0] <= high[0]:
-        return low, 1.0, 0, 0, 0
+        return (0.0, 0.0, 0.0), 1.0, 0, 0, 0
     most = len(crowds.start) - 1
     while True:
         nx = math.floor((high[0] - low[0]) / width) + 1.0

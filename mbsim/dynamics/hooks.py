@@ -15,9 +15,10 @@ from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
-from mbsim.system.arrays import BODY_SIZE, Scene
+from mbsim.system.arrays import BODY_SIZE, LISTINGS, Scene
 
 PAUSE_FOR_EVENTS = 2.0
+STEP_IS_STALE = 4.0
 
 
 def _rhs(context, t, h, a, b):
@@ -54,10 +55,16 @@ def _check(context, t, h, a, b):
 
 
 def _commit(context, t, h, a, b):
-    """The incident table, events and peaks; bit 1: y changed, bit 2: empty the events first."""
+    """The incident table, events and peaks.
+
+    Bit 1: y changed, bit 2: empty the events first, bit 3: a stable step is to be found anew.
+    """
     scene = view(context, Scene)
+    listings = scene.log.counters[LISTINGS]
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
-    return float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    word = float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    # pairs that were not near, and so not counted, are now
+    return word + (STEP_IS_STALE if scene.log.counters[LISTINGS] > listings else 0.0)
 
 
 def _look(context, t, h, a, b):

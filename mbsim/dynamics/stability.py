@@ -3,8 +3,9 @@
 With K = sum over contacts of B' k B and each contact between two bodies, the largest eigenvalue
 of M^-1 K is at most twice the largest of the blocks of single bodies, D_b / m_b with
 D_b = sum of k n n' (a contact with ground counts half, and |D_b| is bounded by its Frobenius
-norm). Dampers and friction, with the slope c of their force over velocity, give rates in the same
-way. A contact that is yet to come counts with the stiffness it reaches at its closing speed.
+norm), plus the turning part, k (r x n)' I^-1 (r x n) summed. Dampers, with the slope c of their
+force over velocity, give rates in the same way. A contact that is yet to come, or that has
+only begun, counts with the stiffness and damping of the depth that it will reach.
 """
 
 from __future__ import annotations
@@ -13,17 +14,22 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import STABLE_EVERY
-from mbsim.core.rotation import dot, norm, scale, sub, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, SLIP, sides
+from mbsim.core.rotation import cross, dot, rotate, sub, unrotate
+from mbsim.dynamics.contact import contact_of, sides
+from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.incidents import deepest_of_impact
-from mbsim.dynamics.limits import longest_stay, time_for
+from mbsim.dynamics.kinematics import place_bodies, position
+from mbsim.dynamics.limits import longest_way
 from mbsim.system.arrays import LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
-#: Largest h w; the bound of w is above the true one.
-LARGEST_PART = 1.6
+#: Largest step over half of the bound; the bound is below the true limit.
+LARGEST_PART = 1.8
+#: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
+AT_REST = 0.1
+#: Substitutions that find the depth of an impact under a force to a few per cent.
+SUBSTITUTIONS = 6
 
 
 @jitable
@@ -37,104 +43,163 @@ def slopes(scene, c, depth, out):
 
 
 @jitable
-def add_touching(scene, s, out):
+def yielding(scene, b, arm, n):
+    """Return n' J I^-1 J' n: how a unit force along n at `arm` from body b's cg turns the point."""
+    turning = unrotate(scene.work.R[b], cross(arm, n))
+    return dot(turning, rotate(scene.bodies.inverse[b], turning))
+
+
+@jitable
+def translation(scene, b):
+    """Return 1/m of body b, 0 for ground."""
+    return 1.0 / scene.bodies.mass[b] if b < len(scene.bodies.mass) else 0.0
+
+
+@jitable
+def turning(scene, g):
+    """Return a bound of n' J I^-1 J' n for a touch anywhere on graphic g: ground and planes 0.
+
+    With the box half edges a (from the cg) and D = I^-1 in its axes (r x n)' D (r x n) is at most
+    the two largest of D_k (a_i^2 + a_j^2), as the three (n_i^2 + n_j^2) are at most 1
+    and 2 together; products of inertia are left out.
+    """
+    graphics, b = scene.graphics, scene.graphics.body[g]
+    if b == len(scene.bodies.mass) or math.isinf(graphics.reach[g]):
+        return 0.0
+    R, p, inverse = graphics.R[g], graphics.p[g], scene.bodies.inverse[b]
+    is_round = graphics.turns[g] == 0
+    if is_round and p[0] == 0.0 and p[1] == 0.0 and p[2] == 0.0:
+        return 0.0
+    square = (0.0, 0.0, 0.0)
+    for k in range(3):
+        # a sphere's surface has its normal through the centre
+        a = abs(p[0] * R[0, k] + p[1] * R[1, k] + p[2] * R[2, k])
+        a += 0.0 if is_round else graphics.half[g, k]
+        square = (square[1], square[2], a * a)
+    total, least = 0.0, math.inf
+    for k in range(3):
+        column = (R[0, k], R[1, k], R[2, k])
+        part = dot(column, rotate(inverse, column)) * (
+            square[0] + square[1] + square[2] - square[k]
+        )
+        total += part
+        least = min(least, part)
+    return total - least
+
+
+@jitable
+def depth_to_come(scene, c, energy, force):
+    """Return the depth at which contact c has stored an impact's energy and what `force` adds.
+
+    E(d) = energy + force d, by repeated substitution: of a power law of exponent e an error
+    shrinks by 1/(e + 1) each time.
+    """
+    depth = 0.0
+    for _ in range(SUBSTITUTIONS if force > 0.0 else 1):
+        depth = deepest_of_impact(scene, c, energy + force * depth)
+    return depth
+
+
+@jitable
+def add_touching(scene, y, s, out):
     """Add stiffness and damping of slot s to the blocks of its bodies."""
-    work, bodies = scene.work, scene.bodies
-    row, point = work.slot[s], work.points[s]
-    c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
-    k, damping = slopes(scene, c, row[DEPTH], out)
-    k *= point[7]
-    damping *= point[7]
-    n = (point[4], point[5], point[6])
+    work, bodies, state = scene.work, scene.bodies, scene.state
+    point = work.points[s]
+    c, depth, share = contact_of(scene, s), point[0], point[7]
+    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     ground = len(bodies.mass)
+    rate = state.rate[s] if state.touching[s] == 1 else 0.0
+    inverse = translation(scene, bi) + translation(scene, bj)
+    kinetic = 0.5 * rate * rate / (share * inverse)
+    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (share * inverse)
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    if kinetic + force * depth > AT_REST * out[2]:
+        energy = max(0.0, out[2] + kinetic - force * depth)
+        depth = max(depth, depth_to_come(scene, c, energy, force))
+    k, damping = slopes(scene, c, depth, out)
+    k *= share
+    damping *= share
     both = 2.0 if bi < ground and bj < ground else 1.0
-    rubbing = 0.0
-    if row[SLIP] > 0.0:
-        force = (row[FORCE], row[FORCE + 1], row[FORCE + 2])
-        rubbing = norm(sub(force, scale(row[NORMAL], n))) / row[SLIP]
-    for g in (gi, gj):
-        b = scene.graphics.body[g]
+    for b in (bi, bj):
         if b == ground:
             continue
         block = work.block[b]
         for r in range(3):
             for q in range(3):
                 block[3 * r + q] += both * k * n[r] * n[q]
-        arm = sub((point[1], point[2], point[3]), vector(scene.work.frames[g]))
-        arm = sub(arm, scale(dot(arm, n), n))
-        lever = scene.graphics.reach[g] if scene.graphics.reach[g] < math.inf else norm(arm)
-        least = least_inertia(bodies.inertia[b])
-        turning = bodies.mass[b] * lever * lever / least
-        block[9] += both * (damping + rubbing * (1.0 + turning))
+                block[10 + 3 * r + q] += both * damping * n[r] * n[q]
+        turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
+        block[9] += both * k * turn
+        block[19] += both * damping * turn
 
 
 @jitable
-def least_inertia(inertia):
-    """Return a lower bound of the smallest principal moment of inertia."""
-    low = math.inf
-    for r in range(3):
-        off = 0.0
-        for q in range(3):
-            off += abs(inertia[r, q]) if q != r else 0.0
-        low = min(low, inertia[r, r] - off)
-    trace = inertia[0, 0] + inertia[1, 1] + inertia[2, 2]
-    return max(low, 1e-3 * trace)
+def fast_pair(scene, pair, best):
+    """Return whether a pair that may come to touch can be stiffer than the one in `best`.
 
-
-@jitable
-def meeting(scene, pair, out):
-    """Return the square of the frequency with which a pair will vibrate that may come to touch."""
-    pairs, bodies, graphics = scene.pairs, scene.bodies, scene.graphics
+    If so `best` becomes it: contact, its energy at touch, the force behind it, inverse mass.
+    """
+    pairs, graphics = scene.pairs, scene.graphics
     i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
     speed = scene.work.speed[i, 0] + scene.work.speed[j, 0]
-    inverse = 0.0
-    for g in (i, j):
-        if graphics.body[g] < len(bodies.mass):
-            inverse += 1.0 / bodies.mass[graphics.body[g]]
-    if speed == 0.0 or inverse == 0.0:
-        return 0.0
-    c = scene.kinds.contact[pairs.kind[pair]]
-    depth = deepest_of_impact(scene, c, 0.5 * speed * speed / inverse)
-    return slopes(scene, c, depth, out)[0] * inverse
+    push = scene.work.speed[i, 1] + scene.work.speed[j, 1]
+    inverse = translation(scene, graphics.body[i]) + translation(scene, graphics.body[j])
+    if inverse == 0.0 or speed + push == 0.0:
+        return False
+    c = float(scene.kinds.contact[pairs.kind[pair]])
+    force = push / inverse
+    energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
+    inverse += turning(scene, i) + turning(scene, j)
+    if c == best[0] and energy <= best[1] and force <= best[2] and inverse <= best[3]:
+        return False
+    best[0], best[1], best[2], best[3] = c, energy, force, inverse
+    return True
+
+
+@jitable
+def add_meeting(scene, best, out, bound):
+    """Raise the squared frequency and the rate in `bound` to those of the pair in `best`."""
+    c, inverse = int(best[0]), best[3]
+    depth = depth_to_come(scene, c, best[1], best[2])
+    k, damping = slopes(scene, c, depth, out)
+    bound[0] = max(bound[0], k * inverse)
+    bound[1] = max(bound[1], damping * inverse)
 
 
 @jitable
 def stable_step(scene, tol, y, f):
     """Return the step that a method without error estimate is to take from the committed point."""
     work, bodies, pairs = scene.work, scene.bodies, scene.pairs
-    longest = longest_stay(scene, y, f)
+    # what was evaluated last may be another point: an output within the step, or nothing yet
+    place_bodies(scene, y)
+    if find_contacts(scene, y) != 0:
+        return math.inf
+    longest = longest_way(scene, y, f, 0.0)
     for b in range(len(bodies.mass)):
-        for k in range(10):
+        for k in range(20):
             work.block[b, k] = 0.0
     hit = work.hit
     for k in range(hit[len(hit) - 1]):
-        add_touching(scene, hit[k], work.law_out)
-    square, rate = 0.0, 0.0
+        add_touching(scene, y, hit[k], work.law_out)
+    bound, best = work.bound, work.best
+    bound[0] = bound[1] = 0.0
     for b in range(len(bodies.mass)):
-        block, total = work.block[b], 0.0
+        block, stiff, damped = work.block[b], 0.0, 0.0
         for k in range(9):
-            total += block[k] * block[k]
-        square = max(square, math.sqrt(total) / bodies.mass[b])
-        rate = max(rate, block[9] / bodies.mass[b])
+            stiff += block[k] * block[k]
+            damped += block[10 + k] * block[10 + k]
+        bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
+        bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
+    best[0] = -1.0
     for k in range(pairs.count[LIVE]):
-        pair = pairs.live[k]
-        if pairs.touches[pair] > 0:
-            continue
-        square = max(square, meeting(scene, pair, work.law_out))
-        # the step is believed for a while: nothing is buried unseen by then
-        i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        way = max(pairs.left[pair], 0.0) + 0.5 * min(scene.graphics.thin[i], scene.graphics.thin[j])
-        speed = work.speed[i, 0] + work.speed[j, 0]
-        push = work.speed[i, 1] + work.speed[j, 1]
-        longest = min(longest, time_for(way, speed, push) / STABLE_EVERY)
+        if pairs.touches[pairs.live[k]] == 0 and fast_pair(scene, pairs.live[k], best):
+            add_meeting(scene, best, work.law_out, bound)
 
-    # h w < 2 is the limit; order 2 needs the root of the tolerance
+    # the limit of the method is (h w)^2 / 4 + h c = 1 (w frequency, c rate of damping), so h =
+    # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance. Friction is held back
+    # instead (`contact.hold_back`)
     part = min(LARGEST_PART, math.sqrt(tol / COARSE))
-    if square > 0.0:
-        longest = min(longest, part / math.sqrt(square))
-    # friction that turns within a step chatters but cannot grow beyond mu N: no shorter than this
-    if rate > 0.0:
-        longest = min(longest, max(part / rate, 1.0 * longest))
-    return longest
+    fastest = bound[1] + math.sqrt(bound[1] * bound[1] + bound[0])
+    return min(longest, part / fastest) if fastest > 0.0 else longest

@@ -41,6 +41,7 @@ from mbsim.integrators.scheme import (
     NEXT_OUTPUT,
     OUTPUTS,
     REJECTED,
+    STALE,
     STEP,
     STEPS,
     TIME,
@@ -89,6 +90,12 @@ def stable(p, m, t, h_max):
     if p.stable == 0:
         return h_max
     return quantised(min(h_max, call_float(p.stable, (p.context, t, m.memory[TOL], m.y, m.k[0]))))
+
+
+@jitable
+def bound_is_due(m):
+    """Return whether the stability bound is to be found anew."""
+    return m.counts[STEPS] % STABLE_EVERY == 0 or m.memory[STALE] == 1.0
 
 
 @jitable
@@ -146,10 +153,12 @@ def output_within(m, times, t):
 
 
 @jitable
-def outputs(p, m, times):
+def outputs(p, m, steps, times):
     """Write a row for every output time within the last step; return 0 or what stopped it."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
     t_new = m.memory[TIME]
+    # forces that depend on a fixed step are shown as they acted
+    within = h if steps.order == 0.0 else 0.0
     while m.counts[NEXT_OUTPUT] < len(times):
         when = times[m.counts[NEXT_OUTPUT]]
         if when > t_new:
@@ -158,7 +167,7 @@ def outputs(p, m, times):
         call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
         m.counts[OUTPUTS] += 1
         m.counts[NEXT_OUTPUT] += 1
-        code = call_float(p.output, (p.context, when, 0.0, m.trial, m.error))
+        code = call_float(p.output, (p.context, when, within, m.trial, m.error))
         if code != 0.0:
             return code
     return 0.0
@@ -208,6 +217,9 @@ def accept(p, m, steps, t, h, asked):
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
+    if word >= 4.0:
+        word -= 4.0
+        m.memory[STALE] = 1.0
     m.memory[LAST_TIME], m.memory[LAST_STEP] = t, h
     m.memory[TIME] = t + h
     m.memory[H_SMALLEST] = min(m.memory[H_SMALLEST], h)
@@ -247,7 +259,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         return FAILED
     # rows of the last step that found the table full
     if m.memory[LAST_STEP] > 0.0:
-        full = outputs(p, m, times)
+        full = outputs(p, m, steps, times)
         if full != 0.0:
             m.counts[CODE] = int(-full)
             return ROWS_FULL if full > 0.0 else FAILED
@@ -257,8 +269,9 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             return PAUSED
         t = m.memory[TIME]
         floor = smallest_step(t, t_end, h_min)
-        if steps.order == 0.0 and m.counts[STEPS] % STABLE_EVERY == 0:
+        if steps.order == 0.0 and m.counts[FAILURES] == 0 and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
+            m.memory[STALE] = 0.0
         h = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
@@ -297,7 +310,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if word < 0.0:
             m.counts[CODE] = int(-word)
             return FAILED
-        full = outputs(p, m, times)
+        full = outputs(p, m, steps, times)
         if full < 0.0:
             m.counts[CODE] = int(-full)
             return FAILED

@@ -33,7 +33,7 @@ from mbsim.core.problem import HOOK, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
-LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION = range(7, 12)
+LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE = range(7, 13)
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 
@@ -84,7 +84,7 @@ class Steps(NamedTuple):
 def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
     """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies."""
     n = len(y0)
-    memory = np.zeros(12)
+    memory = np.zeros(13)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
     memory[H_SMALLEST] = math.inf

@@ -193,7 +193,9 @@ class Work(NamedTuple):
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
-    block: F2  # (nb, 10) stiffness that acts on a body (3 x 3), and damping
+    block: F2  # (nb, 20) stiffness that acts on a body (3 x 3) and its turning part, damping
+    bound: F1  # (2,) squared frequency and rate of damping, the largest so far
+    best: F1  # (4,) pair that gave it: contact, energy at touch, force behind it, inverse mass
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
     trouble: I1  # (2,) worst body of the error norm, contact at fault

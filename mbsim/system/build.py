@@ -46,7 +46,7 @@ NEAR_EACH = 24
 #: Most cells of the grid that finds them, for each graphic.
 CELLS_EACH = 4
 #: Boxes nearer than this many radii are listed as near.
-SKIN = 0.3
+SKIN = 0.45
 
 
 @dataclass
@@ -388,7 +388,9 @@ def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),
-        block=np.zeros((nb, 10)),
+        block=np.zeros((nb, 20)),
+        bound=np.zeros(2),
+        best=np.zeros(4),
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
         trouble=np.full(2, -1, dtype=np.int64),
