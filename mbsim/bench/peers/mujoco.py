@@ -252,8 +252,12 @@ def _stiff(depth: float, rate: float) -> float:
     return max(0.0, p.S10A_LAW.k * depth + p.S10A_LAW.c * rate)
 
 
+#: Plain numbers: compiled code reads no field of a dataclass.
+_HERTZ_K, _HERTZ_E = p.S5.k, p.S5.e
+
+
 def _hertz(depth: float, rate: float) -> float:
-    return p.S5.k * depth**p.S5.e
+    return _HERTZ_K * depth**_HERTZ_E
 
 
 # ---------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from mbsim.bench.scene import Scene, Target, Variation
 PASS = 0.05
 #: dmax of IMPACT's damper [m] and transition velocity of friction [m/s], left open by the scene;
 #: a tenth of the transition takes 1.6 times as many steps and does not change the penetration.
-DMAX, TRANSITION = 1e-5, 0.1
+DMAX, TRANSITION = 1e-5, 0.02
 
 #: Walls by name: Euler angles psi, theta that turn z into the inward normal, and its direction.
 _WALLS = (
@@ -52,7 +52,7 @@ def _deck(count: int, variation: Variation) -> str:
     places = p.s7_positions(count)
     spheres = [text.sphere(2 + k, p.S7.mass, p.S7.radius, x) for k, x in enumerate(places)]
     ids = [100 * (2 + k) for k in range(count)]
-    law = text.impact(p.S7.law.k, 1.0, p.S7.law.c, DMAX) | text.coulomb(p.S7.mu, TRANSITION)
+    law = text.impact(variation["k"], 1.0, p.S7.law.c, DMAX) | text.coulomb(p.S7.mu, TRANSITION)
     box = list(range(100, 105))
     return text.deck(
         f"{count} spheres fall into an open box",
@@ -65,6 +65,7 @@ def _deck(count: int, variation: Variation) -> str:
             text.gravity(),
         ],
         p.S7.end_time,
+        p.s7_sample(count),
     )
 
 
