@@ -19,9 +19,7 @@ def attributes(**values: object) -> str:
     )
 
 
-def deck(
-    comment: str, statements: Sequence[str], end_time: float, sample: float = SAMPLE
-) -> str:
+def deck(comment: str, statements: Sequence[str], end_time: float, sample: float = SAMPLE) -> str:
     """Return a whole deck in SI units with a row every `sample` seconds."""
     body = "\n".join(statements)
     simulate = attributes(analysis_type="Transient", end_time=end_time, print_interval=sample)

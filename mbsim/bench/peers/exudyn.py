@@ -369,6 +369,8 @@ def _free(top: p.FreeBody) -> Cases:
         *_fixed("RK44", steps),
         *_fixed("RK67", (0.05, 0.02, 1e-2, 1e-3) if slow else (1e-3, 5e-4, 2e-4, 1e-4)),
         *_auto("DOPRI5", (1e-4, 1e-6, 1e-9, 1e-12), 1.0 if slow else 0.1),
+        # it stores at steps only: rows every 10 ms need steps as short
+        *(_auto("DOPRI5", (1e-4, 1e-6, 1e-9, 1e-12), p.SAMPLE) if slow else []),
     ]
     note = "Lie group; rows at the steps where these are automatic"
     for solver in solvers:
