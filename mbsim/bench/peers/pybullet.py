@@ -345,7 +345,8 @@ def _grains(count: int) -> Cases:
         return bodies
 
     note = "rigid, no restitution"
-    for dt in (TICK, 1e-3) if count > 1000 else (TICK, 2e-3, 1e-3):
+    steps = {125: (TICK, 2e-3, 1e-3), 1000: (TICK, 1e-3)}.get(count, (TICK,))
+    for dt in steps:
         end, sample = p.S7.end_time, p.s7_sample(count)
         yield (
             f"maximal=1 dt={dt:.4g}",
