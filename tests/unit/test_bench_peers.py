@@ -159,6 +159,12 @@ def test_early_stop_scales_the_wall_time_and_says_so():
     assert "stopped at t = 0.50 s" in outcome.note
 
 
+def test_long_runs_of_peers_are_not_warmed_up():
+    runs = iter([(0.1, "a"), (0.3, "b"), (2.5, "c")])
+    assert common.measure(lambda: next(runs), 1) == (0.3, "b")
+    assert common.measure(lambda: next(runs), 5) == (2.5, "c")
+
+
 def test_hermite_reads_a_parabola_exactly():
     t = np.array([0.0, 0.3, 1.0])
     at = np.linspace(0.0, 1.0, 7)
