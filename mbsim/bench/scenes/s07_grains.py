@@ -138,7 +138,7 @@ def _scene(count: int, **changes: Any) -> Scene:
 
 
 SCENES = (
-    _scene(125, integrators=("VERLET", "DOPRI5")),
+    _scene(125, integrators=("VERLET", "DOPRI5"), limit=40.0),
     _scene(1000, targets=(Target(1 / 2),), elsewhere=(QUICKSTEP,)),
     _scene(8000, tolerances=(1e-3,), limit=300.0),
 )
