@@ -19,10 +19,10 @@ def attributes(**values: object) -> str:
     )
 
 
-def deck(comment: str, statements: Sequence[str], end_time: float) -> str:
-    """Return a whole deck in SI units with a row every `SAMPLE` seconds."""
+def deck(comment: str, statements: Sequence[str], end_time: float, sample: float = SAMPLE) -> str:
+    """Return a whole deck in SI units with a row every `sample` seconds."""
     body = "\n".join(statements)
-    simulate = attributes(analysis_type="Transient", end_time=end_time, print_interval=SAMPLE)
+    simulate = attributes(analysis_type="Transient", end_time=end_time, print_interval=sample)
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <!-- {comment} (units N, kg, m, s) -->
 <MotionSolve>

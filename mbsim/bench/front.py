@@ -14,21 +14,19 @@ LARGEST, SMALLEST = 1e-2, 1e-7
 
 
 class Point(NamedTuple):
-    """An error, the time that it took, and who took it with rows how far apart [ms]."""
+    """An error, the time that it took, and who took it."""
 
     error: float
     time: float
     engine: str
     setting: str
-    rows_ms: float = 0.0
 
 
 class Cell(NamedTuple):
     """One comparison: our time to reach a peer's error, and the verdict.
 
     `ours_s` and `ratio` are None where none of our runs has so small an error; `met` is
-    None where there is no target or no run of ours. `rows_ms` is how far apart the peer's rows
-    are: some of its settings cannot store one every 10 ms, which is less work than ours.
+    None where there is no target or no run of ours. `held_to` is the measure of our error.
     """
 
     scene: str
@@ -40,29 +38,50 @@ class Cell(NamedTuple):
     ratio: float | None
     target: float | None
     met: bool | None
-    rows_ms: float
+    held_to: str
+
+
+def excluded(scene: Scene, row: Measurement) -> str:
+    """Return why a run with a result is not compared; empty where it is.
+
+    A run that was cut short has not shown its largest error, and rows that are further apart
+    than asked are less work.
+    """
+    if "reached_s" in row.counts:
+        return "cut short, so its error is a lower bound"
+    if row.counts.get("rows_ms", 0.0) > 1.1e3 * scene.sample:
+        return f"rows {row.counts['rows_ms']:.3g} ms apart, {1e3 * scene.sample:.3g} asked"
+    return ""
+
+
+def candidates(scene: Scene, rows: Iterable[Measurement], ours: bool) -> list[Measurement]:
+    """Return the runs of a scene that are compared: ours, or those of all peers."""
+    mine = (row for row in rows if row.scene == scene.name and (row.engine == OURS) == ours)
+    return [row for row in mine if not excluded(scene, row)]
 
 
 def points(rows: Iterable[Measurement], measure: str) -> list[Point]:
     """Return the finite points of measurements for one measure."""
     found = [
-        Point(
-            row.errors[measure],
-            row.wall_per_sim_s,
-            row.engine,
-            row.setting,
-            row.counts.get("rows_ms", 0.0),
-        )
+        Point(row.errors[measure], row.wall_per_sim_s, row.engine, row.setting)
         for row in rows
         if measure in row.errors
     ]
     return [p for p in found if math.isfinite(p.error) and math.isfinite(p.time)]
 
 
-def front(candidates: Iterable[Point]) -> list[Point]:
+def fronts(scene: Scene, rows: Sequence[Measurement]) -> tuple[list[Point], list[Point]]:
+    """Return our front of a scene and the common one of the peers, each by what it is held to."""
+    mine, theirs = (
+        front(points(candidates(scene, rows, ours), scene.held_to(ours))) for ours in (True, False)
+    )
+    return mine, theirs
+
+
+def front(all_points: Iterable[Point]) -> list[Point]:
     """Return the points that no other point beats in error and time, by falling error."""
     kept: list[Point] = []
-    for point in sorted(candidates, key=lambda p: (p.time, p.error)):
+    for point in sorted(all_points, key=lambda p: (p.time, p.error)):
         if not kept or point.error < kept[-1].error:
             kept.append(point)
     return kept
@@ -87,34 +106,40 @@ def time_at(ours: Sequence[Point], error: float) -> float | None:
 
 
 def compare(scene: Scene, rows: Sequence[Measurement]) -> list[Cell]:
-    """Return the comparisons of a scene with the peers' front; none without peers."""
-    all_points = points((row for row in rows if row.scene == scene.name), scene.measure)
-    ours = front(p for p in all_points if p.engine == OURS)
-    peers = front(p for p in all_points if p.engine != OURS)
-    if scene.pass_below is not None:
-        return _compare_passing(scene, ours, peers)
-    return [
-        _cell(scene, p, time_at(ours, p.error), bool(ours))
-        for p in peers
-        if SMALLEST <= p.error <= LARGEST
-    ]
+    """Return the comparisons of a scene with the peers' front; none without peers.
+
+    Where ours is held to a measure of its own, the peers' is compared too but not judged.
+    """
+    ours, peers = fronts(scene, rows)
+    shown = _compared_peers(scene, peers)
+    held_to = scene.held_to(ours=True)
+    cells = [_cell(scene, p, ours, held_to, scene.target(p.error)) for p in shown]
+    if held_to != scene.measure:
+        same = front(points(candidates(scene, rows, ours=True), scene.measure))
+        cells += [_cell(scene, p, same, scene.measure, None) for p in shown]
+    for run in scene.elsewhere:
+        known = Point(
+            run.error, run.wall_per_sim_s, run.engine, f"{run.setting} (reference machine)"
+        )
+        cells.append(_cell(scene, known, ours, held_to, None))
+    return cells
 
 
-def _compare_passing(scene: Scene, ours: list[Point], peers: list[Point]) -> list[Cell]:
-    """Return the one comparison between the fastest runs with an error below the scene's."""
-    assert scene.pass_below is not None
-    fastest = next((p for p in peers if p.error < scene.pass_below), None)
-    if fastest is None:
-        return []
-    mine = next((p.time for p in ours if p.error < scene.pass_below), None)
-    return [_cell(scene, fastest, mine, bool(ours))]
+def _compared_peers(scene: Scene, peers: list[Point]) -> list[Point]:
+    """Return the peers' points that ours is compared with; the fastest one that passes."""
+    if scene.pass_below is None:
+        return [p for p in peers if SMALLEST <= p.error <= LARGEST]
+    return [p for p in peers if p.error < scene.pass_below][:1]
 
 
-def _cell(scene: Scene, peer: Point, ours_s: float | None, ran: bool) -> Cell:
-    """Return one comparison; a target that none of our runs reaches is lost."""
-    target = scene.target(peer.error)
+def _cell(scene: Scene, peer: Point, ours: list[Point], held_to: str, target: float | None) -> Cell:
+    """Return one comparison with our front; a target that none of our runs reaches is lost."""
+    if scene.pass_below is None:
+        ours_s = time_at(ours, peer.error)
+    else:
+        ours_s = next((p.time for p in ours if p.error < scene.pass_below), None)
     ratio = None if ours_s is None else ours_s / peer.time
-    met = None if target is None or not ran else ratio is not None and ratio <= target
+    met = None if target is None or not ours else ratio is not None and ratio <= target
     return Cell(
         scene.name,
         peer.error,
@@ -125,5 +150,5 @@ def _cell(scene: Scene, peer: Point, ours_s: float | None, ran: bool) -> Cell:
         ratio,
         target,
         met,
-        peer.rows_ms,
+        held_to,
     )

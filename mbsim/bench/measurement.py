@@ -31,7 +31,8 @@ class Measurement(NamedTuple):
     errors
         Measures of the scene; empty where the run failed.
     counts
-        The engine's own numbers, e.g. steps and evaluations, and `rows_ms`.
+        The engine's own numbers, e.g. steps and evaluations, `rows_ms`, and `reached_s` of
+        a run that ended early.
     """
 
     scene: str
@@ -66,8 +67,10 @@ def measured(
         done, outcome = wanted, run(wanted)
     reached = float(outcome.time[-1])
     complete = abs(reached - scene.end_time) < 1e-6 * scene.end_time
-    # a run may be cut short where its measure is a largest value so far
+    # where the measure is a largest value, a run that was cut short still gives a lower bound
     judged = complete or scene.pass_below is not None
+    counts = outcome.extra | {"rows_ms": rows_apart(outcome)}
+    counts |= {} if complete else {"reached_s": reached}
     errors = scene.errors(outcome, scene.variant(outcome.note)) if judged else {}
     note = outcome.note
     if not judged:
@@ -81,7 +84,7 @@ def measured(
         outcome.wall_s,
         outcome.wall_s / scene.end_time,
         errors,
-        outcome.extra | {"rows_ms": rows_apart(outcome)},
+        counts,
         note,
     )
 

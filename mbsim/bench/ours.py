@@ -21,15 +21,11 @@ if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
-_COUNTS = ("steps", "rejected", "rhs_evaluations")
-
-
-#: A run of ours that takes longer than this [s] is given up, and its line says so.
-LIMIT = 120.0
+_COUNTS = ("steps", "rejected", "rhs_evaluations", "normal_calls")
 
 
 class TookTooLong(MbsimError):
-    """A run was given up after `LIMIT` seconds."""
+    """A run was given up after the limit of its scene."""
 
 
 class Setting(NamedTuple):
@@ -49,11 +45,11 @@ class Setting(NamedTuple):
 def settings(
     scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]
 ) -> list[Setting]:
-    """Return all settings of a scene; no `tolerances` means the scene's own."""
+    """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own."""
     return [
         Setting(integrator, tol, variation)
         for variation in scene.variations
-        for integrator in integrators
+        for integrator in (integrators or scene.integrators)
         for tol in (tolerances or scene.tolerances)
     ]
 
@@ -67,17 +63,18 @@ def deck_file(scene: Scene, variation: Variation, folder: Path) -> Path:
     return path
 
 
-def run(deck: Model, setting: Setting, repeats: int) -> Outcome:
+def run(deck: Model, setting: Setting, repeats: int, limit: float) -> Outcome:
     """Run a deck and return its outcome with the median time of `repeats`.
 
     The time is `loop_s`: all calls of the compiled stepping loop, which also writes the rows.
+    A run is given up after `limit` seconds.
     """
     from mbsim.simulation import simulate
 
     walls = []
     for _ in range(repeats):
         results = simulate(
-            deck, integrator=setting.integrator, tol=setting.tol, progress=_stop_after(LIMIT)
+            deck, integrator=setting.integrator, tol=setting.tol, progress=_stop_after(limit)
         )
         walls.append(float(results.stats["loop_s"]))
     return outcome(results, statistics.median(walls))
@@ -149,7 +146,9 @@ def measure(
                 OURS,
                 __version__,
                 setting.text,
-                lambda count, deck=deck, setting=setting: run(deck, setting, count),  # type: ignore[misc]
+                lambda count, deck=deck, setting=setting: run(  # type: ignore[misc]
+                    deck, setting, count, scene.limit
+                ),
                 repeats,
             )
         except Interrupted:

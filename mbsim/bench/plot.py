@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mbsim.bench.front import Point, front, points
+from mbsim.bench.front import Point, candidates, excluded, front, points
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
 
@@ -33,22 +33,21 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
     axes = figure.add_subplot()
     peers = [row for row in mine if row.engine != OURS]
     for engine in dict.fromkeys(row.engine for row in peers):
-        shown = points((row for row in peers if row.engine == engine), scene.measure)
+        theirs = [row for row in peers if row.engine == engine]
         style = {"color": _COLOURS.get(engine, "tab:gray"), "marker": _MARKERS.get(engine, "v")}
-        _series(axes, shown, engine, style)
+        _series(axes, scene, theirs, engine, style)
     own = [row for row in mine if row.engine == OURS]
     integrators = list(dict.fromkeys(row.setting.split()[0] for row in own))
     for k, name in enumerate(integrators):
         chosen = [row for row in own if row.setting.split()[0] == name]
         style = {"color": _OWN_COLOURS[k % len(_OWN_COLOURS)], "marker": "o"}
-        shown = points(chosen, scene.measure)
-        _series(axes, shown, f"mbsim {name}", style | {"linewidth": 2.0})
-        _label_ends(axes, front(shown), str(style["color"]))
+        _series(axes, scene, chosen, f"mbsim {name}", style | {"linewidth": 2.0})
+        _label_ends(axes, front(points(chosen, scene.measure)), str(style["color"]))
         if scene.second is not None:
             measure, label = scene.second
             dashed = style | {"linestyle": "--"}
             _line(axes, front(points(chosen, measure)), f"mbsim {name}, {label}", dashed)
-    _targets(axes, scene, front(points(peers, scene.measure)))
+    _targets(axes, scene, front(points(candidates(scene, mine, ours=False), scene.measure)))
     axes.set(xscale="log", yscale="log", title=f"{scene.name}: {scene.title}")
     axes.set_xlabel(f"{scene.unit}   (better: left)")
     axes.set_ylabel("wall seconds per simulated second   (better: down)")
@@ -58,9 +57,11 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def _series(axes: Any, shown: list[Point], label: str, style: dict[str, Any]) -> None:
-    """Draw all runs of one engine faintly and its front as a line."""
-    visible = [p for p in shown if p.error <= _RANGE[1]]
+def _series(
+    axes: Any, scene: Scene, rows: Sequence[Measurement], label: str, style: dict[str, Any]
+) -> None:
+    """Draw all runs of one engine faintly and the front of those that are compared as a line."""
+    visible = _visible(points(rows, scene.measure))
     axes.plot(
         [_clipped(p.error) for p in visible],
         [p.time for p in visible],
@@ -69,7 +70,13 @@ def _series(axes: Any, shown: list[Point], label: str, style: dict[str, Any]) ->
         markersize=4,
         **{key: value for key, value in style.items() if key in ("color", "marker")},
     )
-    _line(axes, front(visible), label, style)
+    compared = points((row for row in rows if not excluded(scene, row)), scene.measure)
+    _line(axes, front(_visible(compared)), label, style)
+
+
+def _visible(shown: list[Point]) -> list[Point]:
+    """Return the points that are not wrong altogether."""
+    return [p for p in shown if p.error <= _RANGE[1]]
 
 
 def _line(axes: Any, shown: list[Point], label: str, style: dict[str, Any]) -> None:

@@ -7,9 +7,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from mbsim.bench.front import Cell, Point, front, points, time_at
+from mbsim.bench.front import Cell, candidates, excluded, front, fronts, points, time_at
 from mbsim.bench.measurement import OURS, Measurement
-from mbsim.bench.parameters import SAMPLE
 from mbsim.bench.scene import Scene
 from mbsim.errors import ResultsError
 
@@ -20,6 +19,9 @@ LAST_COLUMNS = ("note", "date", "cpu", "python")
 
 #: Errors at which our own times are listed.
 DECADES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+
+#: Between these numbers of spheres the time for one body or contact shall grow so much at most.
+SCALING_BETWEEN, LARGEST_GROWTH = (125, 8000), 1.5
 
 
 def write_text(path: Path, text: str) -> None:
@@ -39,10 +41,13 @@ def write_csv(
     # an engine's own count of what is an error measure anyway is not listed twice
     counts = [name for name in _names(row.counts for row in rows) if name not in measures]
     header = [*FIRST_COLUMNS, "measure", *measures, *counts, *LAST_COLUMNS]
-    main = {scene.name: scene.measure for scene in scenes}
+    known = {scene.name: scene for scene in scenes}
     lines = []
     for row in rows:
-        values = {**row._asdict(), **machine, "measure": main[row.scene]}
+        scene = known[row.scene]
+        values = {**row._asdict(), **machine, "measure": scene.held_to(row.engine == OURS)}
+        why_not = excluded(scene, row) if row.errors else ""
+        values["note"] = "; ".join(filter(None, (row.note, why_not and f"not compared: {why_not}")))
         values |= {name: _number(value) for name, value in (row.counts | row.errors).items()}
         values |= {name: _number(values[name]) for name in ("wall_s", "wall_per_sim_s")}
         lines.append([values.get(name, "") for name in header])
@@ -68,8 +73,11 @@ def line(scene: Scene, row: Measurement) -> str:
     name = f"{row.scene} {row.engine} {row.setting}"
     if not row.errors:
         return f"{name}: {row.note}"
-    error = row.errors[scene.measure]
-    return f"{name}: {row.wall_per_sim_s:.3g} s per simulated second, {scene.measure} {error:.2g}"
+    measure = scene.held_to(row.engine == OURS)
+    took = f"{row.wall_per_sim_s:.3g} s per simulated second"
+    why_not = excluded(scene, row)
+    end = f" (not compared: {why_not})" if why_not else ""
+    return f"{name}: {took}, {measure} {row.errors[measure]:.2g}{end}"
 
 
 def table(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
@@ -106,17 +114,21 @@ def markdown(
         parts += ["## Time to reach the error of the best peer", comparison(cells)]
         parts.append(_summary(cells))
     parts += ["## Our time to reach an error", own_times(scenes, rows)]
-    parts += [_scaling(rows)] if _scaling(rows) else []
+    many = scaling(rows)
+    parts += ["## Our time with the number of spheres", many] if many else []
     for scene in scenes:
         parts += [f"## {scene.name}: {scene.title}", front_table(scene, rows)]
-    troubles = _troubles(rows)
-    parts += ["## Runs without a result", troubles] if troubles else []
+    troubles = _troubles(scenes, rows)
+    parts += ["## Runs that are not compared", troubles] if troubles else []
     return "\n\n".join(parts) + "\n"
 
 
 def comparison(cells: Sequence[Cell]) -> str:
     """Return the table of comparisons: our time to each error on the peers' front."""
-    header = ("scene", "error", "best peer", "peer [s]", "ours [s]", "ours / peer", "target", "")
+    header = (
+        *("scene", "error", "best peer", "peer [s]", "ours, error by", "ours [s]"),
+        *("ours / peer", "target", ""),
+    )
     return table(header, [_cell_line(cell) for cell in cells])
 
 
@@ -128,16 +140,12 @@ def _cell_line(cell: Cell) -> list[str]:
         f"{cell.error:.1e}",
         f"{cell.peer} {cell.setting}",
         f"{cell.peer_s:.3g}",
+        cell.held_to,
         "not reached" if cell.ours_s is None else f"{cell.ours_s:.3g}",
         "" if cell.ratio is None else _ratio(cell.ratio),
         "" if cell.target is None else _ratio(cell.target),
-        verdict + _rows_note(cell.rows_ms),
+        verdict,
     ]
-
-
-def _rows_note(rows_ms: float) -> str:
-    """Return what to say where a peer stores fewer rows than we do."""
-    return f" (peer's rows {rows_ms:.3g} ms apart)" if rows_ms > 1.1e3 * SAMPLE else ""
 
 
 def _ratio(value: float) -> str:
@@ -156,23 +164,20 @@ def own_times(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
     """Return our time for every decade of error, between measured points."""
     lines = []
     for scene in scenes:
-        ours = _front(scene, rows, ours=True)
-        times = [time_at(ours, error) for error in DECADES]
-        shown = ["" if time is None else f"{time:.3g}" for time in times]
-        lines.append([scene.name, scene.measure, *shown])
+        for measure in dict.fromkeys((scene.held_to(ours=True), scene.measure)):
+            ours = front(points(candidates(scene, rows, ours=True), measure))
+            times = [time_at(ours, error) for error in DECADES]
+            shown = ["" if time is None else f"{time:.3g}" for time in times]
+            lines.append([scene.name, measure, *shown])
     return table(("scene", "measure", *(f"{error:.0e}" for error in DECADES)), lines)
 
 
 def front_table(scene: Scene, rows: Sequence[Measurement]) -> str:
     """Return our front with all measures, then the peers'."""
     mine = [row for row in rows if row.scene == scene.name]
-    measures = [scene.measure]
-    measures += [name for name in _names(row.errors for row in mine) if name != scene.measure]
-    keys = {
-        (point.engine, point.setting)
-        for ours in (True, False)
-        for point in _front(scene, rows, ours)
-    }
+    held_to = list(dict.fromkeys((scene.measure, scene.held_to(ours=True))))
+    measures = [*held_to, *(n for n in _names(row.errors for row in mine) if n not in held_to)]
+    keys = {(point.engine, point.setting) for both in fronts(scene, rows) for point in both}
     chosen = [row for row in mine if (row.engine, row.setting) in keys]
     chosen.sort(key=lambda row: (row.engine != OURS, row.wall_per_sim_s))
     return table(
@@ -189,32 +194,46 @@ def front_table(scene: Scene, rows: Sequence[Measurement]) -> str:
     )
 
 
-def _front(scene: Scene, rows: Sequence[Measurement], ours: bool) -> list[Point]:
-    """Return our front of a scene, or that of all peers together."""
-    mine = [row for row in rows if row.scene == scene.name and (row.engine == OURS) == ours]
-    return front(points(mine, scene.measure))
+def scaling(rows: Sequence[Measurement]) -> str:
+    """Return our time for one body or contact and step, for each number of spheres.
 
-
-def _scaling(rows: Sequence[Measurement]) -> str:
-    """Return our time per step and (body + incident) of the scenes with many spheres."""
-    lines = []
+    The contacts are their mean over the run: calls of the normal law over evaluations, a row
+    being one more evaluation in thousands. Settings are compared with themselves only.
+    """
+    each: dict[str, dict[int, float]] = {}
     for row in rows:
         if row.engine != OURS or not row.scene.startswith("S7_") or not row.errors:
             continue
         bodies = int(row.scene.removeprefix("S7_"))
-        things = bodies + row.counts["incidents_end"]
-        each = 1e9 * row.wall_s / (row.counts["steps"] * things)
-        lines.append([row.scene, row.setting, f"{things:.0f}", f"{each:.0f}"])
-    header = ("scene", "setting", "bodies + contacts at the end", "ns each a step")
+        contacts = row.counts["normal_calls"] / row.counts["rhs_evaluations"]
+        each.setdefault(row.setting, {})[bodies] = (
+            1e9 * row.wall_s / (row.counts["steps"] * (bodies + contacts))
+        )
+    counts = sorted({bodies for found in each.values() for bodies in found})
+    header = ("ns each body or contact a step", *map(str, counts), "growth", "target", "")
+    lines = [_scaling_line(setting, found, counts) for setting, found in each.items()]
     return table(header, lines) if lines else ""
 
 
-def _troubles(rows: Sequence[Measurement]) -> str:
-    """Return what failed, each reason once."""
+def _scaling_line(setting: str, found: Mapping[int, float], counts: Sequence[int]) -> list[str]:
+    """Return the times of one setting, and their growth from the fewest spheres to the most."""
+    shown = [f"{found[n]:.0f}" if n in found else "" for n in counts]
+    few, many = SCALING_BETWEEN
+    if few not in found or many not in found:
+        return [setting, *shown, "", "", ""]
+    growth = found[many] / found[few]
+    verdict = "met" if growth <= LARGEST_GROWTH else "lost"
+    return [setting, *shown, f"{growth:.2f}", f"{LARGEST_GROWTH:g}", verdict]
+
+
+def _troubles(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
+    """Return what failed or is not compared, each reason once."""
+    known = {scene.name: scene for scene in scenes}
     reasons: dict[tuple[str, str, str], int] = {}
     for row in rows:
-        if not row.errors:
-            key = (row.scene, row.engine, row.note)
+        why_not = excluded(known[row.scene], row) if row.errors else row.note
+        if why_not:
+            key = (row.scene, row.engine, why_not)
             reasons[key] = reasons.get(key, 0) + 1
     return "\n".join(
         f"- {scene}, {engine}, {count} settings: {note}"

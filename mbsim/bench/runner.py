@@ -20,7 +20,7 @@ Tell = Callable[[str], None]
 
 
 class Options(NamedTuple):
-    """What to run: scenes by name, our integrators and tolerances (none: the scene's own)."""
+    """What to run: our integrators and tolerances are the scene's own where there are none."""
 
     scenes: Sequence[Scene]
     integrators: Sequence[str]
@@ -54,7 +54,7 @@ def choose_scenes(names: Sequence[str]) -> list[Scene]:
 
 
 def choose_integrators(names: Sequence[str]) -> list[str]:
-    """Return integrators by name, whatever the case; all of them if there is no name.
+    """Return integrators by name, whatever the case; none means those of each scene.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def choose_integrators(names: Sequence[str]) -> list[str]:
     for name in names:
         if name.upper() not in INTEGRATORS:
             raise ModelError(f"integrator={name} is not known; there are {', '.join(INTEGRATORS)}")
-    return [name.upper() for name in names] or list(INTEGRATORS)
+    return [name.upper() for name in names]
 
 
 def run(options: Options, folder: Path, tell: Tell) -> Report:
@@ -73,13 +73,20 @@ def run(options: Options, folder: Path, tell: Tell) -> Report:
     engines = {name: peers.load(name) for name in options.peers}
     rows: list[Measurement] = []
     cells: list[Cell] = []
+    total = sum(_count(scene, options, engines) for scene in options.scenes)
     for scene in options.scenes:
         for row in _scene_rows(scene, options, engines, folder):
             rows.append(row)
-            tell(report.line(scene, row))
+            tell(f"[{len(rows)}/{total}] {report.line(scene, row)}")
         cells += compare(scene, rows)
         report.write_csv(folder / "bench.csv", machine, options.scenes, rows)
     return Report(machine, rows, cells)
+
+
+def _count(scene: Scene, options: Options, engines: dict[str, ModuleType]) -> int:
+    """Return how many measurements a scene gives."""
+    mine = ours.settings(scene, options.integrators, options.tolerances)
+    return len(mine) + sum(len(engine.settings(scene.name)) for engine in engines.values())
 
 
 def _scene_rows(
@@ -98,11 +105,13 @@ def _peer_row(
     scene: Scene, name: str, engine: ModuleType, setting: str, repeats: int
 ) -> Measurement:
     """Return the measurement of one setting of a peer."""
+    version = ""
     try:
+        version = engine.version()
         return measured(
             scene,
             name,
-            engine.version(),
+            version,
             setting,
             lambda count: engine.run(scene.name, setting, count),
             repeats,
@@ -110,4 +119,4 @@ def _peer_row(
     except Exception as error:
         # another project's engine may raise anything: its line says so, the others go on
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        return failed(scene, name, engine.version(), setting, reason)
+        return failed(scene, name, version, setting, reason)

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mbsim.bench.outcome import Outcome
+from mbsim.bench.parameters import SAMPLE
 
 #: Tolerances of our runs where a scene does not say otherwise.
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
+
+#: Our integrators where a scene does not say otherwise.
+INTEGRATORS = ("DOPRI5", "DOP853")
 
 Variation = Mapping[str, float]
 Deck = Callable[[Variation], str]
@@ -21,6 +26,15 @@ class Target:
 
     ratio: float
     up_to: float = float("inf")
+
+
+class Elsewhere(NamedTuple):
+    """A run that was measured on another machine, shown beside ours and never judged."""
+
+    engine: str
+    setting: str
+    error: float
+    wall_per_sim_s: float
 
 
 @dataclass(frozen=True)
@@ -39,6 +53,8 @@ class Scene:
         From a variation, e.g. ``{"vs": 1e-3}``, to the deck as XML text; SI.
     errors
         From an outcome and the variant of the law that it solves to named error measures.
+    own_measure
+        What ours is held to in place of `measure`, if there is such; the peers never are.
     targets
         By rising `up_to`; empty where there is none.
     variations
@@ -49,8 +65,16 @@ class Scene:
         A further measure of our runs that belongs into the plot, dashed, and its label.
     pass_below
         Where set, runs are compared by the time of the fastest one with a smaller error.
-    tolerances, repeats
-        Of our runs; of all runs, where a run is long.
+    elsewhere
+        Figures from another machine that are shown beside the comparison.
+    integrators, tolerances
+        Of our runs.
+    sample
+        Time between the rows that every engine stores [s]; who stores fewer is not compared.
+    repeats
+        Largest number of repeats of any run, where runs are long.
+    limit
+        Seconds after which a run of ours is given up.
     """
 
     name: str
@@ -60,13 +84,22 @@ class Scene:
     unit: str
     deck: Deck
     errors: Errors
+    own_measure: str | None = None
     targets: tuple[Target, ...] = ()
     variations: tuple[Variation, ...] = ({},)
     variants: tuple[str, ...] = ("",)
     second: tuple[str, str] | None = None
     pass_below: float | None = None
+    elsewhere: tuple[Elsewhere, ...] = ()
+    integrators: tuple[str, ...] = INTEGRATORS
     tolerances: tuple[float, ...] = TOLERANCES
+    sample: float = SAMPLE
     repeats: int | None = None
+    limit: float = 120.0
+
+    def held_to(self, ours: bool) -> str:
+        """Return the measure that counts for our runs or for the peers'."""
+        return self.own_measure if ours and self.own_measure is not None else self.measure
 
     def target(self, error: float) -> float | None:
         """Return the ratio that is asked for at this error; None where there is no target."""

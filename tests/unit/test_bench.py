@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
+import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,11 +15,13 @@ import pytest
 from click.testing import CliRunner
 
 from mbsim.bench import oracle, peers, report, runner
+from mbsim.bench import ours as own
 from mbsim.bench import parameters as p
 from mbsim.bench.front import Point, compare, front, time_at
 from mbsim.bench.measurement import OURS, Measurement, measured
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.scene import Scene, Target
+from mbsim.bench.peers import pybullet
+from mbsim.bench.scene import Elsewhere, Scene, Target
 from mbsim.bench.scenes import all_scenes, s01_top, s03_rolling, s07_grains, s10_hard_ball
 from mbsim.cli.main import main
 from mbsim.model.frames import marker_frames
@@ -109,12 +113,40 @@ def test_targets_are_met_lost_or_not_reached():
     assert "not reached" in shown
 
 
-def test_a_peer_that_stores_fewer_rows_is_marked():
-    rows = [row(OURS, 1e-3, 1.0)]
-    rows.append(row("a", 1e-3, 1.0)._replace(counts={"rows_ms": 50.0}))
-    assert "peer's rows 50 ms apart" in report.comparison(compare(scene(), rows))
-    rows[1] = rows[1]._replace(counts={"rows_ms": 10.0})
-    assert "apart" not in report.comparison(compare(scene(), rows))
+def test_a_peer_that_stores_fewer_rows_is_not_compared():
+    rows = [row(OURS, 1e-3, 1.0), row("b", 1e-3, 3.0)]
+    rows.append(row("a", 1e-3, 2.0)._replace(counts={"rows_ms": 50.0}))
+    assert [cell.peer for cell in compare(scene(), rows)] == ["b"]
+    text = report.markdown(MACHINE, [scene()], rows, [], [])
+    assert "- T, a, 1 settings: rows 50 ms apart, 10 asked" in text
+    assert "not compared: rows 50 ms apart" in report.line(scene(), rows[2])
+    # a scene may ask for fewer rows
+    assert [cell.peer for cell in compare(scene(sample=0.05), rows)] == ["a"]
+
+
+def test_a_run_that_was_cut_short_is_not_compared():
+    rows = [row(OURS, 0.01, 2.0), row("a", 0.02, 1.0)._replace(counts={"reached_s": 0.5})]
+    assert compare(scene(pass_below=0.05), rows) == []
+    assert "cut short" in report.markdown(MACHINE, [scene()], rows, [], [])
+
+
+def test_ours_may_be_held_to_a_measure_of_its_own():
+    made = scene(own_measure="law", targets=(Target(1 / 2),))
+    rows = [row(OURS, 1e-3, 1.0, law=1e-6), row("a", 1e-4, 4.0)]
+    judged, beside = compare(made, rows)
+    assert (judged.held_to, judged.ratio, judged.met) == ("law", 0.25, True)
+    # against the peers' own measure our error is too large; that is shown and not judged
+    assert (beside.held_to, beside.ratio, beside.target, beside.met) == ("error", None, None, None)
+    assert "| error " in report.comparison([beside])
+    assert "law 1e-06" in report.line(made, rows[0])
+
+
+def test_a_figure_from_elsewhere_is_shown_and_not_judged():
+    known = Elsewhere("odd", "dt=1", 0.04, 4.0)
+    made = scene(pass_below=0.05, targets=(Target(1 / 2),), elsewhere=(known,))
+    (cell,) = compare(made, [row(OURS, 0.01, 2.0)])
+    assert (cell.peer, cell.setting, cell.ratio) == ("odd", "dt=1 (reference machine)", 0.5)
+    assert (cell.target, cell.met) == (None, None)
 
 
 def test_without_target_or_without_our_run_nothing_is_judged():
@@ -155,7 +187,7 @@ def test_a_run_that_ended_early_is_not_judged():
     early = measured(scene(), "a", "1", "s", lambda count: outcome(end_time=1.0), 1)
     assert early.errors == {}
     assert "ended at 1 s" in early.note
-    assert early.counts == {"rows_ms": 250.0}
+    assert early.counts == {"rows_ms": 250.0, "reached_s": 1.0}
     assert measured(scene(), "a", "1", "s", lambda count: outcome(), 1).wall_per_sim_s == 0.05
 
 
@@ -286,6 +318,57 @@ def test_deepest_of_spheres_floor_and_walls():
     )
 
 
+def test_peaks_of_all_steps_count_beside_the_rows():
+    r = p.S7.radius
+    rest = outcome()._replace(position=np.tile([0.0, 0.0, 0.99 * r], (5, 1, 1)))
+    errors = s07_grains._errors(1, rest._replace(extra={"peak_penetration": 0.03 * r}), "")
+    assert errors["pen_rows_over_r"] == pytest.approx(0.01)
+    assert errors["pen_max_over_r"] == pytest.approx(0.03)
+    assert s07_grains._errors(1, rest, "")["pen_max_over_r"] == pytest.approx(0.01)
+
+
+# --- our settings and the growth with the number of spheres
+
+
+def test_integrators_are_those_of_the_scene_unless_asked_for():
+    scenes = all_scenes()
+
+    def used(name, *asked):
+        return {s.integrator for s in own.settings(scenes[name], asked, [])}
+
+    assert used("S2a") == used("S1") == {"DOPRI5", "DOP853"}
+    assert used("S7_125") == {"DOPRI5", "VERLET"}
+    assert used("S7_1000") == used("S7_8000") == {"VERLET"}
+    assert used("S7_1000", "DOPRI5") == {"DOPRI5"}
+    assert runner.choose_integrators([]) == []
+    assert runner.choose_integrators(["verlet"]) == ["VERLET"]
+    texts = [setting.text for setting in own.settings(scenes["S7_1000"], [], [])]
+    assert "VERLET tol=0.001 k=200000" in texts
+    assert {s.tol for s in own.settings(scenes["S7_1000"], [], [])} == {1e-3, 1e-4}
+
+
+def grains(bodies, wall_s, setting="VERLET tol=0.001"):
+    """Return a run of S7 with 100 steps and as many contacts as bodies."""
+    counts = {"steps": 100.0, "rhs_evaluations": 200.0, "normal_calls": 200.0 * bodies}
+    errors = {"pen_max_over_r": 0.01}
+    name = f"S7_{bodies}"
+    return Measurement(name, OURS, "1", setting, 1, wall_s, 0.5 * wall_s, errors, counts, "")
+
+
+def test_growth_with_the_number_of_spheres():
+    # per body or contact and step: 0.025 / (100 * 250) = 1000 ns
+    few, some, many = grains(125, 0.025), grains(1000, 0.3), grains(8000, 2.4)
+    shown = report.scaling([few, some, many, grains(125, 0.025, "DOPRI5 tol=0.001")])
+    first, second = shown.splitlines()[2:]
+    assert [cell.strip() for cell in first.split("|")[2:-1]] == [
+        *("1000", "1500", "1500"),
+        *("1.50", "1.5", "met"),
+    ]
+    assert [cell.strip() for cell in second.split("|")[2:-1]] == ["1000", *[""] * 5]
+    assert "lost" in report.scaling([few, grains(8000, 2.6)])
+    assert report.scaling([row(OURS, 1e-3, 1.0)]) == ""
+
+
 # --- whole runs
 
 
@@ -299,7 +382,7 @@ def test_every_scene_writes_xml():
 
 
 def test_walls_of_the_grains_look_inward(tmp_path):
-    text = all_scenes()["S7_125"].deck({})
+    text = all_scenes()["S7_125"].deck({"k": 1e5})
     planes = text[: text.index('<Body_Rigid id="2"')] + "</Model></MotionSolve>"
     (tmp_path / "walls.xml").write_text(planes, encoding="utf-8")
     frames = marker_frames(read_model(tmp_path / "walls.xml"))
@@ -331,7 +414,8 @@ def test_a_scene_end_to_end(tmp_path):
 
 def test_a_run_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
     # negative: whenever progress is told, the limit has passed
-    monkeypatch.setattr("mbsim.bench.ours.LIMIT", -1.0)
+    hurried = replace(all_scenes()["S4stick"], limit=-1.0)
+    monkeypatch.setattr(runner, "all_scenes", lambda: {"S4stick": hurried})
     done = call(
         *("S4stick", "--no-peers", "--tol", "1e-4", "--integrator", "DOPRI5"),
         *("--repeats", 1, "-o", tmp_path, "--json"),
@@ -347,6 +431,28 @@ def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
     assert done.exit_code == 0
     (line,) = [line for line in done.stderr.splitlines() if "not installed" in line]
     assert "mujoco, exudyn, pybullet" in line
+
+
+def test_a_machine_without_peers(tmp_path, monkeypatch):
+    for name in peers.ENGINES:
+        monkeypatch.setitem(sys.modules, name, None)  # import raises, and no spec is found
+    assert peers.available() == []
+    done = call("S10a", "--tol", "1e-3", "--integrator", "DOPRI5", "--repeats", 1, "-o", tmp_path)
+    assert done.exit_code == 0, done.stderr
+    assert "Not compared: mujoco, exudyn, pybullet." in done.stdout
+    assert "[1/1] S10a mbsim DOPRI5 tol=0.001: " in done.stderr
+
+
+def test_a_peer_that_cannot_be_imported_has_a_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(peers, "available", lambda: ["pybullet"])
+    monkeypatch.setattr(pybullet, "_engine", pybullet._engine.__wrapped__)
+    monkeypatch.setattr(pybullet, "version", lambda: pybullet._engine().__version__)
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    done = call("S10a", "--tol", "1e-3", "--repeats", 1, "-o", tmp_path, "--json")
+    assert done.exit_code == 0, done.stderr
+    notes = [row["note"] for row in json.loads(done.stdout)["rows"] if row["engine"] != OURS]
+    assert notes
+    assert all(note.startswith("failed: import of pybullet halted") for note in notes)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from mbsim.bench import parameters as p
 from mbsim.bench import peers
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.scenes import all_scenes
 
 
 def _angle(outcome: Outcome, quaternion: tuple[float, ...]) -> float:
@@ -90,6 +91,30 @@ def test_every_setting_is_known_and_unknown_scenes_have_none(engine):
     assert module.settings("S99") == []
 
 
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+def test_every_setting_stores_the_rows_that_are_asked_for(engine):
+    module = peers.load(engine)
+    for name, scene in all_scenes().items():
+        for make in module._cases(name).values():
+            case = make()
+            rows = common.plan(case.dt, case.end_time, case.sample)
+            assert rows.dt * rows.steps_per_row == pytest.approx(scene.sample, rel=1e-9)
+
+
+def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
+    for name, scene in all_scenes().items():
+        cases = [make() for make in peers.load("exudyn")._cases(name).values()]
+        assert any(case.solver.step <= scene.sample for case in cases)
+        assert all(case.sample == scene.sample for case in cases)
+
+
+def test_laws_that_are_compiled_use_plain_numbers():
+    # a field of a dataclass cannot be read in compiled code, which fails at the first run only
+    _run("mujoco", "S5", "mjcb_passive compiled Euler dt=0.0001")
+    mujoco = peers.load("mujoco")
+    assert mujoco._hertz(1e-4, 0.0) == p.S5.k * 1e-4**p.S5.e
+
+
 def test_box_sticks_and_the_body_is_where_it_was():
     outcome = _run("mujoco", "S4stick", "elliptic impratio=10000 noslip=0 dt=0.01")
     assert abs(outcome.position[-1, 0, 0]) < 1e-4
@@ -132,6 +157,12 @@ def test_early_stop_scales_the_wall_time_and_says_so():
     outcome = common.outcome(30.0, rows, "", 2.0)
     assert outcome.wall_s == pytest.approx(120.0)
     assert "stopped at t = 0.50 s" in outcome.note
+
+
+def test_long_runs_of_peers_are_not_warmed_up():
+    runs = iter([(0.1, "a"), (0.3, "b"), (2.5, "c")])
+    assert common.measure(lambda: next(runs), 1) == (0.3, "b")
+    assert common.measure(lambda: next(runs), 5) == (2.5, "c")
 
 
 def test_hermite_reads_a_parabola_exactly():

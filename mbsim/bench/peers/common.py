@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.bench import parameters as p
+from mbsim.bench.measurement import LONG_RUN
 from mbsim.bench.outcome import Outcome
 
 #: One run of S7 stops after this much wall time (s); its note says where.
@@ -74,11 +75,11 @@ def silence() -> Iterator[None]:
 def measure(once: Callable[[], tuple[float, Any]], repeats: int) -> tuple[float, Any]:
     """Median wall time (s) of `repeats` runs after one that is thrown away, and the last run.
 
-    `once` returns the wall time of its stepping loop and what it stored. A run of more than 10 s
-    is not repeated: its own noise is small beside it, and a warm-up changes nothing.
+    `once` returns the wall time of its stepping loop and what it stored. A run of more than
+    `LONG_RUN` is not repeated: its own noise is small beside it, and a warm-up changes nothing.
     """
     wall, stored = once()
-    if wall > 10.0:
+    if wall > LONG_RUN:
         return wall, stored
     walls = []
     for _ in range(repeats):
