@@ -66,6 +66,8 @@ def deepest_of_impact(scene, c, energy):
     Newton for log E over log d, whose slope is F d / E: exact at once for a power law.
     """
     contacts, out = scene.contacts, scene.work.law_out
+    if energy <= 0.0:
+        return 0.0
     depth = 1e-4 * scene.world.scale[0]
     for _ in range(50):
         call_int(contacts.normal_law[c], (depth, 0.0, contacts.normal_par[c], out))
