@@ -12,7 +12,8 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | project| y (in and out), -           | code; y back onto its manifold                        |
 | norm   | local error, y              | largest error over its scale, dimensionless           |
 | check  | y new, -                    | 1, or the part of the step to take instead            |
-| commit | y (in and out), f           | 1 if y changed so that f must be evaluated again      |
+| commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
+|        |                             | rows are full; 4 `stable` must be asked again         |
 | look   | y at an inner point, -      | code; called where `commit` before asked for it       |
 | inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
 | limit  | y, f                        | longest step that may be tried                        |
@@ -50,6 +51,9 @@ class Problem(NamedTuple):
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
+
+#: Numbers of a body at the begin of y: position 3, quaternion 4, velocity 3, angular velocity 3.
+BODY_SIZE = 13
 
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3

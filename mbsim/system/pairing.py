@@ -21,8 +21,10 @@ from mbsim.model.elements import Contact, Graphic, Model
 #: Shapes with flat sides: FCL gives several points for two of them, one for all others.
 _FLAT = {"BOX", "PLANE"}
 FCL_SLOTS = 8
-#: Contacts with more pairs than this are crowds. Listing costs a pair 5 ns an evaluation, looking
-#: for near pairs a graphic some 100 ns now and then (tests/bench/test_crowd.py).
+#: Contacts with more pairs than this are crowds. Every pair listed for good costs some 5 ns an
+#: evaluation: in a heap a crowd is cheaper from 30 pairs on, by a sixth at 300. But steps end
+#: where its list does: bodies in free flight take twice as long at 300 pairs
+#: (tests/bench/test_crowd.py).
 MOST_LISTED = 300
 
 
