@@ -52,9 +52,6 @@ class Problem(NamedTuple):
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
 
-#: Numbers of a body at the begin of y: position 3, quaternion 4, velocity 3, angular velocity 3.
-BODY_SIZE = 13
-
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3
 #: Codes from here on end the run without another try.

@@ -94,7 +94,8 @@ def depth_to_come(scene, c, energy, force):
     E(d) = energy + force d, by repeated substitution: of a power law of exponent e an error
     shrinks by 1/(e + 1) each time.
     """
-    depth = 0.0
+    # without an impact something has to begin the substitution
+    depth = 1e-4 * scene.world.scale[0]
     for _ in range(SUBSTITUTIONS if force > 0.0 else 1):
         depth = deepest_of_impact(scene, c, energy + force * depth)
     return depth

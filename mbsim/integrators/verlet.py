@@ -16,7 +16,7 @@ import math
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import BODY_SIZE
+from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, on_bench
 
 

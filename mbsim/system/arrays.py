@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mbsim.core.arrays import F1, F2, F3, I1, I2
-from mbsim.core.problem import BODY_SIZE as BODY_SIZE
+from mbsim.core.layout import BODY_SIZE as BODY_SIZE
 
 # columns of `Log.contacts`, one row a contact
 (

@@ -140,5 +140,5 @@ def _scene(count: int, **changes: Any) -> Scene:
 SCENES = (
     _scene(125, integrators=("VERLET", "DOPRI5"), limit=40.0),
     _scene(1000, targets=(Target(1 / 2),), elsewhere=(QUICKSTEP,)),
-    _scene(8000, tolerances=(1e-2,), limit=200.0),
+    _scene(8000, tolerances=(1e-2,), variations=({"k": STIFFNESSES[-1]},), limit=200.0),
 )

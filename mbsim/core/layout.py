@@ -1,0 +1,6 @@
+"""How the ODE vector of a mechanism begins, for methods that tell positions from velocities."""
+
+from __future__ import annotations
+
+#: Numbers of a body, body after body: position 3, quaternion 4, velocity 3, angular velocity 3.
+BODY_SIZE = 13
