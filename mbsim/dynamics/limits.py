@@ -19,6 +19,8 @@ from mbsim.system.arrays import BODY_SIZE, LIVE
 
 #: Halvings of the way out in which a force is looked for, and of where it ends.
 SHALLOWEST = 12
+#: Part of the scene's length below which a depth is rounding.
+ROUNDING = 1e-13
 
 
 @jitable
@@ -76,8 +78,8 @@ def step_to_leave(scene, f, s, h):
             leave = after
             break
         before = after
-    # a little more, so that it is over then
-    return 1.0001 * leave
+    # a little more, so that it is over then; a way that rounding swallows would never be gone
+    return max(1.0001 * leave, ROUNDING * scene.world.scale[0] / -rate)
 
 
 @jitable
