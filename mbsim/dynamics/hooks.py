@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray
+from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.problem import BY_CHECK, HOOK, Problem
+from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
@@ -118,6 +119,14 @@ def _stable(context, t, h, a, b):
     return stable_step(scene, h, carray(a, (n,)), carray(b, (n,)))
 
 
+def _follow(context, y):
+    """The lists of near pairs; behind an address so that small scenes need not compile it."""
+    scene = view(context, Scene)
+    follow(scene, carray(y, (scene.rows.y.shape[1],)))
+    return 0
+
+
+_FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
 _HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
 
 
@@ -129,4 +138,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     table = pack(scene)
     hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
     addresses = [jit.address(hook, HOOK) for hook in hooks]
+    if len(scene.crowds.contact) > 0:
+        scene.world.doors[1] = jit.address(_follow, _FOLLOW)
     return Problem(int(table.ctypes.data), *addresses), table

@@ -22,7 +22,6 @@ from mbsim.dynamics.contact import (
     sides,
     velocity_at,
 )
-from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.detection import measure_pair
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
@@ -368,5 +367,5 @@ def commit(scene, t, h, y):
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
     if len(scene.crowds.contact) > 0:
-        follow(scene, y)
+        call_int(scene.world.doors[1], (scene, y))
     return changed

@@ -146,7 +146,7 @@ class World(NamedTuple):
 
     gravity: F1  # (3,)
     scale: F1  # (3,) length L, speed V and energy of the error norm
-    doors: I1  # (1,) address of the FCL detector
+    doors: I1  # (2,) addresses of the FCL detector and of the search for near pairs
     fixed_step: I1  # (1,) 1 for a method without error estimate
 
 

@@ -504,7 +504,7 @@ def build(
         world=a.World(
             np.array(model.gravity.g, dtype=np.float64),
             _scales(placement, speed),
-            np.zeros(1, dtype=np.int64),
+            np.zeros(2, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
         ),
         state=_state(nb, len(graphic_ids), ns),
