@@ -84,7 +84,6 @@ class TiltedBox(NamedTuple):
     stick_end_time: float  # s
     slip_end_time: float  # s
     law: LinearLaw  # of each of the four corners
-    slip_acceleration: float  # m/s^2, reference: g (sin - mu cos)
     slip_end_x: float  # m, reference
 
 
@@ -153,7 +152,6 @@ S2 = Drop(mass=1.0, radius=0.1, gap=0.5, end_time=3.0, first_bounce=0.86)
 S2A_LAW = ImpactLaw(k=1e8, e=1.5, c=200.0, dmax=1e-4)
 S2B_LAW = LinearLaw(k=1e6, c=60.0)
 S2C_LAW = HuntCrossleyLaw(k=1e6, dissipation=0.05)
-S2D_RESTITUTION = 0.8
 
 #: S2: time (s), speed in and speed out (m/s) of the first impact under each law (reference).
 S2_FIRST_IMPACT = {
@@ -190,7 +188,6 @@ S4 = TiltedBox(
     stick_end_time=10.0,
     slip_end_time=2.0,
     law=LinearLaw(k=1e5, c=30.0),
-    slip_acceleration=1.5115406840428576,
     slip_end_x=3.023081368085715,
 )
 
@@ -228,7 +225,6 @@ S7 = Grains(
     end_time=2.0,
     law=LinearLaw(k=1e5, c=20.0),
 )
-S7_COUNTS = (125, 1000, 8000)
 
 
 def s5_positions() -> np.ndarray:
