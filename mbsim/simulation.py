@@ -74,10 +74,11 @@ class Runner:
         if not self.system.needs_fcl:
             return None
         from mbsim.geometry.fcl_detector import FclDetector
+        from mbsim.system.arrays import FCL_DOOR
 
         graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
         detector = FclDetector(self.system.scene, graphics)
-        self.system.scene.world.doors[0] = detector.address
+        self.system.scene.world.doors[FCL_DOOR] = detector.address
         return detector
 
     def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.kinematics import place_graphics
-from mbsim.system.arrays import FCL_CALLS, LIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.system.arrays import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
 
 #: Code of a trial point too far away for the list of near pairs; the step has to be shorter.
 TOO_FAR = 6
@@ -88,7 +88,7 @@ def find_contacts(scene, y):
     # one visit to Python for all pairs that need it
     if waiting > 0:
         log.counters[FCL_CALLS] += waiting
-        code = call_int(scene.world.doors[0], (waiting,))
+        code = call_int(scene.world.doors[FCL_DOOR], (waiting,))
         if code != 0:
             return code
         for k in range(waiting):

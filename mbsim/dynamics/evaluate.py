@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import BODY_SIZE
+from mbsim.system.arrays import APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR
 
 
 @jitable
@@ -82,7 +83,14 @@ def evaluate(scene, t, h, y, dy):
     if code != 0:
         return code
 
+    if scene.world.doors[APPLIED_DOOR] != 0:
+        code = call_int(scene.world.doors[APPLIED_DOOR], (scene, t, y, dy))
+        if code != 0:
+            return code
+
     # what follows
     if not math.isfinite(accelerate(scene, y, dy)):
         return NOT_FINITE
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        return call_int(scene.world.doors[JOINTS_DOOR], (scene, t, y, dy))
     return 0

@@ -16,7 +16,7 @@ from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
-from mbsim.system.arrays import BODY_SIZE, LISTINGS, Scene
+from mbsim.system.arrays import BODY_SIZE, LISTINGS, NEAR_DOOR, Scene
 
 PAUSE_FOR_EVENTS = 2.0
 STEP_IS_STALE = 4.0
@@ -139,5 +139,5 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
     addresses = [jit.address(hook, HOOK) for hook in hooks]
     if len(scene.crowds.contact) > 0:
-        scene.world.doors[1] = jit.address(_follow, _FOLLOW)
+        scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     return Problem(int(table.ctypes.data), *addresses), table

@@ -32,6 +32,7 @@ from mbsim.system.arrays import (
     FIRST_TOUCH,
     LEAVE,
     LIVE,
+    NEAR_DOOR,
     PEAK_DEPTH,
     PEAK_FORCE,
     PEAK_FORCE_TIME,
@@ -367,5 +368,5 @@ def commit(scene, t, h, y):
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
     if len(scene.crowds.contact) > 0:
-        call_int(scene.world.doors[1], (scene, y))
+        call_int(scene.world.doors[NEAR_DOOR], (scene, y))
     return changed

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, rotate, sub, vector
 from mbsim.dynamics.contact import DEPTH, FORCE, SLIP, STORED, TORQUE, contact_of, sides
 from mbsim.dynamics.kinematics import position
-from mbsim.system.arrays import BODY_SIZE, CONTACT_COLUMNS, LIVE
+from mbsim.system.arrays import (
+    BODY_SIZE,
+    CONTACT_COLUMNS,
+    LIVE,
+    REACTIONS_DOOR,
+    STORED_ENERGY,
+)
 
 
 @jitable
 def fill_energy(scene, y, row):
-    """Write kinetic, potential (gravity and contact springs) and dissipated energy."""
+    """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
     kinetic, potential = 0.0, 0.0
     for b in range(len(bodies.mass)):
@@ -28,7 +35,13 @@ def fill_energy(scene, y, row):
     dissipated = 0.0
     for c in range(len(scene.contacts.id)):
         dissipated += y[len(y) - len(scene.contacts.id) + c]
+    for f in range(len(scene.applied.kind)):
+        potential += scene.work.applied[f, STORED_ENERGY]
+    work, damped = scene.world.ledger[0], scene.world.ledger[1]
+    if damped >= 0:
+        dissipated += y[damped]
     row[0], row[1], row[2] = kinetic, potential, dissipated
+    row[3] = y[work] if work >= 0 else 0.0
 
 
 @jitable
@@ -90,6 +103,14 @@ def write_row(scene, t, y, f):
             rows.accel[k, 6 * b + j] = f[at + 7 + j]
             rows.accel[k, 6 * b + 3 + j] = alpha[j]
     fill_contacts(scene, y, rows.contact[k])
+    if scene.world.doors[REACTIONS_DOOR] != 0:
+        call_int(scene.world.doors[REACTIONS_DOOR], (scene, t, y, f))
+    for j in range(len(scene.applied.kind)):
+        for c in range(6):
+            rows.applied[k, 6 * j + c] = work.applied[j, c]
+    for j in range(len(scene.connections.i)):
+        for c in range(6):
+            rows.joint[k, 6 * j + c] = work.joint[j, c]
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, y)
     rows.used[0] = k + 1

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from mbsim.expressions import Expression
+
 Array = npt.NDArray[np.float64]
 
 
@@ -184,8 +186,123 @@ class Simulation:
 
 
 @dataclass(frozen=True)
+class Joint:
+    """Constraint_Joint, and Adams' JOINT and JPRIM. `type` is a name of `joints.JOINTS`."""
+
+    id: int
+    type: str
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    pitch: float | None = None  # SCREW: travel of I along z [L] a turn
+    pitch_diameter: float | None = None  # RACK_PINION [L]
+    length: float | None = None  # DISTANCE [L]; None: as assembled
+    is_primitive: bool = False  # JPRIM: has ids of its own
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Coupler:
+    """Constraint_Coupler: the sum over joints of scale times displacement is constant.
+
+    `motion_types` says for each joint whether its rotation (R) or its translation (T) counts.
+    """
+
+    id: int
+    label: str = ""
+    joint_ids: tuple[int, ...] = ()
+    motion_types: tuple[str, ...] = ()
+    scales: tuple[float, ...] = ()
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion_Joint, Adams' MOTION: a displacement, velocity or acceleration is given.
+
+    `direction` is R (about J's z) or T (along it) on a joint; between two markers X, Y, Z (of I's
+    origin along J's axes) or B3 (about J's z). The markers are the joint's where there is one.
+    """
+
+    id: int
+    label: str = ""
+    joint_id: int | None = None
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    direction: str = "R"
+    val_type: str = "D"  # D, V or A
+    expr: Expression | None = None  # of TIME; [L], [rad] or their rates
+    ic_disp: float = 0.0  # what a V or A motion starts from
+    ic_vel: float = 0.0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class GeneralConstraint:
+    """Constraint_General, Adams' GCON: a scalar expression of displacements and TIME is 0."""
+
+    id: int
+    expr: Expression
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class SpringDamper:
+    """Force_SpringDamper, Adams' SPRINGDAMPER: F = preload - k (x - length) - c dx/dt.
+
+    `type` TRANSLATIONAL: x [L] is the distance of the markers, F > 0 pushes them apart;
+    ROTATIONAL: x [rad] is the angle of I about J's z, F the torque on I about it.
+    """
+
+    id: int
+    type: str = "TRANSLATIONAL"
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    length: float = 0.0
+    preload: float = 0.0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class ScalarForce:
+    """Force_Scalar_TwoBody, Adams' SFORCE: an expression along the line of two markers, or about z.
+
+    `type` TRANSLATIONAL: a positive force pushes I and J apart; ROTATIONAL: a positive torque
+    acts on I about J's z. `action_only`: nothing acts on J; the line (or axis) is J's z.
+    """
+
+    id: int
+    type: str
+    expr: Expression
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    action_only: bool = False
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Reference_Variable, Adams' VARIABLE: an expression that others use by VARVAL(id)."""
+
+    id: int
+    expr: Expression
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Request:
-    """Post_Request of type MARKER_DISPLACEMENT, MARKER_VELOCITY or MARKER_ACCELERATION."""
+    """Post_Request, Adams' REQUEST.
+
+    `type` is MARKER_DISPLACEMENT, MARKER_VELOCITY, MARKER_ACCELERATION, MARKER_FORCE (all
+    forces between two markers), ELEMENTAL_FORCE (`elem_type`, `elem_id`, `jflag`) or EXPRESSION
+    (`exprs`: F1..F8, None where there is none).
+    """
 
     id: int
     type: str
@@ -194,6 +311,10 @@ class Request:
     i_marker_id: int = 0
     j_marker_id: int | None = None
     ref_marker_id: int | None = None
+    elem_type: str = ""  # JOINT, JPRIM, MOTION, SPRINGDAMPER, SFORCE, CONTACT
+    elem_id: int = 0
+    jflag: bool = False  # the force on J's side instead of I's
+    exprs: tuple[Expression | None, ...] = ()
     source: Source = Source()
 
 
@@ -209,6 +330,14 @@ class Model:
     markers: dict[int, Marker]
     graphics: dict[int, Graphic]
     contacts: dict[int, Contact]
+    joints: dict[int, Joint] = field(default_factory=dict)
+    primitives: dict[int, Joint] = field(default_factory=dict)
+    couplers: dict[int, Coupler] = field(default_factory=dict)
+    motions: dict[int, Motion] = field(default_factory=dict)
+    general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
+    spring_dampers: dict[int, SpringDamper] = field(default_factory=dict)
+    scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
+    variables: dict[int, Variable] = field(default_factory=dict)
     gravity: Gravity = Gravity()
     transient: Transient = Transient()
     simulations: tuple[Simulation, ...] = ()

@@ -176,7 +176,7 @@ class Recorder:
         )
         rows.used[:] = 0
         if n:
-            kinetic, potential, dissipated = block.energy[-1].tolist()
+            kinetic, potential, dissipated = block.energy[-1, :3].tolist()
             self.last_energy = (kinetic, potential, dissipated)
         self._blocks.append(block)
         self._bytes += block.bytes

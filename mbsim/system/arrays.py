@@ -8,7 +8,8 @@ units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
-slot whose law uses it; last the energy that each contact has dissipated so far (one number
+slot whose law uses it; then the work of motions and what applied forces dissipated, where there
+are any (`World.ledger`); last the energy that each contact has dissipated so far (one number
 where there is no contact, so that y is never empty).
 """
 
@@ -42,6 +43,13 @@ LIVE, FREE, FIXED, WANTED = range(4)
 
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
+
+# entries of `World.doors`
+FCL_DOOR, NEAR_DOOR, APPLIED_DOOR, JOINTS_DOOR, PROJECT_DOOR, REACTIONS_DOOR, COMMIT_DOOR = range(7)
+DOORS = 7
+
+# columns of `Work.applied`: force 3, torque 3, then
+STORED_ENERGY, LOST_POWER = 6, 7
 
 # kinds of `Rows.events`
 TOUCH, LEAVE = range(2)
@@ -141,13 +149,102 @@ class Slots(NamedTuple):
     x: I1  # (ns,) where X starts in y, -1 where it is not carried
 
 
+class Markers(NamedTuple):
+    """Markers that joints, forces and expressions look at; row 0 is the global frame."""
+
+    body: I1  # (nm,)
+    p: F2  # (nm, 3) in the body's cg axes
+    R: F3  # (nm, 3, 3)
+
+
+class Angles(NamedTuple):
+    """Angles of one marker about the z-axis of another that are followed over whole turns."""
+
+    i: I1  # (na,) markers
+    j: I1  # (na,)
+
+
+class Programs(NamedTuple):
+    """Expressions as instructions of a stack machine, see expressions.program."""
+
+    start: I1  # (programs + 1,) first instruction of each
+    code: I2  # (instructions, 6) operation and up to five rows or indices
+    number: F1  # constants
+    stack: F2  # (deepest, 3) scratch: value, first and second derivative
+
+
+class Applied(NamedTuple):
+    """Forces between two markers: springs, dampers, expressions."""
+
+    kind: I1  # (nf,) see dynamics.applied
+    i: I1  # (nf,) markers
+    j: I1  # (nf,)
+    par: F2  # (nf, 4) stiffness, damping, length, preload
+    program: I1  # (nf,) -1 for none
+    angle: I1  # (nf,) row of `Angles`, -1 for none
+
+
+class Tree(NamedTuple):
+    """Bodies that constraints hold, each hung on its parent by one joint, parents first.
+
+    A body without such a joint is a root that moves freely. The bodies of one root follow each
+    other.
+    """
+
+    body: I1  # (nt,)
+    parent: I1  # (nt,) place in the tree, -1 for ground
+    of_body: I1  # (nb + 1,) place in the tree, -1 for none
+    root: I1  # (nt,) place of the first body of its tree
+    end: I1  # (nt,) one behind the last place of its tree
+    turn: I1  # (nt,) what of the rotation is free: see dynamics.tree
+    slide: I2  # (nt, 3) 1 where the child may move along that axis of the parent's marker
+    axis: I2  # (nt, 2) of UNIVERSAL: axis of the child's and of the parent's marker
+    child_p: F2  # (nt, 3) joint marker on the child, in its cg axes
+    child_R: F3  # (nt, 3, 3) turned so that it is along the parent's where the joint holds it
+    parent_p: F2  # (nt, 3)
+    parent_R: F3  # (nt, 3, 3)
+    free: I1  # (nt,) number of free directions
+
+
+class Equations(NamedTuple):
+    """Constraint equations that the tree does not hold by itself: loops, motions, couplers.
+
+    An equation is a sum of terms, less a function of TIME, = 0; see dynamics.equations.
+    """
+
+    first: I1  # (ne + 1,) first term of each
+    program: I1  # (ne,) function of TIME, or the whole of a general constraint; -1 for none
+    level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
+    general: I1  # (ne,) 1 where the program is the whole equation
+    constant: F1  # (ne,)
+    unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
+    connection: I1  # (ne,) the element that it belongs to
+    kind: I1  # (terms,)
+    i: I1  # (terms,) markers
+    j: I1  # (terms,)
+    axis: I2  # (terms, 2) of I and of J
+    factor: F1  # (terms,)
+    angle: I1  # (terms,) row of `Angles`, -1 for none
+    active: I1  # (ne + 1,) equations in use, ascending, their number last; saved with the state
+
+
+class Connections(NamedTuple):
+    """Elements with reactions: joints, primitives, couplers, motions, general constraints."""
+
+    i: I1  # (nj,) markers
+    j: I1  # (nj,)
+    tree: I1  # (nj,) place in the tree, -1 where equations hold it
+    flip: I1  # (nj,) 1 where I is on the parent
+
+
 class World(NamedTuple):
     """What belongs to no element."""
 
     gravity: F1  # (3,)
     scale: F1  # (3,) length L, speed V and energy of the error norm
-    doors: I1  # (2,) addresses of the FCL detector and of the search for near pairs
+    doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate
+    ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
 
 
 class State(NamedTuple):
@@ -155,6 +252,7 @@ class State(NamedTuple):
 
     q: F2  # (nb + 1, 4) quaternions at the committed state
     centre: F2  # (ng, 3) centres of the graphics at the committed state
+    angle: F1  # (na,) at the committed state, whole turns included
     touching: I1  # (ns,)
     p: F2  # (ns, 3) contact point
     n: F2  # (ns, 3) normal from J into I
@@ -197,7 +295,34 @@ class Work(NamedTuple):
     best: F1  # (4,) pair that gave it: contact, energy at touch, force behind it, inverse mass
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
+    applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
+    joint: F2  # (nj, 6) force, torque on I at the I marker
     trouble: I1  # (2,) worst body of the error norm, contact at fault
+
+
+class Sweep(NamedTuple):
+    """Scratch of the articulated-body recursion.
+
+    Spatial vectors are (angular, linear) about O, the cg of the root of each tree at the trial
+    point.
+    """
+
+    H: F3  # (nt, 6, 6) articulated inertia
+    S: F3  # (nt, 6, 6) free directions by rows
+    W: F3  # (nt, 6, 6) L^-1 S'H by rows, L L' = S'H S
+    L: F3  # (nt, 6, 6)
+    c: F2  # (nt, 6) acceleration of the child that follows from velocities
+    p: F2  # (nt, 6) force that the body would need, articulated
+    a: F2  # (nt, 6) acceleration
+    push: F2  # (nt, 6) forces on bodies beyond those in `bias`
+    bias: F2  # (nt, 6)
+    answer: F2  # (nt, 6) accelerations by a unit multiplier
+    G: F2  # (terms, 12) of each term: wrench on I's body and on J's, each about its O
+    rate: F2  # (ne, 3) residual, its rate, and what of its second rate follows from velocities
+    A: F2  # (ne, ne) how equations act on each other, then its factor
+    multiplier: F1  # (ne,)
+    rhs: F1  # (ne,)
+    skyline: I1  # (ne,) first column of a row of A
 
 
 class Rows(NamedTuple):
@@ -207,7 +332,10 @@ class Rows(NamedTuple):
     y: F2  # (rows, n)
     accel: F2  # (rows, 6 nb)
     contact: F2  # (rows, CONTACT_COLUMNS nc)
-    energy: F2  # (rows, 3) kinetic, potential, dissipated
+    energy: F2  # (rows, 4) kinetic, potential, dissipated, work of motions
+    joint: F2  # (rows, 6 nj) force, torque on I's body at the I marker, global, of `Connections`
+    applied: F2  # (rows, 6 nf) the same of `Applied`
+    value: F2  # (rows, values) expressions of requests
     incident_count: I1  # (rows,)
     incidents: F2  # (capacity, 14) slot, p, n, t, X, depth
     events: F2  # (capacity, 4) time, kind, contact, slot
@@ -229,8 +357,16 @@ class Scene(NamedTuple):
     crowds: Crowds
     contacts: Contacts
     slots: Slots
+    markers: Markers
+    angles: Angles
+    programs: Programs
+    applied: Applied
+    tree: Tree
+    equations: Equations
+    connections: Connections
     world: World
     state: State
     log: Log
     work: Work
+    sweep: Sweep
     rows: Rows

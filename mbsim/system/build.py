@@ -24,6 +24,9 @@ from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
+from mbsim.system.applied import applied_forces
+from mbsim.system.markers import MarkerTable
+from mbsim.system.mechanism import constrain, sweep
 from mbsim.system.pairing import (
     Kind,
     Plans,
@@ -34,6 +37,7 @@ from mbsim.system.pairing import (
     shape_class,
     thinnest,
 )
+from mbsim.system.programs import ProgramTable
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -63,6 +67,9 @@ class System:
     plans: Plans
     user_friction: dict[int, UserFriction]  # by contact id
     needs_fcl: bool
+    connections: list[tuple[str, int]]  # statement and id of each row of `Connections`
+    applied: list[tuple[str, int]]  # of each row of `Applied`
+    values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
 
 
 def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
@@ -328,13 +335,14 @@ def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.nda
     return y
 
 
-def _state(nb: int, ng: int, ns: int) -> a.State:
+def _state(nb: int, ng: int, ns: int, na: int) -> a.State:
     """Return the incident table before anything touched."""
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
     return a.State(
         q=q,
         centre=np.zeros((ng, 3)),
+        angle=np.zeros(na),
         touching=np.zeros(ns, dtype=np.int64),
         p=np.zeros((ns, 3)),
         n=np.zeros((ns, 3)),
@@ -359,7 +367,7 @@ def _log(nc: int) -> a.Log:
     )
 
 
-def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
+def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int) -> a.Work:
     """Return scratch, with the ground's rows as they stay."""
     ng = len(graphics.body)
     fixed = graphics.body == nb
@@ -393,18 +401,23 @@ def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int) -> a.Work:
         best=np.zeros(4),
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
+        applied=np.zeros((nf, 8)),
+        joint=np.zeros((nj, 6)),
         trouble=np.full(2, -1, dtype=np.int64),
     )
 
 
-def _rows(n: int, nb: int, nc: int, ns: int) -> a.Rows:
+def _rows(n: int, nb: int, nc: int, ns: int, nj: int, nf: int, values: int) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
     return a.Rows(
         time=np.zeros(ROWS),
         y=np.zeros((ROWS, n)),
         accel=np.zeros((ROWS, 6 * nb)),
         contact=np.zeros((ROWS, a.CONTACT_COLUMNS * nc)),
-        energy=np.zeros((ROWS, 3)),
+        energy=np.zeros((ROWS, 4)),
+        joint=np.zeros((ROWS, 6 * nj)),
+        applied=np.zeros((ROWS, 6 * nf)),
+        value=np.zeros((ROWS, values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
         incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), 14)),
         events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS), 4)),
@@ -490,6 +503,14 @@ def build(
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
     y0 = _initial_y(placement, len(carried), len(contact_ids))
 
+    table = MarkerTable(placement, row)
+    programs = ProgramTable()
+    applied, applied_ids = applied_forces(model, table, programs)
+    mechanism = constrain(model, table, programs)
+    nj, nf = len(mechanism.elements), len(applied_ids)
+    values: list[tuple[int, int]] = []
+    markers, angles = table.arrays()
+
     speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(
         bodies=_bodies(placement),
@@ -501,18 +522,39 @@ def build(
         ),
         contacts=contacts,
         slots=a.Slots(slot_pair, x),
+        markers=markers,
+        angles=angles,
+        programs=programs.arrays(),
+        applied=applied,
+        tree=mechanism.tree,
+        equations=mechanism.equations,
+        connections=mechanism.connections,
         world=a.World(
             np.array(model.gravity.g, dtype=np.float64),
             _scales(placement, speed),
-            np.zeros(2, dtype=np.int64),
+            np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
+            np.full(2, -1, dtype=np.int64),
         ),
-        state=_state(nb, len(graphic_ids), ns),
+        state=_state(nb, len(graphic_ids), ns, len(angles.i)),
         log=_log(len(contact_ids)),
-        work=_work(nb, graphics, len(pairs.slot), ns, len(contact_ids)),
-        rows=_rows(len(y0), nb, len(contact_ids), ns),
+        work=_work(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
+        sweep=sweep(mechanism),
+        rows=_rows(len(y0), nb, len(contact_ids), ns, nj, nf, len(values)),
     )
     needs_fcl = any(not kind.closed_form for kind in kinds)
     return System(
-        model, placement, scene, y0, body_ids, graphic_ids, contact_ids, plans, user, needs_fcl
+        model,
+        placement,
+        scene,
+        y0,
+        body_ids,
+        graphic_ids,
+        contact_ids,
+        plans,
+        user,
+        needs_fcl,
+        mechanism.elements,
+        applied_ids,
+        values,
     )

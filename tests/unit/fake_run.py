@@ -56,7 +56,10 @@ def fake_system_of(model: Model) -> Any:
         y=np.zeros((CAPACITY, n)),
         accel=np.zeros((CAPACITY, 6 * nb)),
         contact=np.zeros((CAPACITY, a.CONTACT_COLUMNS * nc)),
-        energy=np.zeros((CAPACITY, 3)),
+        energy=np.zeros((CAPACITY, 4)),
+        joint=np.zeros((CAPACITY, 0)),
+        applied=np.zeros((CAPACITY, 0)),
+        value=np.zeros((CAPACITY, 0)),
         incident_count=np.zeros(CAPACITY, dtype=np.int64),
         incidents=np.zeros((CAPACITY, 14)),
         events=np.zeros((CAPACITY, 4)),
@@ -84,6 +87,9 @@ def fake_system_of(model: Model) -> Any:
         body_ids=list(placement.bodies),
         contact_ids=list(model.contacts),
         plans=plan_pairs(model),
+        connections=[],
+        applied=[],
+        values=[],
         user_friction={},
     )
 
@@ -99,7 +105,7 @@ def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
         rows.y[at, 10:13] = (0.0, 0.0, 0.5)
         rows.accel[at] = k
         rows.contact[at].reshape(-1, a.CONTACT_COLUMNS)[:] = np.arange(a.CONTACT_COLUMNS) + 100 * k
-        rows.energy[at] = (k, 2 * k, 3 * k)
+        rows.energy[at] = (k, 2 * k, 3 * k, 0.0)
         rows.incident_count[at] = k % 2
         if k % 2:
             rows.incidents[rows.used[1]] = k

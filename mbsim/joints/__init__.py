@@ -1,0 +1,1 @@
+"""Joints as data: what each holds, in rows that the dynamics know; no arithmetic here."""

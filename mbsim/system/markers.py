@@ -1,0 +1,61 @@
+"""Rows of markers that compiled code looks at, made as they are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mbsim.model.elements import Array
+from mbsim.model.placement import Placement
+from mbsim.system import arrays as a
+
+
+@dataclass
+class MarkerTable:
+    """Rows of `arrays.Markers` and `arrays.Angles`; row 0 of the markers is the global frame.
+
+    `body_row` is the row of every body by id, that of ground being the number of moving bodies.
+    """
+
+    placement: Placement
+    body_row: dict[int, int]
+    rows: dict[int, int] = field(default_factory=dict)
+    angle_rows: dict[tuple[int, int], int] = field(default_factory=dict)
+    frames: list[tuple[int, Array, Array]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.frames.append((self.ground, np.zeros(3), np.eye(3)))
+
+    @property
+    def ground(self) -> int:
+        """Row of ground in the body arrays."""
+        return len(self.placement.bodies)
+
+    def row(self, marker_id: int | None) -> int:
+        """Return the row of a marker of the model; None and 0 are the global frame."""
+        if not marker_id:
+            return 0
+        if marker_id not in self.rows:
+            place = self.placement.markers[marker_id]
+            body = self.body_row[place.body_id]
+            self.rows[marker_id] = self.add(body, place.p_B, place.R_B)
+        return self.rows[marker_id]
+
+    def add(self, body: int, p: Array, R: Array) -> int:
+        """Return the row of a new marker: origin (3,) and axes (3, 3) in the body's cg axes."""
+        self.frames.append((body, p, R))
+        return len(self.frames) - 1
+
+    def angle(self, i: int, j: int) -> int:
+        """Return the row of the angle of marker row i about the z-axis of marker row j."""
+        return self.angle_rows.setdefault((i, j), len(self.angle_rows))
+
+    def arrays(self) -> tuple[a.Markers, a.Angles]:
+        """Return the tables as they are now."""
+        body, p, R = zip(*self.frames, strict=True)
+        pairs = np.array(list(self.angle_rows), dtype=np.int64).reshape(-1, 2)
+        return (
+            a.Markers(np.array(body, dtype=np.int64), np.array(p), np.array(R)),
+            a.Angles(pairs[:, 0].copy(), pairs[:, 1].copy()),
+        )
