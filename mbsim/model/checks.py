@@ -14,6 +14,8 @@ from mbsim.model.body_mass import BodyMassError, body_mass
 from mbsim.model.contact_radius import by_materials, side_radius
 from mbsim.model.elements import Contact, Graphic, Model, Source
 from mbsim.model.frames import marker_frames, marker_loops
+from mbsim.model.mechanism_checks import check_mechanism, wanted
+from mbsim.model.mechanism_checks import tables as mechanism_tables
 from mbsim.model.mesh import solid_fault
 
 _MOST_LISTED = 10
@@ -64,6 +66,7 @@ def check_model(model: Model, known: Known | None = None) -> tuple[list[Fault], 
         *_loops(model),
         *_bodies(model, known),
         *_contacts(model),
+        *check_mechanism(model, known.exists),
     ]
     return faults, list(_warnings(model))
 
@@ -101,6 +104,7 @@ def _wanted(model: Model) -> Iterator[tuple[Source, str, str, int | None, str]]:
         for name in ("i_marker_id", "j_marker_id", "ref_marker_id"):
             id = getattr(request, name) or None
             yield request.source, f"Post_Request[{request.id}]", name, id, "Reference_Marker"
+    yield from wanted(model)
 
 
 def _references(model: Model, known: Known) -> Iterator[Fault]:
@@ -109,6 +113,8 @@ def _references(model: Model, known: Known) -> Iterator[Fault]:
         "Body_Rigid": model.bodies,
         "Reference_Marker": model.markers,
         "Post_Graphic": model.graphics,
+        "Force_Contact": model.contacts,
+        **mechanism_tables(model),
     }
     for source, element, name, id, target in _wanted(model):
         if id is None or id in tables[target] or known.exists(target, id):

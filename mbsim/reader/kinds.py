@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mbsim.expressions import Expression
 from mbsim.reader.keywords import fold, nearest
 
 _REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -125,6 +126,34 @@ def _parse_user(text: str) -> tuple[float, ...]:
     return tuple(values)
 
 
+def _parse_tree(text: str) -> Expression:
+    """Return an expression of the language of functions."""
+    from mbsim.expressions.parse import ExpressionError, parse
+
+    if re.match(r"USER\s*\(", text, re.IGNORECASE):
+        raise BadValueError("user subroutines for this are not built yet; give an expression")
+    try:
+        return parse(text)
+    except ExpressionError as error:
+        raise BadValueError(f"is no expression: {error}") from None
+
+
+def _parse_words(text: str) -> tuple[str, ...]:
+    """Return words separated by blanks or commas, in upper case."""
+    words = tuple(text.replace(",", " ").upper().split())
+    if not words:
+        raise BadValueError
+    return words
+
+
+def _parse_reals(text: str) -> tuple[float, ...]:
+    """Return numbers separated by blanks or commas."""
+    words = text.replace(",", " ").split()
+    if not words:
+        raise BadValueError
+    return tuple(parse_real(word) for word in words)
+
+
 def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = None) -> Kind:
     """Return the kind of keywords; both tables are folded spelling -> canonical keyword."""
     canonical = list(dict.fromkeys(allowed.values()))
@@ -156,3 +185,6 @@ IDS = Kind("positive integer ids, separated by blanks or commas", _parse_ids)
 FLAG = Kind("TRUE or FALSE", _parse_flag)
 TEXT = Kind("text", str)
 USER = Kind("USER(number, number, ...)", _parse_user)
+EXPRESSION = Kind("an expression", _parse_tree)
+WORDS = Kind("words, separated by blanks or commas", _parse_words)
+REALS = Kind("numbers, separated by blanks or commas", _parse_reals)

@@ -1,16 +1,27 @@
-"""Post_Request: marker displacement, velocity and acceleration."""
+"""Post_Request: motion of and forces between markers, forces of elements, expressions."""
 
 from __future__ import annotations
 
 from mbsim.model import elements as el
-from mbsim.reader.keywords import REQUEST_NOT_BUILT, REQUEST_TYPES
-from mbsim.reader.kinds import ID, TEXT, keyword
+from mbsim.reader.keywords import FORCE_ELEMENTS, REQUEST_NOT_BUILT, REQUEST_TYPES
+from mbsim.reader.kinds import EXPRESSION, FLAG, ID, TEXT, keyword
 from mbsim.reader.statement import Entry, Spec, Statement
 
-_OF_OTHER_TYPES = (
-    *("elem_type", "elem_id", "jflag", *(f"expr{k}" for k in range(1, 9))),
-    *("usrsub_param_string", "usrsub_fnc_name", "usrsub_dll_name", "script_name", "interpreter"),
+_EXPRESSIONS = tuple(f"expr{k}" for k in range(1, 9))
+_MARKERS = ("i_marker_id", "j_marker_id", "ref_marker_id")
+_USERSUB = (
+    "usrsub_param_string",
+    "usrsub_fnc_name",
+    "usrsub_dll_name",
+    "script_name",
+    "interpreter",
 )
+#: What each type takes; the first ones it must have.
+_TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "ELEMENTAL_FORCE": (("elem_type", "elem_id"), ("jflag", "ref_marker_id")),
+    "EXPRESSION": ((), _EXPRESSIONS),
+}
+_OF_MARKERS = (("i_marker_id",), ("j_marker_id", "ref_marker_id"))
 
 
 def _build_request(entry: Entry) -> None:
@@ -18,11 +29,18 @@ def _build_request(entry: Entry) -> None:
     type = entry.get("type")
     if type is None:
         return
-    for name in _OF_OTHER_TYPES:
-        if entry.given(name):
+    needs, may = _TAKES.get(type, _OF_MARKERS)
+    every = (*_MARKERS, "elem_type", "elem_id", "jflag", *_EXPRESSIONS, *_USERSUB)
+    for name in every:
+        if entry.given(name) and name not in (*needs, *may):
             entry.fault(f"belongs to another type of request than {type}", name)
-    if not entry.given("i_marker_id"):
-        entry.fault(f"i_marker_id: missing; must be {ID.allowed}")
+    for name in needs:
+        if not entry.given(name):
+            kind = entry.statement.attributes[name].kind
+            entry.fault(f"{name}: missing; must be {kind.allowed}")
+    exprs = tuple(entry.get(name) for name in _EXPRESSIONS)
+    if type == "EXPRESSION" and not any(entry.given(name) for name in _EXPRESSIONS):
+        entry.fault("expr1 ... expr8: missing; at least one must be given")
     request = el.Request(
         id=entry.get("id", 0),
         type=type,
@@ -31,6 +49,10 @@ def _build_request(entry: Entry) -> None:
         i_marker_id=entry.get("i_marker_id", 0),
         j_marker_id=entry.get("j_marker_id"),
         ref_marker_id=entry.get("ref_marker_id"),
+        elem_type=entry.get("elem_type", ""),
+        elem_id=entry.get("elem_id", 0),
+        jflag=entry.get("jflag", False),
+        exprs=exprs if type == "EXPRESSION" else (),
         source=entry.source,
     )
     entry.register(entry.draft.requests, request)
@@ -43,10 +65,12 @@ POST_REQUEST = Statement(
         "type": Spec(keyword(REQUEST_TYPES, REQUEST_NOT_BUILT), required=True),
         "label": Spec(TEXT),
         "comment": Spec(TEXT),
-        "i_marker_id": Spec(ID),
-        "j_marker_id": Spec(ID),
-        "ref_marker_id": Spec(ID),
-        **{name: Spec(TEXT) for name in _OF_OTHER_TYPES},
+        **{name: Spec(ID) for name in _MARKERS},
+        "elem_type": Spec(keyword(FORCE_ELEMENTS)),
+        "elem_id": Spec(ID),
+        "jflag": Spec(FLAG),
+        **{name: Spec(EXPRESSION) for name in _EXPRESSIONS},
+        **{name: Spec(TEXT) for name in _USERSUB},
     },
     _build_request,
 )

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
 from mbsim.reader.command import FORCE_GRAVITY, PARAM_TRANSIENT, SIMULATE, STOP
+from mbsim.reader.constraints import (
+    CONSTRAINT_COUPLER,
+    CONSTRAINT_GENERAL,
+    CONSTRAINT_JOINT,
+    CONSTRAINT_JPRIM,
+    MOTION_JOINT,
+)
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.draft import Draft
+from mbsim.reader.forces import FORCE_SCALAR_TWOBODY, FORCE_SPRINGDAMPER, REFERENCE_VARIABLE
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Node
@@ -30,6 +38,14 @@ STATEMENTS = (
     FORCE_CONTACT,
     FORCE_GRAVITY,
     PARAM_TRANSIENT,
+    CONSTRAINT_JOINT,
+    CONSTRAINT_JPRIM,
+    CONSTRAINT_COUPLER,
+    CONSTRAINT_GENERAL,
+    MOTION_JOINT,
+    FORCE_SPRINGDAMPER,
+    FORCE_SCALAR_TWOBODY,
+    REFERENCE_VARIABLE,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -41,16 +57,16 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
 # documented statements (or members of documented families) that would change the motion
 NOT_BUILT = (
-    "Activate Body_Flexible Body_Point Constraint_Coupler Constraint_CVCV Constraint_Gear "
-    "Constraint_General Constraint_Joint Constraint_Jprim Constraint_PTCV Constraint_PTdCV "
+    "Activate Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
+    "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_Diff Control_FMU Control_PlantInput "
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
     "Force_Beam Force_Bushing Force_Field Force_JointFriction Force_MultiPoint Force_Penalty "
-    "Force_Scalar_TwoBody Force_SpringDamper Force_StateEqn Force_TwoBody Force_Vector_OneBody "
-    "Force_Vector_TwoBody Load_Command Load_Model Motion_Joint Motion_Marker Param_Linear "
+    "Force_StateEqn Force_TwoBody Force_Vector_OneBody "
+    "Force_Vector_TwoBody Load_Command Load_Model Motion_Marker Param_Linear "
     "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
-    "Reference_ParamSurface Reference_Spline Reference_String Reference_Variable Save "
+    "Reference_ParamSurface Reference_Spline Reference_String Save "
     "Sensor_Event Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}

@@ -10,6 +10,7 @@ from pathlib import Path
 from mbsim.errors import DeckError, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
+from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
 from mbsim.reader.overrides import apply_overrides
@@ -57,6 +58,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     if not any(section.key == "model" for section in sections) and not draft.faults:
         draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
 
+    complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
     faults, warnings = check_model(model, known)
@@ -129,6 +131,14 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         markers=draft.markers,
         graphics=draft.graphics,
         contacts=draft.contacts,
+        joints=draft.joints,
+        primitives=draft.primitives,
+        couplers=draft.couplers,
+        motions=draft.motions,
+        general_constraints=draft.general_constraints,
+        spring_dampers=draft.spring_dampers,
+        scalar_forces=draft.scalar_forces,
+        variables=draft.variables,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),
         simulations=tuple(draft.simulations),

@@ -257,10 +257,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ('compatibility="ADAMS"', "MOTIONSOLVE"),
     ),
     # documented, not built
-    "joint": (
-        added('<Constraint_Joint id="1" type="REVOLUTE" i_marker_id="10" j_marker_id="20"/>'),
+    "gear": (
+        added('<Constraint_Gear id="1" i_marker_id="10" j_marker_id="20"/>'),
         END_OF_MODEL,
-        ("Constraint_Joint[1]", "not built yet"),
+        ("Constraint_Gear[1]", "not built yet"),
     ),
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
     "sensor": (added('<SENSOR_EVENT id="4"/>'), END_OF_MODEL, ("Sensor_Event", "not built yet")),
@@ -305,10 +305,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         SIMULATE_LINE,
         ('print_increment="5"', "not built yet"),
     ),
-    "force request": (
-        added('<Post_Request id="1" type="MARKER_FORCE" i_marker_id="10"/>'),
+    "request of a user": (
+        added('<Post_Request id="1" type="USERSUB"/>'),
         END_OF_MODEL,
-        ("Post_Request[1]", 'type="MARKER_FORCE"', "not built yet"),
+        ("Post_Request[1]", 'type="USERSUB"', "not built yet"),
     ),
     "picture in contact": (
         deck(('type="Sphere" center_marker_id="20" radius="0.108"', 'type="Parasolid"')),

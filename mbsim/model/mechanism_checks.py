@@ -1,0 +1,262 @@
+"""Whether joints, couplers, motions, forces and their expressions make sense in their model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from mbsim.errors import Fault
+from mbsim.expressions import Expression
+from mbsim.expressions.tree import Call, Number
+from mbsim.joints.catalog import JOINTS
+from mbsim.model.elements import Model, Source
+
+#: Functions of the language whose arguments are markers, 0 being the global frame.
+OF_MARKERS = frozenset(
+    "DM DX DY DZ VM VR VX VY VZ ACCM ACCX ACCY ACCZ AX AY AZ WM WX WY WZ WDTM WDTX WDTY WDTZ "
+    "PSI THETA PHI YAW PITCH ROLL FM FX FY FZ TM TX TY TZ".split()
+)
+#: Functions of the force of one element (id, jflag, component, rm), with its statement here.
+OF_ELEMENTS = {
+    "JOINT": "Constraint_Joint",
+    "JPRIM": "Constraint_Jprim",
+    "MOTION": "Motion_Joint",
+    "SFORCE": "Force_Scalar_TwoBody",
+    "SPRINGDAMPER": "Force_SpringDamper",
+    "CONTACT": "Force_Contact",
+}
+_DIRECTIONS = {"R": "turn about", "T": "slide along"}
+
+Wanted = tuple[Source, str, str, int | None, str]
+Exists = Callable[[str, int], bool]
+
+
+def tables(model: Model) -> dict[str, Mapping[int, Any]]:
+    """Return the elements of this module by statement and id."""
+    return {
+        "Constraint_Joint": model.joints,
+        "Constraint_Jprim": model.primitives,
+        "Constraint_Coupler": model.couplers,
+        "Constraint_General": model.general_constraints,
+        "Motion_Joint": model.motions,
+        "Force_SpringDamper": model.spring_dampers,
+        "Force_Scalar_TwoBody": model.scalar_forces,
+        "Reference_Variable": model.variables,
+    }
+
+
+def wanted(model: Model) -> Iterator[Wanted]:
+    """Yield every reference: where, from which element and attribute, to which id and statement."""
+    for statement, table in tables(model).items():
+        for element in table.values():
+            name = f"{statement}[{element.id}]"
+            # a motion of a joint has the joint's markers
+            if getattr(element, "joint_id", None) is None:
+                for attribute in ("i_marker_id", "j_marker_id"):
+                    id = getattr(element, attribute, 0) or None
+                    yield element.source, name, attribute, id, "Reference_Marker"
+            else:
+                yield element.source, name, "joint_id", element.joint_id, "Constraint_Joint"
+            for id in getattr(element, "joint_ids", ()):
+                yield element.source, name, "joint_ids", id, "Constraint_Joint"
+    for request in model.requests.values():
+        if request.elem_type and request.elem_id:
+            statement = OF_ELEMENTS[request.elem_type]
+            name = f"Post_Request[{request.id}]"
+            yield request.source, name, "elem_id", request.elem_id, statement
+    for source, name, attribute, expression in expressions(model):
+        for id, statement in _used(expression):
+            yield source, name, attribute, id, statement
+
+
+def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
+    """Yield every expression of the model: where, of which element and attribute."""
+    for statement, table in tables(model).items():
+        for element in table.values():
+            expression = getattr(element, "expr", None)
+            if expression is not None:
+                yield element.source, f"{statement}[{element.id}]", "expr", expression
+    for request in model.requests.values():
+        for k, expression in enumerate(request.exprs, start=1):
+            if expression is not None:
+                yield request.source, f"Post_Request[{request.id}]", f"expr{k}", expression
+
+
+def _calls(expression: Expression) -> Iterator[Call]:
+    """Yield every function of an expression."""
+    rest = [expression.root]
+    while rest:
+        node = rest.pop()
+        if isinstance(node, Call):
+            yield node
+            rest.extend(node.args)
+
+
+def _places(call: Call) -> dict[int, str]:
+    """Return the statement to which each argument that is an id belongs."""
+    if call.name in OF_MARKERS:
+        return {k: "Reference_Marker" for k in range(len(call.args))}
+    if call.name == "ORIENT":
+        return {k: "Reference_Marker" for k in range(2, len(call.args))}
+    if call.name == "VARVAL":
+        return {0: "Reference_Variable"}
+    if call.name in OF_ELEMENTS:
+        return {0: OF_ELEMENTS[call.name], 3: "Reference_Marker"}
+    return {}
+
+
+def _used(expression: Expression) -> Iterator[tuple[int, str]]:
+    """Yield the ids that an expression names, with their statement; marker 0 is always there."""
+    for call in _calls(expression):
+        for k, statement in _places(call).items():
+            if k < len(call.args) and isinstance(node := call.args[k], Number):
+                if node.value == int(node.value) and (
+                    node.value > 0 or (node.value == 0 and statement != "Reference_Marker")
+                ):
+                    yield int(node.value), statement
+
+
+def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
+    """Yield what is wrong with the joints, motions, couplers, forces and expressions of a model.
+
+    Parameters
+    ----------
+    model : Model
+        The deck as read.
+    exists : callable
+        Whether a (statement, id) is in the deck with a fault of its own.
+    """
+    yield from _two_bodies(model)
+    yield from _motions(model, exists)
+    yield from _couplers(model)
+    yield from _ids(model)
+    yield from _circles(model)
+
+
+def _fault(source: Source, element: str, message: str) -> Fault:
+    return Fault(source.file, source.line, element, message)
+
+
+def _two_bodies(model: Model) -> Iterator[Fault]:
+    """Yield constraints and forces whose markers are on one body, or on ground both."""
+    ground = {body.id for body in model.bodies.values() if body.is_ground}
+    for statement, table in tables(model).items():
+        for element in table.values():
+            if getattr(element, "joint_id", None) is not None:
+                continue
+            pair = [
+                model.markers.get(getattr(element, name, 0))
+                for name in ("i_marker_id", "j_marker_id")
+            ]
+            i, j = pair
+            if i is None or j is None:
+                continue
+            both = f"markers {i.id} (I) and {j.id} (J)"
+            name = f"{statement}[{element.id}]"
+            if i.body_id == j.body_id:
+                message = f"{both} are both on body {i.body_id}; must be on two bodies"
+                yield _fault(element.source, name, message)
+            elif {i.body_id, j.body_id} <= ground:
+                message = f"{both} are both on ground; one must be on a body that moves"
+                yield _fault(element.source, name, message)
+
+
+def _allowed(type: str) -> str:
+    """Return in words which directions a joint has."""
+    moves = JOINTS[type].moves
+    return " or ".join(moves) if moves else "none"
+
+
+def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
+    """Yield motions that their joint does not allow, that are repeated, or use more than TIME."""
+    first: dict[tuple[Any, ...], int] = {}
+    for motion in model.motions.values():
+        name = f"Motion_Joint[{motion.id}]"
+        joint = model.joints.get(motion.joint_id or 0)
+        if joint is not None and motion.direction not in JOINTS[joint.type].moves:
+            if exists("Motion_Joint", motion.id):
+                continue
+            given = f'motion_type="{motion.direction}"' if motion.direction else "motion_type"
+            what = f"{given}: joint {joint.id} is {joint.type}; a motion of it may be "
+            yield _fault(motion.source, name, what + _allowed(joint.type))
+            continue
+        if joint is not None or motion.joint_id is None:
+            of = (motion.joint_id, motion.i_marker_id, motion.j_marker_id, motion.direction)
+            if of in first:
+                message = f"motion {first[of]} gives the same direction of the same "
+                message += f"joint {motion.joint_id}" if joint else "markers"
+                yield _fault(motion.source, name, f"{message}; must be given once")
+            first.setdefault(of, motion.id)
+        if motion.expr is not None and (other := _not_of_time(motion.expr)):
+            message = f'expr="{_short(motion.expr.text)}": uses {other}; in this release a motion '
+            yield _fault(motion.source, name, message + "must be an expression of TIME alone")
+
+
+def _not_of_time(expression: Expression) -> str:
+    """Return the first function of an expression that depends on the state, or nothing."""
+    state = OF_MARKERS | set(OF_ELEMENTS) | {"ORIENT", "VARVAL"}
+    return next((call.name for call in _calls(expression) if call.name in state), "")
+
+
+def _couplers(model: Model) -> Iterator[Fault]:
+    """Yield couplers of joints that do not move in the way that counts."""
+    for coupler in model.couplers.values():
+        for id, direction in zip(coupler.joint_ids, coupler.motion_types, strict=False):
+            joint = model.joints.get(id)
+            if joint is None or direction not in _DIRECTIONS:
+                continue
+            if direction not in JOINTS[joint.type].moves:
+                message = f'motion_types="{" ".join(coupler.motion_types)}": joint {id} is '
+                message += f"{joint.type} and does not {_DIRECTIONS[direction]} its z-axis; it has "
+                name = f"Constraint_Coupler[{coupler.id}]"
+                yield _fault(coupler.source, name, message + _allowed(joint.type))
+
+
+def _ids(model: Model) -> Iterator[Fault]:
+    """Yield arguments of functions that should be ids and are not."""
+    for source, name, attribute, expression in expressions(model):
+        for call in _calls(expression):
+            for k, statement in _places(call).items():
+                if k >= len(call.args):
+                    continue
+                node = call.args[k]
+                if not isinstance(node, Number) or node.value < 0 or node.value % 1.0 != 0.0:
+                    message = f'{attribute}="{_short(expression.text)}": argument {k + 1} of '
+                    message += f"{call.name} must be the id of a {statement}"
+                    yield _fault(source, name, message)
+
+
+def _circles(model: Model) -> Iterator[Fault]:
+    """Yield variables that depend on themselves."""
+    uses = {
+        id: [v for v, statement in _used(variable.expr) if statement == "Reference_Variable"]
+        for id, variable in model.variables.items()
+    }
+    finished: set[int] = set()
+    for start in uses:
+        path: list[int] = []
+        stack = [(start, iter(uses[start]))]
+        while stack:
+            id, rest = stack[-1]
+            if not path or path[-1] != id:
+                path.append(id)
+            step = next((v for v in rest if v in uses and v not in finished), None)
+            if step is None:
+                finished.add(id)
+                stack.pop()
+                path.pop()
+            elif step in path:
+                ring = " -> ".join(map(str, [*path[path.index(step) :], step]))
+                source = model.variables[step].source
+                message = f"VARVAL leads back to the variable itself: {ring}"
+                yield _fault(source, f"Reference_Variable[{step}]", message)
+                finished.update(path)
+                break
+            else:
+                stack.append((step, iter(uses[step])))
+
+
+def _short(text: str) -> str:
+    """Return a text short enough for one line of a message."""
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."

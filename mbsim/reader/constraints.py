@@ -1,0 +1,233 @@
+"""Constraint_Joint, _Jprim, _Coupler, _General and Motion_Joint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mbsim.joints.catalog import JOINTS
+from mbsim.model import elements as el
+from mbsim.reader.draft import Draft
+from mbsim.reader.keywords import (
+    BY_EXPRESSION,
+    BY_USERSUB,
+    DIRECTIONS,
+    PRIMITIVES,
+    VALUE_TYPES,
+    spellings,
+)
+from mbsim.reader.kinds import (
+    EXPRESSION,
+    FLAG,
+    ID,
+    IDS,
+    POSITIVE,
+    REAL,
+    REALS,
+    TEXT,
+    WORDS,
+    keyword,
+)
+from mbsim.reader.statement import Entry, Spec, Statement
+
+_NOT_BUILT = "is documented but not built yet"
+#: What only some joints have; DISTANCE may have a length, the others must have theirs.
+_OF_SOME_JOINTS = {"pitch": "SCREW", "pitch_diameter": "RACK_PINION", "length": "DISTANCE"}
+#: Attributes of a user subroutine, which stand in place of an expression.
+USERSUB = ("usrsub_param_string", "usrsub_fnc_name", "usrsub_dll_name")
+USERSUB_REFUSED = {
+    name: Spec(refused=f"{_NOT_BUILT}; give expr")
+    for name in (*USERSUB, "script_name", "interpreter")
+}
+
+
+def _build_joint(entry: Entry) -> None:
+    """Add a joint; what its type needs must be there, what it does not have must not."""
+    type = entry.get("type")
+    if type is None:
+        return
+    for name, owner in _OF_SOME_JOINTS.items():
+        if entry.given(name) and type != owner:
+            entry.fault(f"belongs to a joint of type {owner}; this is {type}", name)
+    for name in JOINTS[type].needs:
+        if not entry.given(name):
+            entry.fault(f"{name}: missing; {type} needs it, must be {_kind(entry, name)}")
+    if entry.get("is_virtual", False):
+        entry.fault(f"virtual joints are {_NOT_BUILT[3:]}; must be FALSE", "is_virtual")
+    joint = el.Joint(
+        id=entry.get("id", 0),
+        type=type,
+        label=entry.get("label", ""),
+        i_marker_id=entry.get("i_marker_id", 0),
+        j_marker_id=entry.get("j_marker_id", 0),
+        pitch=entry.get("pitch"),
+        pitch_diameter=entry.get("pitch_diameter"),
+        length=entry.get("length"),
+        source=entry.source,
+    )
+    entry.register(entry.draft.joints, joint)
+
+
+def _kind(entry: Entry, name: str) -> str:
+    return entry.statement.attributes[name].kind.allowed
+
+
+def _build_primitive(entry: Entry) -> None:
+    """Add a joint primitive, which has ids of its own."""
+    if entry.get("type") is None:
+        return
+    joint = el.Joint(
+        id=entry.get("id", 0),
+        type=entry.get("type"),
+        label=entry.get("label", ""),
+        i_marker_id=entry.get("i_marker_id", 0),
+        j_marker_id=entry.get("j_marker_id", 0),
+        is_primitive=True,
+        source=entry.source,
+    )
+    entry.register(entry.draft.primitives, joint)
+
+
+def _build_coupler(entry: Entry) -> None:
+    """Add a coupler of two or three joints."""
+    ids = entry.get("joint_ids", ())
+    if entry.get("joint_ids") is not None and len(ids) not in (2, 3):
+        entry.fault(f"names {len(ids)} joints; a coupler has 2 or 3", "joint_ids")
+    for name in ("motion_types", "scales"):
+        value = entry.get(name)
+        if value is not None and ids and len(value) != len(ids):
+            entry.fault(f"must have one value for each of the {len(ids)} joints", name)
+    for word in entry.get("motion_types", ()):
+        if word not in ("R", "T"):
+            entry.fault(f"{word}: must be R or T for each joint", "motion_types")
+    if any(scale == 0.0 for scale in entry.get("scales", ())):
+        entry.fault("a joint with scale 0 takes no part; must be numbers other than 0", "scales")
+    coupler = el.Coupler(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        joint_ids=ids,
+        motion_types=entry.get("motion_types", ()),
+        scales=entry.get("scales", ()),
+        source=entry.source,
+    )
+    entry.register(entry.draft.couplers, coupler)
+
+
+def _build_general(entry: Entry) -> None:
+    """Add a constraint by an expression."""
+    expr = entry.get("expr")
+    if expr is None:
+        return
+    constraint = el.GeneralConstraint(
+        id=entry.get("id", 0), expr=expr, label=entry.get("label", ""), source=entry.source
+    )
+    entry.register(entry.draft.general_constraints, constraint)
+
+
+def note_unused_starts(entry: Entry, val_type: str, disp: str, vel: str) -> None:
+    """Note initial values that the type of motion does not take: only V and A integrate."""
+    unused = {"D": (disp, vel), "V": (vel,), "A": ()}[val_type]
+    for name in unused:
+        if entry.given(name):
+            entry.note(f"has no effect with a motion by {_GIVEN[val_type]}", name)
+
+
+_GIVEN = {"D": "displacement", "V": "velocity", "A": "acceleration"}
+
+
+def _build_motion(entry: Entry) -> None:
+    """Add a motion of a joint; its markers, and a direction left open, come from the joint."""
+    val_type = entry.get("val_type")
+    if val_type is None:
+        return
+    note_unused_starts(entry, val_type, "ic_disp", "ic_vel")
+    motion = el.Motion(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        joint_id=entry.get("joint_id"),
+        direction=entry.get("motion_type", ""),
+        val_type=val_type,
+        expr=entry.get("expr"),
+        ic_disp=entry.get("ic_disp", 0.0) if val_type != "D" else 0.0,
+        ic_vel=entry.get("ic_vel", 0.0) if val_type == "A" else 0.0,
+        source=entry.source,
+    )
+    if entry.get("type", "EXPRESSION") == "EXPRESSION" and not entry.given("expr"):
+        entry.fault(f"expr: missing; must be {EXPRESSION.allowed} of TIME")
+    entry.register(entry.draft.motions, motion)
+
+
+def complete_motions(draft: Draft) -> None:
+    """Give the motions of joints the joint's markers, and the one direction that it has."""
+    for motion in draft.motions.values():
+        joint = draft.joints.get(motion.joint_id or 0)
+        if joint is None:
+            continue
+        moves = JOINTS[joint.type].moves
+        direction = motion.direction
+        if not direction and len(moves) == 1:
+            direction = moves[0]
+        draft.motions[motion.id] = replace(
+            motion,
+            direction=direction,
+            i_marker_id=joint.i_marker_id,
+            j_marker_id=joint.j_marker_id,
+        )
+
+
+_JOINT_TYPES = spellings(**{name: "" for name in JOINTS})
+_MARKERS = {"i_marker_id": Spec(ID, required=True), "j_marker_id": Spec(ID, required=True)}
+_NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
+
+CONSTRAINT_JOINT = Statement(
+    "Constraint_Joint",
+    {
+        **_NAMED,
+        "type": Spec(keyword(_JOINT_TYPES), required=True),
+        **_MARKERS,
+        "pitch": Spec(REAL),
+        "pitch_diameter": Spec(POSITIVE),
+        "length": Spec(POSITIVE),  # ours
+        "is_virtual": Spec(FLAG),
+    },
+    _build_joint,
+)
+CONSTRAINT_JPRIM = Statement(
+    "Constraint_Jprim",
+    {**_NAMED, "type": Spec(keyword(PRIMITIVES), required=True), **_MARKERS},
+    _build_primitive,
+)
+CONSTRAINT_COUPLER = Statement(
+    "Constraint_Coupler",
+    {
+        **_NAMED,
+        "joint_ids": Spec(IDS, required=True),
+        "motion_types": Spec(WORDS, required=True),
+        "scales": Spec(REALS, required=True),
+    },
+    _build_coupler,
+)
+CONSTRAINT_GENERAL = Statement(
+    "Constraint_General",
+    {
+        **_NAMED,
+        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
+        "expr": Spec(EXPRESSION, required=True),
+        **USERSUB_REFUSED,
+    },
+    _build_general,
+)
+MOTION_JOINT = Statement(
+    "Motion_Joint",
+    {
+        **_NAMED,
+        "joint_id": Spec(ID, required=True),
+        "motion_type": Spec(keyword(DIRECTIONS)),
+        "val_type": Spec(keyword(VALUE_TYPES), required=True),
+        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
+        "expr": Spec(EXPRESSION),
+        "ic_disp": Spec(REAL),
+        "ic_vel": Spec(REAL),
+        **USERSUB_REFUSED,
+    },
+    _build_motion,
+)
