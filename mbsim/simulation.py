@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,13 @@ FIRST_BUDGET = 200
 
 Progress = Callable[[float, float, float], None]
 Notify = Callable[[str], None]
+
+
+class Active(NamedTuple):
+    """The equations in use, which a resumed run needs as they were."""
+
+    active: Any
+    skyline: Any
 
 
 class Runner:
@@ -84,6 +91,32 @@ class Runner:
     def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> float:
         """Call one of the problem's hooks from Python."""
         return float(self._hook(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+
+    def assemble(self) -> None:
+        """Put the bodies where all constraints hold, and report what had to move."""
+        scene = self.system.scene
+        if len(scene.tree.body) == 0:
+            return
+        from mbsim.dynamics.assembly import ContradictionError, assemble, contradiction, describe
+        from mbsim.system.arrays import JOINTS_DOOR
+
+        pointer = ctypes.c_void_p
+        signature = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer]
+        door = ctypes.CFUNCTYPE(ctypes.c_int64, *signature)(int(scene.world.doors[JOINTS_DOOR]))
+        t = self.settings.stages[0].simulation.start_time
+
+        def serve(what: int, y: Any) -> None:
+            door(self.problem.context, what, t, y.ctypes.data, y.ctypes.data)
+
+        try:
+            self.assembly = assemble(scene, self.method.y, serve)
+        except ContradictionError as error:
+            raise ModelError(contradiction(self.system, error)) from None
+        lines, warnings = describe(self.system, self.assembly)
+        for line in (*lines, *warnings):
+            self.log.line(line)
+        for line in warnings:
+            self.tell(line)
 
     def settle_contacts(self, allow_overlap: bool) -> None:
         """Begin with the incidents that exist at the start; refuse those that are too deep."""
@@ -140,6 +173,7 @@ class Runner:
             "state": scene.state,
             "pairs": scene.pairs,
             "crowds": scene.crowds,
+            "equations": Active(scene.equations.active, scene.sweep.skyline),
             "log": scene.log,
             "method": self.method,
         }
@@ -422,6 +456,7 @@ def simulate(
             if resume:
                 runner.restore(recorder.checkpoint)
             else:
+                runner.assemble()
                 runner.settle_contacts(allow_overlap)
             runner.run(progress, resume)
         status = "finished"

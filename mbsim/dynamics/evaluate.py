@@ -11,7 +11,7 @@ from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR
+from mbsim.system.arrays import ACCELERATE, APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR
 
 
 @jitable
@@ -92,5 +92,5 @@ def evaluate(scene, t, h, y, dy):
     if not math.isfinite(accelerate(scene, y, dy)):
         return NOT_FINITE
     if scene.world.doors[JOINTS_DOOR] != 0:
-        return call_int(scene.world.doors[JOINTS_DOOR], (scene, t, y, dy))
+        return call_int(scene.world.doors[JOINTS_DOOR], (scene, ACCELERATE, t, y, dy))
     return 0

@@ -8,15 +8,24 @@ import numpy as np
 from numba import carray, types
 
 from mbsim.core import jit
-from mbsim.core.address import pack, view
+from mbsim.core.address import call_int, pack, view
 from mbsim.core.problem import BY_CHECK, HOOK, Problem
+from mbsim.dynamics.constraints import serve
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
-from mbsim.system.arrays import BODY_SIZE, LISTINGS, NEAR_DOOR, Scene
+from mbsim.system.arrays import (
+    BODY_SIZE,
+    JOINTS_DOOR,
+    KEEP,
+    LISTINGS,
+    NEAR_DOOR,
+    PROJECT,
+    Scene,
+)
 
 PAUSE_FOR_EVENTS = 2.0
 STEP_IS_STALE = 4.0
@@ -31,7 +40,7 @@ def _rhs(context, t, h, a, b):
 
 
 def _project(context, t, h, a, b):
-    """Quaternions back to unit length."""
+    """Quaternions back to unit length, and bodies onto their constraints."""
     scene = view(context, Scene)
     y = carray(a, (scene.rows.y.shape[1],))
     for body in range(len(scene.bodies.mass)):
@@ -39,6 +48,8 @@ def _project(context, t, h, a, b):
         length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
         for k in range(4):
             y[at + k] /= length
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, PROJECT, t, y, y))
     return 0.0
 
 
@@ -62,6 +73,8 @@ def _commit(context, t, h, a, b):
     """
     scene = view(context, Scene)
     listings = scene.log.counters[LISTINGS]
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
     word = float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
     # pairs that were not near, and so not counted, are now
@@ -126,7 +139,16 @@ def _follow(context, y):
     return 0
 
 
+def _joints(context, what, t, y, dy):
+    """All that joints are asked for; behind an address so that free bodies need not compile it."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return serve(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
+
+
 _FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
+_POINTER = types.CPointer(types.float64)
+_JOINTS = types.int64(types.int64, types.int64, types.float64, _POINTER, _POINTER)
 _HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
 
 
@@ -140,4 +162,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     addresses = [jit.address(hook, HOOK) for hook in hooks]
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
+    if len(scene.tree.body) > 0:
+        scene.world.doors[JOINTS_DOOR] = jit.address(_joints, _JOINTS)
     return Problem(int(table.ctypes.data), *addresses), table

@@ -12,8 +12,9 @@ from mbsim.dynamics.kinematics import position
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
+    JOINTS_DOOR,
     LIVE,
-    REACTIONS_DOOR,
+    REACT,
     STORED_ENERGY,
 )
 
@@ -103,8 +104,8 @@ def write_row(scene, t, y, f):
             rows.accel[k, 6 * b + j] = f[at + 7 + j]
             rows.accel[k, 6 * b + 3 + j] = alpha[j]
     fill_contacts(scene, y, rows.contact[k])
-    if scene.world.doors[REACTIONS_DOOR] != 0:
-        call_int(scene.world.doors[REACTIONS_DOOR], (scene, t, y, f))
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, REACT, t, y, f))
     for j in range(len(scene.applied.kind)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]

@@ -45,8 +45,25 @@ LIVE, FREE, FIXED, WANTED = range(4)
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
 
 # entries of `World.doors`
-FCL_DOOR, NEAR_DOOR, APPLIED_DOOR, JOINTS_DOOR, PROJECT_DOOR, REACTIONS_DOOR, COMMIT_DOOR = range(7)
+(
+    FCL_DOOR,
+    NEAR_DOOR,
+    APPLIED_DOOR,
+    JOINTS_DOOR,
+    JET_DOOR,
+    GRADIENT_DOOR,
+    VALUES_DOOR,
+) = range(7)
 DOORS = 7
+
+# what is asked for at JOINTS_DOOR
+ACCELERATE, PROJECT, REACT, KEEP, MATRIX, DISPLACE, SPEED_UP = range(7)
+
+# what of a joint's rotation is free: `Tree.turn`
+TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
+
+# kinds of terms: `Equations.kind`
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL = range(5)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -196,7 +213,7 @@ class Tree(NamedTuple):
     of_body: I1  # (nb + 1,) place in the tree, -1 for none
     root: I1  # (nt,) place of the first body of its tree
     end: I1  # (nt,) one behind the last place of its tree
-    turn: I1  # (nt,) what of the rotation is free: see dynamics.tree
+    turn: I1  # (nt,) what of the rotation is free: TURN_...
     slide: I2  # (nt, 3) 1 where the child may move along that axis of the parent's marker
     axis: I2  # (nt, 2) of UNIVERSAL: axis of the child's and of the parent's marker
     child_p: F2  # (nt, 3) joint marker on the child, in its cg axes
@@ -313,16 +330,18 @@ class Sweep(NamedTuple):
     L: F3  # (nt, 6, 6)
     c: F2  # (nt, 6) acceleration of the child that follows from velocities
     p: F2  # (nt, 6) force that the body would need, articulated
+    z: F2  # (nt, 6) forces, then accelerations, in the free directions
     a: F2  # (nt, 6) acceleration
-    push: F2  # (nt, 6) forces on bodies beyond those in `bias`
-    bias: F2  # (nt, 6)
+    bias: F2  # (nt, 6) force that velocities call for
     answer: F2  # (nt, 6) accelerations by a unit multiplier
+    mark: I1  # (nt,) by root: equation for which `answer` was made
     G: F2  # (terms, 12) of each term: wrench on I's body and on J's, each about its O
-    rate: F2  # (ne, 3) residual, its rate, and what of its second rate follows from velocities
+    rate: F2  # (ne, 4) residual, its rate, its second rate by velocities alone, rate of its sum
     A: F2  # (ne, ne) how equations act on each other, then its factor
     multiplier: F1  # (ne,)
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
+    jet: F1  # (12,) what a program gives
 
 
 class Rows(NamedTuple):

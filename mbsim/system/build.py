@@ -53,6 +53,16 @@ CELLS_EACH = 4
 SKIN = 0.45
 
 
+#: XML statements of connections.
+_STATEMENTS = {
+    "JOINT": "Constraint_Joint",
+    "JPRIM": "Constraint_Jprim",
+    "COUPLER": "Constraint_Coupler",
+    "MOTION": "Motion_Joint",
+    "GCON": "Constraint_General",
+}
+
+
 @dataclass
 class System:
     """A model as arrays, with what Python still needs to know of it."""
@@ -70,6 +80,14 @@ class System:
     connections: list[tuple[str, int]]  # statement and id of each row of `Connections`
     applied: list[tuple[str, int]]  # of each row of `Applied`
     values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
+    equation_names: list[str]  # of each row of `Equations`, for messages
+
+    def connection_name(self, row: int) -> str:
+        """Return the element of a row of `Connections` as its deck has it."""
+        statement, id = self.connections[row]
+        if self.model.file.lower().endswith(".adm"):
+            return f"{statement}/{id}"
+        return f"{_STATEMENTS[statement]}[{id}]"
 
 
 def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
@@ -335,14 +353,14 @@ def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.nda
     return y
 
 
-def _state(nb: int, ng: int, ns: int, na: int) -> a.State:
+def _state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.State:
     """Return the incident table before anything touched."""
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
     return a.State(
         q=q,
         centre=np.zeros((ng, 3)),
-        angle=np.zeros(na),
+        angle=angle,
         touching=np.zeros(ns, dtype=np.int64),
         p=np.zeros((ns, 3)),
         n=np.zeros((ns, 3)),
@@ -536,7 +554,7 @@ def build(
             np.zeros(1, dtype=np.int64),
             np.full(2, -1, dtype=np.int64),
         ),
-        state=_state(nb, len(graphic_ids), ns, len(angles.i)),
+        state=_state(nb, len(graphic_ids), ns, table.start_angles()),
         log=_log(len(contact_ids)),
         work=_work(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
         sweep=sweep(mechanism),
@@ -557,4 +575,5 @@ def build(
         mechanism.elements,
         applied_ids,
         values,
+        mechanism.names,
     )

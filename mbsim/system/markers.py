@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,9 +48,26 @@ class MarkerTable:
         self.frames.append((body, p, R))
         return len(self.frames) - 1
 
+    def frame(self, row: int) -> tuple[Array, Array]:
+        """Return origin (3,) and axes (3, 3) of a row at the start, global."""
+        body, p, R = self.frames[row]
+        if body == self.ground:
+            return p, R
+        place = list(self.placement.bodies.values())[body]
+        return place.p + place.R @ p, place.R @ R
+
     def angle(self, i: int, j: int) -> int:
         """Return the row of the angle of marker row i about the z-axis of marker row j."""
         return self.angle_rows.setdefault((i, j), len(self.angle_rows))
+
+    def start_angle(self, i: int, j: int) -> float:
+        """Return the angle of row i about the z-axis of row j at the start [rad]."""
+        x, R = self.frame(i)[1][:, 0], self.frame(j)[1]
+        return math.atan2(float(x @ R[:, 1]), float(x @ R[:, 0]))
+
+    def start_angles(self) -> Array:
+        """Return all followed angles at the start [rad]."""
+        return np.array([self.start_angle(i, j) for i, j in self.angle_rows], dtype=np.float64)
 
     def arrays(self) -> tuple[a.Markers, a.Angles]:
         """Return the tables as they are now."""

@@ -1,0 +1,216 @@
+"""Before a run: bodies are put where all constraints hold, and implied equations are found.
+
+Positions first, by Newton steps of least (inertia-weighted) motion, then velocities. What moved,
+which equations others imply and how many degrees of freedom remain is reported; constraints that
+contradict each other are an error that names them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mbsim.core.layout import BODY_SIZE
+from mbsim.system.arrays import DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
+from mbsim.system.build import System
+
+Array = np.ndarray[Any, Any]
+#: Asks the joints' door: what, y.
+Serve = Callable[[int, Array], None]
+
+#: Newton ends below the first, fails above the second: residuals over their units.
+_CLOSED, _OPEN = 1e-13, 1e-8
+_MOST_ROUNDS = 100
+#: Singular values (of the scaled matrix) below this part are those of implied equations.
+_RANK = 1e-9
+#: What is left of the (unit) diagonal of an equation that others imply.
+_IMPLIED = 1e-11
+_RESIDUAL, _MISMATCH = 0, 1
+
+
+class ContradictionError(ValueError):
+    """Constraints that cannot all hold: rows of `Equations`, residuals over their units."""
+
+    def __init__(self, equations: list[int], residuals: list[float], velocities: bool) -> None:
+        super().__init__("constraints contradict each other")
+        self.equations, self.residuals, self.velocities = equations, residuals, velocities
+
+
+@dataclass
+class Assembly:
+    """What assembly did. `moved` and `sped` have (body row, translation, rotation)."""
+
+    moved: list[tuple[int, float, float]] = field(default_factory=list)
+    sped: list[tuple[int, float, float]] = field(default_factory=list)
+    implied: list[int] = field(default_factory=list)
+    freedom: int = 0
+
+
+def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
+    """Bring y onto all constraints and choose the equations to be used.
+
+    Raises
+    ------
+    ContradictionError
+        If positions or velocities cannot satisfy all equations.
+    """
+    before = y.copy()
+    equations = scene.equations
+    n = len(equations.program)
+    use(scene, list(range(n)))
+    scene.sweep.multiplier[:] = 0.0
+    serve(MATRIX, y)
+    serve(DISPLACE, y)
+    _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
+    serve(MATRIX, y)
+    chosen = independent(_scaled(scene)[0])
+    _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
+    use(scene, chosen)
+    serve(PROJECT, y)
+    moved, sped = _changes(scene, before, y)
+    return Assembly(
+        moved,
+        sped,
+        [e for e in range(n) if e not in set(chosen)],
+        int(scene.tree.free.sum()) - len(chosen),
+    )
+
+
+def use(scene: Scene, chosen: list[int]) -> None:
+    """Let only some equations be used, and set where the rows of their matrix begin."""
+    equations, tree = scene.equations, scene.tree
+    equations.active[: len(chosen)] = chosen
+    equations.active[-1] = len(chosen)
+    trees = []
+    for e in chosen:
+        terms = range(equations.first[e], equations.first[e + 1])
+        sides = [m for k in terms for m in (equations.i[k], equations.j[k])]
+        places = [tree.of_body[scene.markers.body[m]] for m in sides]
+        trees.append({int(tree.root[place]) for place in places if place >= 0})
+    first_with: dict[int, int] = {}
+    for r, roots in enumerate(trees):
+        for root in roots:
+            first_with.setdefault(root, r)
+        scene.sweep.skyline[r] = min((first_with[root] for root in roots), default=r)
+
+
+def independent(A: Array) -> list[int]:
+    """Return rows of a symmetric, semidefinite matrix that are independent, ascending.
+
+    Greedy by the largest pivot over its own diagonal; of equals the first.
+    """
+    A = A.copy()
+    diagonal = np.where(np.diag(A) > 0.0, np.diag(A), 1.0)
+    chosen: list[int] = []
+    while len(chosen) < len(A):
+        part = np.diag(A) / diagonal
+        part[chosen] = 0.0
+        best = int(np.argmax(part > 0.999 * part.max()))
+        if not part[best] > _IMPLIED:
+            break
+        chosen.append(best)
+        A -= np.outer(A[:, best], A[best]) / A[best, best]
+    return sorted(chosen)
+
+
+def _scaled(scene: Scene) -> tuple[Array, Array]:
+    """Return the whole matrix with a unit diagonal, and the scale of each equation."""
+    n = int(scene.equations.active[-1])
+    A = np.zeros((n, n))
+    for r in range(n):
+        first = int(scene.sweep.skyline[r])
+        A[r, first : r + 1] = scene.sweep.A[r, first : r + 1]
+    A = A + np.tril(A, -1).T
+    size = np.sqrt(np.where(np.diag(A) > 0.0, np.diag(A), 1.0))
+    return A / np.outer(size, size), size
+
+
+def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
+    """Take the residuals of a column away, for the equations that hold at that level."""
+    held = scene.equations.level >= level
+    n = len(held)
+    if not held.any():
+        return
+    best, stuck = np.inf, 0
+    for _ in range(_MOST_ROUNDS):
+        serve(MATRIX, y)
+        residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
+        worst = float(np.max(np.abs(residual) / scene.equations.unit))
+        stuck = stuck + 1 if worst > 0.5 * best else 0
+        best = min(best, worst)
+        if worst <= _CLOSED or (stuck >= 3 and best < 1e-10) or stuck >= 20:
+            break
+        A, size = _scaled(scene)
+        # the equations that are not held at this level must not move
+        solution = np.linalg.lstsq(A, -residual / size, rcond=_RANK)[0]
+        scene.sweep.multiplier[:n] = solution / size
+        serve(move, y)
+    parts = np.abs(residual) / scene.equations.unit
+    if not worst <= _OPEN:
+        order = [int(e) for e in np.argsort(-parts) if not parts[e] <= _OPEN]
+        raise ContradictionError(order, [float(parts[e]) for e in order], column == _MISMATCH)
+
+
+def _changes(
+    scene: Scene, before: Array, after: Array
+) -> tuple[list[tuple[int, float, float]], list[tuple[int, float, float]]]:
+    """Return which bodies moved and which changed velocity, beyond rounding."""
+    moved, sped = [], []
+    length, speed = scene.world.scale[0], scene.world.scale[1]
+    for b in scene.tree.body:
+        old, new = (v[BODY_SIZE * b : BODY_SIZE * (b + 1)] for v in (before, after))
+        way = float(np.linalg.norm(new[0:3] - old[0:3]))
+        along = min(1.0, abs(float(old[3:7] @ new[3:7])))
+        turn = 2.0 * float(np.arccos(along)) if along < 1.0 - 1e-14 else 0.0
+        if way > 1e-7 * length or turn > 1e-6:
+            moved.append((int(b), way, turn))
+        dv = float(np.linalg.norm(new[7:10] - old[7:10]))
+        dw = float(np.linalg.norm(new[10:13] - old[10:13]))
+        if dv > 1e-7 * speed or dw > 1e-7 * speed / length:
+            sped.append((int(b), dv, dw))
+    return moved, sped
+
+
+def _equation_name(system: System, e: int) -> str:
+    """Return the element and which of its equations row e is."""
+    connection = int(system.scene.equations.connection[e])
+    return f"{system.connection_name(connection)} ({system.equation_names[e]})"
+
+
+def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
+    """Return lines for the log, and those that the user should see at once."""
+    lines, warnings = [], []
+    freedom = assembly.freedom
+    lines.append(f"degrees of freedom of the bodies that joints hold: {freedom}")
+    if freedom == 0:
+        lines.append("kinematically determined: no force changes the motion of these bodies")
+    if assembly.implied:
+        names = ", ".join(_equation_name(system, e) for e in assembly.implied)
+        lines.append(
+            f"{len(assembly.implied)} equations follow from others (redundant): {names}; "
+            "reactions are those of least norm"
+        )
+    for b, way, turn in assembly.moved:
+        warnings.append(
+            f"assembly: Body_Rigid[{system.body_ids[b]}] moved by {way:.6g} and {turn:.6g} rad"
+        )
+    for b, dv, dw in assembly.sped:
+        warnings.append(
+            f"assembly: Body_Rigid[{system.body_ids[b]}] changed its velocity by {dv:.6g} "
+            f"and its angular velocity by {dw:.6g}"
+        )
+    return lines, warnings
+
+
+def contradiction(system: System, error: ContradictionError) -> str:
+    """Return what to tell the user of constraints that cannot all hold."""
+    what = "velocities" if error.velocities else "positions"
+    parts = zip(error.equations[:10], error.residuals[:10], strict=True)
+    names = ", ".join(f"{_equation_name(system, e)} by {size:.3g}" for e, size in parts)
+    return (
+        f"{system.model.file}: the model cannot be assembled: {what} miss {names} "
+        "(of the model's size, or in radians)"
+    )

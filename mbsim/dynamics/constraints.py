@@ -1,0 +1,87 @@
+"""What joints are asked for, behind one door: accelerations, projection, reactions, assembly."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.dynamics.equations import (
+    FLOW,
+    active_count,
+    fill_matrix,
+    followed_angle,
+    hold,
+)
+from mbsim.dynamics.projection import (
+    carry_all,
+    displace,
+    prepare_equations,
+    project,
+    push,
+    seat_all,
+    speed_up,
+)
+from mbsim.dynamics.reactions import fill_reactions
+from mbsim.dynamics.tree import prepare, write_accelerations
+from mbsim.system.arrays import (
+    ACCELERATE,
+    DISPLACE,
+    KEEP,
+    MATRIX,
+    PROJECT,
+    REACT,
+    SPEED_UP,
+)
+
+
+@jitable
+def constrain(scene, t, y, dy):
+    """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
+    prepare(scene, y)
+    hold(scene, t, y)
+    total = write_accelerations(scene, y, dy)
+    ledger = scene.world.ledger[0]
+    if ledger >= 0:
+        # the work of what moves with time: multiplier times the rate of its equation's sum
+        power, sweep = 0.0, scene.sweep
+        for r in range(active_count(scene)):
+            power += sweep.multiplier[r] * sweep.rate[scene.equations.active[r], FLOW]
+        dy[ledger] = power
+    return 0 if math.isfinite(total) else NOT_FINITE
+
+
+@jitable
+def commit_angles(scene):
+    """Keep the angles with their whole turns."""
+    for slot in range(len(scene.angles.i)):
+        scene.state.angle[slot] = followed_angle(scene, slot)
+
+
+@jitable
+def serve(scene, what, t, y, dy):
+    """Do what is asked for at the door of joints; return 0 or a code.
+
+    The last three are for assembly, in Python: residuals and the whole matrix of the equations
+    in use at y; bodies displaced, or sped up, by the multipliers as they stand.
+    """
+    if what == ACCELERATE:
+        return constrain(scene, t, y, dy)
+    if what == PROJECT:
+        project(scene, t, y)
+    elif what == REACT:
+        fill_reactions(scene, y)
+    elif what == KEEP:
+        commit_angles(scene)
+    elif what == MATRIX:
+        prepare_equations(scene, t, y)
+        fill_matrix(scene)
+    elif what == DISPLACE:
+        push(scene)
+        displace(scene, y)
+        seat_all(scene, y)
+    elif what == SPEED_UP:
+        push(scene)
+        speed_up(scene, y)
+        carry_all(scene, y)
+    return 0

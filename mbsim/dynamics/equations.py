@@ -1,0 +1,378 @@
+"""Constraint equations that the tree does not hold: their rows, and the multipliers they need.
+
+An equation g(q, t) = 0 is a sum of terms less a function of TIME. For each its residual, the
+rate G V - dg/dt and what of the second rate follows from velocities alone are taken; a term's
+gradient is a wrench on the bodies of its markers. The tree answers a unit multiplier of equation
+r with accelerations T G_r', and A = G T G' says how equations act on each other, so
+
+    A lambda = -(gamma + G a),   a: accelerations of the tree without multipliers.
+
+A is factored within its skyline: equations on different trees do not meet.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, scale, sub, vector
+from mbsim.dynamics.kinematics import position
+from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.tree import load, origin, put, respond
+from mbsim.system.arrays import ANGLE, GENERAL, GRADIENT_DOOR, JET_DOOR, OFFSET, PERP
+
+# columns of `Sweep.rate`
+RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
+
+#: A pivot below this part of its diagonal is that of an equation that others imply here.
+LEAST_PIVOT = 1e-13
+
+
+@jitable
+def wrapped(angle):
+    """Return an angle brought into -pi..pi by whole turns."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@jitable
+def raw_angle(scene, slot):
+    """Return the angle of x of I about z of J, from x of J, within a turn."""
+    x = marker_axis(scene, scene.angles.i[slot], 0)
+    j = scene.angles.j[slot]
+    return math.atan2(dot(x, marker_axis(scene, j, 1)), dot(x, marker_axis(scene, j, 0)))
+
+
+@jitable
+def followed_angle(scene, slot):
+    """Return that angle with its whole turns, from where it was at the committed state."""
+    before = scene.state.angle[slot]
+    return before + wrapped(raw_angle(scene, slot) - before)
+
+
+@jitable
+def add_side(scene, y, G, m, at, force, torque):
+    """Write force at a point and torque, on the body of marker m, as a wrench about its O."""
+    b = scene.markers.body[m]
+    k = scene.tree.of_body[b]
+    if k < 0:
+        for i in range(6):
+            G[i] = 0.0
+        return
+    put(G, add(torque, cross(sub(at, origin(scene, y, k)), force)), force)
+
+
+@jitable
+def centripetal(scene, m):
+    """Return the acceleration of marker m that the turning of its body alone causes."""
+    w = vector(scene.work.w[scene.markers.body[m]])
+    return cross(w, cross(w, marker_arm(scene, m)))
+
+
+@jitable
+def offset_term(scene, y, i, j, axis, G):
+    """Return value, rate and second rate of e_J . (P_I - P_J), and fill its gradient."""
+    e = marker_axis(scene, j, axis)
+    at = marker_point(scene, y, i)
+    d = sub(at, marker_point(scene, y, j))
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    w = vector(scene.work.w[scene.markers.body[j]])
+    turned = cross(w, e)
+    zero = (0.0, 0.0, 0.0)
+    add_side(scene, y, G[0:6], i, at, e, zero)
+    add_side(scene, y, G[6:12], j, at, scale(-1.0, e), zero)
+    a = sub(centripetal(scene, i), centripetal(scene, j))
+    second = dot(e, a) + 2.0 * dot(turned, v) + dot(cross(w, turned), d)
+    return dot(e, d), dot(e, v) + dot(turned, d), second
+
+
+@jitable
+def fill_turn(scene, y, i, j, torque, G):
+    """Fill the gradient of a term that only turns: opposite torques on the two bodies."""
+    zero = (0.0, 0.0, 0.0)
+    add_side(scene, y, G[0:6], i, zero, zero, torque)
+    add_side(scene, y, G[6:12], j, zero, zero, scale(-1.0, torque))
+
+
+@jitable
+def cosine(scene, i, axis_i, j, axis_j):
+    """Return value, rate, second rate and torque of a_I . b_J."""
+    a, b = marker_axis(scene, i, axis_i), marker_axis(scene, j, axis_j)
+    w_i, w_j = (
+        vector(scene.work.w[scene.markers.body[i]]),
+        vector(scene.work.w[scene.markers.body[j]]),
+    )
+    da, db = cross(w_i, a), cross(w_j, b)
+    second = dot(cross(w_i, da), b) + 2.0 * dot(da, db) + dot(a, cross(w_j, db))
+    return dot(a, b), dot(da, b) + dot(a, db), second, cross(a, b)
+
+
+@jitable
+def perp_term(scene, y, i, j, axis_i, axis_j, G):
+    """Return value, rate and second rate of a_I . b_J, and fill its gradient."""
+    value, rate, second, torque = cosine(scene, i, axis_i, j, axis_j)
+    fill_turn(scene, y, i, j, torque, G)
+    return value, rate, second
+
+
+@jitable
+def angle_term(scene, y, i, j, slot, G):
+    """Return value, rate and second rate of the angle about z, and fill its gradient.
+
+    With c, s the cosines of x_I against x_J and y_J, n = c^2 + s^2: the rate is
+    (c s' - s c')/n.
+    """
+    c, dc, ddc, about_c = cosine(scene, i, 0, j, 0)
+    s, ds, dds, about_s = cosine(scene, i, 0, j, 1)
+    n = c * c + s * s
+    rate = (c * ds - s * dc) / n
+    second = (c * dds - s * ddc) / n - rate * 2.0 * (c * dc + s * ds) / n
+    fill_turn(scene, y, i, j, sub(scale(c / n, about_s), scale(s / n, about_c)), G)
+    return followed_angle(scene, slot), rate, second
+
+
+@jitable
+def distance_term(scene, y, i, j, G):
+    """Return value, rate and second rate of the distance of I and J, and fill its gradient."""
+    at_i, at_j = marker_point(scene, y, i), marker_point(scene, y, j)
+    d = sub(at_i, at_j)
+    length = math.sqrt(dot(d, d))
+    e = scale(1.0 / length, d) if length > 0.0 else (0.0, 0.0, 1.0)
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    zero = (0.0, 0.0, 0.0)
+    add_side(scene, y, G[0:6], i, at_i, e, zero)
+    add_side(scene, y, G[6:12], j, at_j, scale(-1.0, e), zero)
+    along = dot(e, v)
+    second = dot(e, sub(centripetal(scene, i), centripetal(scene, j)))
+    if length > 0.0:
+        second += (dot(v, v) - along * along) / length
+    return length, along, second
+
+
+@jitable
+def general_term(scene, t, y, i, program, G):
+    """Fill the gradient of a program with respect to the body of marker i."""
+    b = scene.markers.body[i]
+    out = scene.sweep.jet
+    call_int(scene.world.doors[GRADIENT_DOOR], (scene, t, y, program, b, out))
+    force, torque = (out[0], out[1], out[2]), (out[3], out[4], out[5])
+    add_side(scene, y, G[0:6], i, position(scene, y, b), force, torque)
+    for k in range(6, 12):
+        G[k] = 0.0
+
+
+@jitable
+def fill_equation(scene, t, y, e):
+    """Fill gradient, residual and rates of equation e."""
+    eq, sweep = scene.equations, scene.sweep
+    value, flow, second = -eq.constant[e], 0.0, 0.0
+    for k in range(eq.first[e], eq.first[e + 1]):
+        i, j, factor, G = eq.i[k], eq.j[k], eq.factor[k], sweep.G[k]
+        kind = eq.kind[k]
+        if kind == GENERAL:
+            general_term(scene, t, y, i, eq.program[e], G)
+            continue
+        g, dg, ddg = 0.0, 0.0, 0.0
+        if kind == OFFSET:
+            g, dg, ddg = offset_term(scene, y, i, j, eq.axis[k, 1], G)
+        elif kind == PERP:
+            g, dg, ddg = perp_term(scene, y, i, j, eq.axis[k, 0], eq.axis[k, 1], G)
+        elif kind == ANGLE:
+            g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
+        else:
+            g, dg, ddg = distance_term(scene, y, i, j, G)
+        value += factor * g
+        flow += factor * dg
+        second += factor * ddg
+        if factor != 1.0:
+            for c in range(12):
+                G[c] *= factor
+    rate = flow
+    if eq.program[e] >= 0:
+        jet = sweep.jet
+        call_int(scene.world.doors[JET_DOOR], (scene, t, y, eq.program[e], jet))
+        if eq.general[e] == 1:
+            value, rate, second = value + jet[0], rate + jet[1], second + jet[2]
+        elif eq.level[e] == 2:
+            value, rate, second = value - jet[0], rate - jet[1], second - jet[2]
+        elif eq.level[e] == 1:
+            rate, second = rate - jet[0], second - jet[1]
+        else:
+            second -= jet[0]
+    sweep.rate[e, RESIDUAL] = value
+    sweep.rate[e, MISMATCH] = rate
+    sweep.rate[e, GAMMA] = second
+    sweep.rate[e, FLOW] = flow
+
+
+@jitable
+def active_count(scene):
+    """Return the number of equations in use."""
+    active = scene.equations.active
+    return active[len(active) - 1]
+
+
+@jitable
+def fill_equations(scene, t, y):
+    """Fill gradient, residual and rates of the equations in use."""
+    for r in range(active_count(scene)):
+        fill_equation(scene, t, y, scene.equations.active[r])
+
+
+@jitable
+def side_place(scene, m):
+    """Return the place in the tree of the body of marker m, -1 for none."""
+    return scene.tree.of_body[scene.markers.body[m]]
+
+
+@jitable
+def add_wrench(scene, e, factor):
+    """Take `factor` times the gradient of equation e from the forces p: it acts on the bodies."""
+    eq, sweep = scene.equations, scene.sweep
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place >= 0:
+                for c in range(6):
+                    sweep.p[place, c] -= factor * sweep.G[k, 6 * side + c]
+
+
+@jitable
+def along(scene, e, motion, stamp):
+    """Return G_e times the spatial motions of all places.
+
+    With stamp >= 0 only trees whose root carries that mark count.
+    """
+    eq, sweep, total = scene.equations, scene.sweep, 0.0
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place < 0 or (stamp >= 0 and sweep.mark[scene.tree.root[place]] != stamp):
+                continue
+            for c in range(6):
+                total += sweep.G[k, 6 * side + c] * motion[place, c]
+    return total
+
+
+@jitable
+def answer(scene, e, stamp):
+    """Fill `answer` of the trees that equation e acts on with what a unit multiplier causes."""
+    eq, sweep, tree = scene.equations, scene.sweep, scene.tree
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place >= 0 and sweep.mark[tree.root[place]] != stamp:
+                root = tree.root[place]
+                sweep.mark[root] = stamp
+                for q in range(root, tree.end[root]):
+                    for c in range(6):
+                        sweep.p[q, c] = 0.0
+    add_wrench(scene, e, 1.0)
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place < 0:
+                continue
+            root = tree.root[place]
+            # a tree that two terms act on answers once: its mark says so
+            if sweep.mark[root] == stamp:
+                respond(scene, root, tree.end[root], 0, sweep.answer)
+                sweep.mark[root] = -2 - stamp
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place >= 0:
+                sweep.mark[tree.root[place]] = stamp
+
+
+@jitable
+def fill_matrix(scene):
+    """Fill the lower part of A for the equations in use, within the skyline."""
+    sweep, active = scene.sweep, scene.equations.active
+    n = active_count(scene)
+    for k in range(len(sweep.mark)):
+        sweep.mark[k] = -1
+    for r in range(n):
+        answer(scene, active[r], r)
+        for s in range(r, n):
+            if sweep.skyline[s] <= r:
+                sweep.A[s, r] = along(scene, active[s], sweep.answer, r)
+
+
+@jitable
+def factor_matrix(scene):
+    """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier."""
+    A, first, n = scene.sweep.A, scene.sweep.skyline, active_count(scene)
+    for i in range(n):
+        diagonal = A[i, i]
+        for j in range(first[i], i + 1):
+            total = A[i, j]
+            for k in range(max(first[i], first[j]), j):
+                total -= A[i, k] * A[j, k]
+            if j < i:
+                A[i, j] = total / A[j, j]
+            elif total > LEAST_PIVOT * diagonal:
+                A[i, i] = math.sqrt(total)
+            else:
+                A[i, i] = math.inf
+
+
+@jitable
+def solve_matrix(scene):
+    """Return the multipliers of `rhs`, by the equations in use."""
+    sweep = scene.sweep
+    A, first, x, n = sweep.A, sweep.skyline, sweep.multiplier, active_count(scene)
+    for i in range(n):
+        total = sweep.rhs[i]
+        for k in range(first[i], i):
+            total -= A[i, k] * x[k]
+        x[i] = total / A[i, i]
+    for i in range(n - 1, -1, -1):
+        x[i] /= A[i, i]
+        for k in range(first[i], i):
+            x[k] -= A[i, k] * x[i]
+
+
+@jitable
+def hold(scene, t, y):
+    """Fill the accelerations of all places under joints and equations."""
+    sweep, active = scene.sweep, scene.equations.active
+    nt, n = len(scene.tree.body), active_count(scene)
+    load(scene, y)
+    respond(scene, 0, nt, 1, sweep.a)
+    if n == 0:
+        return
+    fill_equations(scene, t, y)
+    fill_matrix(scene)
+    factor_matrix(scene)
+    for r in range(n):
+        e = active[r]
+        sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, y, e)
+    solve_matrix(scene)
+    load(scene, y)
+    for r in range(n):
+        add_wrench(scene, active[r], sweep.multiplier[r])
+    respond(scene, 0, nt, 1, sweep.a)
+
+
+@jitable
+def along_motion(scene, y, e):
+    """Return G_e times the accelerations, less what G_e takes of velocities.
+
+    The gradient acts on (alpha, a_cg) as a wrench about the cg does; about O the linear part of
+    the spatial acceleration lacks w x v, which is a force's arm on velocities.
+    """
+    eq, sweep, total = scene.equations, scene.sweep, 0.0
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place < 0:
+                continue
+            b = scene.tree.body[place]
+            G = sweep.G[k, 6 * side : 6 * side + 6]
+            for c in range(6):
+                total += G[c] * sweep.a[place, c]
+            total += dot(
+                (G[3], G[4], G[5]), cross(vector(scene.work.w[b]), vector(scene.work.v[b]))
+            )
+    return total
