@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
-from mbsim.system.arrays import DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
+from mbsim.system.arrays import CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
 from mbsim.system.build import System
 
 Array = np.ndarray[Any, Any]
@@ -26,8 +26,6 @@ _CLOSED, _OPEN = 1e-13, 1e-8
 _MOST_ROUNDS = 100
 #: Singular values (of the scaled matrix) below this part are those of implied equations.
 _RANK = 1e-9
-#: What is left of the (unit) diagonal of an equation that others imply.
-_IMPLIED = 1e-11
 _RESIDUAL, _MISMATCH = 0, 1
 
 
@@ -60,15 +58,14 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
     before = y.copy()
     equations = scene.equations
     n = len(equations.program)
-    use(scene, list(range(n)))
     scene.sweep.multiplier[:] = 0.0
     serve(MATRIX, y)
     serve(DISPLACE, y)
     _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
-    serve(MATRIX, y)
-    chosen = independent(_scaled(scene)[0])
     _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
-    use(scene, chosen)
+    serve(MATRIX, y)
+    serve(CHOOSE, y)
+    chosen = [int(e) for e in equations.active[: equations.active[-1]]]
     serve(PROJECT, y)
     moved, sped = _changes(scene, before, y)
     return Assembly(
@@ -79,52 +76,15 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
     )
 
 
-def use(scene: Scene, chosen: list[int]) -> None:
-    """Let only some equations be used, and set where the rows of their matrix begin."""
-    equations, tree = scene.equations, scene.tree
-    equations.active[: len(chosen)] = chosen
-    equations.active[-1] = len(chosen)
-    trees = []
-    for e in chosen:
-        terms = range(equations.first[e], equations.first[e + 1])
-        sides = [m for k in terms for m in (equations.i[k], equations.j[k])]
-        places = [tree.of_body[scene.markers.body[m]] for m in sides]
-        trees.append({int(tree.root[place]) for place in places if place >= 0})
-    first_with: dict[int, int] = {}
-    for r, roots in enumerate(trees):
-        for root in roots:
-            first_with.setdefault(root, r)
-        scene.sweep.skyline[r] = min((first_with[root] for root in roots), default=r)
-
-
-def independent(A: Array) -> list[int]:
-    """Return rows of a symmetric, semidefinite matrix that are independent, ascending.
-
-    Greedy by the largest pivot over its own diagonal; of equals the first.
-    """
-    A = A.copy()
-    diagonal = np.where(np.diag(A) > 0.0, np.diag(A), 1.0)
-    chosen: list[int] = []
-    while len(chosen) < len(A):
-        part = np.diag(A) / diagonal
-        part[chosen] = 0.0
-        best = int(np.argmax(part > 0.999 * part.max()))
-        if not part[best] > _IMPLIED:
-            break
-        chosen.append(best)
-        A -= np.outer(A[:, best], A[best]) / A[best, best]
-    return sorted(chosen)
-
-
 def _scaled(scene: Scene) -> tuple[Array, Array]:
-    """Return the whole matrix with a unit diagonal, and the scale of each equation."""
+    """Return the whole matrix, and the scale of each equation by which it has been divided."""
     n = int(scene.equations.active[-1])
     A = np.zeros((n, n))
     for r in range(n):
         first = int(scene.sweep.skyline[r])
         A[r, first : r + 1] = scene.sweep.A[r, first : r + 1]
     A = A + np.tril(A, -1).T
-    size = np.sqrt(np.where(np.diag(A) > 0.0, np.diag(A), 1.0))
+    size = scene.sweep.size[:n]
     return A / np.outer(size, size), size
 
 

@@ -6,6 +6,7 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
+from mbsim.dynamics.choice import choose, fill_size, keep_choice, use_all
 from mbsim.dynamics.equations import (
     FLOW,
     active_count,
@@ -26,6 +27,7 @@ from mbsim.dynamics.reactions import fill_reactions
 from mbsim.dynamics.tree import prepare, write_accelerations
 from mbsim.system.arrays import (
     ACCELERATE,
+    CHOOSE,
     DISPLACE,
     KEEP,
     MATRIX,
@@ -40,7 +42,7 @@ def constrain(scene, t, y, dy):
     """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
     prepare(scene, y)
     hold(scene, t, y)
-    total = write_accelerations(scene, y, dy)
+    total = write_accelerations(scene, dy)
     ledger = scene.world.ledger[0]
     if ledger >= 0:
         # the work of what moves with time: multiplier times the rate of its equation's sum
@@ -62,20 +64,26 @@ def commit_angles(scene):
 def serve(scene, what, t, y, dy):
     """Do what is asked for at the door of joints; return 0 or a code.
 
-    The last three are for assembly, in Python: residuals and the whole matrix of the equations
-    in use at y; bodies displaced, or sped up, by the multipliers as they stand.
+    The last four are for assembly, in Python: residuals and matrix of all equations at y; bodies
+    displaced, or sped up, by the multipliers as they stand; the choice of equations.
     """
     if what == ACCELERATE:
         return constrain(scene, t, y, dy)
     if what == PROJECT:
         project(scene, t, y)
     elif what == REACT:
-        fill_reactions(scene, y)
+        fill_reactions(scene, t, y)
     elif what == KEEP:
         commit_angles(scene)
+        return keep_choice(scene, t, y)
     elif what == MATRIX:
+        use_all(scene)
         prepare_equations(scene, t, y)
         fill_matrix(scene)
+        for e in range(active_count(scene)):
+            fill_size(scene, e)
+    elif what == CHOOSE:
+        choose(scene, t, y)
     elif what == DISPLACE:
         push(scene)
         displace(scene, y)

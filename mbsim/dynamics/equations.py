@@ -25,6 +25,9 @@ from mbsim.system.arrays import ANGLE, GENERAL, GRADIENT_DOOR, JET_DOOR, OFFSET,
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 
+#: Code of constraints that contradict each other in the course of the motion.
+CONTRADICTION = 9
+
 #: A pivot below this part of its diagonal is that of an equation that others imply here.
 LEAST_PIVOT = 1e-13
 
@@ -213,6 +216,16 @@ def active_count(scene):
 
 
 @jitable
+def is_active(scene, e):
+    """Return whether equation e is in use."""
+    active = scene.equations.active
+    for r in range(active_count(scene)):
+        if active[r] == e:
+            return True
+    return False
+
+
+@jitable
 def fill_equations(scene, t, y):
     """Fill gradient, residual and rates of the equations in use."""
     for r in range(active_count(scene)):
@@ -338,7 +351,7 @@ def hold(scene, t, y):
     """Fill the accelerations of all places under joints and equations."""
     sweep, active = scene.sweep, scene.equations.active
     nt, n = len(scene.tree.body), active_count(scene)
-    load(scene, y)
+    load(scene)
     respond(scene, 0, nt, 1, sweep.a)
     if n == 0:
         return
@@ -347,16 +360,16 @@ def hold(scene, t, y):
     factor_matrix(scene)
     for r in range(n):
         e = active[r]
-        sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, y, e)
+        sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, e)
     solve_matrix(scene)
-    load(scene, y)
+    load(scene)
     for r in range(n):
         add_wrench(scene, active[r], sweep.multiplier[r])
     respond(scene, 0, nt, 1, sweep.a)
 
 
 @jitable
-def along_motion(scene, y, e):
+def along_motion(scene, e):
     """Return G_e times the accelerations, less what G_e takes of velocities.
 
     The gradient acts on (alpha, a_cg) as a wrench about the cg does; about O the linear part of

@@ -74,7 +74,9 @@ def _commit(context, t, h, a, b):
     scene = view(context, Scene)
     listings = scene.log.counters[LISTINGS]
     if scene.world.doors[JOINTS_DOOR] != 0:
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
+        code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
+        if code != 0:
+            return -float(code)
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
     word = float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
     # pairs that were not near, and so not counted, are now

@@ -109,9 +109,8 @@ def write_row(scene, t, y, f):
     for j in range(len(scene.applied.kind)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
-    for j in range(len(scene.connections.i)):
-        for c in range(6):
-            rows.joint[k, 6 * j + c] = work.joint[j, c]
+    for j in range(len(work.reaction)):
+        rows.joint[k, j] = work.reaction[j]
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, y)
     rows.used[0] = k + 1

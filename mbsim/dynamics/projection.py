@@ -24,7 +24,6 @@ from mbsim.dynamics.equations import (
 from mbsim.dynamics.kinematics import place_bodies, place_body, position
 from mbsim.dynamics.tree import (
     child_axis,
-    origin,
     parent_axis,
     parent_body,
     prepare,
@@ -214,7 +213,7 @@ def displace(scene, y):
         b = scene.tree.body[k]
         D = scene.sweep.answer[k]
         turn = (D[0], D[1], D[2])
-        r = sub(position(scene, y, b), origin(scene, y, k))
+        r = vector(scene.sweep.arm[k])
         move = add((D[3], D[4], D[5]), cross(turn, r))
         for i in range(3):
             scene.sweep.c[k, i] = move[i]
@@ -233,7 +232,7 @@ def speed_up(scene, y):
         b = scene.tree.body[k]
         D = scene.sweep.answer[k]
         turn = (D[0], D[1], D[2])
-        r = sub(position(scene, y, b), origin(scene, y, k))
+        r = vector(scene.sweep.arm[k])
         rise = add((D[3], D[4], D[5]), cross(turn, r))
         set_velocity(scene, y, b, add(vector(scene.work.v[b]), rise))
         set_spin(scene, y, b, add(vector(scene.work.w[b]), turn))

@@ -1,63 +1,146 @@
-"""Reactions of joints and motions: force and torque on the body of marker I, at marker I."""
+"""Reactions of joints and motions: force and torque on the body of marker I, at marker I.
+
+Where equations follow from others, internal forces are not known: any sum of the self-stresses,
+one for each implied equation, may be added. Those reactions are given whose sum of
+|F|^2 + |T|^2 / L^2 over all connections is least (L the model's size).
+"""
 
 from __future__ import annotations
 
+import math
+
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, scale, sub
-from mbsim.dynamics.equations import active_count, side_place
+from mbsim.dynamics.equations import (
+    active_count,
+    add_wrench,
+    along,
+    fill_equation,
+    is_active,
+    side_place,
+    solve_matrix,
+)
 from mbsim.dynamics.markers import marker_point
-from mbsim.dynamics.tree import origin
+from mbsim.dynamics.tree import origin, respond
+
+#: A self-stress that others leave less of than this part is none of its own.
+_NEW = 1e-9
 
 
 @jitable
-def add_reaction(scene, y, c, place, wrench, factor):
+def add_reaction(scene, y, c, place, wrench, factor, out):
     """Add `factor` times a wrench about O of that place to the reaction of connection c."""
     at = sub(marker_point(scene, y, scene.connections.i[c]), origin(scene, y, place))
     force = scale(factor, (wrench[3], wrench[4], wrench[5]))
     moment = cross(at, force)
-    row = scene.work.joint[c]
     for i in range(3):
-        row[i] += force[i]
-        row[3 + i] += factor * wrench[i] - moment[i]
+        out[6 * c + i] += force[i]
+        out[6 * c + 3 + i] += factor * wrench[i] - moment[i]
 
 
 @jitable
-def add_tree_reaction(scene, y, c):
+def add_tree_reaction(scene, y, c, motion, out):
     """Add what the joint of the tree carries: H A + p of all that hangs on it."""
     sweep, k = scene.sweep, scene.connections.tree[c]
     for i in range(6):
         total = sweep.p[k, i]
         for j in range(6):
-            total += sweep.H[k, i, j] * sweep.a[k, j]
+            total += sweep.H[k, i, j] * motion[k, j]
         sweep.z[k, i] = total
     # on the child; marker I may be on the parent
-    add_reaction(scene, y, c, k, sweep.z[k], -1.0 if scene.connections.flip[c] == 1 else 1.0)
+    factor = -1.0 if scene.connections.flip[c] == 1 else 1.0
+    add_reaction(scene, y, c, k, sweep.z[k], factor, out)
 
 
 @jitable
-def add_equation_reaction(scene, y, r):
-    """Add what the multiplier of the r-th equation in use does to the body of I."""
+def add_equation_reaction(scene, y, e, multiplier, out):
+    """Add what a multiplier of equation e does to the body of I."""
     eq, sweep = scene.equations, scene.sweep
-    e = eq.active[r]
     c = eq.connection[e]
+    body = scene.markers.body[scene.connections.i[c]]
+    other = scene.markers.body[scene.connections.j[c]]
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
             m = eq.i[k] if side == 0 else eq.j[k]
             place = side_place(scene, m)
-            if scene.markers.body[m] == scene.markers.body[scene.connections.i[c]] and place >= 0:
-                G = sweep.G[k, 6 * side : 6 * side + 6]
-                add_reaction(scene, y, c, place, G, sweep.multiplier[r])
+            G = sweep.G[k, 6 * side : 6 * side + 6]
+            if place >= 0 and scene.markers.body[m] == body:
+                add_reaction(scene, y, c, place, G, multiplier, out)
+            elif place >= 0 and body == len(scene.bodies.mass) and scene.markers.body[m] == other:
+                # on ground acts the opposite of what acts on J
+                add_reaction(scene, y, c, place, G, -multiplier, out)
 
 
 @jitable
-def fill_reactions(scene, y):
-    """Fill the reactions of all connections; the state has just been evaluated."""
-    connections = scene.connections
-    for c in range(len(connections.i)):
-        for i in range(6):
-            scene.work.joint[c, i] = 0.0
-    for c in range(len(connections.i)):
-        if connections.tree[c] >= 0:
-            add_tree_reaction(scene, y, c)
+def add_reactions(scene, y, motion, out):
+    """Add the reactions of all connections for forces p, accelerations and multipliers."""
+    for c in range(len(scene.connections.i)):
+        if scene.connections.tree[c] >= 0:
+            add_tree_reaction(scene, y, c, motion, out)
     for r in range(active_count(scene)):
-        add_equation_reaction(scene, y, r)
+        add_equation_reaction(scene, y, scene.equations.active[r], scene.sweep.multiplier[r], out)
+
+
+@jitable
+def self_stress(scene, t, y, e, out):
+    """Fill the reactions by which equation e, implied by others, and those hold each other."""
+    sweep, active, n = scene.sweep, scene.equations.active, active_count(scene)
+    nt = len(scene.tree.body)
+    fill_equation(scene, t, y, e)
+    for last in range(2):
+        for k in range(nt):
+            for i in range(6):
+                sweep.p[k, i] = 0.0
+        add_wrench(scene, e, 1.0)
+        if last == 1:
+            for r in range(n):
+                add_wrench(scene, active[r], sweep.multiplier[r])
+        respond(scene, 0, nt, 0, sweep.answer)
+        if last == 0:
+            for r in range(n):
+                sweep.rhs[r] = -along(scene, active[r], sweep.answer, -1)
+            solve_matrix(scene)
+    for i in range(len(out)):
+        out[i] = 0.0
+    add_reactions(scene, y, sweep.answer, out)
+    add_equation_reaction(scene, y, e, 1.0, out)
+
+
+@jitable
+def product(scene, a, b):
+    """Return the sum of F.F' + T.T'/L^2 over all connections."""
+    L2, total = scene.world.scale[0] ** 2, 0.0
+    for c in range(len(scene.connections.i)):
+        for i in range(3):
+            at = 6 * c + i
+            total += a[at] * b[at] + a[at + 3] * b[at + 3] / L2
+    return total
+
+
+@jitable
+def fill_reactions(scene, t, y):
+    """Fill the reactions of all connections; the state has just been evaluated."""
+    out, stress = scene.work.reaction, scene.sweep.stress
+    for i in range(len(out)):
+        out[i] = 0.0
+    add_reactions(scene, y, scene.sweep.a, out)
+    count = 0
+    for e in range(len(scene.equations.program)):
+        if is_active(scene, e):
+            continue
+        new = stress[count]
+        self_stress(scene, t, y, e, new)
+        whole = math.sqrt(product(scene, new, new))
+        for k in range(count):
+            part = product(scene, new, stress[k])
+            for i in range(len(new)):
+                new[i] -= part * stress[k, i]
+        size = math.sqrt(product(scene, new, new))
+        if not size > _NEW * whole:
+            continue
+        for i in range(len(new)):
+            new[i] /= size
+        part = product(scene, out, new)
+        for i in range(len(new)):
+            out[i] -= part * new[i]
+        count += 1

@@ -122,6 +122,8 @@ def fill_body(scene, y, k):
     bodies, work, H = scene.bodies, scene.work, scene.sweep.H[k]
     R, J, m = work.R[b], bodies.inertia[b], bodies.mass[b]
     r = sub(position(scene, y, b), origin(scene, y, k))
+    for i in range(3):
+        scene.sweep.arm[k, i] = r[i]
     square = dot(r, r)
     for i in range(3):
         row = (
@@ -207,14 +209,13 @@ def prepare(scene, y):
 
 
 @jitable
-def load(scene, y):
+def load(scene):
     """Start the forces p of all places: what velocities call for less what acts."""
     sweep, work, tree = scene.sweep, scene.work, scene.tree
     for k in range(len(tree.body)):
         b = tree.body[k]
         force = vector(work.force[b])
-        arm = sub(position(scene, y, b), origin(scene, y, k))
-        torque = add(vector(work.torque[b]), cross(arm, force))
+        torque = add(vector(work.torque[b]), cross(vector(sweep.arm[k]), force))
         for i in range(3):
             sweep.p[k, i] = sweep.bias[k, i] - torque[i]
             sweep.p[k, 3 + i] = sweep.bias[k, 3 + i] - force[i]
@@ -277,14 +278,14 @@ def respond(scene, first, end, moving, out):
 
 
 @jitable
-def write_accelerations(scene, y, dy):
+def write_accelerations(scene, dy):
     """Write the accelerations of all places into y'; return their sum, finite if all are."""
     total = 0.0
     for k in range(len(scene.tree.body)):
         b = scene.tree.body[k]
         A = scene.sweep.a[k]
         alpha = (A[0], A[1], A[2])
-        r = sub(position(scene, y, b), origin(scene, y, k))
+        r = vector(scene.sweep.arm[k])
         a = add((A[3], A[4], A[5]), cross(alpha, r))
         a = add(a, cross(vector(scene.work.w[b]), vector(scene.work.v[b])))
         turn = unrotate(scene.work.R[b], alpha)

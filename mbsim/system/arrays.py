@@ -57,7 +57,7 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
 DOORS = 7
 
 # what is asked for at JOINTS_DOOR
-ACCELERATE, PROJECT, REACT, KEEP, MATRIX, DISPLACE, SPEED_UP = range(7)
+ACCELERATE, PROJECT, REACT, KEEP, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -313,7 +313,7 @@ class Work(NamedTuple):
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
-    joint: F2  # (nj, 6) force, torque on I at the I marker
+    reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
 
 
@@ -332,6 +332,7 @@ class Sweep(NamedTuple):
     p: F2  # (nt, 6) force that the body would need, articulated
     z: F2  # (nt, 6) forces, then accelerations, in the free directions
     a: F2  # (nt, 6) acceleration
+    arm: F2  # (nt, 3) cg from O
     bias: F2  # (nt, 6) force that velocities call for
     answer: F2  # (nt, 6) accelerations by a unit multiplier
     mark: I1  # (nt,) by root: equation for which `answer` was made
@@ -341,6 +342,9 @@ class Sweep(NamedTuple):
     multiplier: F1  # (ne,)
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
+    size: F1  # (ne,) square root of what A would have if the bodies were free
+    quality: F1  # (1,) least pivot over its size squared when equations were chosen
+    stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
 
 

@@ -482,6 +482,7 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         p=np.zeros((nt, 6)),
         z=np.zeros((nt, 6)),
         a=np.zeros((nt, 6)),
+        arm=np.zeros((nt, 3)),
         bias=np.zeros((nt, 6)),
         answer=np.zeros((nt, 6)),
         mark=np.zeros(nt, dtype=np.int64),
@@ -491,5 +492,8 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         multiplier=np.zeros(ne),
         rhs=np.zeros(ne),
         skyline=np.zeros(ne, dtype=np.int64),
+        size=np.ones(ne),
+        quality=np.zeros(1),
+        stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
     )

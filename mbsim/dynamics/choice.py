@@ -1,0 +1,160 @@
+"""Which equations are used where some follow from others (a loop of revolutes in a plane).
+
+The matrix A of all equations, each divided by what it would be if the bodies were free, is
+factored with the largest pivot first; what has no pivot left is implied. The choice is kept while
+its least pivot holds up: off the manifold implied equations differ from what implies them, so a
+choice that changed within a step would be a kink.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, dot, sub, vector
+from mbsim.dynamics.equations import (
+    CONTRADICTION,
+    RESIDUAL,
+    active_count,
+    fill_equation,
+    fill_equations,
+    fill_matrix,
+    is_active,
+    side_place,
+)
+
+#: What at most is left of an equation that others imply, as part of its size for free bodies.
+IMPLIED = 1e-11
+#: A choice is made anew when its least pivot falls below this part of what it was.
+_WORN = 0.1
+#: Largest residual of an implied equation, over its unit, before it contradicts the others.
+_APART = 1e-6
+
+
+@jitable
+def fill_size(scene, e):
+    """Fill the square root of what A would have for equation e if the bodies were free."""
+    eq, sweep, total = scene.equations, scene.sweep, 0.0
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
+            if place < 0:
+                continue
+            b = scene.tree.body[place]
+            G = sweep.G[k, 6 * side : 6 * side + 6]
+            force = (G[3], G[4], G[5])
+            torque = sub((G[0], G[1], G[2]), cross(vector(sweep.arm[place]), force))
+            J = scene.bodies.inertia[b]
+            total += dot(force, force) / scene.bodies.mass[b]
+            total += dot(torque, torque) / (J[0, 0] + J[1, 1] + J[2, 2])
+    sweep.size[e] = math.sqrt(total) if total > 0.0 else 1.0
+
+
+@jitable
+def share_tree(scene, e, f):
+    """Return whether two equations act on bodies of one tree."""
+    eq, root = scene.equations, scene.tree.root
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for s in range(2):
+            place = side_place(scene, eq.i[k] if s == 0 else eq.j[k])
+            if place < 0:
+                continue
+            for q in range(eq.first[f], eq.first[f + 1]):
+                for u in range(2):
+                    other = side_place(scene, eq.i[q] if u == 0 else eq.j[q])
+                    if other >= 0 and root[other] == root[place]:
+                        return True
+    return False
+
+
+@jitable
+def fill_skyline(scene):
+    """Set where the rows of the matrix of the equations in use begin."""
+    active = scene.equations.active
+    for r in range(active_count(scene)):
+        first = 0
+        while first < r and not share_tree(scene, active[first], active[r]):
+            first += 1
+        scene.sweep.skyline[r] = first
+
+
+@jitable
+def use_all(scene):
+    """Take all equations into use."""
+    active = scene.equations.active
+    n = len(active) - 1
+    for e in range(n):
+        active[e] = e
+    active[n] = n
+    fill_skyline(scene)
+
+
+@jitable
+def choose(scene, t, y):
+    """Choose equations that are independent at y, where the tree has been prepared."""
+    sweep, active = scene.sweep, scene.equations.active
+    n = len(active) - 1
+    use_all(scene)
+    fill_equations(scene, t, y)
+    fill_matrix(scene)
+    A = sweep.A
+    for e in range(n):
+        fill_size(scene, e)
+    for e in range(n):
+        for f in range(e + 1):
+            value = A[e, f] / (sweep.size[e] * sweep.size[f]) if f >= sweep.skyline[e] else 0.0
+            A[e, f] = A[f, e] = value
+    least, count = 1.0, 0
+    for e in range(n):
+        active[e] = 0
+    while count < n:
+        best, pivot = -1, 0.0
+        for e in range(n):
+            if active[e] == 0 and A[e, e] > 1.001 * pivot:
+                best, pivot = e, A[e, e]
+        if best < 0 or pivot <= IMPLIED:
+            break
+        active[best] = 1
+        least = min(least, pivot)
+        count += 1
+        for e in range(n):
+            if active[e] == 0:
+                part = A[e, best] / pivot
+                for f in range(n):
+                    A[e, f] -= part * A[best, f]
+    sweep.quality[0] = least
+    count = 0
+    for e in range(n):
+        if active[e] == 1:
+            active[count] = e
+            count += 1
+    active[n] = count
+    fill_skyline(scene)
+
+
+@jitable
+def least_pivot(scene):
+    """Return the least pivot of the factor at hand over what its equation would have alone."""
+    least = 1.0
+    for r in range(active_count(scene)):
+        pivot = scene.sweep.A[r, r] / scene.sweep.size[scene.equations.active[r]]
+        least = min(least, pivot * pivot)
+    return least
+
+
+@jitable
+def keep_choice(scene, t, y):
+    """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
+    n = len(scene.equations.active) - 1
+    if active_count(scene) == n:
+        return 0
+    for e in range(n):
+        if not is_active(scene, e):
+            fill_equation(scene, t, y, e)
+            unit = scene.equations.unit[e]
+            if not abs(scene.sweep.rate[e, RESIDUAL]) <= _APART * unit:
+                scene.work.trouble[1] = e
+                return CONTRADICTION
+    if least_pivot(scene) < _WORN * scene.sweep.quality[0]:
+        choose(scene, t, y)
+    return 0
