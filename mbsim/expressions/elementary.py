@@ -29,15 +29,11 @@ ABS, SIN, COS, TAN, ASIN, ACOS = (
     CODES[name] for name in ("ABS", "SIN", "COS", "TAN", "ASIN", "ACOS")
 )
 ATAN, SINH, COSH, TANH, EXP = (CODES[name] for name in ("ATAN", "SINH", "COSH", "TANH", "EXP"))
-LOG, LOG10, SQRT, AINT, ANINT = (
-    CODES[name] for name in ("LOG", "LOG10", "SQRT", "AINT", "ANINT")
-)
+LOG, LOG10, SQRT, AINT, ANINT = (CODES[name] for name in ("LOG", "LOG10", "SQRT", "AINT", "ANINT"))
 ATAN2, MOD, SIGN, DIM = (CODES[name] for name in ("ATAN2", "MOD", "SIGN", "DIM"))
 MIN, MAX, IF, STEP, STEP5 = (CODES[name] for name in ("MIN", "MAX", "IF", "STEP", "STEP5"))
 HAVSIN, SHF, POLY, CHEBY = (CODES[name] for name in ("HAVSIN", "SHF", "POLY", "CHEBY"))
-FORSIN, FORCOS, IMPACT, BISTOP = (
-    CODES[name] for name in ("FORSIN", "FORCOS", "IMPACT", "BISTOP")
-)
+FORSIN, FORCOS, IMPACT, BISTOP = (CODES[name] for name in ("FORSIN", "FORCOS", "IMPACT", "BISTOP"))
 
 LN10 = math.log(10.0)
 

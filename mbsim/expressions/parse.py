@@ -143,7 +143,9 @@ class _Parser:
         self.nest(-1)
         if sign.text == "+":
             return node
-        return Number(-node.value) if isinstance(node, Number) else Call("NEG", (node,), sign.column)
+        return (
+            Number(-node.value) if isinstance(node, Number) else Call("NEG", (node,), sign.column)
+        )
 
     def power(self) -> Node:
         base = self.primary()

@@ -46,7 +46,11 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
 
 # entries of `World.doors`
 FCL_DOOR, NEAR_DOOR, APPLIED_DOOR, JOINTS_DOOR, PROJECT_DOOR, REACTIONS_DOOR, COMMIT_DOOR = range(7)
-DOORS = 7
+EXPRESSION_DOOR, VALUES_DOOR, ANGLES_DOOR = range(7, 10)
+DOORS = 10
+
+# entries of `Applied.kind`
+LINE_FORCE, AXIS_FORCE, AXIS_TORQUE = range(3)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -165,10 +169,10 @@ class Angles(NamedTuple):
 
 
 class Programs(NamedTuple):
-    """Expressions as instructions of a stack machine, see expressions.program."""
+    """Expressions as instructions of a stack machine."""
 
     start: I1  # (programs + 1,) first instruction of each
-    code: I2  # (instructions, 6) operation and up to five rows or indices
+    code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
 
@@ -182,6 +186,7 @@ class Applied(NamedTuple):
     par: F2  # (nf, 4) stiffness, damping, length, preload
     program: I1  # (nf,) -1 for none
     angle: I1  # (nf,) row of `Angles`, -1 for none
+    alone: I1  # (nf,) 1 where nothing acts on J
 
 
 class Tree(NamedTuple):

@@ -22,6 +22,7 @@ class MarkerTable:
     body_row: dict[int, int]
     rows: dict[int, int] = field(default_factory=dict)
     angle_rows: dict[tuple[int, int], int] = field(default_factory=dict)
+    turned_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     frames: list[tuple[int, Array, Array]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -46,6 +47,21 @@ class MarkerTable:
         """Return the row of a new marker: origin (3,) and axes (3, 3) in the body's cg axes."""
         self.frames.append((body, p, R))
         return len(self.frames) - 1
+
+    def turned(self, row: int, axis: int) -> int:
+        """Return the row of a marker turned so that an angle about `axis` is one about its z.
+
+        The angle about x is atan2(-z_I.y_J, z_I.z_J), so that z, -y, x become the axes; that
+        about y is atan2(z_I.x_J, z_I.z_J), so that z, x, y do.
+        """
+        if axis == 2:
+            return row
+        if (row, axis) not in self.turned_rows:
+            body, p, R = self.frames[row]
+            x, y, z = R.T
+            axes = (z, -y, x) if axis == 0 else (z, x, y)
+            self.turned_rows[row, axis] = self.add(body, p, np.column_stack(axes))
+        return self.turned_rows[row, axis]
 
     def angle(self, i: int, j: int) -> int:
         """Return the row of the angle of marker row i about the z-axis of marker row j."""
