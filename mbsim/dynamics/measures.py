@@ -193,7 +193,11 @@ def relative_spin(scene, i, j):
 @jitable
 def closing(scene, y, i, j):
     """Return VR, the rate of DM; 0 where the points coincide."""
-    return distance(scene, y, i, j, AS_THEY_ARE, 0)[1]
+    r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    d = norm(r)
+    if d == 0.0:
+        return 0.0
+    return dot(r, sub(marker_velocity(scene, i), marker_velocity(scene, j))) / d
 
 
 @jitable

@@ -16,15 +16,15 @@ from mbsim.core.rotation import add, scale, sub
 from mbsim.expressions.functions import FUNCTIONS, Kind
 
 # operations of the stack machine; elementary ones are below FIRST_MEASURE
-_NAMES = ("ADD", "SUB", "MUL", "DIV", "POW", "NEG") + tuple(
-    name for name, function in FUNCTIONS.items() if function.kind is Kind.ELEMENTARY
-)
+_OPERATORS = ("ADD", "SUB", "MUL", "DIV", "POW", "NEG")
+_ELEMENTARY = [name for name, entry in FUNCTIONS.items() if entry.kind is Kind.ELEMENTARY]
+_NAMES = (*_OPERATORS, *_ELEMENTARY)
 #: Operation code of each elementary function.
 CODES = {name: 2 + k for k, name in enumerate(_NAMES)}
 NUMBER, TIME = 0, 1
 FIRST_MEASURE = 2 + len(_NAMES)
 
-ADD, SUB, MUL, DIV, POW, NEG = (CODES[name] for name in ("ADD", "SUB", "MUL", "DIV", "POW", "NEG"))
+ADD, SUB, MUL, DIV, POW, NEG = (CODES[name] for name in _OPERATORS)
 ABS, SIN, COS, TAN, ASIN, ACOS = (
     CODES[name] for name in ("ABS", "SIN", "COS", "TAN", "ASIN", "ACOS")
 )

@@ -112,7 +112,7 @@ class ProgramTable:
                 if forces:
                     allowed.add(Kind.FORCE)
         try:
-            made = _Compiler(self, frozenset(allowed)).node(expression.root)
+            made = _Compiler(self, frozenset(allowed)).compile(expression.root)
         except ExpressionError as fault:
             if owner is None:
                 raise
@@ -183,36 +183,47 @@ class _Compiler:
         self.open: list[int] = []  # variables that are being put in
         self.made: dict[int, list[Instruction]] = {}
 
-    def node(self, node: Node) -> list[Instruction]:
-        """Return the instructions of a tree."""
-        if isinstance(node, Number):
-            return [Instruction(NUMBER, value=node.value)]
-        if isinstance(node, Time):
-            return [Instruction(TIME)]
+    def compile(self, root: Node) -> list[Instruction]:
+        """Return the instructions of a tree, arguments before their function."""
+        made: list[Instruction] = []
+        starts: list[int] = []  # of what is complete and not yet an argument
+        waiting: list[tuple[Node, bool]] = [(root, False)]
+        while waiting:
+            node, complete = waiting.pop()
+            if isinstance(node, Call) and self.is_elementary(node):
+                if complete:
+                    _combine(node, made, starts)
+                else:
+                    waiting.append((node, True))
+                    waiting.extend((arg, False) for arg in reversed(node.args))
+                continue
+            starts.append(len(made))
+            made.extend(self.leaf(node))
+            if len(made) > LONGEST_PROGRAM:
+                column = node.column if isinstance(node, Call) else 1
+                raise ExpressionError(
+                    f"more than {LONGEST_PROGRAM} operations, those of variables counted", column
+                )
+        return made
+
+    def is_elementary(self, node: Call) -> bool:
+        """Return whether a function takes its arguments from the stack; refuse what may not be."""
         function = FUNCTIONS.get(node.name)
         kind = function.kind if function else Kind.ELEMENTARY
         if kind not in self.allowed:
             raise ExpressionError(
                 f"{node.name} looks at {kind.value}, which cannot be used here", node.column
             )
-        if kind is Kind.ELEMENTARY:
-            return self.elementary(node)
-        if kind is Kind.VARIABLE:
-            return self.variable(node)
-        return [self.measure(node, kind)]
+        return kind is Kind.ELEMENTARY
 
-    def elementary(self, node: Call) -> list[Instruction]:
-        """Return an operation after its arguments, or the number that it gives."""
-        args = [self.node(arg) for arg in node.args]
-        apply = Instruction(CODES[node.name], (len(args),))
-        if all(len(arg) == 1 and arg[0].op == NUMBER for arg in args):
-            return [_fold(apply, [arg[0].value for arg in args], node)]
-        made = [*(instruction for arg in args for instruction in arg), apply]
-        if len(made) > LONGEST_PROGRAM:
-            raise ExpressionError(
-                f"more than {LONGEST_PROGRAM} operations, those of variables counted", node.column
-            )
-        return made
+    def leaf(self, node: Node) -> list[Instruction]:
+        """Return the instructions of what takes nothing from the stack."""
+        if isinstance(node, Number):
+            return [Instruction(NUMBER, value=node.value)]
+        if isinstance(node, Time):
+            return [Instruction(TIME)]
+        kind = FUNCTIONS[node.name].kind
+        return self.variable(node) if kind is Kind.VARIABLE else [self.measure(node, kind)]
 
     def variable(self, node: Call) -> list[Instruction]:
         """Return the instructions of another variable's expression."""
@@ -231,7 +242,7 @@ class _Compiler:
             )
         self.open.append(key)
         try:
-            made = self.node(variable.expr.root)
+            made = self.compile(variable.expr.root)
         except ExpressionError as fault:
             if fault.message.startswith("in variable"):
                 raise
@@ -291,12 +302,26 @@ class _Compiler:
         return Instruction(ELEMENT, rows, element=element)
 
 
-def _fold(apply: Instruction, values: list[float], node: Call) -> Instruction:
-    """Return the number that an operation makes of numbers."""
+def _combine(node: Call, made: list[Instruction], starts: list[int]) -> None:
+    """Put a function behind its arguments, or the number that it makes of numbers in their place."""
+    count = len(node.args)
+    first = starts[-count]
+    del starts[-count:]
+    starts.append(first)
+    args = made[first:]
+    if len(args) == count and all(arg.op == NUMBER for arg in args):
+        made[first:] = [_folded(node, [arg.value for arg in args])]
+    else:
+        made.append(Instruction(CODES[node.name], (count,)))
+
+
+def _folded(node: Call, values: list[float]) -> Instruction:
+    """Return the number that a function makes of numbers."""
     stack = np.zeros((len(values), 3))
     stack[:, 0] = values
     try:
-        elementary.apply(apply.op, len(values), stack, len(values))
+        with np.errstate(divide="raise", over="raise", invalid="raise"):
+            elementary.apply(CODES[node.name], len(values), stack, len(values))
     except (ArithmeticError, ValueError):
         stack[0, 0] = np.nan
     if not np.isfinite(stack[0, 0]):
