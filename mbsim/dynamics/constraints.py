@@ -11,7 +11,6 @@ from mbsim.dynamics.equations import (
     FLOW,
     active_count,
     fill_matrix,
-    followed_angle,
     hold,
 )
 from mbsim.dynamics.projection import (
@@ -54,13 +53,6 @@ def constrain(scene, t, y, dy):
 
 
 @jitable
-def commit_angles(scene):
-    """Keep the angles with their whole turns."""
-    for slot in range(len(scene.angles.i)):
-        scene.state.angle[slot] = followed_angle(scene, slot)
-
-
-@jitable
 def serve(scene, what, t, y, dy):
     """Do what is asked for at the door of joints; return 0 or a code.
 
@@ -74,7 +66,6 @@ def serve(scene, what, t, y, dy):
     elif what == REACT:
         fill_reactions(scene, t, y)
     elif what == KEEP:
-        commit_angles(scene)
         return keep_choice(scene, t, y)
     elif what == MATRIX:
         use_all(scene)

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
+from mbsim.dynamics.angles import followed_angle
+from mbsim.dynamics.expressions import gradient, jet
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.tree import load, origin, put, respond
-from mbsim.system.arrays import ANGLE, GENERAL, GRADIENT_DOOR, JET_DOOR, OFFSET, PERP
+from mbsim.system.arrays import ANGLE, GENERAL, OFFSET, PERP
 
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
@@ -30,27 +31,6 @@ CONTRADICTION = 9
 
 #: A pivot below this part of its diagonal is that of an equation that others imply here.
 LEAST_PIVOT = 1e-13
-
-
-@jitable
-def wrapped(angle):
-    """Return an angle brought into -pi..pi by whole turns."""
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-@jitable
-def raw_angle(scene, slot):
-    """Return the angle of x of I about z of J, from x of J, within a turn."""
-    x = marker_axis(scene, scene.angles.i[slot], 0)
-    j = scene.angles.j[slot]
-    return math.atan2(dot(x, marker_axis(scene, j, 1)), dot(x, marker_axis(scene, j, 0)))
-
-
-@jitable
-def followed_angle(scene, slot):
-    """Return that angle with its whole turns, from where it was at the committed state."""
-    before = scene.state.angle[slot]
-    return before + wrapped(raw_angle(scene, slot) - before)
 
 
 @jitable
@@ -157,7 +137,7 @@ def general_term(scene, t, y, i, program, G):
     """Fill the gradient of a program with respect to the body of marker i."""
     b = scene.markers.body[i]
     out = scene.sweep.jet
-    call_int(scene.world.doors[GRADIENT_DOOR], (scene, t, y, program, b, out))
+    gradient(scene, t, y, program, b, out)
     force, torque = (out[0], out[1], out[2]), (out[3], out[4], out[5])
     add_side(scene, y, G[0:6], i, position(scene, y, b), force, torque)
     for k in range(6, 12):
@@ -192,16 +172,15 @@ def fill_equation(scene, t, y, e):
                 G[c] *= factor
     rate = flow
     if eq.program[e] >= 0:
-        jet = sweep.jet
-        call_int(scene.world.doors[JET_DOOR], (scene, t, y, eq.program[e], jet))
+        f, df, ddf = jet(scene, t, y, eq.program[e])
         if eq.general[e] == 1:
-            value, rate, second = value + jet[0], rate + jet[1], second + jet[2]
+            value, rate, second = value + f, rate + df, second + ddf
         elif eq.level[e] == 2:
-            value, rate, second = value - jet[0], rate - jet[1], second - jet[2]
+            value, rate, second = value - f, rate - df, second - ddf
         elif eq.level[e] == 1:
-            rate, second = rate - jet[0], second - jet[1]
+            rate, second = rate - f, second - df
         else:
-            second -= jet[0]
+            second -= f
     sweep.rate[e, RESIDUAL] = value
     sweep.rate[e, MISMATCH] = rate
     sweep.rate[e, GAMMA] = second

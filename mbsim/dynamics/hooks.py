@@ -154,6 +154,11 @@ _JOINTS = types.int64(types.int64, types.int64, types.float64, _POINTER, _POINTE
 _HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
 
 
+def needs_expressions(scene: Scene) -> bool:
+    """Return whether there are applied forces, expressions or followed angles."""
+    return bool(len(scene.applied.kind) or len(scene.programs.start) > 1 or len(scene.angles.i))
+
+
 def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
     """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
 
@@ -161,7 +166,16 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     """
     table = pack(scene)
     hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
+    if len(scene.angles.i) > 0:
+        from mbsim.dynamics.doors import limit_turn
+
+        hooks = tuple(limit_turn if hook is _limit else hook for hook in hooks)
     addresses = [jit.address(hook, HOOK) for hook in hooks]
+    if needs_expressions(scene):
+        # only then: what they are made of need not be imported
+        from mbsim.dynamics.doors import open_expressions
+
+        open_expressions(scene)
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     if len(scene.tree.body) > 0:

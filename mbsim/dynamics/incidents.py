@@ -26,6 +26,7 @@ from mbsim.dynamics.detection import measure_pair
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
 from mbsim.system.arrays import (
+    ANGLES_DOOR,
     APPROACH,
     BODY_SIZE,
     ENERGY_LOST,
@@ -367,6 +368,8 @@ def commit(scene, t, h, y):
         if graphics.body[g] < ground:
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
+    if scene.world.doors[ANGLES_DOOR] != 0:
+        call_int(scene.world.doors[ANGLES_DOOR], (scene,))
     if len(scene.crowds.contact) > 0:
         call_int(scene.world.doors[NEAR_DOOR], (scene, y))
     return changed

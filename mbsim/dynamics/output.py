@@ -16,6 +16,7 @@ from mbsim.system.arrays import (
     LIVE,
     REACT,
     STORED_ENERGY,
+    VALUES_DOOR,
 )
 
 
@@ -111,6 +112,8 @@ def write_row(scene, t, y, f):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
     for j in range(len(work.reaction)):
         rows.joint[k, j] = work.reaction[j]
+    if scene.world.doors[VALUES_DOOR] != 0:
+        call_int(scene.world.doors[VALUES_DOOR], (scene, t, y))
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, y)
     rows.used[0] = k + 1
@@ -172,7 +175,10 @@ def scaled_error(scene, h, e, y):
                 square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
                 largest = max(largest, max(square, e[at + 2] ** 2))
     # the energy balance closes as well as the motion
-    for c in range(len(e) - len(scene.contacts.id), len(e)):
+    first = len(e) - max(1, len(scene.contacts.id))
+    for kept in scene.world.ledger:
+        first -= 1 if kept >= 0 else 0
+    for c in range(first, len(e)):
         largest = max(largest, (e[c] / scene.world.scale[2]) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)

@@ -50,11 +50,14 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     NEAR_DOOR,
     APPLIED_DOOR,
     JOINTS_DOOR,
-    JET_DOOR,
-    GRADIENT_DOOR,
+    EXPRESSION_DOOR,
     VALUES_DOOR,
+    ANGLES_DOOR,
 ) = range(7)
 DOORS = 7
+
+# entries of `Applied.kind`
+LINE_FORCE, AXIS_FORCE, AXIS_TORQUE = range(3)
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(8)
@@ -182,10 +185,10 @@ class Angles(NamedTuple):
 
 
 class Programs(NamedTuple):
-    """Expressions as instructions of a stack machine, see expressions.program."""
+    """Expressions as instructions of a stack machine."""
 
     start: I1  # (programs + 1,) first instruction of each
-    code: I2  # (instructions, 6) operation and up to five rows or indices
+    code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
 
@@ -199,6 +202,7 @@ class Applied(NamedTuple):
     par: F2  # (nf, 4) stiffness, damping, length, preload
     program: I1  # (nf,) -1 for none
     angle: I1  # (nf,) row of `Angles`, -1 for none
+    alone: I1  # (nf,) 1 where nothing acts on J
 
 
 class Tree(NamedTuple):

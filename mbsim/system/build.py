@@ -340,10 +340,15 @@ def _scales(placement: Placement, speed: float) -> np.ndarray[Any, Any]:
     return np.array([placement.L, V, heaviest * V * V])
 
 
-def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.ndarray[Any, Any]:
-    """Return the ODE vector at the start: X and dissipated energy are 0."""
+def _ledger(works: bool, damps: bool, at: int) -> np.ndarray[Any, Any]:
+    """Return where in y, from `at` on, the work of motions and the damped energy stand."""
+    return np.array([at if works else -1, at + int(works) if damps else -1], dtype=np.int64)
+
+
+def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
+    """Return the ODE vector at the start: X, work and dissipated energy are 0."""
     bodies = list(placement.bodies.values())
-    y = np.zeros(a.BODY_SIZE * len(bodies) + 3 * x_count + max(1, contact_count))
+    y = np.zeros(a.BODY_SIZE * len(bodies) + others)
     for k, body in enumerate(bodies):
         row = y[a.BODY_SIZE * k : a.BODY_SIZE * (k + 1)]
         row[0:3] = body.p
@@ -351,6 +356,17 @@ def _initial_y(placement: Placement, x_count: int, contact_count: int) -> np.nda
         row[7:10] = body.v
         row[10:13] = body.R.T @ body.w
     return y
+
+
+def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
+    """Make the programs of requests, the last of all; return request and F number of each."""
+    made = []
+    for request in model.requests.values():
+        for k, expression in enumerate(request.exprs):
+            if expression is not None:
+                programs.add(expression, request, forces=True)
+                made.append((request.id, k + 1))
+    return made
 
 
 def _state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.State:
@@ -519,14 +535,16 @@ def build(
     x = np.full(ns, -1, dtype=np.int64)
     carried = np.flatnonzero(wanted)
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
-    y0 = _initial_y(placement, len(carried), len(contact_ids))
 
     table = MarkerTable(placement, row)
-    programs = ProgramTable()
+    programs = ProgramTable(table, model.variables)
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
-    values: list[tuple[int, int]] = []
+    values = _values(model, programs)
+    ledger = _ledger(bool(model.motions), nf > 0, a.BODY_SIZE * nb + 3 * len(carried))
+    kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
+    y0 = _initial_y(placement, 3 * len(carried) + kept)
     markers, angles = table.arrays()
 
     speed = _speed_scale(model, placement, end_time)
@@ -542,7 +560,7 @@ def build(
         slots=a.Slots(slot_pair, x),
         markers=markers,
         angles=angles,
-        programs=programs.arrays(),
+        programs=programs.arrays(mechanism.elements, applied_ids),
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
@@ -552,7 +570,7 @@ def build(
             _scales(placement, speed),
             np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
-            np.full(2, -1, dtype=np.int64),
+            ledger,
         ),
         state=_state(nb, len(graphic_ids), ns, table.start_angles()),
         log=_log(len(contact_ids)),

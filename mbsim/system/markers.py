@@ -23,6 +23,7 @@ class MarkerTable:
     body_row: dict[int, int]
     rows: dict[int, int] = field(default_factory=dict)
     angle_rows: dict[tuple[int, int], int] = field(default_factory=dict)
+    turned_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     frames: list[tuple[int, Array, Array]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -55,6 +56,21 @@ class MarkerTable:
             return p, R
         place = list(self.placement.bodies.values())[body]
         return place.p + place.R @ p, place.R @ R
+
+    def turned(self, row: int, axis: int) -> int:
+        """Return the row of a marker turned so that an angle about `axis` is one about its z.
+
+        The angle about x is atan2(-z_I.y_J, z_I.z_J), so that z, -y, x become the axes; that
+        about y is atan2(z_I.x_J, z_I.z_J), so that z, x, y do.
+        """
+        if axis == 2:
+            return row
+        if (row, axis) not in self.turned_rows:
+            body, p, R = self.frames[row]
+            x, y, z = R.T
+            axes = (z, -y, x) if axis == 0 else (z, x, y)
+            self.turned_rows[row, axis] = self.add(body, p, np.column_stack(axes))
+        return self.turned_rows[row, axis]
 
     def angle(self, i: int, j: int) -> int:
         """Return the row of the angle of marker row i about the z-axis of marker row j."""

@@ -13,7 +13,6 @@ from itertools import product
 
 import numpy as np
 
-from mbsim.expressions.tree import Call, Node, Number
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Array, Coupler, GeneralConstraint, Joint, Model, Motion
 from mbsim.system import arrays as a
@@ -244,7 +243,7 @@ class _Builder:
         row = _DIRECTIONS[motion.direction]
         self.add_term(row, i, j, 1.0)
         assert motion.expr is not None
-        program = self.programs.add(motion.expr, differentiable=True)
+        program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
         level = _LEVELS[motion.val_type]
         self.sums.close(connection, "its motion", 0.0, self.unit([row]), program, level)
 
@@ -261,14 +260,14 @@ class _Builder:
 
     def add_general(self, constraint: GeneralConstraint) -> None:
         """Add an expression that is 0: one term for each body that it looks at."""
-        rows = [self.markers.row(id) for id in marker_ids(constraint.expr.root, self.model)]
+        program = self.programs.add(constraint.expr, constraint, differentiable=True)
+        rows = self.programs.looks_at(program)
         bodies = {self.markers.frames[row][0]: row for row in rows}
         bodies.pop(self.markers.ground, None)
         i, j = ([*bodies.values(), 0, 0])[:2]
         connection = self.connect("GCON", constraint.id, i, j)
         for row in bodies.values():
             self.sums.terms.append((a.GENERAL, row, 0, 0, 0, 1.0, -1))
-        program = self.programs.add(constraint.expr, differentiable=True)
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
     # the tree
@@ -400,25 +399,6 @@ def _describe(rows: tuple[Row, ...]) -> str:
         "distance": "distance",
     }
     return " with ".join(words[row.kind].format(i=row.i, j=row.j) for row in rows)
-
-
-def marker_ids(node: Node, model: Model) -> list[int]:
-    """Return the ids of all markers that an expression and its variables look at."""
-    if not isinstance(node, Call):
-        return []
-    if node.name == "VARVAL":
-        (number,) = node.args
-        assert isinstance(number, Number)
-        return marker_ids(model.variables[int(number.value)].expr.root, model)
-    from mbsim.expressions.functions import FUNCTIONS
-
-    own = marker_arguments(node) if node.name in FUNCTIONS else []
-    return [*own, *(id for arg in node.args for id in marker_ids(arg, model))]
-
-
-def marker_arguments(node: Call) -> list[int]:
-    """Return the marker ids among a call's own arguments."""
-    raise NotImplementedError
 
 
 def empty_tree(ground: int, n: int) -> a.Tree:

@@ -1,0 +1,46 @@
+"""Models of free bodies without graphics, made of elements and not of a deck's text."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.model.elements import Body, Marker, Model, Simulation, Units
+
+
+def rotation(axis, angle):
+    """Return the matrix that turns by `angle` about `axis` (Rodrigues)."""
+    n = np.asarray(axis, dtype=float)
+    n = n / np.linalg.norm(n)
+    K = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def body(id, mass=1.0, inertia=(0.1, 0.1, 0.1), p=(0, 0, 0), v=(0, 0, 0), w=(0, 0, 0)):
+    """Return a body and its cg marker, whose id is ten times that of the body."""
+    made = Body(
+        id,
+        mass=mass,
+        inertia=(*inertia, 0.0, 0.0, 0.0),
+        cg_id=10 * id,
+        v_ic=tuple(v),
+        w_ic=tuple(w),
+    )
+    return made, Marker(10 * id, body_id=id, pos=tuple(p))
+
+
+def model(*bodies, markers=(), end_time=1.0, print_interval=0.01, **elements):
+    """Return a model of ground (1), bodies with their markers, more markers and elements."""
+    made = [Body(1, is_ground=True), *(b for b, _ in bodies)]
+    frames = [Marker(10, body_id=1), *(m for _, m in bodies), *markers]
+    return Model(
+        name="free",
+        file="free.xml",
+        sha256="",
+        units=Units(),
+        bodies={b.id: b for b in made},
+        markers={m.id: m for m in frames},
+        graphics={},
+        contacts={},
+        simulations=(Simulation(end_time=end_time, print_interval=print_interval),),
+        **{kind: {e.id: e for e in given} for kind, given in elements.items()},
+    )
