@@ -101,8 +101,9 @@ class Runner:
         from mbsim.system.arrays import JOINTS_DOOR
 
         pointer = ctypes.c_void_p
-        signature = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer]
-        door = ctypes.CFUNCTYPE(ctypes.c_int64, *signature)(int(scene.world.doors[JOINTS_DOOR]))
+        door = ctypes.CFUNCTYPE(
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer
+        )(int(scene.world.doors[JOINTS_DOOR]))
         t = self.settings.stages[0].simulation.start_time
 
         def serve(what: int, y: Any) -> None:
@@ -299,7 +300,16 @@ class Runner:
             from mbsim.plugins import raise_failure
 
             raise_failure()
+        from mbsim.dynamics.equations import CONTRADICTION
+
         contact = int(self.system.scene.work.trouble[1])
+        if code == CONTRADICTION:
+            from mbsim.dynamics.assembly import equation_name
+
+            raise SolverError(
+                f"{equation_name(self.system, contact)} contradicts other constraints from time "
+                f"{t:.9g} on; results up to there are kept"
+            )
         element = self.system.contact_ids[contact] if 0 <= contact else 0
         if code in (RAISED_COMPILED, USER_NOT_FINITE):
             from mbsim.plugins import reproduce

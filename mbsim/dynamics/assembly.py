@@ -134,7 +134,7 @@ def _changes(
     return moved, sped
 
 
-def _equation_name(system: System, e: int) -> str:
+def equation_name(system: System, e: int) -> str:
     """Return the element and which of its equations row e is."""
     connection = int(system.scene.equations.connection[e])
     return f"{system.connection_name(connection)} ({system.equation_names[e]})"
@@ -148,7 +148,7 @@ def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
     if freedom == 0:
         lines.append("kinematically determined: no force changes the motion of these bodies")
     if assembly.implied:
-        names = ", ".join(_equation_name(system, e) for e in assembly.implied)
+        names = ", ".join(equation_name(system, e) for e in assembly.implied)
         lines.append(
             f"{len(assembly.implied)} equations follow from others (redundant): {names}; "
             "reactions are those of least norm"
@@ -169,7 +169,7 @@ def contradiction(system: System, error: ContradictionError) -> str:
     """Return what to tell the user of constraints that cannot all hold."""
     what = "velocities" if error.velocities else "positions"
     parts = zip(error.equations[:10], error.residuals[:10], strict=True)
-    names = ", ".join(f"{_equation_name(system, e)} by {size:.3g}" for e, size in parts)
+    names = ", ".join(f"{equation_name(system, e)} by {size:.3g}" for e, size in parts)
     return (
         f"{system.model.file}: the model cannot be assembled: {what} miss {names} "
         "(of the model's size, or in radians)"
