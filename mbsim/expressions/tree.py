@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
+
+from mbsim.expressions.functions import CHOICES, FUNCTIONS
 
 
 @dataclass(frozen=True)
@@ -39,3 +42,28 @@ class Expression:
 
     text: str
     root: Node
+
+
+class Reference(NamedTuple):
+    """An element that an expression names: `statement` is MARKER, JOINT, VARIABLE and so on."""
+
+    statement: str
+    id: int
+    function: str
+    column: int
+
+
+def references(expression: Expression) -> Iterator[Reference]:
+    """Yield the elements that an expression names; marker 0, the global frame, is none."""
+    waiting: list[Node] = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, Call):
+            continue
+        function = FUNCTIONS.get(node.name)
+        kinds = function.args if function else ("number",) * len(node.args)
+        for kind, arg in zip(kinds, node.args, strict=False):
+            if kind == "number":
+                waiting.append(arg)
+            elif kind not in CHOICES and isinstance(arg, Number) and arg.value != 0.0:
+                yield Reference(kind.upper(), int(arg.value), node.name, node.column)

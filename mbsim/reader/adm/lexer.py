@@ -176,12 +176,11 @@ class _Arguments:
             between = " " if self.kind is Value.FUNCTION else ", "
             before.value += between + " ".join(piece.split())
         else:
-            here = self.raw.line(start)
-            known = ", ".join(self.statement.words) or "none"
             shown = piece if len(piece) <= 60 else piece[:57] + "..."
-            self.fault(here, self.label, f"{shown}: unknown word; known: {known}")
+            known = ", ".join(words or self.statement.words) or "none"
+            what = f"may be {known}; write more of it" if words else f"unknown word; known: {known}"
+            self.fault(self.raw.line(start), self.label, f"{shown}: {what}")
 
     def _is_word(self, piece: str, word: str) -> bool:
-        """Return whether a piece is the word and not more text of a comment or function."""
-        loose = self.value is not None and self.kind in (Value.TEXT, Value.FUNCTION)
-        return not loose or fold(piece) == fold(word)
+        """Return whether a piece is the word, in full where it may be more text of a comment."""
+        return self.value is None or self.kind is not Value.TEXT or fold(piece) == fold(word)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.reader.adm.lexer import split_statements, to_node
@@ -13,6 +13,7 @@ from mbsim.reader.overrides import apply_overrides
 from mbsim.reader.parse import MAX_BYTES, Node
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
+_XML_NAMES = {statement.name: statement.xml for statement in STATEMENTS if statement.xml}
 # what the checks of the whole model call attributes, in the words of this deck
 _ATTRIBUTES = {
     **{"cg_id": "CM", "im_id": "IM", "vm_id": "VM", "wm_id": "WM", "body_id": "PART"},
@@ -44,6 +45,7 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
         if node is not None:
             nodes.append(node)
     _check_ends(text, nodes, draft)
+    draft.puzzling = {fault.element for fault in draft.faults}
     section = Node("deck", 1, children=nodes)
     apply_overrides([section], overrides, _known_attributes)
 
@@ -53,7 +55,16 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
         _read_statement(node, draft)
     draft.compatibility = "ADAMS"
     draft.broken = {(BY_KEY[fold(name)].xml, id) for name, id in draft.broken}
+    draft.broken |= {(_XML_NAMES[name], int(id)) for name, id in _named(draft.puzzling)}
     draft.faults.sort(key=lambda fault: fault.line)
+
+
+def _named(elements: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield statement and id of those elements that have one."""
+    for element in elements:
+        name, _, id = element.removesuffix("]").partition("[")
+        if name in _XML_NAMES and id.isdigit():
+            yield name, id
 
 
 def in_words(fault: Fault) -> Fault:

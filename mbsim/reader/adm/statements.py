@@ -20,9 +20,13 @@ from mbsim.reader.statement import Entry, Spec
 
 @dataclass
 class AdmDraft(Draft):
-    """A draft that also knows where the parts' frames are."""
+    """A draft that also knows where the parts' frames are.
+
+    `puzzling` holds statements with words that nobody knows: what they lack may be just that.
+    """
 
     parts: dict[int, Frame] = field(default_factory=dict)
+    puzzling: set[str] = field(default_factory=set)
 
 
 _NOT_BUILT = "is documented but not built yet"
@@ -68,9 +72,16 @@ def _frame(entry: Entry, origin: str, z: str, x: str, z_first: bool = True) -> F
     return Frame(p, np.column_stack((e_x, y, np.cross(e_x, y))))
 
 
-def _parts(entry: Entry) -> dict[int, Frame]:
+def _draft(entry: Entry) -> AdmDraft:
     assert isinstance(entry.draft, AdmDraft)
-    return entry.draft.parts
+    return entry.draft
+
+
+def _missing(entry: Entry, name: str, more: str = "") -> None:
+    """Add the fault that a word is missing, where it is not one that nobody knows."""
+    if not entry.given(name) and entry.label not in _draft(entry).puzzling:
+        allowed = entry.statement.attributes[name].kind.allowed
+        entry.fault(f"{name.lower()}: missing; must be {allowed}{more}")
 
 
 def _build_units(entry: Entry) -> None:
@@ -103,32 +114,31 @@ def _build_part(entry: Entry) -> None:
     ip = (*entry.get("IP", ()), 0.0, 0.0, 0.0)
     # here xx yy zz xy xz yz, in the model xx yy zz xy yz xz
     inertia = (ip[0], ip[1], ip[2], ip[3], ip[5], ip[4]) if entry.get("IP") else None
+    w = (entry.get("WX", 0.0), entry.get("WY", 0.0), entry.get("WZ", 0.0))
     body = el.Body(
         id=id,
-        label=entry.get("LABEL", ""),
         is_ground=entry.get("GROUND", False),
         mass=entry.get("MASS"),
         inertia=inertia,
         cg_id=entry.get("CM"),
         im_id=entry.get("IM"),
         v_ic=(entry.get("VX", 0.0), entry.get("VY", 0.0), entry.get("VZ", 0.0)),
-        w_ic=(entry.get("WX", 0.0), entry.get("WY", 0.0), entry.get("WZ", 0.0)),
+        w_ic=w,
         vm_id=entry.get("VM"),
-        wm_id=entry.get("WM", entry.get("CM")),
+        wm_id=entry.get("WM", entry.get("CM") if any(w) else None),
         source=entry.source,
     )
-    _parts(entry)[id] = frame
+    _draft(entry).parts[id] = frame
     entry.register(entry.draft.bodies, body)
 
 
 def _build_marker(entry: Entry) -> None:
     """Add a marker, whose place in its part becomes one in the global frame."""
     frame = _frame(entry, "QP", "ZP", "XP", not entry.get("USEXP", False))
-    part = _parts(entry).get(entry.get("PART", 0), GLOBAL)
+    part = _draft(entry).parts.get(entry.get("PART", 0), GLOBAL)
     p = part.p + part.R @ frame.p
     marker = el.Marker(
         id=entry.get("id", 0),
-        label=entry.get("LABEL", ""),
         body_id=entry.get("PART", 0),
         pos=(float(p[0]), float(p[1]), float(p[2])),
         R=part.R @ frame.R,
@@ -156,7 +166,7 @@ def _build_joint(entry: Entry) -> None:
     """Add a joint."""
     type = entry.get("TYPE")
     if type is None:
-        entry.fault(f"type: missing; must be {entry.statement.attributes['TYPE'].kind.allowed}")
+        _missing(entry, "TYPE")
         return
     _starts_at_rest(entry)
     for name, owner in _OF_SOME_JOINTS.items():
@@ -180,7 +190,7 @@ def _build_primitive(entry: Entry) -> None:
     """Add a joint primitive."""
     type = entry.get("TYPE")
     if type is None:
-        entry.fault(f"type: missing; must be {entry.statement.attributes['TYPE'].kind.allowed}")
+        _missing(entry, "TYPE")
         return
     joint = el.Joint(
         id=entry.get("id", 0),
@@ -211,9 +221,7 @@ def _motion_direction(entry: Entry) -> str:
     word = entry.get("DIRECTION")
     if entry.given("JOINT"):
         if word is not None and word not in _DIRECTIONS:
-            entry.fault(
-                f"{word}: belongs to a motion of markers; with JOINT: ROTATION, TRANSLATION"
-            )
+            entry.fault(f"{word}: must be ROTATION or TRANSLATION where JOINT is given")
         for name in ("I", "J"):
             if entry.given(name):
                 entry.fault("give JOINT, or I and J, not both", name)
@@ -221,9 +229,10 @@ def _motion_direction(entry: Entry) -> str:
     for name in ("I", "J"):
         if not entry.given(name):
             entry.fault(f"{name}: missing; a motion needs JOINT, or I and J, must be {ID.allowed}")
-    if word not in _BETWEEN_MARKERS:
-        what = f"{word}: " if word else "direction: missing; "
-        entry.fault(f"{what}must be one of {', '.join(_BETWEEN_MARKERS)} between I and J")
+    if word is not None and word not in _BETWEEN_MARKERS:
+        entry.fault(f"{word}: must be one of {', '.join(_BETWEEN_MARKERS)} between I and J")
+    elif word is None:
+        _missing(entry, "DIRECTION")
     return str(word)
 
 
@@ -266,7 +275,7 @@ def _type_of(entry: Entry) -> str:
     """Return TRANSLATIONAL or ROTATIONAL, with a fault where the deck says neither."""
     type: str | None = entry.get("TYPE")
     if type is None:
-        entry.fault("type: missing; must be TRANSLATIONAL or ROTATIONAL")
+        _missing(entry, "TYPE")
         return "TRANSLATIONAL"
     return type
 
@@ -330,8 +339,7 @@ def _build_request(entry: Entry) -> None:
     functions = [name for name in _FUNCTIONS if entry.given(name)]
     by_markers = [name for name in ("I", "J", "RM") if entry.given(name)]
     if word is None and not functions:
-        kinds = entry.statement.attributes["TYPE"].kind.allowed
-        entry.fault(f"type: missing; must be {kinds}, or functions F1 ... F8")
+        _missing(entry, "TYPE", ", or functions F1 ... F8")
     if functions and (word or by_markers):
         other = ", ".join(([word] if word else []) + by_markers)
         entry.fault(f"give functions or markers, not both ({', '.join(functions)} and {other})")
@@ -416,7 +424,6 @@ STATEMENTS = (
         "PART",
         {
             **_ID,
-            "LABEL": Spec(TEXT),
             "GROUND": _TRUE,
             "MASS": Spec(POSITIVE),
             "CM": Spec(ID),
@@ -440,7 +447,6 @@ STATEMENTS = (
         "MARKER",
         {
             **_ID,
-            "LABEL": Spec(TEXT),
             "PART": Spec(ID, required=True),
             "QP": Spec(numbers(3)),
             "REULER": Spec(angles(3)),

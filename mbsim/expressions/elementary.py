@@ -1,0 +1,386 @@
+"""Elementary functions of jets: a value with its first and second derivative by time.
+
+A jet is a 3-tuple (u, u', u''). `apply` replaces the topmost jets of a stack (deepest, 3) by a
+function of them; compiled programs and the folding of constants are made of it. At the
+end of a function's domain, where a derivative has no limit, the derivative is 0.
+
+Source of the definitions: MSC Adams Solver, "Functions"; Altair MotionSolve, "Expressions".
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, scale, sub
+from mbsim.expressions.functions import FUNCTIONS, Kind
+
+# operations of the stack machine; elementary ones are below FIRST_MEASURE
+_NAMES = ("ADD", "SUB", "MUL", "DIV", "POW", "NEG") + tuple(
+    name for name, function in FUNCTIONS.items() if function.kind is Kind.ELEMENTARY
+)
+#: Operation code of each elementary function.
+CODES = {name: 2 + k for k, name in enumerate(_NAMES)}
+NUMBER, TIME = 0, 1
+FIRST_MEASURE = 2 + len(_NAMES)
+
+ADD, SUB, MUL, DIV, POW, NEG = (CODES[name] for name in ("ADD", "SUB", "MUL", "DIV", "POW", "NEG"))
+ABS, SIN, COS, TAN, ASIN, ACOS = (
+    CODES[name] for name in ("ABS", "SIN", "COS", "TAN", "ASIN", "ACOS")
+)
+ATAN, SINH, COSH, TANH, EXP = (CODES[name] for name in ("ATAN", "SINH", "COSH", "TANH", "EXP"))
+LOG, LOG10, SQRT, AINT, ANINT = (CODES[name] for name in ("LOG", "LOG10", "SQRT", "AINT", "ANINT"))
+ATAN2, MOD, SIGN, DIM = (CODES[name] for name in ("ATAN2", "MOD", "SIGN", "DIM"))
+MIN, MAX, IF, STEP, STEP5 = (CODES[name] for name in ("MIN", "MAX", "IF", "STEP", "STEP5"))
+HAVSIN, SHF, POLY, CHEBY = (CODES[name] for name in ("HAVSIN", "SHF", "POLY", "CHEBY"))
+FORSIN, FORCOS, IMPACT, BISTOP = (CODES[name] for name in ("FORSIN", "FORCOS", "IMPACT", "BISTOP"))
+
+LN10 = math.log(10.0)
+
+
+@jitable
+def constant(c):
+    """Return a number as a jet."""
+    return (c, 0.0, 0.0)
+
+
+@jitable
+def get(stack, row):
+    """Return a row of the stack."""
+    return (stack[row, 0], stack[row, 1], stack[row, 2])
+
+
+@jitable
+def put(stack, row, u):
+    """Write a row of the stack."""
+    stack[row, 0], stack[row, 1], stack[row, 2] = u[0], u[1], u[2]
+
+
+@jitable
+def chain(u, f, f1, f2):
+    """Return the jet of f(u) from the values of f and its derivatives at u."""
+    return (f, f1 * u[1], f2 * u[1] * u[1] + f1 * u[2])
+
+
+@jitable
+def times(u, v):
+    """Return u v."""
+    return (u[0] * v[0], u[1] * v[0] + u[0] * v[1], u[2] * v[0] + 2.0 * u[1] * v[1] + u[0] * v[2])
+
+
+@jitable
+def over(u, v):
+    """Return u / v: from u = q v, q' = (u' - q v')/v and q'' = (u'' - 2 q' v' - q v'')/v."""
+    q = u[0] / v[0]
+    q1 = (u[1] - q * v[1]) / v[0]
+    return (q, q1, (u[2] - 2.0 * q1 * v[1] - q * v[2]) / v[0])
+
+
+@jitable
+def sine(u):
+    """Return sin u."""
+    s, c = math.sin(u[0]), math.cos(u[0])
+    return chain(u, s, c, -s)
+
+
+@jitable
+def cosine(u):
+    """Return cos u."""
+    s, c = math.sin(u[0]), math.cos(u[0])
+    return chain(u, c, -s, -c)
+
+
+@jitable
+def root(u):
+    """Return the square root of u; at 0 its derivatives are 0."""
+    r = math.sqrt(u[0])
+    if r == 0.0:
+        return constant(0.0)
+    return chain(u, r, 0.5 / r, -0.25 / (r * u[0]))
+
+
+@jitable
+def power(u, v):
+    """Return u^v."""
+    n = v[0]
+    if v[1] == 0.0 and v[2] == 0.0:
+        if n == 2.0:
+            return times(u, u)
+        f = math.pow(u[0], n)
+        # n u^(n-1) and n (n-1) u^(n-2) have no limit at u = 0 for small n
+        f1 = n * math.pow(u[0], n - 1.0) if u[0] != 0.0 or n >= 1.0 else 0.0
+        f2 = 0.0
+        if n != 1.0 and (u[0] != 0.0 or n >= 2.0):
+            f2 = n * (n - 1.0) * math.pow(u[0], n - 2.0)
+        return chain(u, f, f1, f2)
+    if u[0] == 0.0:
+        return constant(math.pow(u[0], n))
+    # u^v = exp(v ln u)
+    f = math.pow(u[0], n)
+    g = times(v, chain(u, math.log(u[0]), 1.0 / u[0], -1.0 / (u[0] * u[0])))
+    return chain(g, f, f, f)
+
+
+@jitable
+def tangent(u):
+    """Return tan u."""
+    t = math.tan(u[0])
+    slope = 1.0 + t * t
+    return chain(u, t, slope, 2.0 * t * slope)
+
+
+@jitable
+def arc_sine(u):
+    """Return asin u, its derivatives (1 - u^2)^-1/2 and u (1 - u^2)^-3/2."""
+    c = 1.0 - u[0] * u[0]
+    if c <= 0.0:
+        return constant(math.asin(u[0]))
+    f1 = 1.0 / math.sqrt(c)
+    return chain(u, math.asin(u[0]), f1, u[0] * f1 / c)
+
+
+@jitable
+def arc_tangent2(u, v):
+    """Return atan2(u, v): a' = (u' v - u v') / (u^2 + v^2); 0 where both are 0."""
+    square = u[0] * u[0] + v[0] * v[0]
+    if square == 0.0:
+        return constant(0.0)
+    a1 = (u[1] * v[0] - u[0] * v[1]) / square
+    growth = 2.0 * (u[0] * u[1] + v[0] * v[1])
+    a2 = (u[2] * v[0] - u[0] * v[2] - a1 * growth) / square
+    return (math.atan2(u[0], v[0]), a1, a2)
+
+
+@jitable
+def towards_zero(x):
+    """Return x without its fraction, as a float for any size."""
+    return math.copysign(float(math.floor(abs(x))), x)
+
+
+@jitable
+def absolute(u):
+    """Return |u|."""
+    return scale(-1.0, u) if u[0] < 0.0 else u
+
+
+@jitable
+def blend(x, x0, h0, x1, h1, fifth):
+    """Return STEP (s^2 (3 - 2 s)) or, if `fifth`, STEP5 (s^3 (10 - 15 s + 6 s^2)) of jets."""
+    if x[0] <= x0[0]:
+        return h0
+    if x[0] >= x1[0]:
+        return h1
+    s = over(sub(x, x0), sub(x1, x0))
+    a, r = s[0], 1.0 - s[0]
+    if fifth:
+        part = chain(
+            s,
+            a * a * a * (10.0 + a * (6.0 * a - 15.0)),
+            30.0 * a * a * r * r,
+            60.0 * a * r * (1.0 - 2.0 * a),
+        )
+    else:
+        part = chain(s, a * a * (3.0 - 2.0 * a), 6.0 * a * r, 6.0 - 12.0 * a)
+    return add(h0, times(sub(h1, h0), part))
+
+
+@jitable
+def haversine(x, x0, h0, x1, h1):
+    """Return HAVSIN: half a period of a sine from h0 to h1."""
+    if x[0] <= x0[0]:
+        return h0
+    if x[0] >= x1[0]:
+        return h1
+    s = over(sub(x, x0), sub(x1, x0))
+    angle = sub(scale(math.pi, s), constant(0.5 * math.pi))
+    return add(scale(0.5, add(h0, h1)), scale(0.5, times(sub(h1, h0), sine(angle))))
+
+
+@jitable
+def stop(depth, rate, stiffness, exponent, damping, dmax):
+    """Return max(0, k d^e + STEP(d, 0, 0, dmax, c) d'), 0 without depth."""
+    zero = constant(0.0)
+    if depth[0] <= 0.0:
+        return zero
+    damper = times(blend(depth, zero, zero, dmax, damping, False), rate)
+    force = add(times(stiffness, power(depth, exponent)), damper)
+    return force if force[0] > 0.0 else zero
+
+
+@jitable
+def two_stops(stack, at):
+    """Return BISTOP(x, x', x1, x2, k, e, c, d): free between x1 and x2."""
+    x, rate = get(stack, at), get(stack, at + 1)
+    k, e, c, d = get(stack, at + 4), get(stack, at + 5), get(stack, at + 6), get(stack, at + 7)
+    low = stop(sub(get(stack, at + 2), x), scale(-1.0, rate), k, e, c, d)
+    high = stop(sub(x, get(stack, at + 3)), rate, k, e, c, d)
+    return sub(low, high)
+
+
+@jitable
+def polynomial(stack, at, count):
+    """Return POLY(x, x0, a0, a1..): the sum of a_j (x - x0)^j."""
+    x = sub(get(stack, at), get(stack, at + 1))
+    total = get(stack, at + count - 1)
+    for k in range(count - 2, 1, -1):
+        total = add(times(total, x), get(stack, at + k))
+    return total
+
+
+@jitable
+def chebyshev(stack, at, count):
+    """Return CHEBY(x, x0, a0, a1..): the sum of a_j T_j(x - x0), T_j+1 = 2 x T_j - T_j-1."""
+    x = sub(get(stack, at), get(stack, at + 1))
+    before, now = x, constant(1.0)  # T_-1 = T_1
+    total = constant(0.0)
+    for k in range(2, count):
+        total = add(total, times(get(stack, at + k), now))
+        before, now = now, sub(scale(2.0, times(x, now)), before)
+    return total
+
+
+@jitable
+def fourier(stack, at, count, sines):
+    """Return FORSIN or FORCOS (x, x0, w, a0, a1..): a0 + the sum of a_j sin, cos(j w (x - x0))."""
+    angle = times(get(stack, at + 2), sub(get(stack, at), get(stack, at + 1)))
+    total = get(stack, at + 3)
+    for k in range(4, count):
+        turned = scale(float(k - 3), angle)
+        wave = sine(turned) if sines else cosine(turned)
+        total = add(total, times(get(stack, at + k), wave))
+    return total
+
+
+@jitable
+def harmonic(stack, at, count):
+    """Return SHF(x, x0, a, w, phi, b) = a sin(w (x - x0) - phi) + b; phi and b may be absent."""
+    angle = times(get(stack, at + 3), sub(get(stack, at), get(stack, at + 1)))
+    if count > 4:
+        angle = sub(angle, get(stack, at + 4))
+    wave = times(get(stack, at + 2), sine(angle))
+    return add(wave, get(stack, at + 5)) if count > 5 else wave
+
+
+@jitable
+def extreme(stack, at, count, sign):
+    """Return the largest (sign 1) or smallest (-1) of `count` jets."""
+    best = at
+    for k in range(at + 1, at + count):
+        if sign * stack[k, 0] > sign * stack[best, 0]:
+            best = k
+    return get(stack, best)
+
+
+@jitable
+def of_one(op, u):
+    """Return a function of one jet."""
+    x = u[0]
+    if op == NEG:
+        return scale(-1.0, u)
+    if op == ABS:
+        return absolute(u)
+    if op == SIN:
+        return sine(u)
+    if op == COS:
+        return cosine(u)
+    if op == TAN:
+        return tangent(u)
+    if op == ASIN:
+        return arc_sine(u)
+    if op == ACOS:
+        return sub(constant(0.5 * math.pi), arc_sine(u))
+    if op == ATAN:
+        slope = 1.0 / (1.0 + x * x)
+        return chain(u, math.atan(x), slope, -2.0 * x * slope * slope)
+    if op == SINH:
+        return chain(u, math.sinh(x), math.cosh(x), math.sinh(x))
+    if op == COSH:
+        return chain(u, math.cosh(x), math.sinh(x), math.cosh(x))
+    if op == TANH:
+        t = math.tanh(x)
+        return chain(u, t, 1.0 - t * t, -2.0 * t * (1.0 - t * t))
+    if op == EXP:
+        e = math.exp(x)
+        return chain(u, e, e, e)
+    if op == LOG:
+        return chain(u, math.log(x), 1.0 / x, -1.0 / (x * x))
+    if op == LOG10:
+        return chain(u, math.log10(x), 1.0 / (LN10 * x), -1.0 / (LN10 * x * x))
+    if op == SQRT:
+        return root(u)
+    if op == AINT:
+        return constant(towards_zero(x))
+    # ANINT: the nearest whole number, halves away from 0
+    return constant(math.copysign(towards_zero(abs(x) + 0.5), x))
+
+
+@jitable
+def of_two(op, u, v):
+    """Return a function of two jets."""
+    if op == ADD:
+        return add(u, v)
+    if op == SUB:
+        return sub(u, v)
+    if op == MUL:
+        return times(u, v)
+    if op == DIV:
+        return over(u, v)
+    if op == POW:
+        return power(u, v)
+    if op == ATAN2:
+        return arc_tangent2(u, v)
+    if op == MOD:
+        # u - v AINT(u / v): the sign is that of u
+        return sub(u, scale(towards_zero(u[0] / v[0]), v))
+    if op == SIGN:
+        size = absolute(u)
+        return size if v[0] >= 0.0 else scale(-1.0, size)
+    # DIM: how much u is above v
+    return sub(u, v) if u[0] > v[0] else constant(0.0)
+
+
+@jitable
+def of_many(op, stack, at, count):
+    """Return a function of `count` jets that stand from row `at` on."""
+    if op == MIN:
+        return extreme(stack, at, count, -1.0)
+    if op == MAX:
+        return extreme(stack, at, count, 1.0)
+    if op == POLY:
+        return polynomial(stack, at, count)
+    if op == CHEBY:
+        return chebyshev(stack, at, count)
+    if op == FORSIN:
+        return fourier(stack, at, count, True)
+    if op == FORCOS:
+        return fourier(stack, at, count, False)
+    if op == SHF:
+        return harmonic(stack, at, count)
+    if op == BISTOP:
+        return two_stops(stack, at)
+    a, b, c = get(stack, at), get(stack, at + 1), get(stack, at + 2)
+    d = get(stack, at + 3)
+    if op == IF:
+        return b if a[0] < 0.0 else (c if a[0] == 0.0 else d)
+    e = get(stack, at + 4)
+    if op == STEP:
+        return blend(a, b, c, d, e, False)
+    if op == STEP5:
+        return blend(a, b, c, d, e, True)
+    if op == HAVSIN:
+        return haversine(a, b, c, d, e)
+    # IMPACT(x, x', x1, k, e, c, d): depth x1 - x
+    return stop(sub(c, a), scale(-1.0, b), d, e, get(stack, at + 5), get(stack, at + 6))
+
+
+@jitable
+def apply(op, count, stack, top):
+    """Replace the `count` topmost of `top` jets by a function of them; return the new top."""
+    at = top - count
+    if op == MIN or op == MAX or count > 2:
+        put(stack, at, of_many(op, stack, at, count))
+    elif count == 1:
+        put(stack, at, of_one(op, get(stack, at)))
+    else:
+        put(stack, at, of_two(op, get(stack, at), get(stack, at + 1)))
+    return at + 1
