@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
@@ -311,6 +313,40 @@ def test_names_the_fault(tmp_path: Path, name: str) -> None:
     assert lines[0].startswith(line), lines
     assert all(part in lines[0] for part in parts), lines
     assert len(lines) <= 2, lines
+
+
+def test_readme_has_a_deck_that_is_read(tmp_path: Path) -> None:
+    readme = Path(__file__).parents[2] / "README.md"
+    blocks = readme.read_text(encoding="utf-8").split("```")
+    (text,) = [block for block in blocks if "a pendulum; the first line" in block]
+    model = read(tmp_path, text.lstrip("\n"))
+    assert (list(model.joints), list(model.requests)) == ([1], [1, 2])
+    assert model.requests[1].comment == "where the bob is"
+
+
+_PIECES = st.sampled_from(
+    "PART/3, MARKER/9, JOINT/2, MOTION/1, REQUEST/7, UNITS/ ACCGRAV/ , ( ) = \\ ! & D V X I= J= "
+    'QP=1,2,3 FUNCTION=TIME F2=DX(102) MASS=1 GROUND REVOLUTE 90D 1e5 0 -3 " \n, \r\n END'.split(
+        " "
+    )
+)
+_ANY = settings(
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@_ANY
+@given(pieces=st.lists(_PIECES | st.text(max_size=4), max_size=25))
+def test_any_text_is_read_or_refused(tmp_path: Path, pieces: list[str]) -> None:
+    text = PENDULUM.removesuffix("END\n") + "".join(pieces)
+    path = tmp_path / "deck.adm"
+    path.write_text(text, encoding="utf-8", errors="replace", newline="")
+    try:
+        model = read_model(path)
+    except DeckError as error:
+        assert error.faults
+    else:
+        assert model.bodies[2].mass == 1.5
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:

@@ -43,7 +43,8 @@ def split_statements(text: str) -> Iterator[Raw]:
     """Yield the statements after the title line, without comments and blank lines."""
     current: Raw | None = None
     joined = False  # the line before ended with &
-    for number, line in enumerate(text.splitlines(), start=1):
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    for number, line in enumerate(text.split("\n"), start=1):
         line = _without_comment(line).strip()
         if number == 1 or not line:
             continue
