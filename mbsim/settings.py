@@ -14,6 +14,8 @@ from mbsim.model.elements import Model, Simulation
 
 DEFAULT_TOL = 1e-5
 INTEGRATORS = tuple(METHODS)
+#: `Model.compatibility` of a deck in Adams' language.
+ADAMS = "ADAMS"
 #: MotionSolve's names, all run by the first method.
 _MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
 
@@ -60,7 +62,20 @@ def _simulations(
     model: Model, end_time: float | None, print_interval: float | None
 ) -> tuple[Simulation, ...]:
     """Return what to run: the deck's Simulate statements, cut or replaced by the caller's times."""
-    planned = list(model.simulations)
+    # every simulation begins with an assembly; one alone is a run of no time
+    planned = [s for s in model.simulations if s.analysis_type != "ASSEMBLY"]
+    if not planned and model.simulations:
+        if end_time is not None or print_interval is not None:
+            raise ModelError(
+                f"{model.file}: the deck only assembles (analysis_type Assembly): "
+                "--end-time and --print-interval do not apply"
+            )
+        return (model.simulations[-1],)
+    if not planned and model.compatibility == ADAMS and None in (end_time, print_interval):
+        raise ModelError(
+            f"{model.file}: an .adm deck says neither end time nor output interval; "
+            "give --end-time and --print-interval"
+        )
     if end_time is not None:
         _checked("end_time", end_time, 0.0, math.inf)
         if not planned:

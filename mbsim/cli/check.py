@@ -21,7 +21,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     """
     from mbsim.cli.messages import warn
     from mbsim.reader.xml import read_model
-    from mbsim.settings import settle
+    from mbsim.settings import ADAMS, settle
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)
@@ -39,6 +39,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
         for text in pair_texts(plans, contact_id):
             click.echo(f"  Force_Contact[{contact_id}]: {text}")
     if not deck.simulations:
-        click.echo("  no Simulate: a run needs --end-time")
+        more = " and --print-interval" if deck.compatibility == ADAMS else ""
+        click.echo(f"  no Simulate: a run needs --end-time{more}")
     for note in (*deck.notes, *notes):
         click.echo(f"  note: {note}")

@@ -7,23 +7,21 @@ from typing import Any
 
 from mbsim.errors import Fault
 from mbsim.expressions import Expression
+from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.tree import Call, Number
 from mbsim.joints.catalog import JOINTS
 from mbsim.model.elements import Model, Source
 
-#: Functions of the language whose arguments are markers, 0 being the global frame.
-OF_MARKERS = frozenset(
-    "DM DX DY DZ VM VR VX VY VZ ACCM ACCX ACCY ACCZ AX AY AZ WM WX WY WZ WDTM WDTX WDTY WDTZ "
-    "PSI THETA PHI YAW PITCH ROLL FM FX FY FZ TM TX TY TZ".split()
-)
-#: Functions of the force of one element (id, jflag, component, rm), with its statement here.
-OF_ELEMENTS = {
+#: What has an id, as functions and requests of elements call it, with its statement.
+STATEMENTS = {
+    "marker": "Reference_Marker",
     "JOINT": "Constraint_Joint",
     "JPRIM": "Constraint_Jprim",
     "MOTION": "Motion_Joint",
     "SFORCE": "Force_Scalar_TwoBody",
     "SPRINGDAMPER": "Force_SpringDamper",
     "CONTACT": "Force_Contact",
+    "VARIABLE": "Reference_Variable",
 }
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
 
@@ -61,7 +59,7 @@ def wanted(model: Model) -> Iterator[Wanted]:
                 yield element.source, name, "joint_ids", id, "Constraint_Joint"
     for request in model.requests.values():
         if request.elem_type and request.elem_id:
-            statement = OF_ELEMENTS[request.elem_type]
+            statement = STATEMENTS[request.elem_type]
             name = f"Post_Request[{request.id}]"
             yield request.source, name, "elem_id", request.elem_id, statement
     for source, name, attribute, expression in expressions(model):
@@ -92,28 +90,14 @@ def _calls(expression: Expression) -> Iterator[Call]:
             rest.extend(node.args)
 
 
-def _places(call: Call) -> dict[int, str]:
-    """Return the statement to which each argument that is an id belongs."""
-    if call.name in OF_MARKERS:
-        return {k: "Reference_Marker" for k in range(len(call.args))}
-    if call.name == "ORIENT":
-        return {k: "Reference_Marker" for k in range(2, len(call.args))}
-    if call.name == "VARVAL":
-        return {0: "Reference_Variable"}
-    if call.name in OF_ELEMENTS:
-        return {0: OF_ELEMENTS[call.name], 3: "Reference_Marker"}
-    return {}
-
-
 def _used(expression: Expression) -> Iterator[tuple[int, str]]:
     """Yield the ids that an expression names, with their statement; marker 0 is always there."""
     for call in _calls(expression):
-        for k, statement in _places(call).items():
-            if k < len(call.args) and isinstance(node := call.args[k], Number):
-                if node.value == int(node.value) and (
-                    node.value > 0 or (node.value == 0 and statement != "Reference_Marker")
-                ):
-                    yield int(node.value), statement
+        kinds = FUNCTIONS[call.name].args if call.name in FUNCTIONS else ()
+        for what, node in zip(kinds, call.args, strict=False):
+            if what in STATEMENTS and isinstance(node, Number):
+                if node.value != 0.0 or what != "marker":
+                    yield int(node.value), STATEMENTS[what]
 
 
 def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
@@ -129,7 +113,6 @@ def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
     yield from _two_bodies(model)
     yield from _motions(model, exists)
     yield from _couplers(model)
-    yield from _ids(model)
     yield from _circles(model)
 
 
@@ -171,11 +154,11 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
     """Yield motions that their joint does not allow, that are repeated, or use more than TIME."""
     first: dict[tuple[Any, ...], int] = {}
     for motion in model.motions.values():
+        if exists("Motion_Joint", motion.id):
+            continue
         name = f"Motion_Joint[{motion.id}]"
         joint = model.joints.get(motion.joint_id or 0)
         if joint is not None and motion.direction not in JOINTS[joint.type].moves:
-            if exists("Motion_Joint", motion.id):
-                continue
             given = f'motion_type="{motion.direction}"' if motion.direction else "motion_type"
             what = f"{given}: joint {joint.id} is {joint.type}; a motion of it may be "
             yield _fault(motion.source, name, what + _allowed(joint.type))
@@ -194,8 +177,8 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
 
 def _not_of_time(expression: Expression) -> str:
     """Return the first function of an expression that depends on the state, or nothing."""
-    state = OF_MARKERS | set(OF_ELEMENTS) | {"ORIENT", "VARVAL"}
-    return next((call.name for call in _calls(expression) if call.name in state), "")
+    names = (call.name for call in _calls(expression) if call.name in FUNCTIONS)
+    return next((name for name in names if FUNCTIONS[name].kind is not Kind.ELEMENTARY), "")
 
 
 def _couplers(model: Model) -> Iterator[Fault]:
@@ -210,20 +193,6 @@ def _couplers(model: Model) -> Iterator[Fault]:
                 message += f"{joint.type} and does not {_DIRECTIONS[direction]} its z-axis; it has "
                 name = f"Constraint_Coupler[{coupler.id}]"
                 yield _fault(coupler.source, name, message + _allowed(joint.type))
-
-
-def _ids(model: Model) -> Iterator[Fault]:
-    """Yield arguments of functions that should be ids and are not."""
-    for source, name, attribute, expression in expressions(model):
-        for call in _calls(expression):
-            for k, statement in _places(call).items():
-                if k >= len(call.args):
-                    continue
-                node = call.args[k]
-                if not isinstance(node, Number) or node.value < 0 or node.value % 1.0 != 0.0:
-                    message = f'{attribute}="{_short(expression.text)}": argument {k + 1} of '
-                    message += f"{call.name} must be the id of a {statement}"
-                    yield _fault(source, name, message)
 
 
 def _circles(model: Model) -> Iterator[Fault]:

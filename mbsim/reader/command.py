@@ -92,11 +92,27 @@ def _times(entry: Entry) -> tuple[float, float] | None:
     return start, end
 
 
+def _build_assembly(entry: Entry) -> None:
+    """Add an assembly, which takes no time."""
+    draft = entry.draft
+    for name in ("start_time", "end_time", "duration", *_OUTPUTS, "print_increment"):
+        if entry.given(name):
+            entry.note("has no effect with analysis_type ASSEMBLY, which takes no time", name)
+    now = draft.simulations[-1].end_time if draft.simulations else 0.0
+    simulation = el.Simulation(
+        "ASSEMBLY", now, now, 1.0, draft.command_transient, draft.command_gravity, entry.source
+    )
+    draft.simulations.append(simulation)
+
+
 def _build_simulate(entry: Entry) -> None:
     """Add one simulation."""
     draft = entry.draft
     if not entry.given("analysis_type"):
         entry.note("not given; taken as TRANSIENT", "analysis_type")
+    if entry.get("analysis_type") == "ASSEMBLY":
+        _build_assembly(entry)
+        return
     times = _times(entry)
     outputs = [name for name in _OUTPUTS if entry.given(name)]
     refused = [name for name in ("print_increment", "print_array_id") if entry.given(name)]

@@ -151,7 +151,8 @@ def _build_motion(entry: Entry) -> None:
         ic_vel=entry.get("ic_vel", 0.0) if val_type == "A" else 0.0,
         source=entry.source,
     )
-    if entry.get("type", "EXPRESSION") == "EXPRESSION" and not entry.given("expr"):
+    by_expression = entry.get("type") is not None or not entry.given("type")
+    if by_expression and not entry.given("expr"):
         entry.fault(f"expr: missing; must be {EXPRESSION.allowed} of TIME")
     entry.register(entry.draft.motions, motion)
 

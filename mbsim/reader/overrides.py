@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from mbsim.errors import ModelError
 from mbsim.reader.keywords import fold, nearest
@@ -14,7 +14,12 @@ _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?\s*\.\s*(\w+)\s*=(.*)", 
 _MOST_LISTED = 12
 
 
-def apply_overrides(sections: Sequence[Node], overrides: Sequence[str]) -> None:
+Known = Callable[[Node], "list[str] | None"]
+
+
+def apply_overrides(
+    sections: Sequence[Node], overrides: Sequence[str], known: Known = known_attributes
+) -> None:
     """Change attributes of the statements in `sections`.
 
     Parameters
@@ -25,6 +30,8 @@ def apply_overrides(sections: Sequence[Node], overrides: Sequence[str]) -> None:
         ``Element[id].attribute=value``, names matched without case and `_`. A statement
         without ids is named by its place among those of its name, ``Simulate[2]``, or by
         its name alone where there is one.
+    known : callable, optional
+        Returns the attributes that a statement may have, None where that is open.
 
     Raises
     ------
@@ -39,7 +46,7 @@ def apply_overrides(sections: Sequence[Node], overrides: Sequence[str]) -> None:
         element, index, attribute, value = match.groups()
         try:
             node = _find(sections, element, index)
-            _set(node, attribute, value.strip(), f"--set {text}")
+            _set(node, attribute, value.strip(), f"--set {text}", known(node))
         except LookupError as error:
             raise ModelError(f"--set {text}: {error.args[0]}") from None
 
@@ -77,9 +84,8 @@ def _choices(nodes: list[Node]) -> str:
     return " ".join(names[:_MOST_LISTED]) + more
 
 
-def _set(node: Node, name: str, value: str, origin: str) -> None:
+def _set(node: Node, name: str, value: str, origin: str, known: list[str] | None) -> None:
     """Set or add an attribute; one that the statement does not have is a LookupError."""
-    known = known_attributes(node)
     found = node.find(name)
     if found is not None:
         found.value, found.origin = value, origin

@@ -1,13 +1,13 @@
-"""`read_model`: a deck in MotionSolve's XML form, read, checked and returned as a `Model`."""
+"""`read_model`: a deck, MotionSolve's XML or Adams' .adm, read, checked and made a `Model`."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from mbsim.errors import DeckError, ModelError
+from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
 from mbsim.reader.constraints import complete_motions
@@ -27,7 +27,8 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     Parameters
     ----------
     path : path-like
-        The deck, an XML file with <Model> and <Command> parts under any root.
+        The deck: an Adams deck where it ends in .adm, else an XML file with <Model> and
+        <Command> parts under any root.
     overrides : sequence of str, optional
         ``Element[id].attribute=value``, set in the deck before it is read.
 
@@ -46,8 +47,35 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     """
     deck = Path(path)
     data = _read_bytes(deck)
-    root = parse(data, str(path))
-    draft = Draft(str(path), deck.absolute().parent)
+    draft: Draft
+    said_so: Callable[[Fault], Fault] = _as_it_is
+    if deck.suffix.lower() == ".adm":
+        from mbsim.reader.adm.read import fill, in_words
+        from mbsim.reader.adm.statements import AdmDraft
+
+        draft, said_so = AdmDraft(str(path), deck.absolute().parent), in_words
+        fill(data, draft, overrides)
+    else:
+        draft = Draft(str(path), deck.absolute().parent)
+        _fill(data, draft, overrides)
+
+    complete_motions(draft)
+    model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
+    known = Known(frozenset(draft.broken), draft.display_graphics)
+    faults, warnings = check_model(model, known)
+    if draft.faults or faults:
+        raise DeckError([*draft.faults, *map(said_so, faults)])
+    draft.warnings.extend(warnings)
+    return _to_model(draft, deck, model.sha256)
+
+
+def _as_it_is(fault: Fault) -> Fault:
+    return fault
+
+
+def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
+    """Read the XML deck `data` into the draft; faults go there too."""
+    root = parse(data, draft.file)
     sections = list(_find_sections(root, draft))
     apply_overrides(sections, overrides)
 
@@ -57,15 +85,6 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
         read_section(section, draft)
     if not any(section.key == "model" for section in sections) and not draft.faults:
         draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
-
-    complete_motions(draft)
-    model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
-    known = Known(frozenset(draft.broken), draft.display_graphics)
-    faults, warnings = check_model(model, known)
-    if draft.faults or faults:
-        raise DeckError([*draft.faults, *faults])
-    draft.warnings.extend(warnings)
-    return _to_model(draft, deck, model.sha256)
 
 
 def _read_bytes(path: Path) -> bytes:

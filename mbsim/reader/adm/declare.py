@@ -1,0 +1,79 @@
+"""How a statement of an Adams deck is declared: that of the XML, and the words that it takes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from mbsim.reader.kinds import EXPRESSION, TEXT, BadValueError, Kind, parse_real
+from mbsim.reader.statement import Statement
+
+_DEGREES = re.compile(r"(.*\d\.?)[dD]")
+
+
+class Value(Enum):
+    """What may follow an argument's value after a comma: nothing, items, text, a function."""
+
+    ITEM = 0
+    LIST = 1
+    TEXT = 2
+    FUNCTION = 3
+
+
+@dataclass(frozen=True)
+class AdmStatement(Statement):
+    """A statement: `words` stand alone and mean (attribute, value); `xml` is its name there."""
+
+    words: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    xml: str = ""
+
+    def names(self) -> list[str]:
+        """Return the names that stand before ``=``."""
+        of_words = {name for name, _ in self.words.values()}
+        return [name for name in self.attributes if name not in of_words and name != "id"]
+
+    def value_kind(self, name: str) -> Value:
+        """Return how the value of a name may go on."""
+        spec = self.attributes.get(name)
+        if spec is None:
+            return Value.LIST
+        if spec.kind is EXPRESSION:
+            return Value.FUNCTION
+        if spec.kind is TEXT:
+            return Value.TEXT
+        return Value.LIST if spec.kind.allowed.endswith(LIST) else Value.ITEM
+
+
+LIST = "separated by commas"
+
+
+def parse_angle(text: str) -> float:
+    """Return an angle in radians; a D after the number says that it is in degrees."""
+    degrees = _DEGREES.fullmatch(text)
+    return math.radians(parse_real(degrees.group(1))) if degrees else parse_real(text)
+
+
+def _parse_items(text: str, angles: bool, counts: tuple[int, ...]) -> tuple[float, ...]:
+    words = [word.strip() for word in text.split(",")]
+    if len(words) not in counts:
+        raise BadValueError
+    return tuple((parse_angle if angles else parse_real)(word) for word in words)
+
+
+def numbers(*counts: int) -> Kind:
+    """Return the kind of lists of so many numbers."""
+    some = " or ".join(map(str, counts))
+    return Kind(f"{some} numbers {LIST}", lambda text: _parse_items(text, False, counts))
+
+
+def angles(count: int) -> Kind:
+    """Return the kind of lists of so many angles."""
+    allowed = f"{count} angles (radians, or degrees with a D as in 90D) {LIST}"
+    return Kind(allowed, lambda text: _parse_items(text, True, (count,)))
+
+
+ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
+ANY = Kind(f"items {LIST}", str)
