@@ -303,14 +303,13 @@ class _Compiler:
 
 
 def _combine(node: Call, made: list[Instruction], starts: list[int]) -> None:
-    """Put a function behind its arguments, or the number that it makes of numbers in their place."""
+    """Put a function behind its arguments, or in place of numbers the number it makes of them."""
     count = len(node.args)
     first = starts[-count]
     del starts[-count:]
     starts.append(first)
-    args = made[first:]
-    if len(args) == count and all(arg.op == NUMBER for arg in args):
-        made[first:] = [_folded(node, [arg.value for arg in args])]
+    if len(made) - first == count and all(arg.op == NUMBER for arg in made[first:]):
+        made[first:] = [_folded(node, [arg.value for arg in made[first:]])]
     else:
         made.append(Instruction(CODES[node.name], (count,)))
 
