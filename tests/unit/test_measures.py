@@ -99,7 +99,7 @@ class Moving:
         return self.p[b] + arm, self.R[b] @ frame.R_B, v, self.w[b]
 
 
-def differences(f, h=0.02):
+def differences(f, h=0.008):
     """Return value, first and second derivative at 0 by central differences of order 8."""
     first = [(1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280)]
     second = [(1, 8 / 5), (2, -1 / 5), (3, 8 / 315), (4, -1 / 560)]
