@@ -170,7 +170,7 @@ def test_references_are_the_elements_that_are_named():
 def test_variables_are_put_in_place():
     programs = table([(1, "2*VARVAL(2)"), (2, "3 + 4")])
     programs.add(parse("VARVAL(1) + TIME"))
-    assert [i.value for i in programs.programs[0]][0] == 14.0
+    assert programs.programs[0][0].value == 14.0
 
 
 @pytest.mark.parametrize(
