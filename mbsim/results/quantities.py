@@ -64,6 +64,8 @@ _VELOCITY = Quantity("Velocity", length=1, time=-1)
 _ACCELERATION = Quantity("Acceleration", length=1, time=-2)
 _SPIN = Quantity("Angular velocity", time=-1, angle=1)
 _ENERGY = Quantity("Energy", force=1, length=1)
+_FORCE = Quantity("Force", force=1)
+_TORQUE = Quantity("Torque", force=1, length=1)
 
 #: By the last word of a signal's name.
 _BY_NAME = {
@@ -73,8 +75,8 @@ _BY_NAME = {
     "velocity": _VELOCITY,
     "angular_velocity": _SPIN,
     "acceleration": _ACCELERATION,
-    "force": Quantity("Force", force=1),
-    "torque": Quantity("Torque", force=1, length=1),
+    "force": _FORCE,
+    "torque": _TORQUE,
     "penetration": Quantity("Penetration", length=1),
     "slip_speed": Quantity("Slip speed", length=1, time=-1),
     "incidents": INCIDENTS,
@@ -82,12 +84,15 @@ _BY_NAME = {
     "kinetic": _ENERGY,
     "potential": _ENERGY,
     "dissipated": _ENERGY,
+    "work_of_motions": _ENERGY,
 }
 
 #: Of F1..F4 and of F5..F8, by the type of a request.
 _OF_REQUESTS = {
     "MARKER_DISPLACEMENT": (Quantity("Displacement", length=1), Quantity("Angle", angle=1)),
     "MARKER_VELOCITY": (_VELOCITY, _SPIN),
+    "MARKER_FORCE": (_FORCE, _TORQUE),
+    "ELEMENTAL_FORCE": (_FORCE, _TORQUE),
     "MARKER_ACCELERATION": (_ACCELERATION, Quantity("Angular acceleration", time=-2, angle=1)),
 }
 
