@@ -25,7 +25,7 @@ class Group:
 #: By the statement of `System.connections` and `System.applied`.
 GROUPS = {
     "JOINT": Group("joints", "joints", "joint", "Constraint_Joint"),
-    "JPRIM": Group("primitives", "primitives", "primitive", "JPRIM"),
+    "JPRIM": Group("primitives", "primitives", "primitive", "Constraint_Jprim"),
     "COUPLER": Group("couplers", "couplers", "coupler", "Constraint_Coupler"),
     "MOTION": Group("motions", "motions", "motion", "Motion_Joint"),
     "GCON": Group(

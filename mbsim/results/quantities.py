@@ -87,9 +87,18 @@ _BY_NAME = {
     "work_of_motions": _ENERGY,
 }
 
+#: By the measure of an expression, where `requests.measures_of` knows it.
+_BY_MEASURE = {
+    "displacement": Quantity("Displacement", length=1),
+    "angle": Quantity("Angle", angle=1),
+    "velocity": _VELOCITY,
+    "angular_velocity": _SPIN,
+    "force": _FORCE,
+    "torque": _TORQUE,
+}
 #: Of F1..F4 and of F5..F8, by the type of a request.
 _OF_REQUESTS = {
-    "MARKER_DISPLACEMENT": (Quantity("Displacement", length=1), Quantity("Angle", angle=1)),
+    "MARKER_DISPLACEMENT": (_BY_MEASURE["displacement"], _BY_MEASURE["angle"]),
     "MARKER_VELOCITY": (_VELOCITY, _SPIN),
     "MARKER_FORCE": (_FORCE, _TORQUE),
     "ELEMENTAL_FORCE": (_FORCE, _TORQUE),
@@ -104,6 +113,9 @@ def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
         kind = str(results.attribute(dataset, "type") or "")
         if kind in _OF_REQUESTS:
             return _OF_REQUESTS[kind][column // 4]
+        measures = results.attribute(dataset, "measures")
+        if measures is not None and measures[column] in _BY_MEASURE:
+            return _BY_MEASURE[measures[column]]
         last = f"request {last}"
     known = _BY_NAME.get(last)
     return known or Quantity(last.replace("_", " ").capitalize())

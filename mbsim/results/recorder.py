@@ -19,7 +19,7 @@ from mbsim.results.files import prepare_directory
 from mbsim.results.forces import Forces, check_requests
 from mbsim.results.motion import motion
 from mbsim.results.reading import Results, open_results
-from mbsim.results.requests import columns_of, request_table
+from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch, energies
 from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
@@ -173,14 +173,16 @@ class Recorder:
 
     def _columns(self) -> dict[str, dict[str, Any]]:
         """Return what the columns of the requests are, by dataset."""
-        return {
-            f"requests/{request.id}": {
+        about: dict[str, dict[str, Any]] = {}
+        for request in self.system.model.requests.values():
+            about[f"requests/{request.id}"] = {
                 "columns": columns_of(request),
                 "type": request.type,
                 "label": request.label or request.comment,
             }
-            for request in self.system.model.requests.values()
-        }
+            if request.type == "EXPRESSION":
+                about[f"requests/{request.id}"]["measures"] = measures_of(request)
+        return about
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mbsim.expressions import Expression
+from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Array, Request
 from mbsim.model.placement import MarkerPlace
 from mbsim.results.forces import Forces, Wrench
@@ -21,6 +23,17 @@ COLUMNS = {
     "MARKER_FORCE": _FORCES,
     "ELEMENTAL_FORCE": _FORCES,
 }
+#: What functions of the language measure.
+_MEASURES = {
+    "displacement": ("DM", "DX", "DY", "DZ"),
+    "angle": ("AX", "AY", "AZ", "PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL"),
+    "velocity": ("VM", "VR", "VX", "VY", "VZ"),
+    "angular_velocity": ("WM", "WX", "WY", "WZ"),
+    "force": ("FM", "FX", "FY", "FZ"),
+    "torque": ("TM", "TX", "TY", "TZ"),
+}
+#: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
+_FORCES_OF_ELEMENTS = ("JOINT", "JPRIM", "MOTION", "SFORCE", "SPRDP", "CONTACT")
 #: F1 and F5 are magnitudes of the three columns behind them.
 _MAGNITUDES = (1, 5)
 
@@ -118,6 +131,34 @@ def columns_of(request: Request) -> tuple[str, ...]:
         expr.text if expr is not None else "mag" if k in _MAGNITUDES else ""
         for k, expr in enumerate(exprs, 1)
     )
+
+
+def measures_of(request: Request) -> tuple[str, ...]:
+    """Return what F1..F8 of an EXPRESSION measure; nothing where an expression is not one measure.
+
+    A magnitude that the deck does not give is of the kind of its components.
+    """
+    exprs = (*request.exprs, *[None] * 8)[:8]
+    found = ["" if expr is None else _measure(expr) for expr in exprs]
+    for number in _MAGNITUDES:
+        parts = {found[k] for k in range(number, number + 3) if exprs[k] is not None}
+        if exprs[number - 1] is None and len(parts) == 1:
+            found[number - 1] = parts.pop()
+    return tuple(found)
+
+
+def _measure(expr: Expression) -> str:
+    """Return what an expression measures, if it is one function of the language or minus one."""
+    node = expr.root
+    while isinstance(node, Call) and node.name == "NEG":
+        node = node.args[0]
+    if not isinstance(node, Call):
+        return ""
+    if node.name in _FORCES_OF_ELEMENTS:
+        comp = node.args[2] if len(node.args) > 2 else None
+        torque = isinstance(comp, Number) and comp.value >= 5
+        return "torque" if torque else "force"
+    return next((name for name, calls in _MEASURES.items() if node.name in calls), "")
 
 
 def request_table(

@@ -17,7 +17,7 @@ from mbsim.cli import info
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions import Expression
-from mbsim.expressions.tree import Number
+from mbsim.expressions.tree import Call, Node, Number, Time
 from mbsim.model import elements as el
 from mbsim.model.frames import rotation_313
 from mbsim.results.curves import Choice, collect
@@ -26,6 +26,7 @@ from mbsim.results.log import RunLog, counts, freedom
 from mbsim.results.motion import matrices, motion
 from mbsim.results.reading import Results
 from mbsim.results.recorder import Recorder
+from mbsim.results.requests import measures_of
 from mbsim.results.watch import Watch
 from mbsim.system import arrays as a
 
@@ -400,6 +401,55 @@ def test_pictures_say_what_and_in_what_unit(tmp_path: Path) -> None:
     assert axes["joints/1/force/z"] == axes["requests/7/F2"] == "Force [N]"
     assert axes["motions/6/torque/mag"] == axes["requests/7/F6"] == "Torque [N·m]"
     assert axes["energy/work_of_motions"] == "Energy [J]"
+
+
+def call(name: str, *args: float | Node) -> Call:
+    """Return a call of a function, numbers as they are."""
+    return Call(name, tuple(Number(a) if isinstance(a, (int, float)) else a for a in args))
+
+
+@pytest.mark.parametrize(
+    ("node", "measure"),
+    [
+        (call("JOINT", 1, 0, 4, 0), "force"),
+        (call("JOINT", 1, 0, 5, 0), "torque"),
+        (call("NEG", call("NEG", call("SFORCE", 1, 0, 8, 0))), "torque"),
+        (call("FX", 21, 31), "force"),
+        (call("TZ", 21, 31), "torque"),
+        (call("DX", 21), "displacement"),
+        (call("AZ", 21), "angle"),
+        (call("VR", 21), "velocity"),
+        (call("WM", 21), "angular_velocity"),
+        (call("MUL", 2, call("DX", 21)), ""),
+        (call("ORIENT", 27, 1, 21, 31), ""),
+        (Time(), ""),
+    ],
+)
+def test_measures_of_expressions(node: Node, measure: str) -> None:
+    wanted = request("EXPRESSION", exprs=(Expression("", node),))
+    assert measures_of(wanted) == (measure, *[""] * 7)
+
+
+def test_magnitudes_are_of_the_kind_of_their_components() -> None:
+    dx, dy, wx = (Expression("", call(name, 21)) for name in ("DX", "DY", "WX"))
+    exprs = (None, dx, None, dy, None, wx, dx)
+    assert measures_of(request("EXPRESSION", exprs=exprs)) == (
+        *("displacement", "displacement", "", "displacement"),
+        *("", "angular_velocity", "displacement", ""),
+    )
+
+
+def test_units_of_expressions(tmp_path: Path) -> None:
+    force = Expression("JOINT(1,0,2,0)", call("JOINT", 1, 0, 2, 0))
+    system = fake_system_of(
+        model_of(tmp_path / "deck", request("EXPRESSION", exprs=(None, force, text("1"))))
+    )
+    add_rows(system, 0, 3)
+    with run(system, tmp_path) as results:
+        axes = [
+            p.axis for p in collect([results], Choice(("requests/7/F2", "requests/7/F3"))).panels
+        ]
+    assert axes == ["Force [N]", "Request 7"]
 
 
 # --- log -------------------------------------------------------------------------------------
