@@ -108,10 +108,10 @@ def _between_markers(model: Model) -> dict[str, Any]:
         held = equations(model)
         moving = sum(not body.is_ground for body in model.bodies.values())
         about["degrees_of_freedom"] = {
-            "of free bodies": 6 * moving,
-            "constraint equations": held,
+            "of_free_bodies": 6 * moving,
+            "constraint_equations": held,
             # equations may say what others say; a run finds out, and its log tells
-            "left, at least": max(0, 6 * moving - held),
+            "at_least": max(0, 6 * moving - held),
         }
     return about
 
@@ -154,7 +154,7 @@ def _largest(results: Results) -> dict[str, Any]:
             }
             for kind in ("force", "torque"):
                 rows = results[f"{path}/{id}/{kind}/mag"]
-                facts[f"largest {kind}"] = float(rows.max()) if len(rows) else None
+                facts[f"largest_{kind}"] = float(rows.max()) if len(rows) else None
             about.setdefault(path, {})[str(id)] = facts
     return about
 
@@ -172,7 +172,7 @@ def _about_results(results: Results) -> dict[str, Any]:
         "counts": {
             "rows": len(time),
             **{name: len(results.ids(name)) for name in ("bodies", "contacts")},
-            **{name.replace("_", " "): len(ids) for name, ids in largest.items()},
+            **{name: len(ids) for name, ids in largest.items()},
             "requests": len(results.ids("requests")),
             "events": len(results["events"]),
         },

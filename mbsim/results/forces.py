@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,9 +46,9 @@ class Acting:
     one_sided: bool  # nothing acts on J
 
 
-def actings(system: System) -> list[Acting]:
-    """Return all elements between markers."""
-    found = []
+def actings(system: System) -> dict[tuple[str, int], Acting]:
+    """Return all elements between markers by statement and id."""
+    found = {}
     for ids, ends in (
         (system.connections, system.scene.connections),
         (system.applied, system.scene.applied),
@@ -56,7 +57,7 @@ def actings(system: System) -> list[Acting]:
             element = elements_of(system.model, statement)[id]
             one_sided = bool(getattr(element, "action_only", False))
             i, j = int(ends.i[row]), int(ends.j[row])
-            found.append(Acting(statement, id, i, j, row, one_sided))
+            found[statement, id] = Acting(statement, id, i, j, row, one_sided)
     return found
 
 
@@ -72,7 +73,9 @@ def between(acting: Acting, i: int, j: int | None) -> int:
     return 0
 
 
-def marker_actings(system: System, request: Request) -> list[tuple[Acting, int]]:
+def marker_actings(
+    system: System, elements: Mapping[tuple[str, int], Acting], request: Request
+) -> list[tuple[Acting, int]]:
     """Return the elements that a MARKER_FORCE adds up, each with its sign as `between` has it."""
     i = system.marker_rows.get(request.i_marker_id)
     j = None
@@ -81,7 +84,7 @@ def marker_actings(system: System, request: Request) -> list[tuple[Acting, int]]
         j = system.marker_rows.get(request.j_marker_id, -1) if request.j_marker_id else 0
     if i is None:
         return []
-    signs = [(acting, between(acting, i, j)) for acting in actings(system)]
+    signs = [(acting, between(acting, i, j)) for acting in elements.values()]
     return [(acting, sign) for acting, sign in signs if sign]
 
 
@@ -94,6 +97,11 @@ class Forces:
     joint: Array  # (n, 6 nj) as `Rows.joint`
     applied: Array  # (n, 6 nf)
     contact: Array  # (n, CONTACT_COLUMNS nc)
+
+    @cached_property
+    def elements(self) -> dict[tuple[str, int], Acting]:
+        """All elements between markers by statement and id."""
+        return actings(self.system)
 
     def origin(self, marker: int) -> Array:
         """Return where a row of `arrays.Markers` is, (n, 3), or (1, 3) where it stands still."""
@@ -123,21 +131,17 @@ class Forces:
 
     def on_marker(self, request: Request) -> Wrench:
         """Return the sum of what acts on marker I, by elements between it and J if it is given."""
-        return sum(
-            (self.on(acting, sign) for acting, sign in marker_actings(self.system, request)),
-            self.nothing(),
-        )
+        parts = marker_actings(self.system, self.elements, request)
+        return sum((self.on(acting, sign) for acting, sign in parts), self.nothing())
 
     def of_element(self, request: Request) -> Wrench:
         """Return what one element exerts: on I, with `jflag` on J."""
         sign = -1 if request.jflag else 1
         if request.elem_type == "CONTACT":
             return self._of_contact(request.elem_id, sign)
-        for acting in actings(self.system):
-            if (acting.statement, acting.id) == (request.elem_type, request.elem_id):
-                return self.on(acting, sign)
-        # a joint that holds nothing has no row
-        return self.nothing()
+        acting = self.elements.get((request.elem_type, request.elem_id))
+        # a joint that holds nothing need not have a row
+        return self.nothing() if acting is None else self.on(acting, sign)
 
     def _of_contact(self, id: int, sign: int) -> Wrench:
         """Return the net force of a contact, the torque being about the cg of its body."""

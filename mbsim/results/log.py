@@ -14,7 +14,7 @@ from mbsim.model.elements import Contact, Model
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
 from mbsim.results.elements import title as title_of
 from mbsim.results.files import replace_text
-from mbsim.results.forces import marker_actings
+from mbsim.results.forces import actings, marker_actings
 from mbsim.results.store import Value
 from mbsim.results.watch import Watch, energies
 from mbsim.system import arrays as a
@@ -121,7 +121,7 @@ class RunLog:
 def counts(model: Model) -> dict[str, int]:
     """Return the numbers of elements by name, for logs and `mbsim check`."""
     between_markers = {
-        GROUPS[statement].path.replace("_", " "): len(elements_of(model, statement))
+        GROUPS[statement].path: len(elements_of(model, statement))
         for statement in (*CONSTRAINTS, *APPLIED)
     }
     return {
@@ -189,8 +189,9 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
         yield f"  note: {note}"
     for warning in model.warnings:
         yield f"  warning: {warning}"
+    elements = actings(system)
     for request in model.requests.values():
-        if request.type == "MARKER_FORCE" and not marker_actings(system, request):
+        if request.type == "MARKER_FORCE" and not marker_actings(system, elements, request):
             who = f"Reference_Marker[{request.i_marker_id}]"
             if request.j_marker_id is not None:
                 who += f" and Reference_Marker[{request.j_marker_id}]"
@@ -289,7 +290,7 @@ def summary(
     yield "statistics"
     free = freedom(system)
     if free is not None:
-        yield fact("degrees of freedom", free)
+        yield fact("degrees of freedom, all bodies", free)
     for name, value in stats.items():
         if name not in _TIMES:
             yield fact(name, number(value) if isinstance(value, float) else value)

@@ -38,7 +38,7 @@ _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLI
 
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
-#: That size is for each so many bodies: a write opens every signal of every body, 0.3 ms each,
+#: That size is for each so many bodies (and joints, ...): a write opens every signal, 0.3 ms each,
 #: however few rows it adds (8000 bodies: 14 s), so that it should add many.
 BUFFER_BODIES = 400
 #: Time between two publications: at least this [s], and so many times what one costs.
@@ -128,7 +128,8 @@ class Recorder:
         self.watch = Watch(acting(system))
         self._blocks: list[Block] = []
         self._bytes = 0
-        self._buffer = BUFFER_BYTES * max(1, len(system.body_ids) // BUFFER_BODIES)
+        described = len(system.body_ids) + len(self.watch.elements)
+        self._buffer = BUFFER_BYTES * max(1, described // BUFFER_BODIES)
         self._rows_since_flush = 0
         self._incidents = 0  # rows of state/incidents so far
         self._started = False  # whether state/incident_offsets has its first 0

@@ -493,15 +493,15 @@ def test_log_of_a_mechanism(tmp_path: Path) -> None:
     for said in (
         "joints 2",
         "primitives 1",
-        "general constraints 1",
-        "scalar forces 1",
+        "general_constraints 1",
+        "scalar_forces 1",
         "scalar constraint equations 9",
         f"Constraint_Joint[1] hinge {largest:.6g} at 0.3, torque {turning:.6g} at 0.3",
         f"Force_SpringDamper[5] {largest:.6g} at 0.3, torque {turning:.6g} at 0.3",
         "work of motions 12",
         "balance, change since the start 6",
         "of kinetic + potential + dissipated - work of motions",
-        "degrees of freedom 1",
+        "degrees of freedom, all bodies 1",
     ):
         assert said in lines, f"{said!r} is not in\n" + "\n".join(lines)
     zero = [line for line in lines if "no element acts" in line]
@@ -659,7 +659,7 @@ def test_info_of_a_result_file(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["info", "--json", file])
     about = json.loads(done.output)
     assert about["counts"]["joints"] == 2
-    assert about["joints"]["1"]["largest force"] == pytest.approx(
+    assert about["joints"]["1"]["largest_force"] == pytest.approx(
         np.linalg.norm([300.0, 301.0, 302.0])
     )
     assert about["joints"]["1"]["label"] == "hinge"
