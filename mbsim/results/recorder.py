@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.errors import ModelError, ResultsError
-from mbsim.model.elements import Model, Source
+from mbsim.expressions import Expression
+from mbsim.model.elements import Model
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, acting, elements_of, facts
 from mbsim.results.files import prepare_directory
@@ -353,18 +354,24 @@ def _without_size(graphics: Any) -> list[Table]:
     return [array for array in graphics if array is not graphics.size]
 
 
-def _plain_elements(model: Model) -> Iterator[Any]:
-    """Yield what the digest takes as text: constraints, forces, expressions and requests."""
+def _described(model: Model) -> Iterator[Any]:
+    """Yield what the digest takes as text: constraints, forces, variables and requests."""
     for statement in (*CONSTRAINTS, *APPLIED):
-        yield from _nowhere(elements_of(model, statement))
-    yield from _nowhere(model.variables)
-    yield from _nowhere(model.requests)
+        yield from elements_of(model, statement).values()
+    yield from model.variables.values()
+    yield from model.requests.values()
 
 
-def _nowhere(elements: Mapping[int, Any]) -> Iterator[Any]:
-    """Yield elements without file and line: the same deck may be named by another path."""
-    for element in elements.values():
-        yield replace(element, source=Source())
+def _said(element: Any) -> str:
+    """Return an element as text, without file and line: its deck may be named by another path."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Expression):
+            return value.text  # a tree may be deeper than `repr` goes
+        return tuple(map(plain, value)) if isinstance(value, tuple) else value
+
+    said = {f.name: plain(getattr(element, f.name)) for f in fields(element) if f.name != "source"}
+    return f"{type(element).__name__} {said}"
 
 
 def _digests(system: System) -> dict[str, Value]:
@@ -385,7 +392,7 @@ def _digests(system: System) -> dict[str, Value]:
     text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
     text += [repr(system.plans)]
     text += [f"{g.id} {shape_class(g)} {g.size}" for g in system.model.graphics.values()]
-    text += [repr(element) for element in _plain_elements(system.model)]
+    text += [_said(element) for element in _described(system.model)]
     arrays += [
         part for place in system.placement.markers.values() for part in (place.p_B, place.R_B)
     ]

@@ -600,6 +600,21 @@ def test_resume_with_another_element(tmp_path: Path, member: str, change: Any) -
         Recorder(other, SETTINGS, tmp_path, resume=True)
 
 
+def test_a_deep_expression_is_part_of_the_digest(tmp_path: Path) -> None:
+    node: Node = Time()
+    for _ in range(2000):
+        node = call("ADD", node, 1)
+    motion = el.Motion(6, joint_id=1, expr=Expression("TIME" + "+1" * 2000, node))
+    model = dataclasses.replace(model_of(tmp_path / "deck"), motions={6: motion})
+    digests = []
+    for text_of in ("TIME" + "+1" * 2000, "TIME" + "+1" * 1999):
+        changed = dataclasses.replace(motion, expr=Expression(text_of, node))
+        system = fake_system_of(dataclasses.replace(model, motions={6: changed}))
+        with run(system) as results:
+            digests.append(results.attributes["system_sha256"])
+    assert digests[0] != digests[1]
+
+
 def test_resume_where_the_deck_has_another_path(tmp_path: Path) -> None:
     model = interrupted(tmp_path).model
     moved = {
