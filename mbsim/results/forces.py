@@ -64,26 +64,24 @@ def actings(system: System) -> dict[tuple[str, int], Acting]:
 def between(acting: Acting, i: int, j: int | None) -> int:
     """Return 1 where an element acts on marker row i as its I, -1 as its J, 0 where it does not.
 
-    With `j` only elements between both markers count.
+    With `j` only elements between both markers count; one that acts on I alone is not between.
     """
+    if acting.one_sided:
+        return int(acting.i == i and j is None)
     if acting.i == i and j in (None, acting.j):
         return 1
-    if acting.j == i and j in (None, acting.i) and not acting.one_sided:
-        return -1
-    return 0
+    return -1 if acting.j == i and j in (None, acting.i) else 0
 
 
 def marker_actings(
     system: System, elements: Mapping[tuple[str, int], Acting], request: Request
 ) -> list[tuple[Acting, int]]:
     """Return the elements that a MARKER_FORCE adds up, each with its sign as `between` has it."""
-    i = system.marker_rows.get(request.i_marker_id)
-    j = None
-    if request.j_marker_id is not None:
-        # 0 is the global frame; a marker without a row is in no element
-        j = system.marker_rows.get(request.j_marker_id, -1) if request.j_marker_id else 0
+    rows = system.marker_rows
+    i = rows.get(request.i_marker_id)
     if i is None:
-        return []
+        return []  # a marker without a row is in no element
+    j = rows.get(request.j_marker_id, -1) if request.j_marker_id else None
     signs = [(acting, between(acting, i, j)) for acting in elements.values()]
     return [(acting, sign) for acting, sign in signs if sign]
 

@@ -275,8 +275,18 @@ def test_marker_force_without_j_adds_all_at_i(tmp_path: Path) -> None:
     check(table, force, torque)
 
 
+def test_marker_force_without_j_has_one_sided_forces(tmp_path: Path) -> None:
+    # on 21: the joints 1 and 2, the motion and the force, as I of all
+    table, system, _ = asked(tmp_path, request("MARKER_FORCE", 21))
+    parts = [wrench(system.scene.rows.joint, row) for row in (JOINT, FREE, MOTION)]
+    parts.append(wrench(system.scene.rows.applied, SFORCE))
+    check(table, sum(force for force, _ in parts), sum(torque for _, torque in parts))
+
+
 def test_marker_force_between_markers_that_share_nothing(tmp_path: Path) -> None:
     assert not asked(tmp_path / "a", request("MARKER_FORCE", 21, 11))[0].any()
+    # the force on 21 is along a line to 32, but nothing acts on 32
+    assert not asked(tmp_path / "d", request("MARKER_FORCE", 21, 32))[0].any()
     # 20 is in no element at all
     assert not asked(tmp_path / "b", request("MARKER_FORCE", 20))[0].any()
     assert not asked(tmp_path / "c", request("MARKER_FORCE", 21, 20))[0].any()
