@@ -66,8 +66,9 @@ REQUESTS = f"""
 
 
 def run(folder: Path, model: str, **settings: object) -> mbsim.Results:
-    """Run statements for a second."""
-    return mbsim.simulate(mbsim.read_model(write_deck(folder, model)), tol=1e-8, **settings)
+    """Run statements for a second, with 1001 rows."""
+    deck = write_deck(folder, model, print_interval=0.001)
+    return mbsim.simulate(mbsim.read_model(deck), tol=1e-8, **settings)
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +96,8 @@ def test_the_work_of_a_drive_is_its_power(driven: mbsim.Results) -> None:
     power = (driven["motions/4/torque"] * driven["bodies/2/angular_velocity"]).sum(axis=1)
     t = driven["time"]
     work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t))])
-    # the trapezoidal rule's own error is h^2/12 of the power's second derivative
-    np.testing.assert_allclose(driven["energy/work_of_motions"], work, atol=2e-3)
+    # the trapezoidal rule's own error is h^2/12 of the change of slope of the power: below 1e-4
+    np.testing.assert_allclose(driven["energy/work_of_motions"], work, atol=2e-4)
     assert np.ptp(work) > 0.5
 
 
@@ -139,13 +140,13 @@ def test_resume_keeps_forces_and_energies(tmp_path: Path) -> None:
         run(tmp_path, model, output=tmp_path / "a", progress=stop)
     with mbsim.open_results(tmp_path / "a/deck.h5") as results:
         assert results.status == "interrupted"
-        assert 1 < len(results["joints/1/force"]) < 101
+        assert 1 < len(results["joints/1/force"]) < 1001
     with (
         run(tmp_path, model, output=tmp_path / "a", resume=True) as resumed,
         run(tmp_path, model, output=tmp_path / "b") as straight,
     ):
         names = [name for name in straight.signals() if not name.startswith("bodies")]
-        assert "motions/4/torque" in names and "energy/work_of_motions" in names
+        assert {"motions/4/torque", "energy/work_of_motions"} <= set(names)
         for name in names:
             np.testing.assert_array_equal(resumed[name], straight[name], err_msg=name)
     logs = [
