@@ -489,5 +489,5 @@ def simulate(
                     recorder.flush(runner.checkpoint())
                 results = recorder.close(status, stats, system.scene.log.contacts)
         finally:
-            log.close(status, stats, recorder.last_energy)
+            log.close(status, stats, recorder.watch)
     return results

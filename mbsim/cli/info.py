@@ -18,7 +18,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(file: Path, as_json: bool) -> None:
-    """Show what is in FILE, a model or a result file: units, counts, end state, statistics."""
+    """Show what is in FILE, a model or a result file: elements, forces, end state, statistics."""
     from mbsim.cli.messages import print_json, warn
 
     if _is_result(file):
@@ -82,6 +82,7 @@ def _about_model(model: Model) -> dict[str, Any]:
             }
             for contact in model.contacts.values()
         },
+        **_between_markers(model),
         "requests": {
             str(request.id): {"type": request.type, "label": request.label or request.comment}
             for request in model.requests.values()
@@ -95,11 +96,74 @@ def _about_model(model: Model) -> dict[str, Any]:
     return plain
 
 
+def _between_markers(model: Model) -> dict[str, Any]:
+    """Return constraints and forces between markers, by group; nothing of groups without any."""
+    from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
+
+    about: dict[str, Any] = {}
+    for statement in (*CONSTRAINTS, *APPLIED):
+        for id, element in elements_of(model, statement).items():
+            about.setdefault(GROUPS[statement].path, {})[str(id)] = _facts(model, element)
+    if any(GROUPS[statement].path in about for statement in CONSTRAINTS):
+        held = equations(model)
+        moving = sum(not body.is_ground for body in model.bodies.values())
+        about["degrees_of_freedom"] = {
+            "of_free_bodies": 6 * moving,
+            "constraint_equations": held,
+            # equations may say what others say; a run finds out, and its log tells
+            "at_least": max(0, 6 * moving - held),
+        }
+    return about
+
+
+#: Attributes of an element that `info` shows, in this order.
+_SHOWN = (
+    *("label", "type", "joint_id", "joint_ids", "direction", "val_type", "motion_types", "scales"),
+    *("pitch", "pitch_diameter", "length", "stiffness", "damping", "preload", "action_only"),
+)
+
+
+def _facts(model: Model, element: Any) -> dict[str, Any]:
+    """Return what an element says: its attributes, expression, and between what it acts."""
+    about = {name: getattr(element, name, None) for name in _SHOWN}
+    expr = getattr(element, "expr", None)
+    about["expression"] = expr.text if expr is not None else None
+    for side in ("i", "j"):
+        marker_id = getattr(element, f"{side}_marker_id", 0)
+        if marker_id:
+            body_id = model.markers[marker_id].body_id
+            about[side] = f"Reference_Marker[{marker_id}] of Body_Rigid[{body_id}]"
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in about.items()
+        if not (value is None or value is False or value in ("", ()))
+    }
+
+
+def _largest(results: Results) -> dict[str, Any]:
+    """Return the largest force and torque of constraints and forces over rows, by group and id."""
+    from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS
+
+    about: dict[str, Any] = {}
+    for statement in (*CONSTRAINTS, *APPLIED):
+        path = GROUPS[statement].path
+        for id in results.ids(path):
+            facts = {
+                "label": results.label(f"{path}/{id}"),
+                "type": results.attribute(f"{path}/{id}", "type"),
+            }
+            for kind in ("force", "torque"):
+                rows = results[f"{path}/{id}/{kind}/mag"]
+                facts[f"largest_{kind}"] = float(rows.max()) if len(rows) else None
+            about.setdefault(path, {})[str(id)] = facts
+    return about
+
+
 def _about_results(results: Results) -> dict[str, Any]:
     """Return what a result file holds."""
     from mbsim.results.reading import end_state, finite
 
-    time = results["time"]
+    time, largest = results["time"], _largest(results)
     about = {
         "kind": "results",
         "file": str(results.path),
@@ -107,7 +171,9 @@ def _about_results(results: Results) -> dict[str, Any]:
         "attributes": results.attributes,
         "counts": {
             "rows": len(time),
-            **{name: len(results.ids(name)) for name in ("bodies", "contacts", "requests")},
+            **{name: len(results.ids(name)) for name in ("bodies", "contacts")},
+            **{name: len(ids) for name, ids in largest.items()},
+            "requests": len(results.ids("requests")),
             "events": len(results["events"]),
         },
         "end_time": float(time[-1]) if len(time) else None,
@@ -120,6 +186,7 @@ def _about_results(results: Results) -> dict[str, Any]:
             }
             for id in results.ids("contacts")
         },
+        **largest,
         "stats": results.stats,
         "signals": results.keys(),
     }

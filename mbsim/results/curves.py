@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
+from mbsim.results.elements import GROUPS
 from mbsim.results.names import PARTS
 from mbsim.results.quantities import TIME, Quantity, UnitSystem, quantity_of
 from mbsim.results.reading import Results
@@ -20,7 +21,13 @@ from mbsim.results.reading import Results
 Array = np.ndarray[Any, Any]
 
 #: What one of a group is called.
-_ONE_OF = {"bodies": "body", "contacts": "contact", "joints": "joint", "requests": "request"}
+_ONE_OF = {
+    "bodies": "body",
+    "requests": "request",
+    **{group.path: group.one for group in GROUPS.values()},
+}
+#: Characters of a column's name that a label shows; an expression may be of any length.
+_LONGEST = 40
 #: Signals of a contact whose largest value is kept over all steps, and where.
 _PEAKS = {"force/mag": "force", "penetration": "penetration", "slip_speed": "slip_speed"}
 #: A peak so much above the rows is worth a note.
@@ -312,8 +319,9 @@ def label_of(results: Results, component: Component) -> str:
     element = f"{group}/{rest[0]}"
     label = results.label(element)
     columns = results.attribute(component.dataset, "columns")
-    if group == "requests" and columns is not None and part:
-        part = f"{part} = {columns[component.column]}"
+    what = str(columns[component.column]) if group == "requests" and columns is not None else ""
+    if what and part:
+        part = f"{part} = {what if len(what) <= _LONGEST else what[:_LONGEST] + '...'}"
     who = f"{_ONE_OF[group]} {rest[0]}" + (f" ({label})" if label else "")
     return ", ".join(filter(None, (who, part)))
 

@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING
 from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
+from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
+from mbsim.results.elements import title as title_of
 from mbsim.results.files import replace_text
+from mbsim.results.forces import actings, marker_actings
 from mbsim.results.store import Value
+from mbsim.results.watch import Watch, energies
 from mbsim.system import arrays as a
 from mbsim.system.pairing import Plans
 
@@ -91,7 +95,7 @@ class RunLog:
         self,
         status: str,
         stats: Mapping[str, Value],
-        energy: tuple[float, float, float] | None = None,
+        watch: Watch | None = None,
     ) -> None:
         """Add the summary and write the file.
 
@@ -100,8 +104,8 @@ class RunLog:
         status : {"finished", "interrupted", "failed"}
         stats : mapping
             Counters and times of the run.
-        energy : tuple of float, optional
-            Kinetic, potential, dissipated at the end (`Recorder.last_energy`).
+        watch : Watch, optional
+            Energies and largest forces (`Recorder.watch`).
 
         Raises
         ------
@@ -110,19 +114,37 @@ class RunLog:
         """
         if self._dropped:
             self.lines.append(f"... and {self._dropped} lines more that are not kept")
-        self.lines += ["", *summary(self.system, status, stats, energy)]
+        self.lines += ["", *summary(self.system, status, stats, watch)]
         self.flush()
 
 
 def counts(model: Model) -> dict[str, int]:
     """Return the numbers of elements by name, for logs and `mbsim check`."""
+    between_markers = {
+        GROUPS[statement].path: len(elements_of(model, statement))
+        for statement in (*CONSTRAINTS, *APPLIED)
+    }
     return {
         "bodies": sum(not body.is_ground for body in model.bodies.values()),
         "markers": len(model.markers),
         "graphics": len(model.graphics),
         "contacts": len(model.contacts),
+        **{name: count for name, count in between_markers.items() if count},
+        **({"variables": len(model.variables)} if model.variables else {}),
         "requests": len(model.requests),
     }
+
+
+def freedom(system: System) -> int | None:
+    """Return the degrees of freedom of the assembled system, None where nothing is constrained.
+
+    Directions that are free in the tree, less the equations in use: redundant ones do not count.
+    """
+    if not system.connections:
+        return None
+    tree, equations = system.scene.tree, system.scene.equations
+    alone = int((tree.of_body[: len(system.body_ids)] < 0).sum())
+    return 6 * alone + int(tree.free.sum()) - int(equations.active[-1])
 
 
 def units_text(model: Model) -> str:
@@ -159,12 +181,21 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
     yield fact("units", units_text(model))
     for name, count in counts(model).items():
         yield fact(name, count)
+    if system.connections:
+        yield fact("scalar constraint equations", equations(model))
     if not model.requests:
         yield fact("requests written as CSV", "none: the deck has no Post_Request")
     for note in model.notes:
         yield f"  note: {note}"
     for warning in model.warnings:
         yield f"  warning: {warning}"
+    elements = actings(system)
+    for request in model.requests.values():
+        if request.type == "MARKER_FORCE" and not marker_actings(system, elements, request):
+            who = f"Reference_Marker[{request.i_marker_id}]"
+            if request.j_marker_id is not None:
+                who += f" and Reference_Marker[{request.j_marker_id}]"
+            yield f"  warning: Post_Request[{request.id}]: no element acts at {who}; it is 0"
     yield ""
     yield "settings"
     shown = ("integrator", "tol", "end_time", "print_interval", "detector")
@@ -214,9 +245,9 @@ def summary(
     system: System,
     status: str,
     stats: Mapping[str, Value],
-    energy: tuple[float, float, float] | None,
+    watch: Watch | None,
 ) -> Iterator[str]:
-    """Yield what happened: contacts, rejections, energy, statistics, times."""
+    """Yield what happened: contacts, forces, rejections, energy, statistics, times."""
     yield f"end: {status}"
     log = system.scene.log
     for c, contact_id in enumerate(system.contact_ids):
@@ -235,6 +266,8 @@ def summary(
         yield fact("closing speed of the last touch", number(row[a.APPROACH]))
         yield fact("effective rebound, first impact", number(row[a.REBOUND]))
         yield fact("energy lost, damper and friction", number(row[a.ENERGY_LOST]))
+    if watch is not None:
+        yield from _force_lines(system, watch)
     yield ""
     yield "rejected steps, by the contact that asked for it"
     names = [f"Force_Contact[{id}]" for id in system.contact_ids] + ["no contact"]
@@ -251,13 +284,13 @@ def summary(
                 yield fact(name, f"{row[column]} {reason}")
     if not found:
         yield fact("none", "")
-    if energy is not None:
-        yield ""
-        yield "energy at the end"
-        for name, amount in zip(("kinetic", "potential", "dissipated total"), energy, strict=True):
-            yield fact(name, number(amount))
+    if watch is not None:
+        yield from _energy_lines(system, watch)
     yield ""
     yield "statistics"
+    free = freedom(system)
+    if free is not None:
+        yield fact("degrees of freedom, all bodies", free)
     for name, value in stats.items():
         if name not in _TIMES:
             yield fact(name, number(value) if isinstance(value, float) else value)
@@ -266,3 +299,35 @@ def summary(
     for name in _TIMES:
         if name in stats:
             yield fact(name, f"{float(stats[name]):.3f}")
+
+
+def _force_lines(system: System, watch: Watch) -> Iterator[str]:
+    """Yield the largest force and torque of every element between markers, and when."""
+    if not watch.elements:
+        return
+    yield ""
+    yield "largest force and torque on marker I, over output rows"
+    for (statement, id), peak in zip(watch.elements, watch.peaks, strict=True):
+        force, force_time, torque, torque_time = map(number, peak.tolist())
+        texts = (f"{force} at {force_time}", f"torque {torque} at {torque_time}")
+        yield fact(title_of(system.model, statement, id), ", ".join(texts))
+
+
+def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
+    """Yield the energies at the end, and how far their balance is from what it was at first."""
+    if watch.first is None or watch.last is None:
+        return
+    names = energies(system)
+    yield ""
+    yield "energy at the end"
+    for name, amount in zip(names, watch.last, strict=False):
+        said = {"dissipated": "dissipated total"}.get(name, name.replace("_", " "))
+        yield fact(said, number(float(amount)))
+    if any(stage.gravity is not None for stage in system.model.simulations[1:]):
+        return  # another gravity is another potential energy
+    what = "kinetic + potential + dissipated"
+    if len(names) == len(watch.last):
+        what += " - work of motions"
+    first, last = (float(e[:3].sum() - e[3]) for e in (watch.first, watch.last))
+    yield fact("balance, change since the start", number(last - first))
+    yield fact("  of", what)

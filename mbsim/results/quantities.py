@@ -64,6 +64,8 @@ _VELOCITY = Quantity("Velocity", length=1, time=-1)
 _ACCELERATION = Quantity("Acceleration", length=1, time=-2)
 _SPIN = Quantity("Angular velocity", time=-1, angle=1)
 _ENERGY = Quantity("Energy", force=1, length=1)
+_FORCE = Quantity("Force", force=1)
+_TORQUE = Quantity("Torque", force=1, length=1)
 
 #: By the last word of a signal's name.
 _BY_NAME = {
@@ -73,8 +75,8 @@ _BY_NAME = {
     "velocity": _VELOCITY,
     "angular_velocity": _SPIN,
     "acceleration": _ACCELERATION,
-    "force": Quantity("Force", force=1),
-    "torque": Quantity("Torque", force=1, length=1),
+    "force": _FORCE,
+    "torque": _TORQUE,
     "penetration": Quantity("Penetration", length=1),
     "slip_speed": Quantity("Slip speed", length=1, time=-1),
     "incidents": INCIDENTS,
@@ -82,12 +84,24 @@ _BY_NAME = {
     "kinetic": _ENERGY,
     "potential": _ENERGY,
     "dissipated": _ENERGY,
+    "work_of_motions": _ENERGY,
 }
 
+#: By the measure of an expression, where `requests.measures_of` knows it.
+_BY_MEASURE = {
+    "displacement": Quantity("Displacement", length=1),
+    "angle": Quantity("Angle", angle=1),
+    "velocity": _VELOCITY,
+    "angular_velocity": _SPIN,
+    "force": _FORCE,
+    "torque": _TORQUE,
+}
 #: Of F1..F4 and of F5..F8, by the type of a request.
 _OF_REQUESTS = {
-    "MARKER_DISPLACEMENT": (Quantity("Displacement", length=1), Quantity("Angle", angle=1)),
+    "MARKER_DISPLACEMENT": (_BY_MEASURE["displacement"], _BY_MEASURE["angle"]),
     "MARKER_VELOCITY": (_VELOCITY, _SPIN),
+    "MARKER_FORCE": (_FORCE, _TORQUE),
+    "ELEMENTAL_FORCE": (_FORCE, _TORQUE),
     "MARKER_ACCELERATION": (_ACCELERATION, Quantity("Angular acceleration", time=-2, angle=1)),
 }
 
@@ -99,6 +113,9 @@ def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
         kind = str(results.attribute(dataset, "type") or "")
         if kind in _OF_REQUESTS:
             return _OF_REQUESTS[kind][column // 4]
+        measures = results.attribute(dataset, "measures")
+        if measures is not None and measures[column] in _BY_MEASURE:
+            return _BY_MEASURE[measures[column]]
         last = f"request {last}"
     known = _BY_NAME.get(last)
     return known or Quantity(last.replace("_", " ").capitalize())

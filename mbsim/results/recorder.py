@@ -5,19 +5,24 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.errors import ModelError, ResultsError
+from mbsim.expressions import Expression
+from mbsim.model.elements import Model
 from mbsim.results.csv_file import write_csv
+from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, acting, elements_of, facts
 from mbsim.results.files import prepare_directory
+from mbsim.results.forces import Forces, check_requests
 from mbsim.results.motion import motion
 from mbsim.results.reading import Results, open_results
-from mbsim.results.requests import COLUMNS, evaluate
+from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.store import Store, Value
+from mbsim.results.watch import Watch, energies
 from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.system.pairing import shape_class
 
@@ -34,7 +39,7 @@ _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLI
 
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
-#: That size is for each so many bodies: a write opens every signal of every body, 0.3 ms each,
+#: That size is for each so many bodies (and joints, ...): a write opens every signal, 0.3 ms each,
 #: however few rows it adds (8000 bodies: 14 s), so that it should add many.
 BUFFER_BODIES = 400
 #: Time between two publications: at least this [s], and so many times what one costs.
@@ -53,6 +58,9 @@ class Block:
     accel: Table
     contact: Table
     energy: Table
+    joint: Table
+    applied: Table
+    value: Table
     incident_count: Table
     incidents: Table
     events: Table
@@ -61,6 +69,20 @@ class Block:
     def bytes(self) -> int:
         """Memory that the block takes."""
         return sum(int(array.nbytes) for array in vars(self).values())
+
+    @property
+    def wrenches(self) -> Table:
+        """Force and torque of all elements between markers, in the order of `acting`."""
+        return np.hstack([self.joint, self.applied])
+
+
+def _cut(system: System, rows: int, incidents: int, events: int) -> Block:
+    """Return a copy of the first rows that the pipeline has left."""
+    counts = {"incidents": incidents, "events": events}
+    found = system.scene.rows
+    return Block(
+        *(getattr(found, f.name)[: counts.get(f.name, rows)].copy() for f in fields(Block))
+    )
 
 
 def _joined(blocks: list[Block]) -> Block:
@@ -103,16 +125,18 @@ class Recorder:
         self.system = system
         self.directory = directory
         self.checkpoint: dict[str, Table] = {}
-        #: Kinetic, potential and dissipated energy of the last row; None before there is one.
-        self.last_energy: tuple[float, float, float] | None = None
+        #: What the log says of all rows, those before a resume included.
+        self.watch = Watch(acting(system))
         self._blocks: list[Block] = []
         self._bytes = 0
-        self._buffer = BUFFER_BYTES * max(1, len(system.body_ids) // BUFFER_BODIES)
+        described = len(system.body_ids) + len(self.watch.elements)
+        self._buffer = BUFFER_BYTES * max(1, described // BUFFER_BODIES)
         self._rows_since_flush = 0
         self._incidents = 0  # rows of state/incidents so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._target: Path | None = None
+        check_requests(system.model)
         settings: dict[str, Value] = {**attributes, **_digests(system)}
         if directory is not None:
             prepare_directory(directory, system.model.name)
@@ -136,6 +160,7 @@ class Recorder:
                 _check_same(self._target, results, settings)
                 offsets = results["state/incident_offsets"]
                 self._incidents, self._started = int(offsets[-1]), True
+                self.watch.recall(results)
                 return results.tables("checkpoint")
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
@@ -145,18 +170,21 @@ class Recorder:
         model = self.system.model
         named = {f"bodies/{id}": model.bodies[id].label for id in self.system.body_ids}
         named |= {f"contacts/{id}": model.contacts[id].label for id in self.system.contact_ids}
-        return {name: {"label": label} for name, label in named.items() if label}
+        labels = {name: {"label": label} for name, label in named.items() if label}
+        return labels | {name: about for name, about in facts(model) if about}
 
     def _columns(self) -> dict[str, dict[str, Any]]:
         """Return what the columns of the requests are, by dataset."""
-        return {
-            f"requests/{request.id}": {
-                "columns": COLUMNS[request.type],
+        about: dict[str, dict[str, Any]] = {}
+        for request in self.system.model.requests.values():
+            about[f"requests/{request.id}"] = {
+                "columns": columns_of(request),
                 "type": request.type,
                 "label": request.label or request.comment,
             }
-            for request in self.system.model.requests.values()
-        }
+            if request.type == "EXPRESSION":
+                about[f"requests/{request.id}"]["measures"] = measures_of(request)
+        return about
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
@@ -164,20 +192,9 @@ class Recorder:
         n, incidents, events = (int(count) for count in rows.used)
         if n == incidents == events == 0:
             return
-        block = Block(
-            rows.time[:n].copy(),
-            rows.y[:n].copy(),
-            rows.accel[:n].copy(),
-            rows.contact[:n].copy(),
-            rows.energy[:n].copy(),
-            rows.incident_count[:n].copy(),
-            rows.incidents[:incidents].copy(),
-            rows.events[:events].copy(),
-        )
+        block = _cut(self.system, n, incidents, events)
         rows.used[:] = 0
-        if n:
-            kinetic, potential, dissipated = block.energy[-1, :3].tolist()
-            self.last_energy = (kinetic, potential, dissipated)
+        self.watch.add(block.time, block.energy, block.wrenches)
         self._blocks.append(block)
         self._bytes += block.bytes
         self._rows_since_flush += n + events
@@ -297,10 +314,17 @@ class Recorder:
             yield f"contacts/{contact_id}/slip_speed", contacts[:, c, 7]
             yield f"contacts/{contact_id}/incidents", contacts[:, c, 8].astype(np.int64)
             yield f"contacts/{contact_id}/area", contacts[:, c, 9]
+        elements = acting(system)
+        wrenches = block.wrenches.reshape(n, len(elements), 6)
+        for k, (statement, id) in enumerate(elements):
+            path = f"{GROUPS[statement].path}/{id}"
+            yield f"{path}/force", wrenches[:, k, 0:3]
+            yield f"{path}/torque", wrenches[:, k, 3:6]
+        forces = Forces(system, bodies, block.joint, block.applied, block.contact)
         for request in system.model.requests.values():
             markers = system.placement.markers
-            yield f"requests/{request.id}", evaluate(request, markers, bodies)
-        for k, name in enumerate(("kinetic", "potential", "dissipated")):
+            yield f"requests/{request.id}", request_table(request, markers, forces, block.value)
+        for k, name in enumerate(energies(system)):
             yield f"energy/{name}", block.energy[:, k]
         yield "state/y", block.y
         ends = self._incidents + np.cumsum(block.incident_count, dtype=np.int64)
@@ -322,14 +346,32 @@ def _events(rows: Table) -> Table:
 
 def _nothing(system: System) -> Block:
     """Return a block without rows: a run that failed at once has a complete file too."""
-    rows = system.scene.rows
-    fields = ("time", "y", "accel", "contact", "energy", "incident_count", "incidents", "events")
-    return Block(*(getattr(rows, field)[:0].copy() for field in fields))
+    return _cut(system, 0, 0, 0)
 
 
 def _without_size(graphics: Any) -> list[Table]:
     """Return the graphics' arrays but `size`, which holds addresses where meshes are."""
     return [array for array in graphics if array is not graphics.size]
+
+
+def _described(model: Model) -> Iterator[Any]:
+    """Yield what the digest takes as text: constraints, forces, variables and requests."""
+    for statement in (*CONSTRAINTS, *APPLIED):
+        yield from elements_of(model, statement).values()
+    yield from model.variables.values()
+    yield from model.requests.values()
+
+
+def _said(element: Any) -> str:
+    """Return an element as text, without file and line: its deck may be named by another path."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Expression):
+            return value.text  # a tree may be deeper than `repr` goes
+        return tuple(map(plain, value)) if isinstance(value, tuple) else value
+
+    said = {f.name: plain(getattr(element, f.name)) for f in fields(element) if f.name != "source"}
+    return f"{type(element).__name__} {said}"
 
 
 def _digests(system: System) -> dict[str, Value]:
@@ -350,7 +392,10 @@ def _digests(system: System) -> dict[str, Value]:
     text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
     text += [repr(system.plans)]
     text += [f"{g.id} {shape_class(g)} {g.size}" for g in system.model.graphics.values()]
-    text += [repr(request) for request in system.model.requests.values()]
+    text += [_said(element) for element in _described(system.model)]
+    arrays += [
+        part for place in system.placement.markers.values() for part in (place.p_B, place.R_B)
+    ]
     model = hashlib.sha256("\n".join(text).encode())
     for array in arrays:
         model.update(np.ascontiguousarray(array).tobytes())

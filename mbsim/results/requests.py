@@ -1,22 +1,41 @@
-"""Post_Request: F1..F8 of marker displacements, velocities and accelerations, over rows."""
+"""Post_Request: F1..F8 of how markers move, of forces and of expressions, over rows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from mbsim.expressions import Expression
+from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Array, Request
 from mbsim.model.placement import MarkerPlace
+from mbsim.results.forces import Forces, Wrench
 from mbsim.results.motion import Motion, matrices
 
+_FORCES = ("mag", "fx", "fy", "fz", "tmag", "tx", "ty", "tz")
 #: What F1..F8 are, by type of request.
 COLUMNS = {
     "MARKER_DISPLACEMENT": ("mag", "x", "y", "z", "angle", "psi", "theta", "phi"),
     "MARKER_VELOCITY": ("mag", "vx", "vy", "vz", "wmag", "wx", "wy", "wz"),
     "MARKER_ACCELERATION": ("mag", "ax", "ay", "az", "alphamag", "alphax", "alphay", "alphaz"),
+    "MARKER_FORCE": _FORCES,
+    "ELEMENTAL_FORCE": _FORCES,
 }
+#: What functions of the language measure.
+_MEASURES = {
+    "displacement": ("DM", "DX", "DY", "DZ"),
+    "angle": ("AX", "AY", "AZ", "PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL"),
+    "velocity": ("VM", "VR", "VX", "VY", "VZ"),
+    "angular_velocity": ("WM", "WX", "WY", "WZ"),
+    "force": ("FM", "FX", "FY", "FZ"),
+    "torque": ("TM", "TX", "TY", "TZ"),
+}
+#: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
+_FORCES_OF_ELEMENTS = ("JOINT", "JPRIM", "MOTION", "SFORCE", "SPRDP", "CONTACT")
+#: F1 and F5 are magnitudes of the three columns behind them.
+_MAGNITUDES = (1, 5)
 
 # below this sine of theta, psi and phi turn about one line and only their sum is known
 _SINGULAR = 1e-9
@@ -103,8 +122,106 @@ def rotation_angle(R: Array) -> Array:
     return angle
 
 
+def columns_of(request: Request) -> tuple[str, ...]:
+    """Return what F1..F8 of a request are; of an EXPRESSION its texts."""
+    if request.type != "EXPRESSION":
+        return COLUMNS[request.type]
+    exprs = (*request.exprs, *[None] * 8)[:8]
+    return tuple(
+        expr.text if expr is not None else "mag" if k in _MAGNITUDES else ""
+        for k, expr in enumerate(exprs, 1)
+    )
+
+
+def measures_of(request: Request) -> tuple[str, ...]:
+    """Return what F1..F8 of an EXPRESSION measure; nothing where an expression is not one measure.
+
+    A magnitude that the deck does not give is of the kind of its components.
+    """
+    exprs = (*request.exprs, *[None] * 8)[:8]
+    found = ["" if expr is None else _measure(expr) for expr in exprs]
+    for number in _MAGNITUDES:
+        parts = {found[k] for k in range(number, number + 3) if exprs[k] is not None}
+        if exprs[number - 1] is None and len(parts) == 1:
+            found[number - 1] = parts.pop()
+    return tuple(found)
+
+
+def _measure(expr: Expression) -> str:
+    """Return what an expression measures, if it is one function of the language or minus one."""
+    node = expr.root
+    while isinstance(node, Call) and node.name == "NEG":
+        node = node.args[0]
+    if not isinstance(node, Call):
+        return ""
+    if node.name in _FORCES_OF_ELEMENTS:
+        comp = node.args[2] if len(node.args) > 2 else None
+        torque = isinstance(comp, Number) and comp.value >= 5
+        return "torque" if torque else "force"
+    return next((name for name, calls in _MEASURES.items() if node.name in calls), "")
+
+
+def request_table(
+    request: Request, markers: Mapping[int, MarkerPlace], forces: Forces, value: Array
+) -> Array:
+    """Return F1..F8 of a request of any type, shape (n, 8), in model units and radians.
+
+    Parameters
+    ----------
+    request : Request
+    markers : mapping of int to MarkerPlace
+        All markers of the model.
+    forces : Forces
+        With the moving bodies over n rows.
+    value : ndarray, shape (n, values)
+        Expressions, as `Rows.value`.
+    """
+    if request.type == "EXPRESSION":
+        return expressions(request, forces.system.values, value)
+    if request.type == "MARKER_FORCE":
+        wrench = forces.on_marker(request)
+    elif request.type == "ELEMENTAL_FORCE":
+        wrench = forces.of_element(request)
+    else:
+        return evaluate(request, markers, forces.bodies)
+    return resolved(wrench, marker_motion(request.ref_marker_id, markers, forces.bodies).R)
+
+
+def resolved(wrench: Wrench, R: Array) -> Array:
+    """Return magnitude and components of force and torque, (n, 8), along the columns of R."""
+    to_reference = R.swapaxes(-1, -2)
+    made = np.zeros((len(wrench.force), 8))
+    for first, vectors in ((0, wrench.force), (4, wrench.torque)):
+        made[:, first] = np.linalg.norm(vectors, axis=-1)
+        made[:, first + 1 : first + 4] = (to_reference @ vectors[..., None])[..., 0]
+    return made
+
+
+def expressions(request: Request, values: Sequence[tuple[int, int]], value: Array) -> Array:
+    """Return F1..F8 (n, 8) of an EXPRESSION.
+
+    F1 and F5 are, where the deck gives none, the magnitudes of F2..F4 and of F6..F8; others
+    that it does not give are 0.
+
+    Parameters
+    ----------
+    request : Request
+    values : sequence of (int, int)
+        Request id and F number of each column of `value`.
+    value : ndarray, shape (n, values)
+    """
+    made = np.zeros((len(value), 8))
+    given = {number: column for column, (id, number) in enumerate(values) if id == request.id}
+    for number, column in given.items():
+        made[:, number - 1] = value[:, column]
+    for number in _MAGNITUDES:
+        if number not in given:
+            made[:, number - 1] = np.linalg.norm(made[:, number : number + 3], axis=1)
+    return made
+
+
 def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motion) -> Array:
-    """Return F1..F8 of a request, shape (n, 8), in model units and radians.
+    """Return F1..F8 of how markers move, shape (n, 8), in model units and radians.
 
     Parameters
     ----------
@@ -140,15 +257,15 @@ def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motio
     else:
         linear, angular = i.a - j.a, i.alpha - j.alpha
 
-    table = np.zeros((bodies.rows, 8))
+    made = np.zeros((bodies.rows, 8))
     to_reference = reference.R.swapaxes(-1, -2)
-    table[:, 0] = np.linalg.norm(linear, axis=-1)
-    table[:, 1:4] = (to_reference @ linear[..., None])[..., 0]
+    made[:, 0] = np.linalg.norm(linear, axis=-1)
+    made[:, 1:4] = (to_reference @ linear[..., None])[..., 0]
     if angular is None:
         relative = np.broadcast_to(j.R.swapaxes(-1, -2) @ i.R, (bodies.rows, 3, 3))
-        table[:, 4] = rotation_angle(relative)
-        table[:, 5], table[:, 6], table[:, 7] = angles_313(relative)
+        made[:, 4] = rotation_angle(relative)
+        made[:, 5], made[:, 6], made[:, 7] = angles_313(relative)
     else:
-        table[:, 4] = np.linalg.norm(angular, axis=-1)
-        table[:, 5:8] = (to_reference @ angular[..., None])[..., 0]
-    return table
+        made[:, 4] = np.linalg.norm(angular, axis=-1)
+        made[:, 5:8] = (to_reference @ angular[..., None])[..., 0]
+    return made

@@ -79,6 +79,7 @@ class System:
     needs_fcl: bool
     connections: list[tuple[str, int]]  # statement and id of each row of `Connections`
     applied: list[tuple[str, int]]  # of each row of `Applied`
+    marker_rows: dict[int, int]  # of `Markers` by id, of those that joints, forces, ... look at
     values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
     equation_names: list[str]  # of each row of `Equations`, for messages
 
@@ -592,6 +593,7 @@ def build(
         needs_fcl,
         mechanism.elements,
         applied_ids,
+        table.rows,
         values,
         mechanism.names,
     )

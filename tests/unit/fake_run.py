@@ -17,8 +17,10 @@ from decks import added, read
 
 from mbsim.model.elements import Model
 from mbsim.model.placement import place
+from mbsim.results.elements import APPLIED, CONSTRAINTS, elements_of
 from mbsim.results.recorder import Recorder
 from mbsim.system import arrays as a
+from mbsim.system.markers import MarkerTable
 from mbsim.system.pairing import plan_pairs
 
 REQUEST = '<Post_Request id="7" type="MARKER_DISPLACEMENT" i_marker_id="20" label="ball"/>'
@@ -50,6 +52,17 @@ def fake_system_of(model: Model) -> Any:
     for k, body in enumerate(bodies):
         row = y0[a.BODY_SIZE * k :]
         row[0:3], row[3:7], row[7:10] = body.p, body.q, body.v
+    row_of = {body.id: nb for body in model.bodies.values()}
+    row_of |= {body.id: k for k, body in enumerate(bodies)}
+    table = MarkerTable(placement, row_of)
+    connections, of_connections = ends(model, CONSTRAINTS, table)
+    applied, of_applied = ends(model, APPLIED, table)
+    values = [
+        (request.id, number)
+        for request in model.requests.values()
+        for number, expr in enumerate(request.exprs, 1)
+        if expr is not None
+    ]
     log = np.zeros((nc, a.LOG_COLUMNS))
     rows = a.Rows(
         time=np.zeros(CAPACITY),
@@ -57,9 +70,9 @@ def fake_system_of(model: Model) -> Any:
         accel=np.zeros((CAPACITY, 6 * nb)),
         contact=np.zeros((CAPACITY, a.CONTACT_COLUMNS * nc)),
         energy=np.zeros((CAPACITY, 4)),
-        joint=np.zeros((CAPACITY, 0)),
-        applied=np.zeros((CAPACITY, 0)),
-        value=np.zeros((CAPACITY, 0)),
+        joint=np.zeros((CAPACITY, 6 * len(connections))),
+        applied=np.zeros((CAPACITY, 6 * len(applied))),
+        value=np.zeros((CAPACITY, len(values))),
         incident_count=np.zeros(CAPACITY, dtype=np.int64),
         incidents=np.zeros((CAPACITY, 14)),
         events=np.zeros((CAPACITY, 4)),
@@ -75,7 +88,15 @@ def fake_system_of(model: Model) -> Any:
         bodies=(np.array([body.mass for body in bodies]),),
         graphics=a.Graphics(*[np.zeros(0)] * len(a.Graphics._fields)),
         contacts=contacts,
-        world=SimpleNamespace(gravity=np.array(model.gravity.g), scale=np.ones(2)),
+        world=SimpleNamespace(
+            gravity=np.array(model.gravity.g), scale=np.ones(2), ledger=np.full(2, -1)
+        ),
+        markers=table.arrays()[0],
+        connections=of_connections,
+        applied=of_applied,
+        # all bodies hang on the first by some tree of 4 free directions, and 3 equations hold
+        tree=SimpleNamespace(of_body=np.arange(nb + 1), free=np.array([4])),
+        equations=SimpleNamespace(active=np.array([0, 1, 2, 3])),
         log=a.Log(log, np.zeros(a.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 3), np.int64)),
         rows=rows,
     )
@@ -87,11 +108,25 @@ def fake_system_of(model: Model) -> Any:
         body_ids=list(placement.bodies),
         contact_ids=list(model.contacts),
         plans=plan_pairs(model),
-        connections=[],
-        applied=[],
-        values=[],
+        connections=connections,
+        applied=applied,
+        marker_rows=table.rows,
+        values=values,
         user_friction={},
     )
+
+
+def ends(model: Model, statements: tuple[str, ...], table: MarkerTable) -> tuple[Any, Any]:
+    """Return (statement, id) of elements, and the rows of their markers I and J."""
+    found, i, j = [], [], []
+    for statement in statements:
+        for id, element in elements_of(model, statement).items():
+            joint_id = getattr(element, "joint_id", None)
+            held = model.joints[joint_id] if joint_id else element
+            found.append((statement, id))
+            i.append(table.row(getattr(held, "i_marker_id", 0)))
+            j.append(table.row(getattr(held, "j_marker_id", 0)))
+    return found, SimpleNamespace(i=np.array(i, dtype=np.int64), j=np.array(j, dtype=np.int64))
 
 
 def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
@@ -105,7 +140,10 @@ def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
         rows.y[at, 10:13] = (0.0, 0.0, 0.5)
         rows.accel[at] = k
         rows.contact[at].reshape(-1, a.CONTACT_COLUMNS)[:] = np.arange(a.CONTACT_COLUMNS) + 100 * k
-        rows.energy[at] = (k, 2 * k, 3 * k, 0.0)
+        rows.energy[at] = (k, 2 * k, 3 * k, 4 * k)
+        for table in (rows.joint, rows.applied):
+            table[at] = np.arange(table.shape[1]) + 100 * k
+        rows.value[at] = np.arange(rows.value.shape[1]) + 1 + k
         rows.incident_count[at] = k % 2
         if k % 2:
             rows.incidents[rows.used[1]] = k

@@ -19,6 +19,7 @@ from mbsim.results.log import MOST_LINES, RunLog
 from mbsim.results.reading import Results, finite, open_results
 from mbsim.results.recorder import Recorder
 from mbsim.results.store import Store
+from mbsim.results.watch import Watch
 from mbsim.system import arrays as a
 
 FAKE = Path(__file__).with_name("fake_run.py")
@@ -125,7 +126,8 @@ def test_take_empties_the_rows(tmp_path: Path) -> None:
     add_rows(system, 0, 5)
     recorder.take()
     assert list(system.scene.rows.used) == [0, 0, 0]
-    assert recorder.last_energy == (4.0, 8.0, 12.0)
+    np.testing.assert_array_equal(recorder.watch.first, [0, 0, 0, 0])
+    np.testing.assert_array_equal(recorder.watch.last, [4, 8, 12, 16])
     assert not recorder.due()
 
 
@@ -436,7 +438,9 @@ def test_log(tmp_path: Path) -> None:
     row[:] = np.nan
     row[[a.TOUCHES, a.PEAK_FORCE, a.FIRST_TOUCH]] = 2, 1234.5, 0.25
     system.scene.log.rejections[0, a.REJECT_DEPTH] = 4
-    log.close("finished", {"steps": 12, "wall_s": 0.5}, (1.0, 2.0, 3.0))
+    watch = Watch([])
+    watch.add(np.array([0.0, 1.0]), np.array([[4.0, 1, 0, 0], [1, 2, 3, 0]]), np.zeros((2, 0)))
+    log.close("finished", {"steps": 12, "wall_s": 0.5}, watch)
     text = (tmp_path / "deck.log").read_text()
     facts = [" ".join(line.split()) for line in text.splitlines()]
     for said in (
@@ -451,6 +455,8 @@ def test_log(tmp_path: Path) -> None:
         "effective rebound, first impact -",
         "Force_Contact[301] 4 impact would begin too deep",
         "dissipated total 3",
+        "balance, change since the start 1",
+        "of kinetic + potential + dissipated",
         "steps 12",
         "wall_s 0.500",
     ):

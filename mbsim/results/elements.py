@@ -1,0 +1,79 @@
+"""Elements that exert forces: what they are called in decks, in result files and on pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mbsim.model.elements import Model
+
+if TYPE_CHECKING:
+    from mbsim.system.build import System
+
+
+@dataclass(frozen=True)
+class Group:
+    """Elements of one statement: where a model and a result file have them, and their names."""
+
+    member: str  # of Model
+    path: str  # in result files
+    one: str  # on pictures
+    title: str  # in messages, with the id behind it
+
+
+#: By the statement of `System.connections` and `System.applied`.
+GROUPS = {
+    "JOINT": Group("joints", "joints", "joint", "Constraint_Joint"),
+    "JPRIM": Group("primitives", "primitives", "primitive", "Constraint_Jprim"),
+    "COUPLER": Group("couplers", "couplers", "coupler", "Constraint_Coupler"),
+    "MOTION": Group("motions", "motions", "motion", "Motion_Joint"),
+    "GCON": Group(
+        "general_constraints", "general_constraints", "general constraint", "Constraint_General"
+    ),
+    "SPRINGDAMPER": Group("spring_dampers", "springs", "spring", "Force_SpringDamper"),
+    "SFORCE": Group("scalar_forces", "scalar_forces", "scalar force", "Force_Scalar_TwoBody"),
+    "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
+}
+#: Those that hold degrees of freedom, then those that push.
+CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
+APPLIED = ("SPRINGDAMPER", "SFORCE")
+
+
+def elements_of(model: Model, statement: str) -> dict[int, Any]:
+    """Return the elements of a statement by id."""
+    found: dict[int, Any] = getattr(model, GROUPS[statement].member)
+    return found
+
+
+def title(model: Model, statement: str, id: int) -> str:
+    """Return an element's name and label: ``Constraint_Joint[1] crank``."""
+    label = elements_of(model, statement)[id].label
+    return f"{GROUPS[statement].title}[{id}] {label}".rstrip()
+
+
+def acting(system: System) -> list[tuple[str, int]]:
+    """Return statement and id of all elements between markers, as rows have them."""
+    return [*system.connections, *system.applied]
+
+
+def facts(model: Model) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the place of each such element in a result file, with its type and label."""
+    for statement in (*CONSTRAINTS, *APPLIED):
+        for id, element in elements_of(model, statement).items():
+            about = {"type": getattr(element, "type", ""), "label": element.label}
+            yield (
+                f"{GROUPS[statement].path}/{id}",
+                {name: text for name, text in about.items() if text},
+            )
+
+
+def equations(model: Model) -> int:
+    """Return how many scalar equations the model's constraints are, redundant ones included."""
+    from mbsim.joints.catalog import JOINTS
+
+    held = sum(
+        len(JOINTS[joint.type].equations)
+        for joint in (*model.joints.values(), *model.primitives.values())
+    )
+    return held + len(model.couplers) + len(model.motions) + len(model.general_constraints)

@@ -1,0 +1,82 @@
+"""`Watch`: what a run's log says of all output rows, kept while they pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbsim.model.elements import Array
+from mbsim.results.elements import GROUPS
+from mbsim.results.reading import Results
+
+if TYPE_CHECKING:
+    from mbsim.system.build import System
+
+#: Names in the group `energy`, by the column of `Rows.energy`.
+ENERGIES = ("kinetic", "potential", "dissipated", "work_of_motions")
+
+
+def energies(system: System) -> tuple[str, ...]:
+    """Return which energies a system has: the work of motions only where something drives it."""
+    driven = system.model.motions or system.scene.world.ledger[0] >= 0
+    return ENERGIES if driven else ENERGIES[:3]
+
+
+@dataclass
+class Watch:
+    """First and last energies, and the largest force and torque of every element between markers.
+
+    Parameters
+    ----------
+    elements : sequence of (str, int)
+        Statement and id, as `results.elements.acting` has them.
+    """
+
+    elements: Sequence[tuple[str, int]]
+    first: Array | None = None  # (4,) as `Rows.energy`
+    last: Array | None = None
+
+    def __post_init__(self) -> None:
+        #: Force and torque, and when: (elements, 4); NaN before there is a row.
+        self.peaks = np.full((len(self.elements), 4), np.nan)
+
+    def add(self, time: Array, energy: Array, wrenches: Array) -> None:
+        """Look at rows.
+
+        Parameters
+        ----------
+        time : ndarray, shape (n,)
+        energy : ndarray, shape (n, 4)
+        wrenches : ndarray, shape (n, 6 elements)
+            Force and torque of every element.
+        """
+        if not len(time):
+            return
+        if self.first is None:
+            self.first = energy[0].copy()
+        self.last = energy[-1].copy()
+        each = wrenches.reshape(len(time), len(self.elements), 2, 3)
+        # of a not finite force the rest is still worth telling
+        sizes = np.nan_to_num(np.linalg.norm(each, axis=-1), nan=-1.0)
+        rows = sizes.argmax(axis=0)
+        for kind in range(2):
+            size = sizes[rows[:, kind], np.arange(len(self.elements)), kind]
+            above = (size >= 0.0) & ~(size <= self.peaks[:, 2 * kind])
+            self.peaks[above, 2 * kind] = size[above]
+            self.peaks[above, 2 * kind + 1] = time[rows[above, kind]]
+
+    def recall(self, results: Results) -> None:
+        """Look at the rows that a run which goes on has recorded before."""
+        time = results["time"]
+        n = len(time)
+        columns = [f"energy/{name}" for name in ENERGIES]
+        energy = [results[name] if name in results else np.zeros(n) for name in columns]
+        wrenches = [
+            results[f"{GROUPS[statement].path}/{id}/{kind}"]
+            for statement, id in self.elements
+            for kind in ("force", "torque")
+        ]
+        self.add(time, np.column_stack(energy), np.hstack([np.zeros((n, 0)), *wrenches]))
