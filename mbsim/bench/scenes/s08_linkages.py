@@ -72,7 +72,7 @@ def _ends(outcome: Outcome, bodies: slice, length: float) -> tuple[np.ndarray, n
 
 def _at_rows(reference: np.ndarray, outcome: Outcome) -> np.ndarray:
     """Return a reference that is sampled as the rows are asked for, at the rows there are."""
-    return reference[np.rint(outcome.time / p.SAMPLE).astype(int)]
+    return np.asarray(reference[np.rint(outcome.time / p.SAMPLE).astype(int)])
 
 
 def _chain_errors(count: int, outcome: Outcome, variant: str) -> dict[str, float]:
