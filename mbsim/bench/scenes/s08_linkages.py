@@ -49,7 +49,7 @@ def _hinge(number: int, i: int, j: int, place: list[float]) -> list[str]:
     ]
 
 
-def _chain_deck(count: int, variation: Variation) -> str:
+def chain_deck(count: int, end_time: float) -> str:
     """Return the deck: each rod hinged to the one before, the first one to ground."""
     length, flat = p.S8.length / count, np.zeros((1, count))
     rods = _rods(linkages.chain(flat, flat), [p.S8.mass] * count, [length] * count)
@@ -59,7 +59,7 @@ def _chain_deck(count: int, variation: Variation) -> str:
     return text.deck(
         f"A chain of {count} hinged rods swings down from the horizontal",
         [text.GROUND, *rods, *hinges, text.gravity()],
-        p.S8.end_time[count],
+        end_time,
     )
 
 
@@ -151,7 +151,7 @@ def _chain_scene(count: int, ratio: float) -> Scene:
         end_time=end_time,
         measure="tip_max",
         unit="largest error of the free end [m]",
-        deck=partial(_chain_deck, count),
+        deck=lambda variation: chain_deck(count, end_time),
         errors=partial(_chain_errors, count),
         targets=(Target(ratio),),
         compared=COMPARED,
