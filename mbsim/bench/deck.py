@@ -44,8 +44,12 @@ def body(
     position: Sequence[float] = (0.0, 0.0, 0.0),
     velocity: Sequence[float] = (0.0, 0.0, 0.0),
     spin: Sequence[float] = (0.0, 0.0, 0.0),
+    axes: Sequence[Sequence[float]] | None = None,
 ) -> str:
-    """Return a body and its cg marker `10 number`; principal `inertia`, global velocities."""
+    """Return a body and its cg marker `10 number`; principal `inertia`, global velocities.
+
+    `axes` are those of the marker, a rotation matrix (3, 3); None means the global ones.
+    """
     mass_text = attributes(
         mass=float(mass),
         inertia_xx=float(inertia[0]),
@@ -62,17 +66,36 @@ def body(
             (f"{kind}_ic_{axis}_flag", "TRUE"),
         )
     }
-    place = {
+    start = f"\n  {attributes(**initial)}" if initial else ""
+    return (
+        f'<Body_Rigid id="{number}" cg_id="{10 * number}" {mass_text}{start}/>\n'
+        f"{marker(10 * number, number, position, axes)}"
+    )
+
+
+def marker(
+    number: int,
+    body_number: int,
+    position: Sequence[float],
+    axes: Sequence[Sequence[float]] | None = None,
+) -> str:
+    """Return a marker of a body; place and axes (3, 3) in the global frame at t = 0."""
+    placed = {
         f"pos_{axis}": float(value)
         for axis, value in zip("xyz", position, strict=True)
         if value != 0.0
     }
-    marker = attributes(id=10 * number, body_id=number, **place)
-    start = f"\n  {attributes(**initial)}" if initial else ""
-    return (
-        f'<Body_Rigid id="{number}" cg_id="{10 * number}" {mass_text}{start}/>\n'
-        f"<Reference_Marker {marker}/>"
-    )
+    turned = {
+        f"a{row}{column}": float(value)
+        for row, values in enumerate(axes or ())
+        for column, value in enumerate(values)
+    }
+    return f"<Reference_Marker {attributes(id=number, body_id=body_number, **placed, **turned)}/>"
+
+
+def joint(number: int, kind: str, i: int, j: int) -> str:
+    """Return a Constraint_Joint between two markers."""
+    return f"<Constraint_Joint {attributes(id=number, type=kind, i_marker_id=i, j_marker_id=j)}/>"
 
 
 def sphere(

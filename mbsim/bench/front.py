@@ -9,9 +9,6 @@ from typing import NamedTuple
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
 
-#: Errors of the peers' front at which we are compared.
-LARGEST, SMALLEST = 1e-2, 1e-7
-
 
 class Point(NamedTuple):
     """An error, the time that it took, and who took it."""
@@ -128,7 +125,8 @@ def compare(scene: Scene, rows: Sequence[Measurement]) -> list[Cell]:
 def _compared_peers(scene: Scene, peers: list[Point]) -> list[Point]:
     """Return the peers' points that ours is compared with; the fastest one that passes."""
     if scene.pass_below is None:
-        return [p for p in peers if SMALLEST <= p.error <= LARGEST]
+        smallest, largest = scene.compared
+        return [p for p in peers if smallest <= p.error <= largest]
     return [p for p in peers if p.error < scene.pass_below][:1]
 
 

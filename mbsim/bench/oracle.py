@@ -1,4 +1,4 @@
-"""References that are computed anew: exact flight, contact by DOP853 at its finest.
+"""References that are computed anew: exact flight; contact and linkages by DOP853 at its finest.
 
 They use none of mbsim's own simulation code, so that they can judge it.
 """
@@ -120,6 +120,100 @@ def _touch(
     )
     end = float(done.t_events[0][0])
     return Touch(start, start + end, done.sol), -float(done.y_events[0][0][1])
+
+
+#: Rate of a state at a time.
+Rate = Callable[[float, np.ndarray], np.ndarray]
+
+
+def sampled(rate: Rate, start: np.ndarray, end_time: float) -> np.ndarray:
+    """Return states every `SAMPLE` seconds, shape (n + 1, len(start)).
+
+    Every sample ends a step, because between its steps DOP853 is less exact than at them.
+    """
+    from scipy.integrate import solve_ivp
+
+    rows = [start]
+    step = 1e-4
+    for k in range(round(end_time / p.SAMPLE)):
+        done = solve_ivp(
+            rate,
+            (k * p.SAMPLE, (k + 1) * p.SAMPLE),
+            rows[-1],
+            method="DOP853",
+            rtol=RELATIVE,
+            atol=1e-14,
+            first_step=step,
+        )
+        # the last step is cut at the sample; the first of the next may be as long as any
+        step = min(float(np.diff(done.t).max()), p.SAMPLE)
+        rows.append(done.y[:, -1])
+    return np.array(rows)
+
+
+def chain_rate(count: int) -> Rate:
+    """Return the rate of angles and their rates of S8_n, in minimal coordinates.
+
+    With a the rods' angles from x towards z and all over m l^2:
+    sum_j c_ij (cos(a_i - a_j) a_j'' + sin(a_i - a_j) a_j'^2) = -g/l (n - i + 1/2) cos a_i,
+    c_ij = n - max(i, j) + 1/2, c_ii = n - i + 1/3, counted from 1 (Lagrange).
+    """
+    i = np.arange(1, count + 1)
+    c = count - np.maximum.outer(i, i) + 0.5
+    c[np.diag_indices(count)] = count - i + 1.0 / 3.0
+    weight = p.GRAVITY * count / p.S8.length * (count - i + 0.5)
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        angle, w = y[:count], y[count:]
+        between = np.subtract.outer(angle, angle)
+        pull = (c * np.sin(between)) @ (w * w) + weight * np.cos(angle)
+        return np.concatenate([w, -np.linalg.solve(c * np.cos(between), pull)])
+
+    return rate
+
+
+@lru_cache
+def s8_tip(count: int) -> np.ndarray:
+    """Return x and z of the free end of S8_n every `SAMPLE` seconds, shape (n, 2), m."""
+    angles = sampled(chain_rate(count), np.zeros(2 * count), p.S8.end_time[count])[:, :count]
+    length = p.S8.length / count
+    return length * np.stack([np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1)], axis=1)
+
+
+def crank_rate(t: float, y: np.ndarray) -> np.ndarray:
+    """Return the rate of the crank's angle a and its rate w in S8b: M a'' + M' w^2 / 2 + V' = 0.
+
+    The rod's angle b follows from l1 sin a + l2 sin b = 0; x of the slider, and x and z of the
+    rod's middle, from both. A rate by a is written with one stroke: b1 = db/da, b2 = d2b/da2.
+    """
+    s = p.S8B
+    a, w = y
+    l1, l2 = s.crank_length, s.rod_length
+    sin_a, cos_a = math.sin(a), math.cos(a)
+    sin_b = -l1 / l2 * sin_a
+    cos_b = math.sqrt(1.0 - sin_b * sin_b)
+    b1 = -l1 * cos_a / (l2 * cos_b)
+    b2 = (l1 * sin_a / l2 + sin_b * b1 * b1) / cos_b
+    # first and second rates of l2 cos b
+    reach1 = -l2 * sin_b * b1
+    reach2 = -l2 * (cos_b * b1 * b1 + sin_b * b2)
+    x1, x2 = -l1 * sin_a + reach1, -l1 * cos_a + reach2
+    mid_x1, mid_x2 = -l1 * sin_a + reach1 / 2.0, -l1 * cos_a + reach2 / 2.0
+    mid_z1, mid_z2 = l1 * cos_a / 2.0, -l1 * sin_a / 2.0
+    across = p.ROD_ACROSS * s.rod_mass * l2 * l2
+    mass = s.crank_mass * l1 * l1 / 3.0 + s.slider_mass * x1 * x1
+    mass += s.rod_mass * (mid_x1 * mid_x1 + mid_z1 * mid_z1) + across * b1 * b1
+    slope = s.slider_mass * x1 * x2 + s.rod_mass * (mid_x1 * mid_x2 + mid_z1 * mid_z2)
+    slope += across * b1 * b2
+    torque = p.GRAVITY * (s.crank_mass * l1 / 2.0 * cos_a + s.rod_mass * mid_z1)
+    return np.array([w, -(slope * w * w + torque) / mass])
+
+
+@lru_cache
+def s8b_angle() -> np.ndarray:
+    """Return the crank's angle in S8b every `SAMPLE` seconds, shape (n,), rad."""
+    start = np.array([p.S8B.angle, p.S8B.speed])
+    return sampled(crank_rate, start, p.S8B.end_time)[:, 0]
 
 
 def _linear(law: p.LinearLaw) -> Force:

@@ -120,6 +120,30 @@ class Grains(NamedTuple):
         return self.density * 4 / 3 * math.pi * self.radius**3
 
 
+class Chain(NamedTuple):
+    """S8_n: equal slender rods hinged about y in a row, from the origin along x, at rest."""
+
+    length: float  # m, of the whole chain
+    mass: float  # kg, of one rod
+    end_time: dict[int, float]  # s, for each number of rods
+
+
+class SliderCrank(NamedTuple):
+    """S8b: uniform rods in the plane x-z, the crank about the origin, the slider along x.
+
+    Angles count from x towards z.
+    """
+
+    crank_length: float  # m
+    crank_mass: float  # kg
+    rod_length: float  # m
+    rod_mass: float  # kg
+    slider_mass: float  # kg
+    angle: float  # rad, of the crank at t = 0
+    speed: float  # rad/s, of the crank at t = 0
+    end_time: float  # s
+
+
 S1 = FreeBody(
     mass=1.0,
     inertia=(0.010, 0.020, 0.025),
@@ -226,6 +250,21 @@ S7 = Grains(
     law=LinearLaw(k=1e5, c=20.0),
 )
 
+S8 = Chain(length=2.0, mass=1.0, end_time={2: 5.0, 10: 2.0, 40: 2.0})
+#: Inertia of a slender rod over m l^2: about its own axis, and across at its middle.
+ROD_ALONG, ROD_ACROSS = 1e-3, 1.0 / 12.0
+
+S8B = SliderCrank(
+    crank_length=0.15,
+    crank_mass=1.0,
+    rod_length=0.35,
+    rod_mass=0.5,
+    slider_mass=0.8,
+    angle=math.pi / 4.0,
+    speed=10.0,
+    end_time=2.0,
+)
+
 
 def s5_positions() -> np.ndarray:
     """Centres of the balls of S5 along x at t = 0 (m), shape (5,); ball 2 at 0.2."""
@@ -264,3 +303,9 @@ def s7_positions(count: int) -> np.ndarray:
 def s7_sample(count: int) -> float:
     """Time between the stored rows of S7 (s): short of 100 MB of rows at any count."""
     return SAMPLE if count <= 1000 else 0.1
+
+
+def rod_inertia(mass: float, length: float) -> tuple[float, float, float]:
+    """Principal inertia of a slender rod along x about its middle (kg m^2)."""
+    across = ROD_ACROSS * mass * length**2
+    return (ROD_ALONG * mass * length**2, across, across)

@@ -23,6 +23,9 @@ DECADES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 #: Between these numbers of spheres the time for one body or contact shall grow so much at most.
 SCALING_BETWEEN, LARGEST_GROWTH = (125, 8000), 1.5
 
+#: Between these numbers of rods an evaluation shall grow so much at most.
+CHAIN_BETWEEN, CHAIN_GROWTH = (10, 40), 5.0
+
 
 def write_text(path: Path, text: str) -> None:
     """Write a file, or raise why not as `ResultsError`."""
@@ -116,6 +119,8 @@ def markdown(
     parts += ["## Our time to reach an error", own_times(scenes, rows)]
     many = scaling(rows)
     parts += ["## Our time with the number of spheres", many] if many else []
+    long = chain_growth(rows)
+    parts += ["## Our time with the number of rods", long] if long else []
     for scene in scenes:
         parts += [f"## {scene.name}: {scene.title}", front_table(scene, rows)]
     troubles = _troubles(scenes, rows)
@@ -201,29 +206,60 @@ def scaling(rows: Sequence[Measurement]) -> str:
     being one more evaluation in thousands. Settings are compared with themselves only.
     """
     each: dict[str, dict[int, float]] = {}
-    for row in rows:
-        if row.engine != OURS or not row.scene.startswith("S7_") or not row.errors:
-            continue
-        bodies = int(row.scene.removeprefix("S7_"))
+    for row, bodies in _counted(rows, "S7_"):
         contacts = row.counts["normal_calls"] / row.counts["rhs_evaluations"]
         each.setdefault(row.setting, {})[bodies] = (
             1e9 * row.wall_s / (row.counts["steps"] * (bodies + contacts))
         )
+    first = "ns each body or contact a step"
+    return _growth_table(first, each, SCALING_BETWEEN, LARGEST_GROWTH)
+
+
+def chain_growth(rows: Sequence[Measurement]) -> str:
+    """Return our time for one evaluation, all included, for each number of rods of S8_n."""
+    each: dict[str, dict[int, float]] = {}
+    for row, rods in _counted(rows, "S8_"):
+        spent = row.wall_s / row.counts["rhs_evaluations"]
+        each.setdefault(row.setting, {})[rods] = 1e9 * spent
+    return _growth_table("ns an evaluation", each, CHAIN_BETWEEN, CHAIN_GROWTH)
+
+
+def _counted(rows: Sequence[Measurement], prefix: str) -> list[tuple[Measurement, int]]:
+    """Return our runs with a result of scenes that are called `prefix` and a number, and that."""
+    return [
+        (row, int(row.scene.removeprefix(prefix)))
+        for row in rows
+        if row.engine == OURS and row.scene.startswith(prefix) and row.errors
+    ]
+
+
+def _growth_table(
+    first: str, each: Mapping[str, Mapping[int, float]], between: tuple[int, int], largest: float
+) -> str:
+    """Return times by setting and number of bodies, and their growth; empty if there is none."""
     counts = sorted({bodies for found in each.values() for bodies in found})
-    header = ("ns each body or contact a step", *map(str, counts), "growth", "target", "")
-    lines = [_scaling_line(setting, found, counts) for setting, found in each.items()]
+    header = (first, *map(str, counts), "growth", "target", "")
+    lines = [
+        _growth_line(setting, found, counts, between, largest) for setting, found in each.items()
+    ]
     return table(header, lines) if lines else ""
 
 
-def _scaling_line(setting: str, found: Mapping[int, float], counts: Sequence[int]) -> list[str]:
-    """Return the times of one setting, and their growth from the fewest spheres to the most."""
+def _growth_line(
+    setting: str,
+    found: Mapping[int, float],
+    counts: Sequence[int],
+    between: tuple[int, int],
+    largest: float,
+) -> list[str]:
+    """Return the times of one setting, and their growth from the fewest bodies to the most."""
     shown = [f"{found[n]:.0f}" if n in found else "" for n in counts]
-    few, many = SCALING_BETWEEN
+    few, many = between
     if few not in found or many not in found:
         return [setting, *shown, "", "", ""]
     growth = found[many] / found[few]
-    verdict = "met" if growth <= LARGEST_GROWTH else "lost"
-    return [setting, *shown, f"{growth:.2f}", f"{LARGEST_GROWTH:g}", verdict]
+    verdict = "met" if growth <= largest else "lost"
+    return [setting, *shown, f"{growth:.2f}", f"{largest:g}", verdict]
 
 
 def _troubles(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:

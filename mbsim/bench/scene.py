@@ -12,6 +12,9 @@ from mbsim.bench.parameters import SAMPLE
 #: Tolerances of our runs where a scene does not say otherwise.
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 
+#: Errors of the peers' front at which we are compared where a scene does not say otherwise.
+COMPARED = (1e-7, 1e-2)
+
 #: Our integrators where a scene does not say otherwise.
 INTEGRATORS = ("DOPRI5", "DOP853")
 
@@ -57,6 +60,8 @@ class Scene:
         What ours is held to in place of `measure`, if there is such; the peers never are.
     targets
         By rising `up_to`; empty where there is none.
+    compared
+        Smallest and largest error of the peers' front at which ours is compared with it.
     variations
         What is varied besides integrator and tolerance.
     variants
@@ -86,6 +91,7 @@ class Scene:
     errors: Errors
     own_measure: str | None = None
     targets: tuple[Target, ...] = ()
+    compared: tuple[float, float] = COMPARED
     variations: tuple[Variation, ...] = ({},)
     variants: tuple[str, ...] = ("",)
     second: tuple[str, str] | None = None

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbsim.bench import oracle, peers, report, runner
+from mbsim.bench import linkages, oracle, peers, report, runner
 from mbsim.bench import ours as own
 from mbsim.bench import parameters as p
 from mbsim.bench.front import Point, compare, front, time_at
@@ -369,6 +369,125 @@ def test_growth_with_the_number_of_spheres():
     assert report.scaling([row(OURS, 1e-3, 1.0)]) == ""
 
 
+def chain(rods, wall_s, evaluations, setting="DOPRI5 tol=1e-06"):
+    """Return a run of ours of S8 with so many rods."""
+    counts = {"rhs_evaluations": float(evaluations)}
+    name = f"S8_{rods}"
+    return Measurement(name, OURS, "1", setting, 1, wall_s, wall_s / 2, {"e": 1.0}, counts, "")
+
+
+def test_growth_of_an_evaluation_with_the_length_of_a_chain():
+    shown = report.chain_growth([chain(10, 2e-3, 2000), chain(40, 18e-3, 4000)])
+    (line,) = shown.splitlines()[2:]
+    assert [cell.strip() for cell in line.split("|")[2:-1]] == ["1000", "4500", "4.50", "5", "met"]
+    assert "lost" in report.chain_growth([chain(10, 2e-3, 2000), chain(40, 21e-3, 4000)])
+    assert report.chain_growth([grains(125, 0.025)]) == ""
+
+
+def test_a_scene_says_at_which_errors_it_is_compared():
+    mine = [row(OURS, 1e-9, 1.0, "fine"), row(OURS, 1e-2, 0.1)]
+    theirs = [row("peer", 5e-3, 1.0, "a"), row("peer", 5e-8, 2.0, "b")]
+    assert [cell.setting for cell in compare(scene(), mine + theirs)] == ["a"]
+    fine = scene(compared=(1e-9, 1e-3))
+    assert [cell.setting for cell in compare(fine, mine + theirs)] == ["b"]
+
+
+# --- linkages
+
+
+def swung(count):
+    """Return an outcome of S8_n from its own reference, with the reference's rates."""
+    end_time = p.S8.end_time[count]
+    start = np.zeros(2 * count)
+    states = oracle.sampled(oracle.chain_rate(count), start, end_time)
+    poses = linkages.chain(states[:, :count], states[:, count:])
+    return Outcome(1.0, np.arange(len(states)) * p.SAMPLE, *poses, {}, "")
+
+
+def test_errors_of_a_chain_that_follows_its_reference():
+    done = swung(2)
+    made = all_scenes()["S8_2"]
+    errors = made.errors(done, "")
+    assert max(errors[name] for name in ("tip_max", "tip_rms", "tip_end", "joint_drift")) < 1e-14
+    assert errors["E_rel"] < 1e-12  # the equations of motion keep the energy of the bodies
+    moved = done._replace(position=done.position + np.array([0.0, 0.0, 1e-6]))
+    errors = made.errors(moved, "")
+    assert errors["tip_max"] == pytest.approx(1e-6, rel=1e-6)
+    assert errors["joint_drift"] == pytest.approx(1e-6, rel=1e-6)
+
+
+def test_errors_of_a_crank_that_follows_its_reference():
+    s = p.S8B
+    crank, rate = oracle.sampled(oracle.crank_rate, np.array([s.angle, s.speed]), s.end_time).T
+    rod = -np.arcsin(s.crank_length / s.rod_length * np.sin(crank))
+    rod_rate = -s.crank_length * np.cos(crank) * rate / (s.rod_length * np.cos(rod))
+    slider = s.crank_length * np.cos(crank) + s.rod_length * np.cos(rod)
+    speed = -s.crank_length * np.sin(crank) * rate - s.rod_length * np.sin(rod) * rod_rate
+    poses = linkages.slider_crank(
+        np.stack([crank, rod], axis=1), np.stack([rate, rod_rate], axis=1), slider, speed
+    )
+    done = Outcome(1.0, np.arange(len(crank)) * p.SAMPLE, *poses, {}, "")
+    errors = all_scenes()["S8b"].errors(done, "")
+    assert errors["crank_angle_max"] < 1e-13
+    assert errors["loop_gap"] < 1e-15
+    moved = done._replace(position=done.position + np.array([0, 0, 1.0])[:, None] * [0.0, 1e-7, 0])
+    assert all_scenes()["S8b"].errors(moved, "")["loop_gap"] == pytest.approx(1e-7)
+    # the bodies' own energy is constant, which the one equation of motion does not know
+    across = [p.rod_inertia(s.crank_mass, s.crank_length)[1]]
+    across += [p.rod_inertia(s.rod_mass, s.rod_length)[1], 0.0]
+    mass = np.array([s.crank_mass, s.rod_mass, s.slider_mass])
+    kinetic = mass * (done.velocity**2).sum(axis=2) + across * done.angular_velocity[..., 1] ** 2
+    energy = (kinetic / 2 + mass * p.GRAVITY * done.position[..., 2]).sum(axis=1)
+    assert np.ptp(energy) < 1e-11 * energy[0]
+
+
+@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+@pytest.mark.parametrize("count", [2, 10, pytest.param(40, marks=pytest.mark.slow)])
+def test_free_end_is_that_of_the_shared_file(count):
+    shared = json.loads(REFERENCES.read_text(encoding="utf-8"))[f"S8_{count}"]
+    tip = np.stack([shared["tip_x"], shared["tip_z"]], axis=1)
+    assert np.abs(oracle.s8_tip(count) - tip).max() < 2e-11
+
+
+@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+def test_crank_angle_is_that_of_the_shared_file():
+    shared = json.loads(REFERENCES.read_text(encoding="utf-8"))["S8b"]
+    assert np.abs(oracle.s8b_angle() - shared["th"]).max() < 2e-11
+
+
+@pytest.mark.parametrize("name", ["S8_2", "S8_10", "S8b"])
+def test_joints_are_closed_at_the_start(tmp_path, name):
+    from lxml import etree
+
+    root = etree.fromstring(all_scenes()[name].deck({}).encode())
+    joints = root.findall("Model/Constraint_Joint")
+    for statement in joints:
+        statement.getparent().remove(statement)
+    (tmp_path / "bodies.xml").write_bytes(etree.tostring(root))
+    deck = read_model(tmp_path / "bodies.xml")
+    frames = marker_frames(deck)
+    bodies = {body.id: body for body in deck.bodies.values()}
+
+    def speed(marker_id):
+        body = bodies[deck.markers[marker_id].body_id]
+        if body.is_ground:
+            return np.zeros(3)
+        arm = frames[marker_id].p - frames[body.cg_id].p
+        w, v = (np.array([x or 0.0 for x in rate]) for rate in (body.w_ic, body.v_ic))
+        return v + np.cross(w, arm)
+
+    assert len(joints) == {"S8_2": 2, "S8_10": 10, "S8b": 4}[name]
+    for statement in joints:
+        i, j = int(statement.get("i_marker_id")), int(statement.get("j_marker_id"))
+        assert frames[i].R == pytest.approx(frames[j].R, abs=1e-15)
+        apart, slip = frames[i].p - frames[j].p, speed(i) - speed(j)
+        if statement.get("type") == "TRANSLATIONAL":  # free along z of J
+            axis = frames[j].R[:, 2]
+            apart, slip = np.cross(axis, apart), np.cross(axis, slip)
+        assert apart == pytest.approx(np.zeros(3), abs=1e-15)
+        assert slip == pytest.approx(np.zeros(3), abs=1e-14)
+
+
 # --- whole runs
 
 
@@ -430,16 +549,16 @@ def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
     done = call("S10a", "--tol", "1e-3", "--repeats", 1, "-o", tmp_path)
     assert done.exit_code == 0
     (line,) = [line for line in done.stderr.splitlines() if "not installed" in line]
-    assert "mujoco, exudyn, pybullet" in line
+    assert "mujoco, exudyn, pybullet, drake" in line
 
 
 def test_a_machine_without_peers(tmp_path, monkeypatch):
-    for name in peers.ENGINES:
+    for name in peers.ENGINES.values():
         monkeypatch.setitem(sys.modules, name, None)  # import raises, and no spec is found
     assert peers.available() == []
     done = call("S10a", "--tol", "1e-3", "--integrator", "DOPRI5", "--repeats", 1, "-o", tmp_path)
     assert done.exit_code == 0, done.stderr
-    assert "Not compared: mujoco, exudyn, pybullet." in done.stdout
+    assert "Not compared: mujoco, exudyn, pybullet, drake." in done.stdout
     assert "[1/1] S10a mbsim DOPRI5 tol=0.001: " in done.stderr
 
 

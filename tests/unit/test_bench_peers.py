@@ -23,7 +23,8 @@ def _angle(outcome: Outcome, quaternion: tuple[float, ...]) -> float:
 
 
 def _run(engine: str, scene: str, setting: str) -> Outcome:
-    pytest.importorskip(engine, reason=f"{engine} is not installed")
+    if engine not in peers.available():
+        pytest.skip(f"{engine} is not installed")
     return peers.load(engine).run(scene, setting, repeats=1)
 
 
@@ -81,10 +82,20 @@ def test_drop_leaves_the_plane_at_the_speed_of_its_law(engine, scene, setting, l
     assert speed == pytest.approx(p.S2_FIRST_IMPACT[law][2], rel=bound)
 
 
+CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c")
+JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
+SCENES_OF = {
+    "mujoco": CONTACT + JOINTS,
+    "exudyn": CONTACT + JOINTS,
+    "pybullet": CONTACT,
+    "drake": JOINTS,
+}
+
+
 @pytest.mark.parametrize("engine", peers.ENGINES)
 def test_every_setting_is_known_and_unknown_scenes_have_none(engine):
     module = peers.load(engine)
-    for scene in ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c"):
+    for scene in SCENES_OF[engine]:
         names = module.settings(scene)
         assert names
         assert len(set(names)) == len(names)
@@ -127,8 +138,42 @@ def test_row_of_balls_keeps_its_momentum():
     assert outcome.velocity[-1, :, 0].sum() == pytest.approx(p.S5.speed, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("engine", "scene", "setting", "measure", "bound"),
+    [
+        ("mujoco", "S8_2", "RK4 dt=0.001", "tip_max", 2e-8),
+        ("mujoco", "S8_10", "RK4 dt=0.001", "tip_max", 1e-5),
+        ("mujoco", "S8b", "RK4 solref=2dt,1 dt=0.001", "crank_angle_max", 5e-5),
+        ("exudyn", "S8_2", "tree RK67 dt=0.005", "tip_max", 1e-8),
+        ("exudyn", "S8_2", "tree DOPRI5 tol=1e-10 hmax=0.1", "tip_max", 1e-7),
+        ("exudyn", "S8_10", "tree RK44 dt=0.001", "tip_max", 1e-5),
+        ("exudyn", "S8_2", "joints TrapezoidalIndex2 dt=0.001", "tip_max", 5e-3),
+        ("exudyn", "S8b", "slide TrapezoidalIndex2 dt=0.001", "crank_angle_max", 2e-3),
+        ("exudyn", "S8b", "axis GeneralizedAlpha rho=0.9 dt=0.001", "crank_angle_max", 5e-3),
+        ("drake", "S8_2", "runge_kutta5 dt=0.002", "tip_max", 1e-8),
+        ("drake", "S8_10", "runge_kutta5 accuracy=1e-08", "tip_max", 1e-5),
+        ("drake", "S8b", "discrete dt=0.001", "crank_angle_max", 0.5),
+    ],
+)
+def test_linkages_end_where_minimal_coordinates_say(engine, scene, setting, measure, bound):
+    outcome = _run(engine, scene, setting)
+    made = all_scenes()[scene]
+    assert outcome.time == pytest.approx(
+        np.arange(round(made.end_time / p.SAMPLE) + 1) * p.SAMPLE, abs=1e-9
+    )
+    errors = made.errors(outcome, "")
+    assert errors[measure] < bound
+    # the bodies that the peer gave belong together, their rates included
+    assert errors.get("joint_drift", errors.get("loop_gap")) < 2e-4
+    rates = (outcome.position[2:50] - outcome.position[:48]) / (2 * p.SAMPLE)
+    assert outcome.velocity[1:49] == pytest.approx(rates, abs=0.1)
+    assert errors.get("E_rel", 0.0) < 1e-3
+
+
 def test_unknown_peer_is_refused_by_name():
-    with pytest.raises(ValueError, match="peer 'odd': must be one of mujoco, exudyn, pybullet"):
+    with pytest.raises(
+        ValueError, match="peer 'odd': must be one of mujoco, exudyn, pybullet, drake"
+    ):
         peers.load("odd")
 
 
@@ -136,12 +181,12 @@ def test_nothing_imports_an_engine_before_it_runs():
     code = (
         "import sys; from mbsim.bench import peers\n"
         "found = peers.available(); [peers.load(n).settings('S1') for n in peers.ENGINES]\n"
-        "print(found, [n for n in peers.ENGINES if n in sys.modules])"
+        "print(found, [n for n in peers.ENGINES.values() if n in sys.modules])"
     )
     out = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()
-    found = [n for n in peers.ENGINES if importlib.util.find_spec(n)]
+    found = [n for n, engine in peers.ENGINES.items() if importlib.util.find_spec(engine)]
     assert out == f"{found} []"
 
 
@@ -169,6 +214,17 @@ def test_hermite_reads_a_parabola_exactly():
     t = np.array([0.0, 0.3, 1.0])
     at = np.linspace(0.0, 1.0, 7)
     assert common.hermite(t, 1 - t * t, -2 * t, at) == pytest.approx(1 - at * at, abs=1e-15)
+
+
+def test_polynomials_through_four_steps_have_degree_seven():
+    path = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0, -1.0, 0.2, 2.0, -4.0])
+    t = np.array([0.0, 0.1, 0.15, 0.4, 0.5, 0.9, 1.0])
+    at = np.linspace(0.0, 1.0, 31)
+    both = np.stack([path(t), -path(t)], axis=1)
+    slopes = np.stack([path.deriv()(t), -path.deriv()(t)], axis=1)
+    x, v = common.through_four(t, both, slopes, at)
+    assert x[:, 1] == pytest.approx(-path(at), abs=1e-13)
+    assert v[:, 0] == pytest.approx(path.deriv()(at), abs=1e-11)
 
 
 def test_quaternion_of_a_turn_about_z():

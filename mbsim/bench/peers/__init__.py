@@ -10,13 +10,13 @@ import importlib
 import importlib.util
 from types import ModuleType
 
-#: Module in this folder and the import name of its engine (the same for all three).
-ENGINES = ("mujoco", "exudyn", "pybullet")
+#: Module in this folder, and the import name of its engine.
+ENGINES = {"mujoco": "mujoco", "exudyn": "exudyn", "pybullet": "pybullet", "drake": "pydrake"}
 
 
 def available() -> list[str]:
     """Names of the engines that can be imported; none of them is imported to find out."""
-    return [name for name in ENGINES if importlib.util.find_spec(name) is not None]
+    return [name for name, engine in ENGINES.items() if importlib.util.find_spec(engine)]
 
 
 def load(name: str) -> ModuleType:

@@ -127,6 +127,33 @@ def hermite(time: np.ndarray, x: np.ndarray, v: np.ndarray, at: np.ndarray) -> n
     return left + right
 
 
+def through_four(
+    time: np.ndarray, x: np.ndarray, v: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Polynomials through values and slopes (n, k) at the four steps around each of `at`.
+
+    They have degree 7, so that a solution of order 5 is not less exact between its steps; `time`
+    has at least four of them. Values and slopes (len(at), k), by Hermite's divided differences.
+    """
+    first = np.clip(np.searchsorted(time, at, side="right") - 2, 0, len(time) - 4)
+    nodes = first[:, None] + np.arange(4)
+    t = np.repeat(time[nodes], 2, axis=1)  # (m, 8), each twice
+    table = np.repeat(x[nodes], 2, axis=1)  # (m, 8, k), differences of growing order
+    slopes = np.repeat(v[nodes], 2, axis=1)
+    for order in range(1, 8):
+        span = (t[:, order:] - t[:, : 8 - order])[..., None]
+        same = span == 0.0
+        rise = np.diff(table[:, order - 1 :], axis=1) / np.where(same, 1.0, span)
+        table[:, order:] = np.where(same, slopes[:, order:], rise)
+    value = np.zeros((len(at), x.shape[1]))
+    slope = np.zeros_like(value)
+    for k in reversed(range(8)):  # Horner, with the slope of each product
+        step = (at - t[:, k])[:, None]
+        slope = slope * step + value
+        value = value * step + table[:, k]
+    return value, slope
+
+
 def s7_measures(position: np.ndarray) -> dict[str, float]:
     """Penetrations and losses of S7 over the rows of positions (n, spheres, 3).
 

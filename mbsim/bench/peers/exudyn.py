@@ -21,6 +21,7 @@ import numpy as np
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.peers import exudyn_linkages as jointed
 
 NAME = "exudyn"
 
@@ -32,6 +33,7 @@ class Solver(NamedTuple):
     step: float  # s
     tol: float = 0.0
     rho: float = 0.9  # spectral radius of the generalised alpha method
+    fresh: bool = False  # a new Jacobian every step
 
     @property
     def label(self) -> str:
@@ -39,7 +41,13 @@ class Solver(NamedTuple):
         if self.tol:
             return f"{self.name} tol={self.tol:g} hmax={self.step:g}"
         rho = f" rho={self.rho:g}" if self.name == "GeneralizedAlpha" else ""
-        return f"{self.name}{rho} dt={self.step:g}"
+        fresh = " Jacobian every step" if self.fresh else ""
+        return f"{self.name}{rho}{fresh} dt={self.step:g}"
+
+    @property
+    def implicit(self) -> bool:
+        """Whether each step solves equations."""
+        return self.name in ("GeneralizedAlpha", "TrapezoidalIndex2")
 
 
 class Case(NamedTuple):
@@ -52,8 +60,10 @@ class Case(NamedTuple):
     grid: bool = False  # rows of automatic steps are brought to the 10-ms grid
     many: bool = False  # S7: sparse, one mass matrix a body, rows from a step function, capped
     sample: float = p.SAMPLE  # s
+    rows: RowsOf | None = None  # from times, all coordinates and rates; None: one body a node
 
 
+RowsOf = Callable[[np.ndarray, np.ndarray, np.ndarray], common.Rows]
 Cases = Iterator[tuple[str, Callable[[], Case]]]
 
 
@@ -89,7 +99,7 @@ def run(scene: str, setting: str, repeats: int) -> Outcome:
 def _run(case: Case, repeats: int) -> Outcome:
     exu = _engine()
     options = _options(exu, case)
-    implicit = case.solver.name == "GeneralizedAlpha"
+    implicit = case.solver.implicit
     kind = exu.MainSolverImplicitSecondOrder if implicit else exu.MainSolverExplicit
 
     def once() -> tuple[float, Any]:
@@ -106,11 +116,14 @@ def _run(case: Case, repeats: int) -> Outcome:
         solver.SolveSteps(system, options)
         wall = time.perf_counter() - start
         solver.FinalizeSolver(system, options)
-        rows = _rows(*store.coordinates(len(nodes)), _places(exu, system, nodes))
+        if case.rows is not None:
+            rows = case.rows(*_coordinates(store, case))
+        else:
+            rows = _rows(*store.coordinates(len(nodes)), _places(exu, system, nodes))
         return wall, (rows, solver.it.currentStepIndex - 1)  # it counts from 1
 
     wall, (rows, steps) = common.measure(once, repeats)
-    if case.solver.tol and case.grid:
+    if case.solver.tol and case.grid and case.rows is None:
         rows = _on_grid(rows, case)
     extra = {"steps": float(steps)}
     if case.many:
@@ -122,6 +135,15 @@ def _places(exu: Any, system: Any, nodes: list[Any]) -> np.ndarray:
     """Places of the nodes in the reference configuration (m), from which coordinates count."""
     position, reference = exu.OutputVariableType.Position, exu.ConfigurationType.Reference
     return np.array([system.GetNodeOutput(node, position, reference) for node in nodes])
+
+
+def _coordinates(store: Any, case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times and all coordinates and their rates, at multiples of the sample time."""
+    at_steps, x, v = store.all_coordinates()
+    if not case.solver.tol:
+        return at_steps, x, v
+    at = np.arange(round(case.end_time / case.sample) + 1) * case.sample
+    return at, *common.through_four(at_steps, x, v, at)
 
 
 def _options(exu: Any, case: Case) -> Any:
@@ -139,6 +161,9 @@ def _options(exu: Any, case: Case) -> Any:
         steps.initialStepSize = min(1e-4, solver.step)
         steps.minimumStepSize = 1e-13
     steps.verboseMode = 0
+    if solver.name == "TrapezoidalIndex2":  # as Exudyn's own SolveDynamic sets it
+        steps.generalizedAlpha.useIndex2Constraints = steps.generalizedAlpha.useNewmark = True
+    steps.newton.modifiedNewtonJacUpdatePerStep = solver.fresh
     steps.generalizedAlpha.spectralRadius = solver.rho
     steps.explicit.computeEndOfStepAccelerations = False
     if case.many:
@@ -175,6 +200,12 @@ class _Sensors:
         stored = [[self._system.GetSensorStoredData(s) for s in pair] for pair in self._sensors]
         x = np.stack([pair[0][:, 1:] for pair in stored], axis=1)
         v = np.stack([pair[1][:, 1:] for pair in stored], axis=1)
+        return stored[0][0][:, 0], x, v
+
+    def all_coordinates(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times (n,), coordinates and rates (n, all) of nodes of any size."""
+        stored = [[self._system.GetSensorStoredData(s) for s in pair] for pair in self._sensors]
+        x, v = (np.hstack([pair[k][:, 1:] for pair in stored]) for k in range(2))
         return stored[0][0][:, 0], x, v
 
 
@@ -334,6 +365,8 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
     """Settings of a scene and what builds each."""
     if scene.startswith("S7_"):
         return dict(_grains(int(scene[3:])))
+    if scene.startswith("S8_"):
+        return dict(_chain(int(scene[3:])))
     scenes: dict[str, Callable[[], Cases]] = {
         "S1": lambda: _free(p.S1),
         "S2a": lambda: _law_drop(_impact, "impact"),
@@ -343,6 +376,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (5e-4, 1e-4)),
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (5e-4, 1e-4, 2e-5)),
         "S5": _row,
+        "S8b": _slider_crank,
         "S10a": _stiff_drop,
         "S10c": lambda: _free(p.S10C),
     }
@@ -693,3 +727,83 @@ def _grains(count: int) -> Cases:
                 sample=p.s7_sample(count),
             ),
         )
+
+
+def _chain(count: int) -> Cases:
+    def as_tree(exu: Any, system: Any) -> list[Any]:
+        return jointed.tree(exu, system, count)
+
+    def with_joints(exu: Any, system: Any) -> list[Any]:
+        return jointed.jointed(exu, system, count)
+
+    fixed = {
+        2: (1e-2, 5e-3, 2e-3, 1e-3),
+        10: (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4),
+        40: (1e-3, 5e-4, 2e-4),
+    }[count]
+    tols = (1e-5, 1e-7, 1e-9, 1e-11) if count == 40 else tuple(10.0**-k for k in range(4, 13))
+    solvers = [
+        *_fixed("VelocityVerlet", (1e-3,)),
+        *_fixed("RK44", fixed),
+        *_fixed("RK67", fixed),
+        *_auto("DOPRI5", tols, 0.1),
+        *([] if count == 40 else _auto("ODE23", (1e-4, 1e-6), 0.1)),
+        *_fixed("GeneralizedAlpha", (1e-3,)),
+    ]
+    end = p.S8.end_time[count]
+    note = "kinematic tree; rows of automatic steps by polynomials through four of them"
+    for solver in solvers:
+        yield (
+            f"tree {solver.label}",
+            functools.partial(Case, as_tree, solver, end, note, rows=jointed.tree_rows),
+        )
+    for solver in (
+        *_fixed("GeneralizedAlpha", (1e-3,)),
+        *_fixed("TrapezoidalIndex2", (1e-3, 1e-4) if count == 2 else (1e-3,)),
+    ):
+        yield (
+            f"joints {solver.label}",
+            functools.partial(
+                Case,
+                with_joints,
+                solver,
+                end,
+                "plane bodies with joints",
+                rows=jointed.jointed_rows,
+            ),
+        )
+
+
+def _slider_crank() -> Cases:
+    def build(slide: bool, exu: Any, system: Any) -> list[Any]:
+        return jointed.slider_crank(exu, system, slide)
+
+    steps = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5)
+    for slide, name, solvers in (
+        (
+            True,
+            "slide",
+            [*_fixed("GeneralizedAlpha", (1e-3,)), *_fixed("TrapezoidalIndex2", (1e-3,))],
+        ),
+        (
+            False,
+            "axis",
+            [
+                *_fixed("GeneralizedAlpha", steps),
+                *_fixed("TrapezoidalIndex2", steps),
+                *(Solver("TrapezoidalIndex2", step, fresh=True) for step in steps),
+            ],
+        ),
+    ):
+        for solver in solvers:
+            yield (
+                f"{name} {solver.label}",
+                functools.partial(
+                    Case,
+                    functools.partial(build, slide),
+                    solver,
+                    p.S8B.end_time,
+                    "plane bodies with joints",
+                    rows=jointed.crank_rows,
+                ),
+            )
