@@ -1,3 +1,4 @@
+# ruff: noqa: E741  (I and J are the markers of a joint)
 """An independent solver of small mechanisms, for tests: bodies, constraints, multipliers.
 
 A quantity that moves with the bodies is a `Jet`: its value, its rate, and its second
@@ -395,12 +396,12 @@ def perpendicular(I, J, t):
 
 def universal(I, J, t):
     """Cross with arms along the z-axes."""
-    return spherical(I, J, t) + [dot(I.z, J.z)]
+    return [*spherical(I, J, t), dot(I.z, J.z)]
 
 
 def hooke(I, J, t):
     """Cross with arms along I's x and J's y; the shafts are the z-axes."""
-    return spherical(I, J, t) + [dot(I.x, J.y)]
+    return [*spherical(I, J, t), dot(I.x, J.y)]
 
 
 def distance(length):

@@ -1,3 +1,4 @@
+# ruff: noqa: E741  (I and J are the markers of a joint)
 """Joints and reactions against Adams' own output: curves of 15 models over 5 s.
 
 The curves (`../shared/data/adams`, from Project Chrono's tests) carry 6 or 7 digits. Frames, as
@@ -6,7 +7,9 @@ quaternion of the cg marker; reaction on the I marker, about its origin, in glob
 
 An accurate solution does not reach all of them: the curves of Spherical_Case01 and
 Universal_Case01 lose 8e-3 J of 19.6 J in 5 s, those of Distance_Case02 and RotSpring_Case01 are
-off by less. They are held by the distance that an exact integration has from them, see `OFF`. The decks of
+off by less. They are held by the distance that an exact integration has from them (`OFF`).
+
+The decks of
 TransSpring_Case01 and RotSpring_Case01 have other constants than the curves of that name:
 10 N/m, 0.5 Ns/m and start at the origin, and 200 Nm/rad, 10 Nms/rad, fit the curves to their
 last digit; those are put into the decks here, and the decks as they are held against `mechanics`.
