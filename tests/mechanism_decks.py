@@ -1,3 +1,4 @@
+# ruff: noqa: E741  (I and J are the markers of a joint)
 """One description of a mechanism, two readings: a deck for mbsim and `mechanics.Mechanism`."""
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ class Scene:
                 for axis, value in zip("xyz", vector, strict=True)
             )
             out.append(
-                f'<Body_Rigid id="{k + 1}" cg_id="{100 + k}" mass="{body.mass!r}" {inertia} {start}/>'
+                f'<Body_Rigid id="{k + 1}" cg_id="{100 + k}" mass="{body.mass!r}" '
+                f"{inertia} {start}/>"
             )
             out.append(marker(100 + k, k, body.p, body.R))
         for n, joint in enumerate(self.joints):

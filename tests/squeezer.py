@@ -1,3 +1,4 @@
+# ruff: noqa: E741  (I and J are the markers of a joint)
 """Andrews' squeezing mechanism as bodies and revolute joints; constants of the IVP Test Set.
 
 Points: crank O-P, link P-E, triangle B-E-D (spring C-D), links E-H and H-A, E-G and G-A.
@@ -117,7 +118,7 @@ def scene():
             f'<Reference_Marker id="502" body_id="1" pos_x="{C[0]!r}" pos_y="{C[1]!r}"/>',
             '<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="501" j_marker_id="502"'
             f' stiffness="{SPRING!r}" damping="0" length="{LENGTH!r}"/>',
-            '<Force_Scalar_TwoBody id="2" type="ROTATION" i_marker_id="1000" j_marker_id="1001"'
+            '<Force_Scalar_TwoBody id="2" type="ROTATIONAL" i_marker_id="1000" j_marker_id="1001"'
             f' expr="{TORQUE!r}"/>',
         )
     )

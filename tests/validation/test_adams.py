@@ -150,7 +150,7 @@ XML = {
         inertia=BAR,
         ic="",
         at="",
-        rest='<Force_Scalar_TwoBody id="1" type="TRANSLATION" i_marker_id="10" j_marker_id="20"'
+        rest='<Force_Scalar_TwoBody id="1" type="TRANSLATIONAL" i_marker_id="10" j_marker_id="20"'
         ' expr="-10*DM(10,20)-0.5*VR(10,20)"/>',
     ),
     "TranSpringCB_Case02": dict(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +151,7 @@ def bricard():
     )
     long, cross = 1 / 600, (1 + 0.01) / 12  # square section of 0.1 m
     bodies, joints = [], []
-    for start, end in zip(points[:-1], points[1:], strict=True):
+    for start, end in pairwise(points):
         along = np.abs(end - start) > 0.5
         inertia = np.where(along, long, cross)
         bodies.append(mech.Body(1.0, inertia, (start + end) / 2))
@@ -327,7 +328,7 @@ def test_gear_pair(tmp_path):
     two = mech.Body(1.0, (0.09,) * 3, (1, 0, 0))
     extra = (
         '<Constraint_Coupler id="1" joint_ids="1 2" motion_types="R R" scales="1 3"/>'
-        '<Force_Scalar_TwoBody id="1" type="ROTATION" i_marker_id="1000" j_marker_id="1001"'
+        '<Force_Scalar_TwoBody id="1" type="ROTATIONAL" i_marker_id="1000" j_marker_id="1001"'
         ' expr="0.5"/>'
     )
     joints = [Joint("REVOLUTE", 1, 0), Joint("REVOLUTE", 2, 0, (1, 0, 0))]
