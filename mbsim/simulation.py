@@ -40,6 +40,7 @@ class Active(NamedTuple):
 
     active: Any
     skyline: Any
+    quality: Any
 
 
 class Runner:
@@ -174,7 +175,7 @@ class Runner:
             "state": scene.state,
             "pairs": scene.pairs,
             "crowds": scene.crowds,
-            "equations": Active(scene.equations.active, scene.sweep.skyline),
+            "equations": Active(scene.equations.active, scene.sweep.skyline, scene.sweep.quality),
             "log": scene.log,
             "method": self.method,
         }

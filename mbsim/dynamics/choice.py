@@ -22,13 +22,17 @@ from mbsim.dynamics.equations import (
     is_active,
     side_place,
 )
+from mbsim.system.arrays import CHOSEN, NEAR_FOLD, USUAL
 
 #: What at most is left of an equation that others imply, as part of its size for free bodies.
-IMPLIED = 1e-11
+IMPLIED = 1e-12
 #: A choice is made anew when its least pivot falls below this part of what it was.
 _WORN = 0.1
-#: Largest residual of an implied equation, over its unit, before it contradicts the others.
-_APART = 1e-6
+#: A state is near a position in which a loop can fold below this part of the usual pivots.
+_NEAR = 0.01
+#: Residual of an implied equation, over its unit, from which it is asked whether it still is
+#: implied, as in a position that folds it is, and from which it contradicts the others.
+_DOUBT, _APART = 1e-11, 1e-6
 
 
 @jitable
@@ -122,7 +126,8 @@ def choose(scene, t, y):
                 part = A[e, best] / pivot
                 for f in range(n):
                     A[e, f] -= part * A[best, f]
-    sweep.quality[0] = least
+    sweep.quality[CHOSEN] = least
+    sweep.quality[USUAL] = max(sweep.quality[USUAL], least)
     count = 0
     for e in range(n):
         if active[e] == 1:
@@ -143,18 +148,32 @@ def least_pivot(scene):
 
 
 @jitable
-def keep_choice(scene, t, y):
-    """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
-    n = len(scene.equations.active) - 1
-    if active_count(scene) == n:
-        return 0
-    for e in range(n):
+def implied_residual(scene, t, y):
+    """Return the largest residual of the equations not in use, over its unit, and whose it is."""
+    largest, worst = 0.0, -1
+    for e in range(len(scene.equations.active) - 1):
         if not is_active(scene, e):
             fill_equation(scene, t, y, e)
-            unit = scene.equations.unit[e]
-            if not abs(scene.sweep.rate[e, RESIDUAL]) <= _APART * unit:
-                scene.work.trouble[1] = e
-                return CONTRADICTION
-    if least_pivot(scene) < _WORN * scene.sweep.quality[0]:
+            size = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
+            if not size <= largest:
+                largest, worst = size, e
+    return largest, worst
+
+
+@jitable
+def keep_choice(scene, t, y):
+    """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
+    sweep, count = scene.sweep, active_count(scene)
+    if count == 0:
+        return 0
+    least = least_pivot(scene)
+    sweep.quality[NEAR_FOLD] = 1.0 if least < _NEAR * sweep.quality[USUAL] else 0.0
+    if count == len(scene.equations.active) - 1:
+        return 0
+    apart, worst = implied_residual(scene, t, y)
+    if apart > _DOUBT or least < _WORN * sweep.quality[CHOSEN]:
         choose(scene, t, y)
+    if not apart <= _APART and active_count(scene) <= count:
+        scene.work.trouble[1] = worst
+        return CONTRADICTION
     return 0

@@ -32,6 +32,7 @@ from mbsim.system.arrays import (
     MATRIX,
     PROJECT,
     REACT,
+    SEAT,
     SPEED_UP,
 )
 
@@ -61,7 +62,10 @@ def serve(scene, what, t, y, dy):
     """
     if what == ACCELERATE:
         return constrain(scene, t, y, dy)
-    if what == PROJECT:
+    if what == SEAT:
+        seat_all(scene, y)
+        carry_all(scene, y)
+    elif what == PROJECT:
         project(scene, t, y)
     elif what == REACT:
         fill_reactions(scene, t, y)

@@ -21,7 +21,7 @@ from mbsim.dynamics.expressions import gradient, jet
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.tree import load, origin, put, respond
-from mbsim.system.arrays import ANGLE, GENERAL, OFFSET, PERP
+from mbsim.system.arrays import ANGLE, GENERAL, OFFSET, PERP, USUAL
 
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
@@ -29,8 +29,9 @@ RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 #: Code of constraints that contradict each other in the course of the motion.
 CONTRADICTION = 9
 
-#: A pivot below this part of its diagonal is that of an equation that others imply here.
-LEAST_PIVOT = 1e-13
+#: Pivots of about this part of the usual ones are those of a position in which a loop can fold:
+#: there an equation fades out, and behind it comes in again.
+FOLDING = 1e-8
 
 
 @jitable
@@ -293,18 +294,23 @@ def fill_matrix(scene):
 
 @jitable
 def factor_matrix(scene):
-    """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier."""
+    """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier.
+
+    A pivot d stands as d + f^2/d, f a part of the usual pivots: itself where d is large,
+    infinite where it is 0, smooth between.
+    """
     A, first, n = scene.sweep.A, scene.sweep.skyline, active_count(scene)
+    usual = FOLDING * scene.sweep.quality[USUAL]
     for i in range(n):
-        diagonal = A[i, i]
+        fold = usual * scene.sweep.size[scene.equations.active[i]] ** 2
         for j in range(first[i], i + 1):
             total = A[i, j]
             for k in range(max(first[i], first[j]), j):
                 total -= A[i, k] * A[j, k]
             if j < i:
                 A[i, j] = total / A[j, j]
-            elif total > LEAST_PIVOT * diagonal:
-                A[i, i] = math.sqrt(total)
+            elif total > 0.0:
+                A[i, i] = math.sqrt(total + fold * fold / total)
             else:
                 A[i, i] = math.inf
 

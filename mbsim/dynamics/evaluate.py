@@ -11,7 +11,7 @@ from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import ACCELERATE, APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR
+from mbsim.system.arrays import ACCELERATE, APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR, NEAR_FOLD, SEAT
 
 
 @jitable
@@ -71,6 +71,9 @@ def evaluate(scene, t, h, y, dy):
     """Fill dy = f(t, y), `h` after the committed state; return 0 or why it cannot be."""
     # where things are
     place_bodies(scene, y)
+    if scene.sweep.quality[NEAR_FOLD] == 1.0:
+        # near a position in which a loop can fold, equations are sound only on a sound tree
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, SEAT, t, y, dy))
 
     # who touches whom
     code = find_contacts(scene, y)

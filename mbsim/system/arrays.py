@@ -60,13 +60,17 @@ DOORS = 7
 LINE_FORCE, AXIS_FORCE, AXIS_TORQUE = range(3)
 
 # what is asked for at JOINTS_DOOR
-ACCELERATE, PROJECT, REACT, KEEP, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(8)
+ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
 # kinds of terms: `Equations.kind`
 OFFSET, PERP, ANGLE, DISTANCE, GENERAL = range(5)
+
+# entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
+# the committed state is near a position in which a loop can fold
+CHOSEN, USUAL, NEAR_FOLD = range(3)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -347,7 +351,7 @@ class Sweep(NamedTuple):
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
     size: F1  # (ne,) square root of what A would have if the bodies were free
-    quality: F1  # (1,) least pivot over its size squared when equations were chosen
+    quality: F1  # (3,) least pivot over its size squared, see the names above
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
 

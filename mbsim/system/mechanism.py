@@ -263,8 +263,8 @@ class _Builder:
         program = self.programs.add(constraint.expr, constraint, differentiable=True)
         rows = self.programs.looks_at(program)
         bodies = {self.markers.frames[row][0]: row for row in rows}
-        bodies.pop(self.markers.ground, None)
-        i, j = ([*bodies.values(), 0, 0])[:2]
+        fixed = bodies.pop(self.markers.ground, 0)
+        i, j = ([*bodies.values(), fixed, 0])[:2]
         connection = self.connect("GCON", constraint.id, i, j)
         for row in bodies.values():
             self.sums.terms.append((a.GENERAL, row, 0, 0, 0, 1.0, -1))
@@ -473,7 +473,7 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         rhs=np.zeros(ne),
         skyline=np.zeros(ne, dtype=np.int64),
         size=np.ones(ne),
-        quality=np.zeros(1),
+        quality=np.zeros(3),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
     )

@@ -31,7 +31,7 @@ from decks_io import ROOT
 
 import mbsim
 
-DATA = ROOT.parent.parent / "shared/data/adams"
+DATA = ROOT.parent / "shared/data/adams"
 G = (0.0, 0.0, -9.80665)
 BAR = (0.04, 0.1, 0.1)  # inertia of the pendulum [kg m^2]; its mass is 1 kg
 EYE = np.eye(3)
