@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
-_COUNTS = ("steps", "rejected", "rhs_evaluations", "normal_calls")
+_COUNTS = ("steps", "rejected", "rhs_evaluations", "output_evaluations", "normal_calls")
 
 
 class TookTooLong(MbsimError):

@@ -741,7 +741,8 @@ def _chain(count: int) -> Cases:
         10: (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4),
         40: (1e-3, 5e-4, 2e-4),
     }[count]
-    tols = (1e-5, 1e-7, 1e-9, 1e-11) if count == 40 else tuple(10.0**-k for k in range(4, 13))
+    # of 40 rods at 1e-11 its steps shrink without end
+    tols = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9) if count == 40 else tuple(10.0**-k for k in range(4, 13))
     solvers = [
         *_fixed("VelocityVerlet", (1e-3,)),
         *_fixed("RK44", fixed),
