@@ -303,7 +303,7 @@ class _Compiler:
 
 
 def _combine(node: Call, made: list[Instruction], starts: list[int]) -> None:
-    """Put a function behind its arguments, or in place of numbers the number it makes of them."""
+    """Put a function behind its arguments, or the number that it makes of numbers there."""
     count = len(node.args)
     first = starts[-count]
     del starts[-count:]
