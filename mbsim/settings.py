@@ -154,7 +154,7 @@ def settle(
         force = next(iter(model.scalar_forces.values()))
         raise ModelError(
             f"{model.file}:{force.source.line}: Force_Scalar_TwoBody[{force.id}]: integrator "
-            "VERLET steps by stiffness, and that of an expression is not known; use DOPRI5 or DOP853"
+            "VERLET steps by stiffness, which is not known of an expression; use DOPRI5 or DOP853"
         )
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
