@@ -165,6 +165,12 @@ def settle(
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
     method, said_of_names = _method(asked)
+    if method == "VERLET" and model.scalar_forces:
+        force = next(iter(model.scalar_forces.values()))
+        raise ModelError(
+            f"{model.file}:{force.source.line}: Force_Scalar_TwoBody[{force.id}]: integrator "
+            "VERLET steps by stiffness, which is not known of an expression; use DOPRI5 or DOP853"
+        )
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 

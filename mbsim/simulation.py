@@ -281,6 +281,8 @@ class Runner:
         where = []
         if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
             where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
+        if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
+            where.extend(self._not_finite()[:1])
         if 0 <= contact < len(self.system.contact_ids):
             where.append(f"Force_Contact[{self.system.contact_ids[contact]}]")
         raise SolverError(
@@ -288,6 +290,12 @@ class Runner:
             f"because {reason}; at {', '.join(where) or 'no single element'}. "
             "Results up to there are kept."
         )
+
+    def _not_finite(self) -> list[str]:
+        """Return the applied forces that were no numbers when last evaluated."""
+        applied = self.system.scene.work.applied
+        broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
+        return [f"{statement}[{id}]" for statement, id in (self.system.applied[k] for k in broken)]
 
     def fail(self, code: int, t: float) -> None:
         """Raise what the hooks' code says."""
@@ -324,7 +332,8 @@ class Runner:
                 f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
             )
         if code == NOT_FINITE:
-            raise SolverError(f"a force or acceleration is not finite at time {t:.9g}")
+            where = "".join(f" of {name}" for name in self._not_finite()[:1])
+            raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
         raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:

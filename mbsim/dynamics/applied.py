@@ -94,8 +94,6 @@ def add_applied(scene, t, y, dy):
         if kind == AXIS_TORQUE and applied.alone[f] == 1:
             rate = dot(n, vector(work.w[scene.markers.body[i]]))
         size, stored, power = strength(scene, t, y, f, x, rate)
-        if not math.isfinite(size):
-            return NOT_FINITE
         load = scale(size, n)
         force, torque = (none, load) if kind == AXIS_TORQUE else (load, none)
         push(scene, i, force, torque)
@@ -107,6 +105,8 @@ def add_applied(scene, t, y, dy):
         work.applied[f, STORED_ENERGY] = stored
         work.applied[f, LOST_POWER] = power
         lost += power
+        if not math.isfinite(size):
+            return NOT_FINITE
     if scene.world.ledger[1] >= 0:
         dy[scene.world.ledger[1]] = lost
     return 0

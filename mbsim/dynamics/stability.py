@@ -5,7 +5,8 @@ of M^-1 K is at most twice the largest of the blocks of single bodies, D_b / m_b
 D_b = sum of k n n' (a contact with ground counts half, and |D_b| is bounded by its Frobenius
 norm), plus the turning part, k (r x n)' I^-1 (r x n) summed. Dampers, with the slope c of their
 force over velocity, give rates in the same way. A contact that is yet to come, or that has
-only begun, counts with the stiffness and damping of the depth that it will reach.
+only begun, counts with the stiffness and damping of the depth that it will reach. Springs
+between markers count like contacts; forces by expressions are refused with such a method.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, rotate, sub, unrotate
+from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate
 from mbsim.dynamics.contact import contact_of, sides
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.incidents import deepest_of_impact
 from mbsim.dynamics.kinematics import place_bodies, position
 from mbsim.dynamics.limits import longest_way
-from mbsim.system.arrays import LIVE
+from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point
+from mbsim.system.arrays import AXIS_TORQUE, LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
@@ -102,6 +104,17 @@ def depth_to_come(scene, c, energy, force):
 
 
 @jitable
+def add_to_block(block, n, stiffness, damping, turn):
+    """Add stiffness and damping along n to the block of a body; `turn`: see `yielding`."""
+    for r in range(3):
+        for q in range(3):
+            block[3 * r + q] += stiffness * n[r] * n[q]
+            block[10 + 3 * r + q] += damping * n[r] * n[q]
+    block[9] += stiffness * turn
+    block[19] += damping * turn
+
+
+@jitable
 def add_touching(scene, y, s, out):
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
@@ -126,14 +139,45 @@ def add_touching(scene, y, s, out):
     for b in (bi, bj):
         if b == ground:
             continue
-        block = work.block[b]
-        for r in range(3):
-            for q in range(3):
-                block[3 * r + q] += both * k * n[r] * n[q]
-                block[10 + 3 * r + q] += both * damping * n[r] * n[q]
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
-        block[9] += both * k * turn
-        block[19] += both * damping * turn
+        add_to_block(work.block[b], n, both * k, both * damping, turn)
+
+
+@jitable
+def add_spring(scene, y, f):
+    """Add stiffness and damping of spring f to the blocks of its bodies.
+
+    Along the line of a spring at distance d acts k, across it F/d, and an arm r turns with the
+    torque F r. Stiffness across and by F is bounded by what the smallest moment of inertia gives.
+    """
+    applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
+    i, j, par = applied.i[f], applied.j[f], applied.par[f]
+    both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
+    k, damping = both * par[0], both * par[1]
+    line = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    d = norm(line)
+    n = scale(1.0 / d, line) if d > 0.0 else (0.0, 0.0, 0.0)
+    force = abs(par[3] - par[0] * (d - par[2])) if d > 0.0 else 0.0
+    for side in range(2):
+        m = i if side == 0 else j
+        b = markers.body[m]
+        if b == ground:
+            continue
+        block, inverse = scene.work.block[b], scene.bodies.inverse[b]
+        if applied.kind[f] == AXIS_TORQUE:
+            axis = unrotate(scene.work.R[b], marker_axis(scene, j, 2))
+            turn = dot(axis, rotate(inverse, axis))
+            block[9] += k * turn
+            block[19] += damping * turn
+            continue
+        arm = marker_arm(scene, m)
+        add_to_block(block, n, k, damping, yielding(scene, b, arm, n))
+        if d > 0.0:
+            across, length = both * force / d, norm(arm)
+            for r in range(3):
+                block[4 * r] += across
+            most = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
+            block[9] += (across * length * length + both * force * length) * most
 
 
 @jitable
@@ -184,6 +228,8 @@ def stable_step(scene, tol, y, f):
     hit = work.hit
     for k in range(hit[len(hit) - 1]):
         add_touching(scene, y, hit[k], work.law_out)
+    for k in range(len(scene.applied.kind)):
+        add_spring(scene, y, k)
     bound, best = work.bound, work.best
     bound[0] = bound[1] = 0.0
     for b in range(len(bodies.mass)):

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper, Variable
 
@@ -173,12 +174,31 @@ def test_markers_that_coincide_give_no_direction_and_no_fault():
     assert np.isfinite(rows["energy"]).all()
 
 
-def test_a_force_that_is_no_number_ends_the_run_with_its_time():
-    from mbsim.errors import SolverError
-
-    force = ScalarForce(
-        1, "TRANSLATIONAL", parse("SQRT(0.5 - TIME)"), i_marker_id=20, j_marker_id=10
-    )
+@pytest.mark.parametrize("text", ["SQRT(0.5 - TIME)", "LOG(TIME - 5)"])
+def test_a_force_that_is_no_number_ends_the_run_and_is_named(text):
+    force = ScalarForce(7, "TRANSLATIONAL", parse(text), i_marker_id=20, j_marker_id=10)
     model = free.model(free.body(2, p=(0, 0, 1)), scalar_forces=[force], end_time=1.0)
-    with pytest.raises(SolverError, match="not finite"):
+    with pytest.raises(SolverError, match="not finite") as caught:
         free.run(model)
+    assert "SFORCE[7]" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["TRANSLATIONAL", "ROTATIONAL"])
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+def test_the_method_without_error_estimate_takes_stable_steps(kind, damping):
+    spring = SpringDamper(1, kind, "", 20, 10, 1e4, damping, 1.0)
+    body = free.body(2, M, (M, M, M), p=(0, 0, 1.01), v=(0, 0, 0.5), w=(0, 0, 0.5))
+    model = free.model(body, spring_dampers=[spring], end_time=0.5)
+    rows, _ = free.run(model, tol=1e-5, integrator="VERLET")
+    if kind == "TRANSLATIONAL":
+        x, _ = oscillation(rows["time"], 0.01, 0.5, M, 1e4, damping)
+        np.testing.assert_allclose(rows["y"][:, 2], 1 + x, atol=2e-4)
+    else:
+        x, v = oscillation(rows["time"], -1.0, 0.5, M, 1e4, damping)
+        np.testing.assert_allclose(rows["y"][:, 12], v, atol=2e-2 * np.abs(v).max())
+
+
+def test_the_method_without_error_estimate_refuses_expressions():
+    force = ScalarForce(7, "TRANSLATIONAL", parse("1"), i_marker_id=20, j_marker_id=10)
+    with pytest.raises(ModelError, match=r"Force_Scalar_TwoBody\[7\]: integrator VERLET"):
+        free.run(free.model(free.body(2), scalar_forces=[force]), integrator="VERLET")
