@@ -153,10 +153,10 @@ def slider_crank(times, angle, speed, crank, rod, slider, g=9.81):
         return inertia, g * height
 
     def rhs(t, y):
-        inertia, potential = terms(y[0] + 1e-30j)
-        push = potential.imag + 0.5 * inertia.imag * y[1] ** 2 / 1.0
-        return [y[1], -(potential.imag / 1e-30 + 0.5 * inertia.imag / 1e-30 * y[1] ** 2)
-                / inertia.real if push == push else np.nan]
+        step = 1e-30
+        inertia, potential = terms(y[0] + 1j * step)
+        push = (potential.imag + 0.5 * inertia.imag * y[1] ** 2) / step
+        return [y[1], -push / inertia.real]
 
     return solve_ivp(
         rhs, (times[0], times[-1]), [angle, speed], method="DOP853", t_eval=times,
@@ -194,7 +194,7 @@ def falling_chain(times, node, angles, length, mass, radius, law, g=9.81):
             middle, rest = (J[k] + J[k + 1]) / 2, (c[k] + c[k + 1]) / 2
             M += mass * middle.T @ middle
             M[2 + k, 2 + k] += mass * length**2 / 12
-            F -= mass * middle.T @ (rest + [0.0, g])
+            F -= mass * middle.T @ (rest + np.array([0.0, g]))
         for k in range(links + 1):
             push = impact(radius - p[k, 1], -J[k][1] @ u, *law)
             F += push * J[k][1]
@@ -212,14 +212,12 @@ def falling_chain(times, node, angles, length, mass, radius, law, g=9.81):
     y, t = np.concatenate([node, angles, np.zeros(size)]), float(times[0])
     out = np.full((len(times), links + 1, 2), np.nan)
     while t < times[-1]:
+        # in contact, and just after, small steps; in flight to the next touch
         near = min(event(t, y) for event in events) < 1e-9
         found = solve_ivp(
-            rhs, (t, times[-1]), y, method="DOP853", rtol=1e-11, atol=1e-13,
-            events=None if near else events, max_step=5e-4 if near else np.inf,
-            dense_output=True,
-        ) if not near else solve_ivp(
-            rhs, (t, min(t + 0.01, times[-1])), y, method="DOP853", rtol=1e-11, atol=1e-13,
-            max_step=1e-4, dense_output=True,
+            rhs, (t, min(t + 0.01, times[-1]) if near else times[-1]), y, method="DOP853",
+            rtol=1e-11, atol=1e-13, max_step=1e-4 if near else 0.01,
+            events=None if near else events, dense_output=True,
         )  # fmt: skip
         for row in np.flatnonzero((times >= t) & (times <= found.t[-1])):
             state = found.sol(times[row])
