@@ -114,7 +114,8 @@ def scene():
     joints = [Joint("REVOLUTE", i, j, point) for i, j, point in pins]
     extra = "\n".join(
         (
-            f'<Reference_Marker id="501" body_id="4" pos_x="{d[0]!r}" pos_y="{d[1]!r}"/>',
+            f'<Reference_Marker id="501" body_id="4" pos_x="{float(d[0])!r}" '
+            f'pos_y="{float(d[1])!r}"/>',
             f'<Reference_Marker id="502" body_id="1" pos_x="{C[0]!r}" pos_y="{C[1]!r}"/>',
             '<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="501" j_marker_id="502"'
             f' stiffness="{SPRING!r}" damping="0" length="{LENGTH!r}"/>',

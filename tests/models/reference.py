@@ -94,3 +94,133 @@ def top_attitude(inertia, w0, end, steps, order=28):
 def angle_between(p, q):
     """Return the angle [rad] from attitude p to attitude q."""
     return 4.0 * np.arcsin(0.5 * min(np.linalg.norm(p - q), np.linalg.norm(p + q)))
+
+
+def impact(depth, rate, stiffness, exponent, damping, dmax):
+    """Return the IMPACT force at a depth and its rate."""
+    if depth <= 0.0:
+        return 0.0
+    s = min(depth / dmax, 1.0)
+    return max(0.0, stiffness * depth**exponent + damping * s * s * (3.0 - 2.0 * s) * rate)
+
+
+def wall_pendulum(times, start, length, mass, inertia, law, g=9.81):
+    """Return the angle [rad] from the vertical of a pendulum that meets a wall at 0.
+
+    `inertia` is that about the hinge; the wall pushes level at the bob. Steps end at each touch
+    and are bounded in contact.
+    """
+
+    def rhs(t, y):
+        depth, rate = length * np.sin(y[0]), length * np.cos(y[0]) * y[1]
+        push = impact(depth, rate, *law) * length * np.cos(y[0])
+        return [y[1], -(mass * g * length * np.sin(y[0]) + push) / inertia]
+
+    def cross(t, y):
+        return y[0]
+
+    cross.terminal = True
+    angles, t, y, end = np.full(len(times), np.nan), float(times[0]), [start, 0.0], times[-1]
+    while t < end:
+        free = y[0] < 0.0 or (y[0] == 0.0 and y[1] < 0.0)
+        cross.direction = 1.0 if free else -1.0
+        found = solve_ivp(
+            rhs, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-14, events=cross,
+            max_step=np.inf if free else 5e-5, dense_output=True,
+        )  # fmt: skip
+        inside = (times >= t) & (times <= found.t[-1])
+        angles[inside] = found.sol(times[inside])[0]
+        t, y = float(found.t[-1]), [0.0, float(found.y[1, -1])]
+    return angles
+
+
+def slider_crank(times, angle, speed, crank, rod, slider, g=9.81):
+    """Return the crank's angle; `crank` and `rod` are (length, mass) of slender bars.
+
+    The kinetic energy is M(a) a'^2 / 2; M' by the complex step.
+    """
+    (r, m), (length, n) = crank, rod
+
+    def terms(a):
+        sine = -r * np.sin(a) / length
+        cosine = np.sqrt(1 - sine**2)
+        turn = -r * np.cos(a) / (length * cosine)  # the rod's angle per crank angle
+        x = -r * np.sin(a) - length / 2 * sine * turn
+        z = r * np.cos(a) + length / 2 * cosine * turn
+        slide = -r * np.sin(a) - length * sine * turn
+        inertia = m * r**2 / 3 + n * (x**2 + z**2 + length**2 / 12 * turn**2) + slider * slide**2
+        height = m * r / 2 * np.sin(a) + n * (r * np.sin(a) + length / 2 * sine)
+        return inertia, g * height
+
+    def rhs(t, y):
+        step = 1e-30
+        inertia, potential = terms(y[0] + 1j * step)
+        push = (potential.imag + 0.5 * inertia.imag * y[1] ** 2) / step
+        return [y[1], -push / inertia.real]
+
+    return solve_ivp(
+        rhs, (times[0], times[-1]), [angle, speed], method="DOP853", t_eval=times,
+        rtol=1e-12, atol=1e-13,
+    ).y[0]  # fmt: skip
+
+
+def falling_chain(times, node, angles, length, mass, radius, law, g=9.81):
+    """Return the nodes (rows, links + 1, 2) of hinged slender links above a floor at 0.
+
+    Coordinates: x and z of the first node, and the links' angles from the horizontal; a ball at
+    each node meets the floor without friction.
+    """
+    links = len(angles)
+    size = 2 + links
+
+    def place(q, u):
+        """Return for each node its position, Jacobian, and the acceleration left at q'' = 0."""
+        p, J, c = [q[:2]], [np.eye(2, size)], [np.zeros(2)]
+        for k in range(links):
+            cos, sin = np.cos(q[2 + k]), np.sin(q[2 + k])
+            along, across = length * np.array([cos, sin]), length * np.array([-sin, cos])
+            step = np.zeros((2, size))
+            step[:, 2 + k] = across
+            p.append(p[-1] + along)
+            J.append(J[-1] + step)
+            c.append(c[-1] - along * u[2 + k] ** 2)
+        return np.array(p), np.array(J), np.array(c)
+
+    def rhs(t, y):
+        q, u = y[:size], y[size:]
+        p, J, c = place(q, u)
+        M, F = np.zeros((size, size)), np.zeros(size)
+        for k in range(links):
+            middle, rest = (J[k] + J[k + 1]) / 2, (c[k] + c[k + 1]) / 2
+            M += mass * middle.T @ middle
+            M[2 + k, 2 + k] += mass * length**2 / 12
+            F -= mass * middle.T @ (rest + np.array([0.0, g]))
+        for k in range(links + 1):
+            push = impact(radius - p[k, 1], -J[k][1] @ u, *law)
+            F += push * J[k][1]
+        return np.concatenate([u, np.linalg.solve(M, F)])
+
+    def touches(k):
+        def gap(t, y):
+            return place(y[:size], y[size:])[0][k, 1] - radius
+
+        return gap
+
+    events = [touches(k) for k in range(links + 1)]
+    for event in events:
+        event.terminal = True
+    y, t = np.concatenate([node, angles, np.zeros(size)]), float(times[0])
+    out = np.full((len(times), links + 1, 2), np.nan)
+    while t < times[-1]:
+        # in contact, and just after, small steps; in flight to the next touch
+        near = min(event(t, y) for event in events) < 1e-9
+        found = solve_ivp(
+            rhs, (t, min(t + 0.01, times[-1]) if near else times[-1]), y, method="DOP853",
+            rtol=1e-11, atol=1e-13, max_step=1e-4 if near else 0.01,
+            events=None if near else events, dense_output=True,
+        )  # fmt: skip
+        for row in np.flatnonzero((times >= t) & (times <= found.t[-1])):
+            state = found.sol(times[row])
+            out[row] = place(state[:size], state[size:])[0]
+        t, y = float(found.t[-1]), found.y[:, -1]
+    return out

@@ -12,7 +12,14 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from decks_io import MODELS, USERFUNCS, run_model
-from models.reference import angle_between, drop_height, top_attitude
+from models.reference import (
+    angle_between,
+    drop_height,
+    falling_chain,
+    slider_crank,
+    top_attitude,
+    wall_pendulum,
+)
 
 REFERENCES = Path(__file__).resolve().parents[3] / "shared/data/references.json"
 BOTH = pytest.mark.parametrize("detector", ["auto", "fcl"])
@@ -276,3 +283,66 @@ def test_poisson_walls(tol, allowed):
         after = np.searchsorted(t, leave)
         assert abs(v[after]) == pytest.approx(2.0 * 0.8**n, rel=allowed)
     assert leaves[-1] == pytest.approx(1.067262, rel=max(allowed, 1e-6))
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-6)])
+def test_slider_crank(tol, allowed):
+    results = run_model("slider_crank.xml", tol=tol)
+    bars = ((0.15, 1.0), (0.35, 0.5))
+    exact = slider_crank(results["time"], np.pi / 4, 10.0, *bars, 0.8)
+    p = results["bodies/2/position"]
+    angle = np.unwrap(np.arctan2(p[:, 2], p[:, 0]))
+    assert np.abs(angle - exact).max() < allowed
+    slide = 0.15 * np.cos(exact) + np.sqrt(0.35**2 - (0.15 * np.sin(exact)) ** 2)
+    assert np.abs(results["bodies/4/position/x"] - slide).max() < allowed * 0.2
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    assert np.abs(energy - energy[0]).max() < allowed * results["energy/kinetic"][0]
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 2e-2), (1e-9, 1e-5)])
+def test_four_bar(tol, allowed):
+    results = run_model("four_bar.xml", tol=tol)
+    q = results["bodies/2/quaternion"]
+    tip = results["bodies/2/position"][:, :2] + 0.5 * rotation_matrices(q)[:, :2, 1]
+    expected = {
+        1.0: (-0.1950203019, -0.9807992057),
+        5.0: (-0.8113104610, -0.5846155454),
+        10.0: (0.3284581115, 0.9445185382),
+        20.0: (0.8397465743, 0.5429785364),
+    }
+    for t, place in expected.items():
+        row = np.searchsorted(results["time"], t - 1e-9)
+        np.testing.assert_allclose(tip[row], place, rtol=0, atol=allowed)
+
+
+@BOTH
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-2), (1e-9, 1e-5)])
+def test_pendulum_wall(tol, allowed, detector):
+    results = run_model("pendulum_wall.xml", tol=tol, detector=detector)
+    inertia = 1.0 + 0.4 * 0.05**2
+    law = (1e6, 1.5, 200.0, 1e-3)
+    exact = wall_pendulum(results["time"], -np.pi / 3, 1.0, 1.0, inertia, law)
+    p = results["bodies/2/position"]
+    assert np.abs(np.arctan2(p[:, 0], -p[:, 2]) - exact).max() < allowed
+    touches = [event["time"] for event in results["events"] if event["kind"] == "touch"]
+    assert len(touches) >= 3
+
+
+def chain_energy(results):
+    parts = ("kinetic", "potential", "dissipated")
+    return sum(results[f"energy/{part}"] for part in parts)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-2), (1e-9, 1e-5)])
+def test_chain_on_box(tol, allowed):
+    results = run_model("chain_on_box.xml", tol=tol)
+    angles = np.radians([10.0, -20.0, 35.0])
+    law = (1e5, 1.5, 20.0, 1e-3)
+    nodes = falling_chain(results["time"], np.array([-0.4, 0.5]), angles, 0.3, 0.2, 0.03, law)
+    for k in range(3):
+        middle = (nodes[:, k] + nodes[:, k + 1]) / 2
+        p = results[f"bodies/{k + 2}/position"]
+        assert np.abs(p[:, [0, 2]] - middle).max() < allowed
+        assert np.abs(p[:, 1]).max() < 1e-6
+    energy = chain_energy(results)
+    assert np.abs(energy - energy[0]).max() < allowed * results["energy/dissipated"][-1]
