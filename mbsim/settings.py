@@ -13,6 +13,8 @@ from mbsim.integrators.catalog import METHODS
 from mbsim.model.elements import Model, Simulation
 
 DEFAULT_TOL = 1e-5
+#: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
+DEFAULT_TOL_ADAMS = 1e-7
 INTEGRATORS = tuple(METHODS)
 #: `Model.compatibility` of a deck in Adams' language.
 ADAMS = "ADAMS"
@@ -144,6 +146,7 @@ def settle(
     stages = []
     asked: dict[str, str] = {}
     from_deck = set()
+    usual = DEFAULT_TOL_ADAMS if model.file.lower().endswith(".adm") else DEFAULT_TOL
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -157,7 +160,7 @@ def settle(
         chosen = tol if tol is not None else said("integr_tol")
         if tol is None and chosen is not None:
             from_deck.add(f"integr_tol {chosen:g} of the deck is used as the dimensionless tol")
-        chosen = DEFAULT_TOL if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
+        chosen = usual if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
         h_max = said("h_max") or math.inf
         if motionsolve:
             h_max = min(h_max, simulation.print_interval)

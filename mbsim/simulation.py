@@ -409,7 +409,8 @@ def simulate(
     integrator : str, optional
         "DOPRI5" (order 5) or "DOP853" (order 8); default: the deck's, else the first.
     tol : float, optional
-        Local error of a step, dimensionless (README, "Tolerance"); default 1e-5.
+        Local error of a step, dimensionless (README, "Tolerance"); default: the deck's, else 1e-5,
+        of Adams decks 1e-7.
     plugins : sequence of path
         Files with user subroutines.
     output : path, optional

@@ -80,7 +80,7 @@ def command(
     report.write_text(output / "bench.csv", "")  # now, not after minutes, if DIR cannot be used
     done = runner.run(options, output, _say)
     text = report.markdown(
-        done.machine, chosen, done.rows, done.cells, peers.ENGINES if no_peers else missing
+        done.machine, chosen, done.rows, done.cells, list(peers.ENGINES) if no_peers else missing
     )
     report.write_text(output / "bench.md", text)
     pictures = _draw(options, done, output) if plot.available() else []

@@ -126,7 +126,8 @@ _SIMPLE = """
 <Model><Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="METER"
  time_unit="SECOND"/><Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="{0}" inertia_yy="{1}" inertia_zz="{2}" {ic}/>
-<Reference_Marker id="20" body_id="2" {at}/>{rest}<Force_Gravity grav_z="-9.80665"/></Model>
+<Reference_Marker id="20" body_id="2" {at}/>{rest}<Force_Gravity grav_z="-9.80665"/>
+<Param_Transient integr_tol="1e-7"/></Model>
 <Command><Simulate analysis_type="Transient" end_time="5" print_interval="0.01"/></Command>
 """
 XML = {
