@@ -41,6 +41,7 @@ class Active(NamedTuple):
     active: Any
     skyline: Any
     quality: Any
+    size: Any
 
 
 class Runner:
@@ -175,7 +176,12 @@ class Runner:
             "state": scene.state,
             "pairs": scene.pairs,
             "crowds": scene.crowds,
-            "equations": Active(scene.equations.active, scene.sweep.skyline, scene.sweep.quality),
+            "equations": Active(
+                scene.equations.active,
+                scene.sweep.skyline,
+                scene.sweep.quality,
+                scene.sweep.size,
+            ),
             "log": scene.log,
             "method": self.method,
         }

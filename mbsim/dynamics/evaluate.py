@@ -54,12 +54,16 @@ def accelerate(scene, y, dy):
         dy[at + 5] = 0.5 * (qw * w[1] + qz * w[0] - qx * w[2])
         dy[at + 6] = 0.5 * (qw * w[2] + qx * w[1] - qy * w[0])
 
+        for k in range(3):
+            dy[at + k] = y[at + 7 + k]
+        if scene.tree.of_body[b] >= 0:
+            # joints have their say first
+            continue
         torque = unrotate(work.R[b], vector(work.torque[b]))
         gyroscopic = cross(w, rotate(bodies.inertia[b], w))
         alpha = rotate(bodies.inverse[b], sub(torque, gyroscopic))
         for k in range(3):
             a = work.force[b, k] / bodies.mass[b]
-            dy[at + k] = y[at + 7 + k]
             dy[at + 7 + k] = a
             dy[at + 10 + k] = alpha[k]
             total += a + alpha[k]

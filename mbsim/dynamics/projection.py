@@ -41,6 +41,8 @@ from mbsim.system.arrays import (
 #: Newton ends when no residual is above this part of its unit, or after so many rounds.
 CLOSED = 2e-14
 MOST_ROUNDS = 8
+#: A residual, over its unit, whose square is rounding.
+SMALL = 1e-8
 
 
 @jitable
@@ -259,19 +261,26 @@ def prepare_equations(scene, t, y):
 
 @jitable
 def close_loops(scene, t, y):
-    """Move the bodies until no equation has a residual; leave matrix and equations as there."""
+    """Move the bodies until no equation has a residual; leave the factor of there.
+
+    Newton leaves the square of a residual: after a small one neither bodies nor factor are so
+    different that the last round, or the velocities, would notice.
+    """
     prepare_equations(scene, t, y)
+    fill_matrix(scene)
+    factor_matrix(scene)
     for _ in range(MOST_ROUNDS):
-        if largest_residual(scene, 2, RESIDUAL) <= CLOSED:
-            break
-        fill_matrix(scene)
-        factor_matrix(scene)
+        size = largest_residual(scene, 2, RESIDUAL)
+        if size <= CLOSED:
+            return
         correct(scene, 2, RESIDUAL)
         displace(scene, y)
         seat_all(scene, y)
+        if size <= SMALL:
+            return
         prepare_equations(scene, t, y)
-    fill_matrix(scene)
-    factor_matrix(scene)
+        fill_matrix(scene)
+        factor_matrix(scene)
 
 
 @jitable

@@ -49,6 +49,18 @@ def child_axis(scene, k, axis):
 
 
 @jitable
+def six(row):
+    """Return a spatial vector as a tuple, which stores to arrays do not make be read again."""
+    return (row[0], row[1], row[2], row[3], row[4], row[5])
+
+
+@jitable
+def inner(a, b):
+    """Return the product of a force and a motion."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@jitable
 def put(row, a, b):
     """Write a spatial vector into a row."""
     for i in range(3):
@@ -76,7 +88,7 @@ def fill_directions(scene, y, k):
     w_c, w_p = vector(work.w[body]), vector(work.w[parent])
     arm = rotate(work.R[body], vector(tree.child_p[k]))
     at = add(position(scene, y, body), arm)
-    P = sub(at, origin(scene, y, k))
+    P = add(vector(scene.sweep.arm[k]), arm)
     v_P = add(vector(work.v[body]), cross(w_c, arm))
     relative = sub(w_c, w_p)
     turning, bend = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -153,48 +165,61 @@ def fill_body(scene, y, k):
 
 
 @jitable
-def hang(scene, k):
-    """Factor what place k resists in its free directions and hang the rest on its parent.
-
-    With D = S'HS = L L' and W = L^-1 S'H the parent gets H - W'W.
-    """
-    sweep, parent, free = scene.sweep, scene.tree.parent[k], scene.tree.free[k]
+def factor_free(scene, k):
+    """Fill L and W of place k: D = S'HS = L L', W = L^-1 S'H."""
+    sweep, free = scene.sweep, scene.tree.free[k]
     H, S, W, L = sweep.H[k], sweep.S[k], sweep.W[k], sweep.L[k]
     for q in range(free):
+        s = six(S[q])
+        u = (
+            inner(six(H[0]), s),
+            inner(six(H[1]), s),
+            inner(six(H[2]), s),
+            inner(six(H[3]), s),
+            inner(six(H[4]), s),
+            inner(six(H[5]), s),
+        )
+        for r in range(q):
+            # W[r] is done, so that L[q, r] = S[q] . W[r]
+            part = inner(six(W[r]), s)
+            L[q, r] = part
+            w = six(W[r])
+            u = (
+                u[0] - part * w[0],
+                u[1] - part * w[1],
+                u[2] - part * w[2],
+                u[3] - part * w[3],
+                u[4] - part * w[4],
+                u[5] - part * w[5],
+            )
+        size = math.sqrt(inner(u, s))
+        L[q, q] = size
         for i in range(6):
-            total = 0.0
-            for j in range(6):
-                total += H[i, j] * S[q, j]
-            W[q, i] = total
-        for s in range(q + 1):
-            total = 0.0
-            for i in range(6):
-                total += S[s, i] * W[q, i]
-            L[q, s] = total
-    for q in range(free):
-        for s in range(q):
-            total = L[q, s]
-            for j in range(s):
-                total -= L[q, j] * L[s, j]
-            L[q, s] = total / L[s, s]
-            for i in range(6):
-                W[q, i] -= L[q, s] * W[s, i]
-        total = L[q, q]
-        for j in range(q):
-            total -= L[q, j] * L[q, j]
-        L[q, q] = math.sqrt(total)
-        for i in range(6):
-            W[q, i] /= L[q, q]
+            W[q, i] = u[i] / size
+
+
+@jitable
+def hang(scene, k):
+    """Factor what place k resists in its free directions and hang the rest, H - W'W, above."""
+    factor_free(scene, k)
+    sweep, parent = scene.sweep, scene.tree.parent[k]
     if parent < 0:
         return
-    above = sweep.H[parent]
+    above, H, W = sweep.H[parent], sweep.H[k], sweep.W[k]
     for i in range(6):
+        row = six(H[i])
+        for q in range(scene.tree.free[k]):
+            w, factor = six(W[q]), W[q, i]
+            row = (
+                row[0] - factor * w[0],
+                row[1] - factor * w[1],
+                row[2] - factor * w[2],
+                row[3] - factor * w[3],
+                row[4] - factor * w[4],
+                row[5] - factor * w[5],
+            )
         for j in range(6):
-            above[i, j] += H[i, j]
-    for q in range(free):
-        for i in range(6):
-            for j in range(6):
-                above[i, j] -= W[q, i] * W[q, j]
+            above[i, j] += row[j]
 
 
 @jitable
@@ -222,59 +247,85 @@ def load(scene):
 
 
 @jitable
+def pass_up(scene, k, moving):
+    """Find what the forces p of place k ask of its free directions; pass the rest to its parent."""
+    sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
+    S, W, L, z, p = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k], six(sweep.p[k])
+    for q in range(free):
+        total = -inner(six(S[q]), p)
+        for j in range(q):
+            total -= L[q, j] * z[j]
+        z[q] = total / L[q, q]
+    if parent < 0:
+        return
+    up, above = p, sweep.p[parent]
+    if moving == 1:
+        H, c = sweep.H[k], six(sweep.c[k])
+        up = (
+            up[0] + inner(six(H[0]), c),
+            up[1] + inner(six(H[1]), c),
+            up[2] + inner(six(H[2]), c),
+            up[3] + inner(six(H[3]), c),
+            up[4] + inner(six(H[4]), c),
+            up[5] + inner(six(H[5]), c),
+        )
+    for q in range(free):
+        w, share = six(W[q]), z[q]
+        if moving == 1:
+            share -= inner(w, six(sweep.c[k]))
+        up = (
+            up[0] + share * w[0],
+            up[1] + share * w[1],
+            up[2] + share * w[2],
+            up[3] + share * w[3],
+            up[4] + share * w[4],
+            up[5] + share * w[5],
+        )
+    for i in range(6):
+        above[i] += up[i]
+
+
+@jitable
+def pass_down(scene, k, moving, out):
+    """Find the acceleration of place k from that of its parent: L' q'' = z - W a."""
+    sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
+    S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
+    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if parent >= 0:
+        a = six(out[parent])
+    if moving == 1:
+        c = six(sweep.c[k])
+        a = (a[0] + c[0], a[1] + c[1], a[2] + c[2], a[3] + c[3], a[4] + c[4], a[5] + c[5])
+    for q in range(free):
+        z[q] -= inner(six(W[q]), a)
+    for q in range(free - 1, -1, -1):
+        for j in range(q + 1, free):
+            z[q] -= L[j, q] * z[j]
+        z[q] /= L[q, q]
+    for q in range(free):
+        s, rise = six(S[q]), z[q]
+        a = (
+            a[0] + rise * s[0],
+            a[1] + rise * s[1],
+            a[2] + rise * s[2],
+            a[3] + rise * s[3],
+            a[4] + rise * s[4],
+            a[5] + rise * s[5],
+        )
+    for i in range(6):
+        out[k, i] = a[i]
+
+
+@jitable
 def respond(scene, first, end, moving, out):
     """Fill the accelerations `out` of places first..end that the forces p cause.
 
     `moving` 0 leaves out what velocities cause. On return p is the articulated force.
     """
-    sweep, tree = scene.sweep, scene.tree
     for k in range(end - 1, first - 1, -1):
-        free, parent, p = tree.free[k], tree.parent[k], sweep.p[k]
-        S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
-        for q in range(free):
-            total = 0.0
-            for i in range(6):
-                total -= S[q, i] * p[i]
-            for j in range(q):
-                total -= L[q, j] * z[j]
-            z[q] = total / L[q, q]
-        if parent < 0:
-            continue
-        above = sweep.p[parent]
-        for i in range(6):
-            above[i] += p[i]
-        for q in range(free):
-            share = z[q]
-            if moving == 1:
-                for i in range(6):
-                    share -= W[q, i] * sweep.c[k, i]
-            for i in range(6):
-                above[i] += W[q, i] * share
-        if moving == 1:
-            H = sweep.H[k]
-            for i in range(6):
-                total = 0.0
-                for j in range(6):
-                    total += H[i, j] * sweep.c[k, j]
-                above[i] += total
+        pass_up(scene, k, moving)
     for k in range(first, end):
-        free, parent, a = tree.free[k], tree.parent[k], out[k]
-        S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
-        for i in range(6):
-            a[i] = out[parent, i] if parent >= 0 else 0.0
-            if moving == 1:
-                a[i] += sweep.c[k, i]
-        # L' q'' = z - W a
-        for q in range(free):
-            for i in range(6):
-                z[q] -= W[q, i] * a[i]
-        for q in range(free - 1, -1, -1):
-            for j in range(q + 1, free):
-                z[q] -= L[j, q] * z[j]
-            z[q] /= L[q, q]
-        for q in range(free):
-            for i in range(6):
-                a[i] += z[q] * S[q, i]
+        pass_down(scene, k, moving, out)
 
 
 @jitable
