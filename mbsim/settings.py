@@ -14,7 +14,7 @@ from mbsim.model.elements import Model, Simulation
 
 DEFAULT_TOL = 1e-5
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
-DEFAULT_TOL_ADAMS = 1e-7
+DEFAULT_TOL_ADAMS = 1e-8
 INTEGRATORS = tuple(METHODS)
 #: `Model.compatibility` of a deck in Adams' language.
 ADAMS = "ADAMS"

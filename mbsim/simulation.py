@@ -58,6 +58,11 @@ class Runner:
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
         method = catalog.load(settings.integrator)
+        if method.order == 0.0 and len(system.scene.tree.body) > 0:
+            raise ModelError(
+                f"integrator={settings.integrator} is for free bodies; this model has joints or "
+                "other constraints: take DOPRI5 or DOP853"
+            )
         self.method = scheme.make(
             method,
             system.y0,
@@ -416,7 +421,7 @@ def simulate(
         "DOPRI5" (order 5) or "DOP853" (order 8); default: the deck's, else the first.
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default: the deck's, else 1e-5,
-        of Adams decks 1e-7.
+        of Adams decks 1e-8.
     plugins : sequence of path
         Files with user subroutines.
     output : path, optional

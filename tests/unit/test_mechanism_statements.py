@@ -12,6 +12,7 @@ from mbsim.errors import DeckError, ModelError
 from mbsim.expressions.tree import Call, Number
 from mbsim.joints.catalog import JOINTS
 from mbsim.settings import settle
+from mbsim.simulation import simulate
 
 ADDED_LINE = 14  # of the last statement of <Model> in the minimal deck
 ON = 'i_marker_id="20" j_marker_id="10"'
@@ -294,3 +295,9 @@ def test_angles_of_expressions_may_be_degrees(tmp_path: Path) -> None:
     model = read(tmp_path, added(f'{MOTION} val_type="D" expr="180D"/>'))
     assert model.motions[1].expr is not None
     assert model.motions[1].expr.root == Number(math.pi)
+
+
+def test_verlet_refuses_joints(tmp_path: Path) -> None:
+    model = read(tmp_path, added(REVOLUTE))
+    with pytest.raises(ModelError, match=r"integrator=VERLET is for free bodies.*joints"):
+        simulate(model, end_time=0.1, integrator="VERLET")
