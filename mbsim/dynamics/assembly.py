@@ -90,7 +90,9 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
 
 def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
     """Take the residuals of a column away, for the equations that hold at that level."""
-    held = scene.equations.level >= level
+    given = scene.equations.start[:, column]
+    starts = (scene.equations.level < level) & np.isfinite(given)
+    held = (scene.equations.level >= level) | starts
     n = len(held)
     if not held.any():
         return
@@ -98,6 +100,7 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
     for _ in range(_MOST_ROUNDS):
         serve(MATRIX, y)
         residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
+        residual[starts] -= given[starts]
         worst = float(np.max(np.abs(residual) / scene.equations.unit))
         stuck = stuck + 1 if worst > 0.5 * best else 0
         best = min(best, worst)

@@ -152,7 +152,7 @@ def implied_residual(scene, t, y):
     """Return the largest residual of the equations not in use, over its unit, and whose it is."""
     largest, worst = 0.0, -1
     for e in range(len(scene.equations.active) - 1):
-        if not is_active(scene, e):
+        if not is_active(scene, e) and scene.equations.level[e] == 2:
             fill_equation(scene, t, y, e)
             size = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
             if not size <= largest:

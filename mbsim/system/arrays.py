@@ -242,6 +242,7 @@ class Equations(NamedTuple):
     level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
     general: I1  # (ne,) 1 where the program is the whole equation
     constant: F1  # (ne,)
+    start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
     connection: I1  # (ne,) the element that it belongs to
     kind: I1  # (terms,)

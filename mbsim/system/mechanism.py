@@ -81,6 +81,7 @@ class _Sums:
     level: list[int] = field(default_factory=list)
     general: list[int] = field(default_factory=list)
     constant: list[float] = field(default_factory=list)
+    start: list[tuple[float, float]] = field(default_factory=list)
     unit: list[float] = field(default_factory=list)
     connection: list[int] = field(default_factory=list)
     terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
@@ -95,6 +96,7 @@ class _Sums:
         program: int = -1,
         level: int = 2,
         general: int = 0,
+        start: tuple[float | None, float | None] = (None, None),
     ) -> None:
         """End an equation whose terms have been added."""
         self.first.append(len(self.terms))
@@ -102,6 +104,7 @@ class _Sums:
         self.level.append(level)
         self.general.append(general)
         self.constant.append(constant)
+        self.start.append(tuple(np.nan if value is None else value for value in start))
         self.unit.append(unit)
         self.connection.append(connection)
         self.names.append(name)
@@ -119,6 +122,7 @@ class _Sums:
             level=ints(self.level),
             general=ints(self.general),
             constant=np.array(self.constant, dtype=np.float64),
+            start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
             unit=np.array(self.unit, dtype=np.float64),
             connection=ints(self.connection),
             kind=ints(t[0] for t in self.terms),
@@ -245,7 +249,10 @@ class _Builder:
         assert motion.expr is not None
         program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
         level = _LEVELS[motion.val_type]
-        self.sums.close(connection, "its motion", 0.0, self.unit([row]), program, level)
+        start = (motion.ic_disp, motion.ic_vel)
+        self.sums.close(
+            connection, "its motion", 0.0, self.unit([row]), program, level, start=start
+        )
 
     def add_coupler(self, coupler: Coupler) -> None:
         """Add a coupler: a sum of displacements of joints stays what it is."""

@@ -517,3 +517,20 @@ def test_rows_of_a_run_are_states_of_the_mechanism(tmp_path):
     for k in (3, 16):
         y[k : k + 4] *= np.sign(y[k : k + 4] @ start[k : k + 4])
     np.testing.assert_allclose(y, start, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("val_type", "expr", "extra", "w0"),
+    [("V", "0.7", 'ic_disp="0.4"', 0.7), ("A", "0", 'ic_disp="0.4" ic_vel="0.3"', 0.3)],
+)
+def test_a_motion_starts_where_it_says(val_type, expr, extra, w0, tmp_path):
+    # the bar lies along x at rest; assembly turns it by 0.4 and gives it the speed
+    bar = mech.Body(0.8, (0.01, 0.07, 0.07), (0.5, 0, 0))
+    motion = (
+        f'<Motion_Joint id="5" joint_id="1" motion_type="R" val_type="{val_type}" '
+        f'type="EXPRESSION" expr="{expr}" {extra}/>'
+    )
+    results = Scene([bar], [Joint("REVOLUTE", 1, 0)], extra=motion).run(tmp_path, 1.0, 0.1)
+    angle = 0.4 + w0 * results["time"]
+    expected = 0.5 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    assert np.abs(results["bodies/2/position"] - expected).max() < 1e-8
