@@ -1,10 +1,11 @@
-"""A chain of rods on oblique hinges in joint coordinates: equations that share nothing with mbsim's.
+"""A chain of rods on oblique hinges in joint coordinates, apart from mbsim's own equations.
 
 The rods lie along x at the start; the axis of each hinge is the one before turned about the
-rod by the golden angle. The state is y = (angles, rates); the accelerations are those of
-R. Featherstone, Rigid Body Dynamics Algorithms (2008), table 7.1, with all spatial vectors
-about the origin of the global frame, so that no vector is ever transformed.
-`problem` makes them a `Problem` for mbsim's integrators, `exact` integrates them by scipy.
+rod by the golden angle, square to the rod or tilted towards it. The state is y = (angles,
+rates); the accelerations are those of R. Featherstone, Rigid Body Dynamics Algorithms (2008),
+table 7.1, with all spatial vectors about the origin of the global frame, so that none is
+transformed. `problem` makes them a `Problem` for mbsim's integrators, `exact` integrates them
+by scipy.
 """
 
 from __future__ import annotations
@@ -53,22 +54,23 @@ class Chain(NamedTuple):
     used: I1  # (1,)
 
 
-def axes(count: int) -> np.ndarray:
-    """Return the axes of the hinges (count, 3) in the rods' own frames."""
-    turned = GOLDEN_ANGLE * np.arange(count)
-    return np.stack([np.zeros(count), np.cos(turned), np.sin(turned)], axis=1)
+def axes(count: int, tilt: float) -> np.ndarray:
+    """Return the axes of the hinges (count, 3) in the rods' own frames, tilted towards the rod."""
+    turned, across = GOLDEN_ANGLE * np.arange(count), math.cos(tilt)
+    along = np.full(count, math.sin(tilt))
+    return np.stack([along, across * np.cos(turned), across * np.sin(turned)], axis=1)
 
 
-def chain_deck(count: int, end_time: float) -> str:
+def chain_deck(count: int, end_time: float, tilt: float = 0.0) -> str:
     """Return the deck of the same chain."""
     length = p.S8.length / count
     statements = [text.GROUND]
-    for k, (_, c, s) in enumerate(axes(count).tolist()):
+    for k, axis in enumerate(axes(count, tilt)):
         body, before, at = 2 + k, 1 + k, [k * length, 0.0, 0.0]
         inertia = p.rod_inertia(p.S8.mass, length)
         statements.append(text.body(body, p.S8.mass, inertia, [(k + 0.5) * length, 0.0, 0.0]))
-        # columns: x along the rod, y, and z along the hinge
-        hinge = ((1.0, 0.0, 0.0), (0.0, s, c), (0.0, -c, s))
+        beside = np.cross(axis, [1.0, 0.0, 0.0]) / math.cos(tilt)
+        hinge = np.stack([np.cross(beside, axis), beside, axis], axis=1).tolist()
         statements.append(text.marker(10 * body + 1, body, at, hinge))
         statements.append(text.marker(10 * before + 2, before, at, hinge))
         statements.append(text.joint(501 + k, "REVOLUTE", 10 * body + 1, 10 * before + 2))
@@ -297,14 +299,14 @@ def _far(context, t, h, a, b):
     return 1e300
 
 
-def make(count: int, samples: int) -> Chain:
+def make(count: int, samples: int, tilt: float = 0.0) -> Chain:
     """Return a chain of `count` rods with room for `samples` rows."""
     n = count
     length, along = p.S8.length, p.ROD_ALONG
     turn = np.zeros((n + 1, 3, 3))
     turn[0] = np.eye(3)
     return Chain(
-        axis=axes(n),
+        axis=axes(n, tilt),
         rod=np.array([length / n, p.S8.mass, along]),
         scale=np.array([length, math.sqrt(p.GRAVITY * length)]),
         turn=turn,
@@ -334,9 +336,9 @@ def problem(chain: Chain) -> tuple[Problem, Any]:
     return Problem(int(table.ctypes.data), *addresses), (table, chain)
 
 
-def exact(count: int, times: np.ndarray) -> np.ndarray:
+def exact(count: int, times: np.ndarray, tilt: float = 0.0) -> np.ndarray:
     """Return the free end (times, 3) by scipy's DOP853 at 1e-13; `times` begin with 0."""
-    chain = make(count, len(times))
+    chain = make(count, len(times), tilt)
     found, _kept = problem(chain)
     pointer = ctypes.c_void_p
     signature = ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
