@@ -58,13 +58,14 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
     before = y.copy()
     equations = scene.equations
     n = len(equations.program)
-    scene.sweep.multiplier[:] = 0.0
-    serve(MATRIX, y)
-    serve(DISPLACE, y)
-    _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
-    _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
-    serve(MATRIX, y)
-    serve(CHOOSE, y)
+    if n > 0:
+        scene.sweep.multiplier[:] = 0.0
+        serve(MATRIX, y)
+        serve(DISPLACE, y)
+        _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
+        _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
+        serve(MATRIX, y)
+        serve(CHOOSE, y)
     chosen = [int(e) for e in equations.active[: equations.active[-1]]]
     serve(PROJECT, y)
     moved, sped = _changes(scene, before, y)

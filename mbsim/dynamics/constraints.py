@@ -14,15 +14,14 @@ from mbsim.dynamics.equations import (
     hold,
 )
 from mbsim.dynamics.projection import (
-    carry_all,
     displace,
     prepare_equations,
     project,
     push,
-    seat_all,
     speed_up,
 )
 from mbsim.dynamics.reactions import fill_reactions
+from mbsim.dynamics.seating import carry_all, seat_all
 from mbsim.dynamics.tree import prepare, write_accelerations
 from mbsim.system.arrays import (
     ACCELERATE,

@@ -14,6 +14,7 @@ from mbsim.dynamics.constraints import serve
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
+from mbsim.dynamics.limbs import serve_limbs
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
@@ -148,6 +149,13 @@ def _joints(context, what, t, y, dy):
     return serve(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
 
 
+def _limbs(context, what, t, y, dy):
+    """The same where the tree holds all joints."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return serve_limbs(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
+
+
 _FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
 _POINTER = types.CPointer(types.float64)
 _JOINTS = types.int64(types.int64, types.int64, types.float64, _POINTER, _POINTER)
@@ -179,5 +187,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     if len(scene.tree.body) > 0:
-        scene.world.doors[JOINTS_DOOR] = jit.address(_joints, _JOINTS)
+        served = _joints if len(scene.equations.program) > 0 else _limbs
+        scene.world.doors[JOINTS_DOOR] = jit.address(served, _JOINTS)
     return Problem(int(table.ctypes.data), *addresses), table
