@@ -61,6 +61,32 @@ def inner(a, b):
 
 
 @jitable
+def plus(a, factor, b):
+    """Return a + factor b."""
+    return (
+        a[0] + factor * b[0],
+        a[1] + factor * b[1],
+        a[2] + factor * b[2],
+        a[3] + factor * b[3],
+        a[4] + factor * b[4],
+        a[5] + factor * b[5],
+    )
+
+
+@jitable
+def times(H, a):
+    """Return H a, rows of H times a."""
+    return (
+        inner(six(H[0]), a),
+        inner(six(H[1]), a),
+        inner(six(H[2]), a),
+        inner(six(H[3]), a),
+        inner(six(H[4]), a),
+        inner(six(H[5]), a),
+    )
+
+
+@jitable
 def put(row, a, b):
     """Write a spatial vector into a row."""
     for i in range(3):
@@ -171,27 +197,13 @@ def factor_free(scene, k):
     H, S, W, L = sweep.H[k], sweep.S[k], sweep.W[k], sweep.L[k]
     for q in range(free):
         s = six(S[q])
-        u = (
-            inner(six(H[0]), s),
-            inner(six(H[1]), s),
-            inner(six(H[2]), s),
-            inner(six(H[3]), s),
-            inner(six(H[4]), s),
-            inner(six(H[5]), s),
-        )
+        u = times(H, s)
         for r in range(q):
             # W[r] is done, so that L[q, r] = S[q] . W[r]
             part = inner(six(W[r]), s)
             L[q, r] = part
             w = six(W[r])
-            u = (
-                u[0] - part * w[0],
-                u[1] - part * w[1],
-                u[2] - part * w[2],
-                u[3] - part * w[3],
-                u[4] - part * w[4],
-                u[5] - part * w[5],
-            )
+            u = plus(u, -part, w)
         size = math.sqrt(inner(u, s))
         L[q, q] = size
         for i in range(6):
@@ -210,14 +222,7 @@ def hang(scene, k):
         row = six(H[i])
         for q in range(scene.tree.free[k]):
             w, factor = six(W[q]), W[q, i]
-            row = (
-                row[0] - factor * w[0],
-                row[1] - factor * w[1],
-                row[2] - factor * w[2],
-                row[3] - factor * w[3],
-                row[4] - factor * w[4],
-                row[5] - factor * w[5],
-            )
+            row = plus(row, -factor, w)
         for j in range(6):
             above[i, j] += row[j]
 
@@ -261,26 +266,12 @@ def pass_up(scene, k, moving):
     up, above = p, sweep.p[parent]
     if moving == 1:
         H, c = sweep.H[k], six(sweep.c[k])
-        up = (
-            up[0] + inner(six(H[0]), c),
-            up[1] + inner(six(H[1]), c),
-            up[2] + inner(six(H[2]), c),
-            up[3] + inner(six(H[3]), c),
-            up[4] + inner(six(H[4]), c),
-            up[5] + inner(six(H[5]), c),
-        )
+        up = plus(up, 1.0, times(H, c))
     for q in range(free):
         w, share = six(W[q]), z[q]
         if moving == 1:
             share -= inner(w, six(sweep.c[k]))
-        up = (
-            up[0] + share * w[0],
-            up[1] + share * w[1],
-            up[2] + share * w[2],
-            up[3] + share * w[3],
-            up[4] + share * w[4],
-            up[5] + share * w[5],
-        )
+        up = plus(up, share, w)
     for i in range(6):
         above[i] += up[i]
 
@@ -295,7 +286,7 @@ def pass_down(scene, k, moving, out):
         a = six(out[parent])
     if moving == 1:
         c = six(sweep.c[k])
-        a = (a[0] + c[0], a[1] + c[1], a[2] + c[2], a[3] + c[3], a[4] + c[4], a[5] + c[5])
+        a = plus(a, 1.0, c)
     for q in range(free):
         z[q] -= inner(six(W[q]), a)
     for q in range(free - 1, -1, -1):
@@ -304,14 +295,7 @@ def pass_down(scene, k, moving, out):
         z[q] /= L[q, q]
     for q in range(free):
         s, rise = six(S[q]), z[q]
-        a = (
-            a[0] + rise * s[0],
-            a[1] + rise * s[1],
-            a[2] + rise * s[2],
-            a[3] + rise * s[3],
-            a[4] + rise * s[4],
-            a[5] + rise * s[5],
-        )
+        a = plus(a, rise, s)
     for i in range(6):
         out[k, i] = a[i]
 
