@@ -174,13 +174,15 @@ def settle(
             f"{model.file}:{force.source.line}: Force_Scalar_TwoBody[{force.id}]: integrator "
             "VERLET steps by stiffness, which is not known of an expression; use DOPRI5 or DOP853"
         )
-    of_joints = [*model.joint_frictions.values(), *model.joint_limits.values()]
-    if method == "VERLET" and of_joints:
-        force = of_joints[0]
-        name = "Force_JointFriction" if model.joint_frictions else "Force_JointLimit"
+    in_joints = [
+        *((f.source.line, f"Force_JointFriction[{f.id}]") for f in model.joint_frictions.values()),
+        *((f.source.line, f"Force_JointLimit[{f.id}]") for f in model.joint_limits.values()),
+    ]
+    if method == "VERLET" and in_joints:
+        line, name = in_joints[0]
         raise ModelError(
-            f"{model.file}:{force.source.line}: {name}[{force.id}]: integrator VERLET steps by "
-            "stiffness, which is not taken of forces in joints; use DOPRI5 or DOP853"
+            f"{model.file}:{line}: {name}: integrator VERLET steps by stiffness, which is not "
+            "taken of forces in joints; use DOPRI5 or DOP853"
         )
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 

@@ -132,7 +132,9 @@ def test_a_block_on_rails_slows_down_by_mu_n_over_m(tmp_path, side, rails):
     slow = mu * np.hypot(M * G, side) / M
     t = results["time"]
     np.testing.assert_allclose(results["bodies/2/velocity"][:, 0], 3.0 - slow * t, atol=1e-8)
-    np.testing.assert_allclose(results["bodies/2/position"][:, 0], 3 * t - slow * t * t / 2, atol=1e-8)
+    np.testing.assert_allclose(
+        results["bodies/2/position"][:, 0], 3 * t - slow * t * t / 2, atol=1e-8
+    )
     assert imbalance(results) < 1e-9
     for k in range(rails):
         force = results[f"joint_frictions/{k + 1}/force"][:, 0]
@@ -338,3 +340,43 @@ def test_a_slider_between_two_elastic_stops_keeps_its_energy(tmp_path, swapped):
     np.testing.assert_allclose(results["bodies/2/velocity"][:, 0], v, atol=1e-6)
     assert imbalance(results) < 1e-7
     assert results[DISSIPATED][-1] == 0.0
+
+
+@pytest.mark.parametrize("law", ["HUNT_CROSSLEY", "POISSON"])
+def test_other_laws_serve_as_stops_and_close_the_balance(tmp_path, law):
+    text = {
+        "HUNT_CROSSLEY": 'stiffness="4e4" restitution_coef="0.6" ref_velocity="2"',
+        "POISSON": 'penalty="4e4" restitution_coef="0.6" normal_trans_vel="0.01"',
+    }[law]
+    stop = (
+        '<Force_JointLimit id="1" joint_id="1" motion_type="T" lower="-0.1" upper="0.1" '
+        f'cnf_type="{law}" {text}/>'
+    )
+    results = slider(stop, v=2.0).run(tmp_path, 0.1, 0.002, tol=1e-9)
+    assert imbalance(results) < 1e-6
+    # one rebound: 2 -> -e 2
+    assert results["bodies/2/velocity"][-1, 0] == pytest.approx(-1.2, rel=0.01)
+    assert results["joint_limits/1/force"][:, 0].min() < -100.0
+    assert results["joint_limits/1/force"][:, 0].max() == 0.0
+
+
+def test_requests_and_info_know_friction_and_limits(tmp_path):
+    """The force on J is the opposite; all that acts between the markers is reaction + friction."""
+    asked = "".join(
+        f'<Post_Request id="{k}" type="ELEMENTAL_FORCE" elem_type="{elem}" elem_id="1" {more}/>'
+        for k, (elem, more) in enumerate(
+            [("JOINTFRICTION", ""), ("JOINTFRICTION", 'jflag="TRUE"'), ("JOINTLIMIT", "")], 1
+        )
+    )
+    all_of_it = '<Post_Request id="4" type="MARKER_FORCE" i_marker_id="1000" j_marker_id="1001"/>'
+    stop = limit(1, "T", upper=0.2, stiffness=1e4, exponent=1.0)
+    scene = slider(friction(1, 0.25) + stop + asked + all_of_it)
+    results = scene.run(tmp_path, 0.1, 0.01)
+    on_i, on_j = results["requests/1"][:, 1:4], results["requests/2"][:, 1:4]
+    np.testing.assert_allclose(on_i, results["joint_frictions/1/force"])
+    np.testing.assert_allclose(on_j, -on_i)
+    np.testing.assert_allclose(results["requests/3"][:, 1:4], results["joint_limits/1/force"])
+    parts = ("joints", "joint_frictions", "joint_limits")
+    total = sum(results[f"{part}/1/force"] for part in parts)
+    np.testing.assert_allclose(results["requests/4"][:, 1:4], total)
+    assert results["joint_limits/1/force"][:, 0].min() < -100.0
