@@ -352,7 +352,7 @@ def test_other_laws_serve_as_stops_and_close_the_balance(tmp_path, law):
         '<Force_JointLimit id="1" joint_id="1" motion_type="T" lower="-0.1" upper="0.1" '
         f'cnf_type="{law}" {text}/>'
     )
-    results = slider(stop, v=2.0).run(tmp_path, 0.1, 0.002, tol=1e-9)
+    results = slider(stop, v=2.0).run(tmp_path, 0.14, 0.002, tol=1e-9)
     assert imbalance(results) < 1e-6
     # one rebound: 2 -> -e 2
     assert results["bodies/2/velocity"][-1, 0] == pytest.approx(-1.2, rel=0.01)
