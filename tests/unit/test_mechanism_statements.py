@@ -340,19 +340,6 @@ def test_names_the_fault(tmp_path: Path, name: str) -> None:
     assert all(part in line for part in parts), line
 
 
-def test_spring_that_does_nothing(tmp_path: Path) -> None:
-    model = read(tmp_path, added(f'<Force_SpringDamper id="1" type="ROTATIONAL" {ON}/>'))
-    (warning,) = model.warnings
-    assert "Force_SpringDamper[1]" in warning
-    assert "does nothing" in warning
-
-
-def test_angles_of_expressions_may_be_degrees(tmp_path: Path) -> None:
-    model = read(tmp_path, added(f'{MOTION} val_type="D" expr="180D"/>'))
-    assert model.motions[1].expr is not None
-    assert model.motions[1].expr.root == Number(math.pi)
-
-
 def test_friction_and_limits_of_joints(tmp_path: Path) -> None:
     text = (
         f'{REVOLUTE}<Force_JointFriction id="4" label="f" joint_id="1" cff_type="ON" '
@@ -390,3 +377,16 @@ def test_attributes_of_another_law_are_noted(tmp_path: Path) -> None:
     notes = "\n".join(model.notes)
     assert "Force_JointFriction mu_static: has no effect with cff_type" in notes
     assert "Force_JointLimit penalty: has no effect with cnf_type IMPACT" in notes
+
+
+def test_spring_that_does_nothing(tmp_path: Path) -> None:
+    model = read(tmp_path, added(f'<Force_SpringDamper id="1" type="ROTATIONAL" {ON}/>'))
+    (warning,) = model.warnings
+    assert "Force_SpringDamper[1]" in warning
+    assert "does nothing" in warning
+
+
+def test_angles_of_expressions_may_be_degrees(tmp_path: Path) -> None:
+    model = read(tmp_path, added(f'{MOTION} val_type="D" expr="180D"/>'))
+    assert model.motions[1].expr is not None
+    assert model.motions[1].expr.root == Number(math.pi)

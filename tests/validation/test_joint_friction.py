@@ -141,20 +141,21 @@ def test_a_block_on_rails_slows_down_by_mu_n_over_m(tmp_path, side, rails):
         np.testing.assert_allclose(force, -slow * M / rails, rtol=1e-9)
 
 
-def test_an_arm_adds_the_bending_torque(tmp_path):
-    mu, arm, high = 0.25, 0.4, 0.3
+@pytest.mark.parametrize("arm", [0.4, 0.15, 0.079])
+def test_an_arm_adds_the_bending_torque(tmp_path, arm):
+    mu, high = 0.25, 0.3
     # the rail runs `high` above the cg: m a high is borne as torque, and presses
     scene = slider(friction(1, mu, friction_arm=arm))
     scene.joints[0].p = (0.0, 0.0, high)
-    results = scene.run(tmp_path, 0.5, 0.05, tol=1e-10)
-    # a = mu (g + a high/arm)
+    # a = mu (g + a high/arm): with the last arm nearly self-locking
     slow = mu * G / (1.0 - mu * high / arm)
+    results = scene.run(tmp_path, 2.0 / slow, 0.2 / slow, tol=1e-10)
     velocity = results["bodies/2/velocity"][:, 0]
     np.testing.assert_allclose(velocity, 3.0 - slow * results["time"], atol=1e-8)
 
 
 def test_friction_that_feeds_itself_jams_and_is_named(tmp_path):
-    scene = slider(friction(1, 0.5, friction_arm=0.1))
+    scene = slider(friction(1, 0.25, friction_arm=0.071))
     scene.joints[0].p = (0.0, 0.0, 0.3)
     with pytest.raises(SolverError, match=r"Force_JointFriction\[1\]: Constraint_Joint\[1\] jams"):
         scene.run(tmp_path, 0.5, 0.05)
