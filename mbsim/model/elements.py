@@ -290,7 +290,7 @@ class JointFriction:
     """Force_JointFriction: a friction law in a joint, pressed by the joint's own reaction.
 
     Normal force: the reaction across the free axis (of SPHERICAL all of it) + `preload` + the
-    reaction torque across that axis over `friction_arm`, where that is > 0.
+    reaction torque across that axis over `bending_reaction_arm`, where that is > 0.
     """
 
     id: int
@@ -304,7 +304,7 @@ class JointFriction:
     pin_radius: float | None = None  # REVOLUTE, CYLINDRICAL [L]
     ball_radius: float | None = None  # SPHERICAL [L]
     preload: float = 0.0  # [F]
-    friction_arm: float = 0.0  # [L]
+    bending_reaction_arm: float = 0.0  # [L]
     source: Source = Source()
 
 

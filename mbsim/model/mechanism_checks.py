@@ -235,8 +235,9 @@ def _frictions(model: Model) -> Iterator[Fault]:
                 belongs = " or ".join(type for type, has in _LEVERS.items() if has == attribute)
                 message = f'{attribute}="{value:g}": {of}; belongs to {belongs}'
                 yield _fault(source, name, message)
-        if joint.type == "SPHERICAL" and friction.friction_arm > 0.0:
-            message = f'friction_arm="{friction.friction_arm:g}": {of}, which bears no torque'
+        if joint.type == "SPHERICAL" and friction.bending_reaction_arm > 0.0:
+            given = f'bending_reaction_arm="{friction.bending_reaction_arm:g}"'
+            message = f"{given}: {of}, which bears no torque"
             yield _fault(source, name, message)
 
 

@@ -15,6 +15,12 @@ _NORMAL = (
     *("stiffness", "exponent", "damping", "dmax", "penalty", "restitution_coef"),
     *("ref_velocity", "normal_trans_vel"),
 )
+#: Attributes of MotionSolve's own friction, with its stiction and its other ways to be pressed.
+_NOT_BUILT = (
+    *("friction_arm", "reaction_arm", "initial_overlap", "overlap_delta", "torque_preload"),
+    *("force_preload", "max_stiction_deform", "bristle_stiffness", "damping_effects"),
+    *("viscous_effects", "inactive", "effect", "inputs"),
+)
 
 
 def _of_contact(names: tuple[str, ...]) -> dict[str, Spec]:
@@ -41,7 +47,7 @@ def _build_friction(entry: Entry) -> None:
         pin_radius=entry.get("pin_radius"),
         ball_radius=entry.get("ball_radius"),
         preload=entry.get("preload", 0.0),
-        friction_arm=entry.get("friction_arm", 0.0),
+        bending_reaction_arm=entry.get("bending_reaction_arm", 0.0),
         source=entry.source,
     )
     entry.register(entry.draft.joint_frictions, friction)
@@ -99,7 +105,8 @@ FORCE_JOINTFRICTION = Statement(
         "pin_radius": Spec(POSITIVE),
         "ball_radius": Spec(POSITIVE),
         "preload": Spec(NOT_NEGATIVE),
-        "friction_arm": Spec(NOT_NEGATIVE),
+        "bending_reaction_arm": Spec(NOT_NEGATIVE),
+        **{name: Spec(refused="is documented but not built yet") for name in _NOT_BUILT},
     },
     _build_friction,
 )

@@ -96,7 +96,7 @@ def _add_friction(
     _place(model, markers, made, k, friction.joint_id)
     made.kind[k] = _FRICTIONS[model.joints[friction.joint_id].type]
     radius = friction.pin_radius or friction.ball_radius or 0.0
-    made.par[k] = radius, friction.preload, friction.friction_arm, 0.0
+    made.par[k] = radius, friction.preload, friction.bending_reaction_arm, 0.0
     # joints are the first connections, in the order of the model
     made.connection[k] = list(model.joints).index(friction.joint_id)
 

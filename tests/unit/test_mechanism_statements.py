@@ -273,12 +273,16 @@ BAD = {
         ('pin_radius="2"', "belongs to REVOLUTE or CYLINDRICAL"),
     ),
     "arm of a ball": (
-        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" friction_arm="2"/>',
-        ('friction_arm="2"', "bears no torque"),
+        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" bending_reaction_arm="2"/>',
+        ('bending_reaction_arm="2"', "bears no torque"),
     ),
     "pulling preload": (
         f'{REVOLUTE}{RUBS} pin_radius="1" preload="-2"/>',
         ('preload="-2"', "number >= 0"),
+    ),
+    "collar": (
+        f'{REVOLUTE}{RUBS} pin_radius="1" friction_arm="2"/>',
+        ('friction_arm="2"', "documented but not built yet"),
     ),
     "friction twice": (
         f'{REVOLUTE}{RUBS} pin_radius="1"/>{RUBS} pin_radius="1"/>'.replace(
@@ -344,7 +348,7 @@ def test_friction_and_limits_of_joints(tmp_path: Path) -> None:
     text = (
         f'{REVOLUTE}<Force_JointFriction id="4" label="f" joint_id="1" cff_type="ON" '
         'mu_static="0.3" mu_dynamic="0.2" stiction_trans_vel="0.01" friction_trans_vel="0.02" '
-        'pin_radius="0.05" preload="3" friction_arm="0.2"/>'
+        'pin_radius="0.05" preload="3" bending_reaction_arm="0.2"/>'
         '<Force_JointLimit id="5" label="l" joint_id="1" motion_type="Rotation" lower="-1.5" '
         'cnf_type="HUNT_CROSSLEY" stiffness="100" exponent="1" damping="0.5"/>'
     )
@@ -354,7 +358,7 @@ def test_friction_and_limits_of_joints(tmp_path: Path) -> None:
     assert (friction.mu_static, friction.mu_dynamic) == (0.3, 0.2)
     assert (friction.stiction_trans_vel, friction.friction_trans_vel) == (0.01, 0.02)
     assert (friction.pin_radius, friction.ball_radius) == (0.05, None)
-    assert (friction.preload, friction.friction_arm) == (3.0, 0.2)
+    assert (friction.preload, friction.bending_reaction_arm) == (3.0, 0.2)
     assert (limit.joint_id, limit.label, limit.direction) == (1, "l", "R")
     assert (limit.lower, limit.upper) == (-1.5, None)
     assert (limit.cnf_type, limit.stiffness) == ("HUNT_CROSSLEY", 100.0)

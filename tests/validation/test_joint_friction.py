@@ -145,7 +145,7 @@ def test_a_block_on_rails_slows_down_by_mu_n_over_m(tmp_path, side, rails):
 def test_an_arm_adds_the_bending_torque(tmp_path, arm):
     mu, high = 0.25, 0.3
     # the rail runs `high` above the cg: m a high is borne as torque, and presses
-    scene = slider(friction(1, mu, friction_arm=arm))
+    scene = slider(friction(1, mu, bending_reaction_arm=arm))
     scene.joints[0].p = (0.0, 0.0, high)
     # a = mu (g + a high/arm): with the last arm nearly self-locking
     slow = mu * G / (1.0 - mu * high / arm)
@@ -155,7 +155,7 @@ def test_an_arm_adds_the_bending_torque(tmp_path, arm):
 
 
 def test_friction_that_feeds_itself_jams_and_is_named(tmp_path):
-    scene = slider(friction(1, 0.25, friction_arm=0.071))
+    scene = slider(friction(1, 0.25, bending_reaction_arm=0.071))
     scene.joints[0].p = (0.0, 0.0, 0.3)
     with pytest.raises(SolverError, match=r"Force_JointFriction\[1\]: Constraint_Joint\[1\] jams"):
         scene.run(tmp_path, 0.5, 0.05)
@@ -239,7 +239,7 @@ def chain(closed, mu):
         joints.append(decks.Joint("REVOLUTE", 4, 0, ends[4], HINGE))
     # out of plane weight is borne too
     pins = "".join(
-        friction(k + 1, mu, 0.02, id=k + 1, pin_radius=0.02, friction_arm=turn)
+        friction(k + 1, mu, 0.02, id=k + 1, pin_radius=0.02, bending_reaction_arm=turn)
         for k in range(len(joints))
     )
     return decks.Scene(bodies, joints, g=(0.5, 2.0, -9.81), extra=pins)
