@@ -174,6 +174,16 @@ def settle(
             f"{model.file}:{force.source.line}: Force_Scalar_TwoBody[{force.id}]: integrator "
             "VERLET steps by stiffness, which is not known of an expression; use DOPRI5 or DOP853"
         )
+    in_joints = [
+        *((f.source.line, f"Force_JointFriction[{f.id}]") for f in model.joint_frictions.values()),
+        *((f.source.line, f"Force_JointLimit[{f.id}]") for f in model.joint_limits.values()),
+    ]
+    if method == "VERLET" and in_joints:
+        line, name = in_joints[0]
+        raise ModelError(
+            f"{model.file}:{line}: {name}: integrator VERLET steps by stiffness, which is not "
+            "taken of forces in joints; use DOPRI5 or DOP853"
+        )
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 

@@ -330,6 +330,10 @@ class Runner:
                 f"{equation_name(self.system, contact)} contradicts other constraints from time "
                 f"{t:.9g} on; results up to there are kept"
             )
+        from mbsim.dynamics.joint_friction import JAMMED
+
+        if code == JAMMED:
+            raise SolverError(self._jammed(contact, t))
         element = self.system.contact_ids[contact] if 0 <= contact else 0
         if code in (RAISED_COMPILED, USER_NOT_FINITE):
             from mbsim.plugins import reproduce
@@ -346,6 +350,16 @@ class Runner:
             where = "".join(f" of {name}" for name in self._not_finite()[:1])
             raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
         raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
+
+    def _jammed(self, row: int, t: float) -> str:
+        """Return what is said of friction that no acceleration can bear."""
+        id = self.system.applied[row][1]
+        joint = self.system.model.joint_frictions[id].joint_id
+        return (
+            f"Force_JointFriction[{id}]: Constraint_Joint[{joint}] jams at time {t:.9g}: friction "
+            "and the reaction that it causes raise each other without end; results up to there "
+            "are kept"
+        )
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run."""

@@ -119,7 +119,9 @@ def _between_markers(model: Model) -> dict[str, Any]:
 #: Attributes of an element that `info` shows, in this order.
 _SHOWN = (
     *("label", "type", "joint_id", "joint_ids", "direction", "val_type", "motion_types", "scales"),
-    *("pitch", "pitch_diameter", "length", "stiffness", "damping", "preload", "action_only"),
+    *("pitch", "pitch_diameter", "length", "lower", "upper", "cnf_type", "stiffness", "damping"),
+    *("cff_type", "mu_static", "mu_dynamic", "pin_radius", "ball_radius", "preload"),
+    *("bending_reaction_arm", "action_only"),
 )
 
 

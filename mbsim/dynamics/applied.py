@@ -1,4 +1,4 @@
-"""Forces between two markers: springs with dampers, and scalar forces by expressions.
+"""Forces between two markers: springs with dampers, scalar forces by expressions, limits.
 
 With r = P_I - P_J, d = |r| and z the z-axis of J:
 
@@ -7,17 +7,22 @@ With r = P_I - P_J, d = |r| and z the z-axis of J:
 | LINE_FORCE  | F r/d at I's origin          | the opposite at J's     | d, d'                 |
 | AXIS_FORCE  | F z at I's origin            | nothing                 | -, v_I . z            |
 | AXIS_TORQUE | torque F z                   | the opposite            | angle, (w_I - w_J) . z|
+| SLIDE_LIMIT | F z at I's origin            | the opposite            | r . z, (v_I - v_J) . z|
+| TURN_LIMIT  | torque F z                   | the opposite            | as AXIS_TORQUE        |
 
 A spring has F = preload - k (x - length) - c x' and stores k (x - length)^2 / 2 - preload (x -
 length); its damper loses c x'^2. What an expression's force does, F x', counts as lost,
 with the sign turned, for nothing says what part of it could come back. Where the origins
-coincide a line has no direction and its force is 0.
+coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
+depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
+later (`dynamics.joint_friction`).
 """
 
 from __future__ import annotations
 
 import math
 
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
@@ -29,7 +34,10 @@ from mbsim.system.arrays import (
     AXIS_TORQUE,
     LINE_FORCE,
     LOST_POWER,
+    SLIDE_FRICTION,
+    SLIDE_LIMIT,
     STORED_ENERGY,
+    TURN_LIMIT,
 )
 
 
@@ -65,9 +73,36 @@ def along_axis(scene, f):
 
 
 @jitable
+def along_slide(scene, y, f):
+    """Return J's z-axis, how far I is along it, and its rate."""
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    z = marker_axis(scene, j, 2)
+    r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    return z, dot(z, r), dot(z, sub(marker_velocity(scene, i), marker_velocity(scene, j)))
+
+
+@jitable
+def at_limit(scene, f, x, rate):
+    """Return F, stored energy and lost power of limit f at displacement x."""
+    applied, out = scene.applied, scene.work.law_out
+    lower, upper = applied.bounds[f, 0], applied.bounds[f, 1]
+    side, depth, closing = 1.0, lower - x, -rate
+    if x - upper > depth:
+        side, depth, closing = -1.0, x - upper, rate
+    # a displacement that is no number is passed on
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    if call_int(applied.law[f], (depth, closing, applied.law_par[f], out)) != 0:
+        return math.nan, 0.0, 0.0
+    return side * out[0], out[2], (out[0] - out[1]) * closing
+
+
+@jitable
 def strength(scene, t, y, f, x, rate):
     """Return F, stored energy and lost power of applied force f at displacement x."""
     par, program = scene.applied.par[f], scene.applied.program[f]
+    if scene.applied.kind[f] >= SLIDE_LIMIT:
+        return at_limit(scene, f, x, rate)
     if program >= 0:
         size = value(scene, t, y, program)
         return size, 0.0, -size * rate
@@ -84,18 +119,25 @@ def add_applied(scene, t, y, dy):
     none = (0.0, 0.0, 0.0)
     for f in range(len(applied.kind)):
         i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
+        if kind >= SLIDE_FRICTION:
+            for k in range(len(work.applied[f])):
+                work.applied[f, k] = 0.0
+            continue
         if kind == LINE_FORCE:
             n, x, rate = along_line(scene, y, f)
         elif kind == AXIS_FORCE:
             n, x = marker_axis(scene, j, 2), 0.0
             rate = dot(n, marker_velocity(scene, i))
+        elif kind == SLIDE_LIMIT:
+            n, x, rate = along_slide(scene, y, f)
         else:
             n, x, rate = along_axis(scene, f)
         if kind == AXIS_TORQUE and applied.alone[f] == 1:
             rate = dot(n, vector(work.w[scene.markers.body[i]]))
         size, stored, power = strength(scene, t, y, f, x, rate)
         load = scale(size, n)
-        force, torque = (none, load) if kind == AXIS_TORQUE else (load, none)
+        turns = kind == AXIS_TORQUE or kind == TURN_LIMIT
+        force, torque = (none, load) if turns else (load, none)
         push(scene, i, force, torque)
         if applied.alone[f] == 0:
             push(scene, j, scale(-1.0, force), scale(-1.0, torque))

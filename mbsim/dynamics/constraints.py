@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.choice import choose, fill_size, keep_choice, use_all
@@ -27,6 +28,7 @@ from mbsim.system.arrays import (
     ACCELERATE,
     CHOOSE,
     DISPLACE,
+    FRICTION_DOOR,
     KEEP,
     MATRIX,
     PROJECT,
@@ -41,6 +43,11 @@ def constrain(scene, t, y, dy):
     """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
     prepare(scene, y)
     hold(scene, t, y)
+    if scene.world.doors[FRICTION_DOOR] != 0:
+        # friction follows from reactions, and these from friction
+        code = call_int(scene.world.doors[FRICTION_DOOR], (scene, t, y, dy))
+        if code != 0:
+            return code
     total = write_accelerations(scene, dy)
     ledger = scene.world.ledger[0]
     if ledger >= 0:

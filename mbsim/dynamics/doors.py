@@ -10,11 +10,13 @@ from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
 from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
+from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
     EXPRESSION_DOOR,
+    FRICTION_DOOR,
     VALUES_DOOR,
     Scene,
 )
@@ -31,6 +33,13 @@ def _apply(context, t, y, dy):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+
+
+def _rub(context, t, y, dy):
+    """Friction in joints, and the accelerations with it."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return add_friction(scene, t, carray(y, (n,)), carray(dy, (n,)))
 
 
 def _express(context, t, y, program, body, way):
@@ -64,6 +73,8 @@ def open_expressions(scene: Scene) -> None:
         doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
     if len(scene.applied.kind) > 0:
         doors[APPLIED_DOOR] = jit.address(_apply, _APPLY)
+    if (scene.applied.connection >= 0).any():
+        doors[FRICTION_DOOR] = jit.address(_rub, _APPLY)
     if scene.rows.value.shape[1] > 0:
         doors[VALUES_DOOR] = jit.address(_evaluate_requests, _VALUES)
     if len(scene.angles.i) > 0:

@@ -334,15 +334,30 @@ def solve_matrix(scene):
 @jitable
 def hold(scene, t, y):
     """Fill the accelerations of all places under joints and equations."""
-    sweep, active = scene.sweep, scene.equations.active
-    nt, n = len(scene.tree.body), active_count(scene)
     load(scene)
-    respond(scene, 0, nt, 1, sweep.a)
-    if n == 0:
+    respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
+    if active_count(scene) == 0:
         return
     fill_equations(scene, t, y)
     fill_matrix(scene)
     factor_matrix(scene)
+    impose(scene)
+
+
+@jitable
+def hold_again(scene):
+    """Fill the accelerations anew after forces changed; all else is as `hold` left it."""
+    load(scene)
+    respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
+    if active_count(scene) > 0:
+        impose(scene)
+
+
+@jitable
+def impose(scene):
+    """Bend accelerations of the tree alone to those that the equations allow."""
+    sweep, active = scene.sweep, scene.equations.active
+    nt, n = len(scene.tree.body), active_count(scene)
     for r in range(n):
         e = active[r]
         sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, e)

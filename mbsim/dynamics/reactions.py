@@ -90,13 +90,9 @@ def product(scene, a, b):
 
 
 @jitable
-def fill_reactions(scene, t, y):
-    """Fill the reactions of all connections; the state has just been evaluated."""
-    out, stress = scene.work.reaction, scene.sweep.stress
-    for i in range(len(out)):
-        out[i] = 0.0
-    add_reactions(scene, y, scene.sweep.a, out)
-    count = 0
+def fill_stresses(scene, t, y):
+    """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
+    stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
         if is_active(scene, e):
             continue
@@ -112,7 +108,32 @@ def fill_reactions(scene, t, y):
             continue
         for i in range(len(new)):
             new[i] /= size
-        part = product(scene, out, new)
-        for i in range(len(new)):
-            out[i] -= part * new[i]
         count += 1
+    return count
+
+
+@jitable
+def sum_reactions(scene, y):
+    """Fill reactions that hold, not yet the least of all; the state has just been evaluated."""
+    out = scene.work.reaction
+    for i in range(len(out)):
+        out[i] = 0.0
+    add_reactions(scene, y, scene.sweep.a, out)
+
+
+@jitable
+def take_stresses(scene, count):
+    """Take the self-stresses out of the reactions, so that these are the least."""
+    out = scene.work.reaction
+    for k in range(count):
+        stress = scene.sweep.stress[k]
+        part = product(scene, out, stress)
+        for i in range(len(out)):
+            out[i] -= part * stress[i]
+
+
+@jitable
+def fill_reactions(scene, t, y):
+    """Fill the reactions of all connections; the state has just been evaluated."""
+    sum_reactions(scene, y)
+    take_stresses(scene, fill_stresses(scene, t, y))

@@ -286,6 +286,55 @@ class ScalarForce:
 
 
 @dataclass(frozen=True)
+class JointFriction:
+    """Force_JointFriction: a friction law in a joint, pressed by the joint's own reaction.
+
+    Normal force: the reaction across the free axis (of SPHERICAL all of it) + `preload` + the
+    reaction torque across that axis over `bending_reaction_arm`, where that is > 0.
+    """
+
+    id: int
+    joint_id: int
+    label: str = ""
+    cff_type: str = "COULOMB_ON"
+    mu_static: float = 0.0
+    mu_dynamic: float = 0.0
+    stiction_trans_vel: float = 1e-3  # [L/T]
+    friction_trans_vel: float = 1e-3  # [L/T]
+    pin_radius: float | None = None  # REVOLUTE, CYLINDRICAL [L]
+    ball_radius: float | None = None  # SPHERICAL [L]
+    preload: float = 0.0  # [F]
+    bending_reaction_arm: float = 0.0  # [L]
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """Force_JointLimit (ours): a normal law pushes a joint's displacement back between bounds.
+
+    `direction` T: of I along J's z [L]; R: the angle about it [rad], whole turns counted. The
+    law's force is then a torque, and its depth an angle.
+    """
+
+    id: int
+    joint_id: int
+    direction: str
+    label: str = ""
+    lower: float | None = None
+    upper: float | None = None
+    cnf_type: str = "IMPACT"
+    stiffness: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    dmax: float | None = None
+    penalty: float = 0.1
+    restitution_coef: float | None = None
+    ref_velocity: float | None = None
+    normal_trans_vel: float = 1e-3
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Variable:
     """Reference_Variable, Adams' VARIABLE: an expression that others use by VARVAL(id)."""
 
@@ -311,7 +360,7 @@ class Request:
     i_marker_id: int = 0
     j_marker_id: int | None = None
     ref_marker_id: int | None = None
-    elem_type: str = ""  # JOINT, JPRIM, MOTION, SPRINGDAMPER, SFORCE, CONTACT
+    elem_type: str = ""  # JOINT JPRIM MOTION SPRINGDAMPER SFORCE JOINTFRICTION JOINTLIMIT CONTACT
     elem_id: int = 0
     jflag: bool = False  # the force on J's side instead of I's
     exprs: tuple[Expression | None, ...] = ()
@@ -337,6 +386,8 @@ class Model:
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
     spring_dampers: dict[int, SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
+    joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
+    joint_limits: dict[int, JointLimit] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
     gravity: Gravity = Gravity()
     transient: Transient = Transient()

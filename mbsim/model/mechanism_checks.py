@@ -20,10 +20,19 @@ STATEMENTS = {
     "MOTION": "Motion_Joint",
     "SFORCE": "Force_Scalar_TwoBody",
     "SPRINGDAMPER": "Force_SpringDamper",
+    "JOINTFRICTION": "Force_JointFriction",
+    "JOINTLIMIT": "Force_JointLimit",
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
 }
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
+#: Joints that may have friction, with the attribute that is the lever of what turns.
+_LEVERS = {
+    "REVOLUTE": "pin_radius",
+    "TRANSLATIONAL": "",
+    "CYLINDRICAL": "pin_radius",
+    "SPHERICAL": "ball_radius",
+}
 
 Wanted = tuple[Source, str, str, int | None, str]
 Exists = Callable[[str, int], bool]
@@ -39,6 +48,8 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Motion_Joint": model.motions,
         "Force_SpringDamper": model.spring_dampers,
         "Force_Scalar_TwoBody": model.scalar_forces,
+        "Force_JointFriction": model.joint_frictions,
+        "Force_JointLimit": model.joint_limits,
         "Reference_Variable": model.variables,
     }
 
@@ -113,6 +124,8 @@ def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
     yield from _two_bodies(model)
     yield from _motions(model, exists)
     yield from _couplers(model)
+    yield from _frictions(model)
+    yield from _limits(model)
     yield from _circles(model)
 
 
@@ -193,6 +206,49 @@ def _couplers(model: Model) -> Iterator[Fault]:
                 message += f"{joint.type} and does not {_DIRECTIONS[direction]} its z-axis; it has "
                 name = f"Constraint_Coupler[{coupler.id}]"
                 yield _fault(coupler.source, name, message + _allowed(joint.type))
+
+
+def _frictions(model: Model) -> Iterator[Fault]:
+    """Yield frictions of joints that have none, or twice, and levers that lack or do not belong."""
+    first: dict[int, int] = {}
+    for friction in model.joint_frictions.values():
+        joint, source = model.joints.get(friction.joint_id), friction.source
+        name = f"Force_JointFriction[{friction.id}]"
+        if joint is None:
+            continue
+        of = f"joint {joint.id} is {joint.type}"
+        if joint.type not in _LEVERS:
+            message = f'joint_id="{joint.id}": {of}; must be one of {", ".join(_LEVERS)}'
+            yield _fault(source, name, message)
+            continue
+        if joint.id in first:
+            message = f"friction {first[joint.id]} is in joint {joint.id} already; must be one"
+            yield _fault(source, name, message)
+        first.setdefault(joint.id, friction.id)
+        lever = _LEVERS[joint.type]
+        for attribute in ("pin_radius", "ball_radius"):
+            value = getattr(friction, attribute)
+            if attribute == lever and value is None:
+                message = f"{attribute}: missing; {of}, which needs it, a number > 0"
+                yield _fault(source, name, message)
+            elif attribute != lever and value is not None:
+                belongs = " or ".join(type for type, has in _LEVERS.items() if has == attribute)
+                message = f'{attribute}="{value:g}": {of}; belongs to {belongs}'
+                yield _fault(source, name, message)
+        if joint.type == "SPHERICAL" and friction.bending_reaction_arm > 0.0:
+            given = f'bending_reaction_arm="{friction.bending_reaction_arm:g}"'
+            message = f"{given}: {of}, which bears no torque"
+            yield _fault(source, name, message)
+
+
+def _limits(model: Model) -> Iterator[Fault]:
+    """Yield limits of joints that do not move in the way that is limited."""
+    for limit in model.joint_limits.values():
+        joint = model.joints.get(limit.joint_id)
+        if joint is not None and limit.direction not in JOINTS[joint.type].moves:
+            message = f'motion_type="{limit.direction}": joint {joint.id} is {joint.type}; '
+            message += f"a limit of it may be {_allowed(joint.type)}"
+            yield _fault(limit.source, f"Force_JointLimit[{limit.id}]", message)
 
 
 def _circles(model: Model) -> Iterator[Fault]:

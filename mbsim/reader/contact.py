@@ -30,7 +30,7 @@ from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, 
 from mbsim.reader.statement import Entry, Spec, Statement
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
-_CFF_USES: dict[str, set[str]] = {
+CFF_USES: dict[str, set[str]] = {
     "COULOMB_ON": {"mu_static", "mu_dynamic", *_SPEEDS},
     "COULOMB_DYNAMICONLY": {"mu_dynamic", "friction_trans_vel"},
     "COULOMB_OFF": set(),
@@ -39,7 +39,7 @@ _CFF_USES: dict[str, set[str]] = {
         *("script_name", "interpreter"),
     },
 }
-_CFF_ALL = set().union(*_CFF_USES.values())
+CFF_ALL = set().union(*CFF_USES.values())
 
 
 def _build_contact(entry: Entry) -> None:
@@ -51,9 +51,9 @@ def _build_contact(entry: Entry) -> None:
     if entry.get("cnf_type") is not None:
         check_normal(entry, cnf_type)
     if entry.get("cff_type") is not None or not entry.given("cff_type"):
-        note_unused(entry, f"cff_type {cff_type}", _CFF_ALL - _CFF_USES[cff_type])
+        note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
-        _check_coulomb(entry, cff_type)
+        check_coulomb(entry, cff_type)
 
     contact = el.Contact(
         id=entry.get("id", 0),
@@ -96,10 +96,10 @@ def _check_count(entry: Entry, side: str) -> None:
         entry.fault(message, f"num_{side}_graphics")
 
 
-def _check_coulomb(entry: Entry, cff_type: str) -> None:
+def check_coulomb(entry: Entry, cff_type: str) -> None:
     """Check friction coefficients and transition velocities against each other."""
     for name in _SPEEDS:
-        if name in _CFF_USES[cff_type]:
+        if name in CFF_USES[cff_type]:
             warn_default_speed(entry, name)
     if cff_type != "COULOMB_ON":
         return

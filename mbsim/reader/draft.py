@@ -31,6 +31,8 @@ class Draft:
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
     spring_dampers: dict[int, el.SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
+    joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)
+    joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
     requests: dict[int, el.Request] = field(default_factory=dict)
     display_graphics: dict[int, str] = field(default_factory=dict)

@@ -32,6 +32,8 @@ def spellings(**canonical: str) -> dict[str, str]:
 
 # one keyword, many documented forms; the canonical one is the key
 CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="")
+#: Laws that need no shapes: those of limits.
+CNF_OF_LIMITS = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="")
 CNF_NOT_BUILT = spellings(VOLUME="", USERCNF="USER")
 CFF_TYPES = spellings(
     COULOMB_ON="ON",
@@ -39,6 +41,7 @@ CFF_TYPES = spellings(
     COULOMB_DYNAMICONLY="DYNAMICONLY DYNAMICSONLY COULOMB_DYNAMICSONLY",
     USERCFF="",
 )
+CFF_OF_JOINTS = {word: name for word, name in CFF_TYPES.items() if name.startswith("COULOMB")}
 MASTER_SURFACES = spellings(I="", J="", I_AND_J="", AUTO="")
 ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")
 
@@ -58,6 +61,8 @@ FORCE_ELEMENTS = spellings(
     MOTION="MOTION_JOINT",
     SPRINGDAMPER="FORCE_SPRINGDAMPER",
     SFORCE="FORCE_SCALAR_TWOBODY",
+    JOINTFRICTION="FORCE_JOINTFRICTION",
+    JOINTLIMIT="FORCE_JOINTLIMIT",
     CONTACT="FORCE_CONTACT",
 )
 

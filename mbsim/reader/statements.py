@@ -15,6 +15,7 @@ from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import FORCE_SCALAR_TWOBODY, FORCE_SPRINGDAMPER, REFERENCE_VARIABLE
 from mbsim.reader.graphics import POST_GRAPHIC
+from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
@@ -45,6 +46,8 @@ STATEMENTS = (
     MOTION_JOINT,
     FORCE_SPRINGDAMPER,
     FORCE_SCALAR_TWOBODY,
+    FORCE_JOINTFRICTION,
+    FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
     POST_REQUEST,
     SIMULATE,
@@ -61,7 +64,7 @@ NOT_BUILT = (
     "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_Diff Control_FMU Control_PlantInput "
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
-    "Force_Beam Force_Bushing Force_Field Force_JointFriction Force_MultiPoint Force_Penalty "
+    "Force_Beam Force_Bushing Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody Force_Vector_OneBody "
     "Force_Vector_TwoBody Load_Command Load_Model Motion_Marker Param_Linear "
     "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "

@@ -157,6 +157,8 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         general_constraints=draft.general_constraints,
         spring_dampers=draft.spring_dampers,
         scalar_forces=draft.scalar_forces,
+        joint_frictions=draft.joint_frictions,
+        joint_limits=draft.joint_limits,
         variables=draft.variables,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),

@@ -33,11 +33,15 @@ GROUPS = {
     ),
     "SPRINGDAMPER": Group("spring_dampers", "springs", "spring", "Force_SpringDamper"),
     "SFORCE": Group("scalar_forces", "scalar_forces", "scalar force", "Force_Scalar_TwoBody"),
+    "JOINTFRICTION": Group(
+        "joint_frictions", "joint_frictions", "joint friction", "Force_JointFriction"
+    ),
+    "JOINTLIMIT": Group("joint_limits", "joint_limits", "joint limit", "Force_JointLimit"),
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
-APPLIED = ("SPRINGDAMPER", "SFORCE")
+APPLIED = ("SPRINGDAMPER", "SFORCE", "JOINTFRICTION", "JOINTLIMIT")
 
 
 def elements_of(model: Model, statement: str) -> dict[int, Any]:

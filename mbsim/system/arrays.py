@@ -53,11 +53,22 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     EXPRESSION_DOOR,
     VALUES_DOOR,
     ANGLES_DOOR,
-) = range(7)
-DOORS = 7
+    FRICTION_DOOR,
+) = range(8)
+DOORS = 8
 
 # entries of `Applied.kind`
-LINE_FORCE, AXIS_FORCE, AXIS_TORQUE = range(3)
+(
+    LINE_FORCE,
+    AXIS_FORCE,
+    AXIS_TORQUE,
+    SLIDE_LIMIT,
+    TURN_LIMIT,
+    SLIDE_FRICTION,  # the kinds from here on are frictions in joints
+    TURN_FRICTION,
+    SCREW_FRICTION,  # slides and turns at once
+    BALL_FRICTION,
+) = range(9)
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
@@ -198,15 +209,20 @@ class Programs(NamedTuple):
 
 
 class Applied(NamedTuple):
-    """Forces between two markers: springs, dampers, expressions."""
+    """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
 
     kind: I1  # (nf,) see dynamics.applied
     i: I1  # (nf,) markers
     j: I1  # (nf,)
-    par: F2  # (nf, 4) stiffness, damping, length, preload
+    par: F2  # (nf, 4) stiffness, damping, length, preload; of friction radius, preload, arm
     program: I1  # (nf,) -1 for none
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
+    bounds: F2  # (nf, 2) of limits
+    law: I1  # (nf,) address of a normal or friction law, 0 for none
+    law_par: F2  # (nf, widest)
+    id: I1  # (nf,) of the element
+    connection: I1  # (nf,) whose reaction presses, -1 for none
 
 
 class Tree(NamedTuple):
@@ -322,6 +338,7 @@ class Work(NamedTuple):
     law_in: F1  # (FRICTION_INPUTS,)
     law_out: F1  # (5,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
+    rub: F2  # (nf, 9) of friction: see dynamics.joint_friction
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
 

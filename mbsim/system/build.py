@@ -437,6 +437,7 @@ def _work(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj
         law_in=np.zeros(abi.FRICTION_INPUTS),
         law_out=np.zeros(5),
         applied=np.zeros((nf, 8)),
+        rub=np.zeros((nf, 9)),
         reaction=np.zeros(6 * nj),
         trouble=np.full(2, -1, dtype=np.int64),
     )

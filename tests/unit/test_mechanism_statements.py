@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -147,6 +148,8 @@ JOINT = 'Constraint_Joint id="1" type='
 MOTION = f'{REVOLUTE}<Motion_Joint id="1" joint_id="1"'
 SLIDER = f'<Constraint_Joint id="2" type="TRANSLATIONAL" {ON}/>'
 COUPLED = REVOLUTE + SLIDER + '<Constraint_Coupler id="1" joint_ids='
+RUBS = '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY"'
+STOPS = '<Force_JointLimit id="1" joint_id="1" cnf_type="IMPACT" stiffness="100"'
 BAD = {
     "no such joint": (f'<{JOINT}"HINGE" {ON}/>', ("Constraint_Joint[1]", '"HINGE"', "REVOLUTE")),
     "no pitch": (f'<{JOINT}"SCREW" {ON}/>', ("pitch: missing", "a number")),
@@ -254,6 +257,64 @@ BAD = {
         'expr="1+VARVAL(3)"/><Reference_Variable id="3" expr="VARVAL(2)"/>',
         ("Reference_Variable[2]", "2 -> 3 -> 2"),
     ),
+    "friction of a plane": (
+        f'<{JOINT}"PLANAR" {ON}/>{RUBS} mu_dynamic="0.1"/>',
+        ("Force_JointFriction[1]", 'joint_id="1"', "PLANAR", "REVOLUTE, TRANSLATIONAL"),
+    ),
+    "friction of no joint": (
+        f'{RUBS} mu_dynamic="0.1"/>',
+        ("Force_JointFriction[1]", 'joint_id="1"', "no Constraint_Joint has this id"),
+    ),
+    "friction without a pin": (
+        f'{REVOLUTE}{RUBS} mu_dynamic="0.1"/>',
+        ("Force_JointFriction[1]", "pin_radius: missing", "number > 0"),
+    ),
+    "pin of a ball": (
+        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" pin_radius="2"/>',
+        ('pin_radius="2"', "belongs to REVOLUTE or CYLINDRICAL"),
+    ),
+    "arm of a ball": (
+        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" bending_reaction_arm="2"/>',
+        ('bending_reaction_arm="2"', "bears no torque"),
+    ),
+    "pulling preload": (
+        f'{REVOLUTE}{RUBS} pin_radius="1" preload="-2"/>',
+        ('preload="-2"', "number >= 0"),
+    ),
+    "collar": (
+        f'{REVOLUTE}{RUBS} pin_radius="1" friction_arm="2"/>',
+        ('friction_arm="2"', "documented but not built yet"),
+    ),
+    "friction twice": (
+        f'{REVOLUTE}{RUBS} pin_radius="1"/>{RUBS} pin_radius="1"/>'.replace(
+            'Friction id="1" j', 'Friction id="2" j', 1
+        ),
+        ("friction 2 is in joint 1 already",),
+    ),
+    "user friction": (
+        f'{REVOLUTE}{RUBS} pin_radius="1"/>'.replace("COULOMB_DYNAMICONLY", "USERCFF"),
+        ('cff_type="USERCFF"', "COULOMB_ON"),
+    ),
+    "limit of what does not slide": (
+        f'{REVOLUTE}{STOPS} motion_type="T" upper="1"/>',
+        ('motion_type="T"', "joint 1 is REVOLUTE", "may be R"),
+    ),
+    "limit without bounds": (
+        f'{REVOLUTE}{STOPS} motion_type="R"/>',
+        ("Force_JointLimit[1]", "lower, upper: missing"),
+    ),
+    "empty range": (
+        f'{REVOLUTE}{STOPS} motion_type="R" lower="2" upper="1"/>',
+        ('upper="1"', "greater than lower (2)"),
+    ),
+    "limit by Hertz": (
+        f'{REVOLUTE}{STOPS} motion_type="R" upper="1"/>'.replace("IMPACT", "HERTZ"),
+        ('cnf_type="HERTZ"', "IMPACT, POISSON, HUNT_CROSSLEY"),
+    ),
+    "limit without speed": (
+        f'{REVOLUTE}{STOPS} motion_type="R" upper="1" penalty="9"/>'.replace("IMPACT", "POISSON"),
+        ("normal_trans_vel: missing", "rad/T"),
+    ),
     "what force": (
         '<Post_Request id="1" type="ELEMENTAL_FORCE" elem_id="1"/>',
         ("Post_Request[1]", "elem_type: missing", "JOINT"),
@@ -282,6 +343,45 @@ def test_names_the_fault(tmp_path: Path, name: str) -> None:
     (line,) = [str(fault) for fault in caught.value.faults]
     assert line.startswith(f"{tmp_path / 'deck.xml'}:{ADDED_LINE}: ")
     assert all(part in line for part in parts), line
+
+
+def test_friction_and_limits_of_joints(tmp_path: Path) -> None:
+    text = (
+        f'{REVOLUTE}<Force_JointFriction id="4" label="f" joint_id="1" cff_type="ON" '
+        'mu_static="0.3" mu_dynamic="0.2" stiction_trans_vel="0.01" friction_trans_vel="0.02" '
+        'pin_radius="0.05" preload="3" bending_reaction_arm="0.2"/>'
+        '<Force_JointLimit id="5" label="l" joint_id="1" motion_type="Rotation" lower="-1.5" '
+        'cnf_type="HUNT_CROSSLEY" stiffness="100" exponent="1" damping="0.5"/>'
+    )
+    model = read(tmp_path, added(text))
+    friction, limit = model.joint_frictions[4], model.joint_limits[5]
+    assert (friction.joint_id, friction.label, friction.cff_type) == (1, "f", "COULOMB_ON")
+    assert (friction.mu_static, friction.mu_dynamic) == (0.3, 0.2)
+    assert (friction.stiction_trans_vel, friction.friction_trans_vel) == (0.01, 0.02)
+    assert (friction.pin_radius, friction.ball_radius) == (0.05, None)
+    assert (friction.preload, friction.bending_reaction_arm) == (3.0, 0.2)
+    assert (limit.joint_id, limit.label, limit.direction) == (1, "l", "R")
+    assert (limit.lower, limit.upper) == (-1.5, None)
+    assert (limit.cnf_type, limit.stiffness) == ("HUNT_CROSSLEY", 100.0)
+    assert (limit.exponent, limit.damping) == (1.0, 0.5)
+    for left in (0, 1):
+        one = replace(model, **{("joint_frictions", "joint_limits")[left]: {}})
+        name = ("Force_JointLimit", "Force_JointFriction")[left]
+        with pytest.raises(ModelError, match=rf"{name}\[.\]: integrator VERLET"):
+            settle(one, None, None, "VERLET", None)
+
+
+def test_attributes_of_another_law_are_noted(tmp_path: Path) -> None:
+    model = read(
+        tmp_path,
+        added(
+            f'{REVOLUTE}{RUBS} pin_radius="1" mu_dynamic="0.1" mu_static="0.2" '
+            f'friction_trans_vel="1"/>{STOPS} motion_type="R" upper="1" penalty="3"/>'
+        ),
+    )
+    notes = "\n".join(model.notes)
+    assert "Force_JointFriction mu_static: has no effect with cff_type" in notes
+    assert "Force_JointLimit penalty: has no effect with cnf_type IMPACT" in notes
 
 
 def test_spring_that_does_nothing(tmp_path: Path) -> None:
