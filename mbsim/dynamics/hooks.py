@@ -25,6 +25,7 @@ from mbsim.system.arrays import (
     LISTINGS,
     NEAR_DOOR,
     PROJECT,
+    SLIDE_FRICTION,
     Scene,
 )
 
@@ -187,6 +188,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     if len(scene.tree.body) > 0:
-        served = _joints if len(scene.equations.program) > 0 else _limbs
+        rubs = bool((scene.applied.kind >= SLIDE_FRICTION).any())
+        served = _joints if len(scene.equations.program) > 0 or rubs else _limbs
         scene.world.doors[JOINTS_DOOR] = jit.address(served, _JOINTS)
     return Problem(int(table.ctypes.data), *addresses), table
