@@ -146,7 +146,8 @@ def settle(
     stages = []
     asked: dict[str, str] = {}
     from_deck = set()
-    usual = DEFAULT_TOL_ADAMS if model.file.lower().endswith(".adm") else DEFAULT_TOL
+    adams = model.file.lower().endswith(".adm")
+    usual = DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -159,7 +160,8 @@ def settle(
         asked.setdefault(method, where)
         chosen = tol if tol is not None else said("integr_tol")
         if tol is None and chosen is not None:
-            from_deck.add(f"integr_tol {chosen:g} of the deck is used as the dimensionless tol")
+            name = "INTEGRATOR/ERROR times 1e-5" if adams else "integr_tol"
+            from_deck.add(f"{name}, {chosen:g}, is used as the dimensionless tol")
         chosen = usual if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
         h_max = said("h_max") or math.inf
         if motionsolve:

@@ -117,7 +117,7 @@ class Runner:
             door(self.problem.context, what, t, y.ctypes.data, y.ctypes.data)
 
         try:
-            self.assembly = assemble(scene, self.method.y, serve)
+            self.assembly = assemble(scene, self.method.y, serve, self.system.given_velocities())
         except ContradictionError as error:
             raise ModelError(contradiction(self.system, error)) from None
         lines, warnings = describe(self.system, self.assembly)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
+from mbsim.dynamics.start import MOST_DIRECTIONS, start_velocities
 from mbsim.system.arrays import CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
 from mbsim.system.build import System
 
@@ -39,16 +40,24 @@ class ContradictionError(ValueError):
 
 @dataclass
 class Assembly:
-    """What assembly did. `moved` and `sped` have (body row, translation, rotation)."""
+    """What assembly did.
+
+    `moved` has (body row, translation, rotation), `sped` (body row, velocity, angular velocity,
+    global) of bodies whose velocity is another than the deck's, `lost` (body row, component, what
+    the deck gives, what it is) of velocities that the joints do not allow.
+    """
 
     moved: list[tuple[int, float, float]] = field(default_factory=list)
-    sped: list[tuple[int, float, float]] = field(default_factory=list)
+    sped: list[tuple[int, Array, Array]] = field(default_factory=list)
+    lost: list[tuple[int, str, float, float]] = field(default_factory=list)
     implied: list[int] = field(default_factory=list)
     freedom: int = 0
 
 
-def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
+def assemble(scene: Scene, y: Array, serve: Serve, given: dict[int, Array]) -> Assembly:
     """Bring y onto all constraints and choose the equations to be used.
+
+    `given` are the velocities that the deck gives, see `start.start_velocities`.
 
     Raises
     ------
@@ -63,6 +72,15 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
         serve(MATRIX, y)
         serve(DISPLACE, y)
         _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
+    else:
+        serve(PROJECT, positions := y.copy())
+        for b in scene.tree.body:
+            at = BODY_SIZE * b
+            y[at : at + 7] = positions[at : at + 7]
+    if given and int(scene.tree.free.sum()) <= MOST_DIRECTIONS:
+        serve(MATRIX, y)
+        start_velocities(scene, y, given)
+    if n > 0:
         _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
         serve(MATRIX, y)
         serve(CHOOSE, y)
@@ -72,6 +90,7 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
     return Assembly(
         moved,
         sped,
+        _lost(scene, y, given),
         [e for e in range(n) if e not in set(chosen)],
         int(scene.tree.free.sum()) - len(chosen),
     )
@@ -118,9 +137,29 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
         raise ContradictionError(order, [float(parts[e]) for e in order], column == _MISMATCH)
 
 
+def _lost(scene: Scene, y: Array, given: dict[int, Array]) -> list[tuple[int, str, float, float]]:
+    """Return the given velocities that do not hold."""
+    found = []
+    speed, length = float(scene.world.scale[1]), float(scene.world.scale[0])
+    for b, rows in given.items():
+        if scene.tree.of_body[b] < 0:
+            continue
+        v = y[BODY_SIZE * b + 7 : BODY_SIZE * b + 10]
+        w = scene.work.R[b] @ y[BODY_SIZE * b + 10 : BODY_SIZE * b + 13]
+        for row in rows:
+            turning = bool(row[3:6].any())
+            axis = row[3:6] if turning else row[:3]
+            is_ = float(axis @ (w if turning else v))
+            if abs(is_ - row[6]) > 1e-6 * (speed / length if turning else speed):
+                along = np.flatnonzero(np.abs(np.abs(axis) - 1.0) < 1e-9)
+                name = "xyz"[along[0]] if len(along) else f"along {np.round(axis, 4).tolist()}"
+                found.append((b, f"{'w' if turning else 'v'} {name}", float(row[6]), is_))
+    return found
+
+
 def _changes(
     scene: Scene, before: Array, after: Array
-) -> tuple[list[tuple[int, float, float]], list[tuple[int, float, float]]]:
+) -> tuple[list[tuple[int, float, float]], list[tuple[int, Array, Array]]]:
     """Return which bodies moved and which changed velocity, beyond rounding."""
     moved, sped = [], []
     length, speed = scene.world.scale[0], scene.world.scale[1]
@@ -134,7 +173,7 @@ def _changes(
         dv = float(np.linalg.norm(new[7:10] - old[7:10]))
         dw = float(np.linalg.norm(new[10:13] - old[10:13]))
         if dv > 1e-7 * speed or dw > 1e-7 * speed / length:
-            sped.append((int(b), dv, dw))
+            sped.append((int(b), new[7:10].copy(), scene.work.R[b] @ new[10:13]))
     return moved, sped
 
 
@@ -142,6 +181,12 @@ def equation_name(system: System, e: int) -> str:
     """Return the element and which of its equations row e is."""
     connection = int(system.scene.equations.connection[e])
     return f"{system.connection_name(connection)} ({system.equation_names[e]})"
+
+
+def _vector(values: Array, scale: float) -> str:
+    """Return three numbers, those that are rounding as 0."""
+    kept = np.where(np.abs(values) > 1e-9 * scale, values, 0.0)
+    return "(" + ", ".join(f"{value:.6g}" for value in kept) + ")"
 
 
 def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
@@ -161,10 +206,16 @@ def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
         warnings.append(
             f"assembly: Body_Rigid[{system.body_ids[b]}] moved by {way:.6g} and {turn:.6g} rad"
         )
-    for b, dv, dw in assembly.sped:
+    length, speed = system.scene.world.scale[:2]
+    for b, v, w in assembly.sped:
+        lines.append(
+            f"assembly: Body_Rigid[{system.body_ids[b]}] starts with velocity {_vector(v, speed)} "
+            f"and angular velocity {_vector(w, speed / length)}"
+        )
+    for b, name, given, is_ in assembly.lost:
         warnings.append(
-            f"assembly: Body_Rigid[{system.body_ids[b]}] changed its velocity by {dv:.6g} "
-            f"and its angular velocity by {dw:.6g}"
+            f"assembly: Body_Rigid[{system.body_ids[b]}]: velocity {name} = {given:.6g} of the "
+            f"deck cannot hold with the joints and the other velocities: it is {is_:.6g}"
         )
     return lines, warnings
 

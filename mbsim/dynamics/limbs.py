@@ -10,7 +10,7 @@ from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.seating import carry_all, seat_all
 from mbsim.dynamics.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.tree_reactions import add_tree_reactions
-from mbsim.system.arrays import ACCELERATE, PROJECT, REACT
+from mbsim.system.arrays import ACCELERATE, MATRIX, PROJECT, REACT
 
 
 @jitable
@@ -26,6 +26,9 @@ def serve_limbs(scene, what, t, y, dy):
         for i in range(len(reaction)):
             reaction[i] = 0.0
         add_tree_reactions(scene, y, scene.sweep.a, reaction)
+    elif what == MATRIX:
+        place_bodies(scene, y)
+        prepare(scene, y)
     elif what == PROJECT:
         place_bodies(scene, y)
         seat_all(scene, y)

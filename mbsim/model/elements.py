@@ -56,6 +56,8 @@ class Body:
     lprf_id: int | None = None
     v_ic: tuple[float, float, float] = (0.0, 0.0, 0.0)
     w_ic: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    v_given: tuple[bool, bool, bool] = (False, False, False)  # flagged in the deck
+    w_given: tuple[bool, bool, bool] = (False, False, False)
     vm_id: int | None = None
     wm_id: int | None = None
     density: float | None = None  # ours, [mass/L^3]; used only where mass is absent

@@ -37,6 +37,8 @@ class BodyPlace:
     `p` (3,) [L], `R` (3, 3) and unit quaternion `q` (w, x, y, z) of its cg marker, global;
     `mass` and `inertia` (3, 3) about the cg origin in cg axes, both times `mass_scale`,
     so that F = m a in the model's units; `v` [L/T] of the cg origin and `w` [1/T], global.
+    `given` (n, 7): for each component of them that the deck gives its axis, three numbers for v
+    and three for w, and its value.
     """
 
     id: int
@@ -47,6 +49,7 @@ class BodyPlace:
     inertia: Array
     v: Array
     w: Array
+    given: Array
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,13 @@ def _place_body(model: Model, frames: Mapping[int, Frame], body: Body) -> BodyPl
         inertia=(inertia + inertia.T) * (0.5 * scale),
         v=axes_v @ np.array(body.v_ic),
         w=axes_w @ np.array(body.w_ic),
+        given=np.array(
+            [
+                *((*axes_v[:, k], 0, 0, 0, body.v_ic[k]) for k in range(3) if body.v_given[k]),
+                *((0, 0, 0, *axes_w[:, k], body.w_ic[k]) for k in range(3) if body.w_given[k]),
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 7),
     )
 
 

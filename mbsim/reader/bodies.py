@@ -51,6 +51,15 @@ def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
     return (parts[0], parts[1], parts[2])
 
 
+def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
+    """Return which components of the initial velocity the deck gives."""
+    x, y, z = (
+        entry.given(f"{kind}_ic_{axis}") and entry.get(f"{kind}_ic_{axis}_flag", False)
+        for axis in "xyz"
+    )
+    return bool(x), bool(y), bool(z)
+
+
 def _inertia(entry: Entry) -> tuple[float, float, float, float, float, float] | None:
     """Return the six inertias, or None where the deck gives none; products default to 0."""
     if not any(entry.given(name) for name in _INERTIAS):
@@ -75,6 +84,8 @@ def _build_body(entry: Entry) -> None:
         lprf_id=entry.get("lprf_id"),
         v_ic=_velocity(entry, "v"),
         w_ic=_velocity(entry, "w"),
+        v_given=_given(entry, "v"),
+        w_given=_given(entry, "w"),
         vm_id=entry.get("vm_id"),
         wm_id=entry.get("wm_id"),
         density=entry.get("density"),

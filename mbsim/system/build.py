@@ -83,6 +83,12 @@ class System:
     values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
     equation_names: list[str]  # of each row of `Equations`, for messages
 
+    def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
+        """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
+        places = self.placement.bodies
+        rows = {k: places[id].given for k, id in enumerate(self.body_ids)}
+        return {k: given for k, given in rows.items() if len(given)}
+
     def connection_name(self, row: int) -> str:
         """Return the element of a row of `Connections` as its deck has it."""
         statement, id = self.connections[row]

@@ -180,7 +180,7 @@ def test_constraints_forces_and_variables(tmp_path: Path) -> None:
     assert (force.type, force.action_only) == ("ROTATIONAL", True)
     assert force.expr.text == "- 2.0*(az(102,202) -1.0) + VARVAL(1)"
     assert model.variables[1].expr.text == "WZ(102,202,202)"
-    assert (model.transient.integr_tol, model.transient.h_max) == (1e-6, 0.01)
+    assert (model.transient.integr_tol, model.transient.h_max) == (pytest.approx(1e-11), 0.01)
     request = model.requests[2]
     assert (request.type, request.comment) == ("EXPRESSION", "EULER PARAMETERS, and more")
     given = [k for k, expr in enumerate(request.exprs, start=1) if expr is not None]

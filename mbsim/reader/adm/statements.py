@@ -124,12 +124,20 @@ def _build_part(entry: Entry) -> None:
         im_id=entry.get("IM"),
         v_ic=(entry.get("VX", 0.0), entry.get("VY", 0.0), entry.get("VZ", 0.0)),
         w_ic=w,
+        v_given=_given(entry, "V"),
+        w_given=_given(entry, "W"),
         vm_id=entry.get("VM"),
-        wm_id=entry.get("WM", entry.get("CM") if any(w) else None),
+        wm_id=entry.get("WM", entry.get("CM") if any(_given(entry, "W")) else None),
         source=entry.source,
     )
     _draft(entry).parts[id] = frame
     entry.register(entry.draft.bodies, body)
+
+
+def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
+    """Return which components of a velocity the deck gives."""
+    x, y, z = (entry.given(f"{kind}{axis}") for axis in "XYZ")
+    return x, y, z
 
 
 def _build_marker(entry: Entry) -> None:
@@ -369,7 +377,8 @@ def _build_integrator(entry: Entry) -> None:
     if h_min is not None and h_max is not None and h_min > h_max:
         entry.fault(f"must not be larger than HMAX ({h_max:g})", "HMIN")
     draft.transient = el.Transient(
-        integr_tol=entry.get("ERROR"),
+        # Adams' own default, 1e-3, stands for the default of Adams decks
+        integr_tol=None if entry.get("ERROR") is None else 1e-5 * entry.get("ERROR"),
         h_max=h_max,
         h_min=h_min,
         h0_max=entry.get("HINIT"),
