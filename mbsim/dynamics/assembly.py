@@ -47,8 +47,10 @@ class Assembly:
     freedom: int = 0
 
 
-def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
+def assemble(scene: Scene, y: Array, serve: Serve, starts: Array) -> Assembly:
     """Bring y onto all constraints and choose the equations to be used.
+
+    `starts` has the displacement and the rate at which equations begin, see `motion_starts`.
 
     Raises
     ------
@@ -61,8 +63,8 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
     scene.sweep.multiplier[:] = 0.0
     serve(MATRIX, y)
     serve(DISPLACE, y)
-    _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
-    _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
+    _close(scene, y, serve, DISPLACE, 2, _RESIDUAL, starts[:, 0])
+    _close(scene, y, serve, SPEED_UP, 1, _MISMATCH, starts[:, 1])
     serve(MATRIX, y)
     serve(CHOOSE, y)
     chosen = [int(e) for e in equations.active[: equations.active[-1]]]
@@ -74,6 +76,22 @@ def assemble(scene: Scene, y: Array, serve: Serve) -> Assembly:
         [e for e in range(n) if e not in set(chosen)],
         int(scene.tree.free.sum()) - len(chosen),
     )
+
+
+def motion_starts(system: System) -> Array:
+    """Return for each equation the displacement and the rate that a motion is to begin with.
+
+    They are those of motions by velocity or acceleration; NaN where the deck does not say.
+    """
+    equations = system.scene.equations
+    starts = np.full((len(equations.program), 2), np.nan)
+    for e, connection in enumerate(equations.connection):
+        statement, id = system.connections[int(connection)]
+        if statement == "MOTION":
+            motion = system.model.motions[id]
+            given = (motion.ic_disp, motion.ic_vel)
+            starts[e] = [np.nan if value is None else value for value in given]
+    return starts
 
 
 def _scaled(scene: Scene) -> tuple[Array, Array]:
@@ -88,16 +106,20 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
     return A / np.outer(size, size), size
 
 
-def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
-    """Take the residuals of a column away, for the equations that hold at that level."""
-    held = scene.equations.level >= level
+def _close(
+    scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int, starts: Array
+) -> None:
+    """Take the residuals of a column away, for equations that hold at that level or start there."""
+    given = (scene.equations.level < level) & np.isfinite(starts)
+    held = (scene.equations.level >= level) | given
+    wanted = np.where(given, starts, 0.0)
     n = len(held)
     if not held.any():
         return
     best, stuck = np.inf, 0
     for _ in range(_MOST_ROUNDS):
         serve(MATRIX, y)
-        residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
+        residual = np.where(held, scene.sweep.rate[:n, column] - wanted, 0.0)
         worst = float(np.max(np.abs(residual) / scene.equations.unit))
         stuck = stuck + 1 if worst > 0.5 * best else 0
         best = min(best, worst)

@@ -232,8 +232,8 @@ class Motion:
     direction: str = "R"
     val_type: str = "D"  # D, V or A
     expr: Expression | None = None  # of TIME; [L], [rad] or their rates
-    ic_disp: float = 0.0  # what a V or A motion starts from
-    ic_vel: float = 0.0
+    ic_disp: float | None = None  # what a V or A motion starts from; None: as assembled
+    ic_vel: float | None = None  # of an A motion; None: as the bodies' own velocities have it
     source: Source = Source()
 
 

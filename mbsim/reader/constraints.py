@@ -147,8 +147,8 @@ def _build_motion(entry: Entry) -> None:
         direction=entry.get("motion_type", ""),
         val_type=val_type,
         expr=entry.get("expr"),
-        ic_disp=entry.get("ic_disp", 0.0) if val_type != "D" else 0.0,
-        ic_vel=entry.get("ic_vel", 0.0) if val_type == "A" else 0.0,
+        ic_disp=entry.get("ic_disp") if val_type != "D" else None,
+        ic_vel=entry.get("ic_vel") if val_type == "A" else None,
         source=entry.source,
     )
     by_expression = entry.get("type") is not None or not entry.given("type")

@@ -49,8 +49,8 @@ def test_primitives_have_ids_of_their_own(tmp_path: Path, type: str) -> None:
 @pytest.mark.parametrize(
     ("attributes", "expected"),
     [
-        ('val_type="D" ic_disp="3"', ("D", 0.0, 0.0)),
-        ('val_type="V" ic_disp="3" ic_vel="4"', ("V", 3.0, 0.0)),
+        ('val_type="D" ic_disp="3"', ("D", None, None)),
+        ('val_type="V" ic_disp="3" ic_vel="4"', ("V", 3.0, None)),
         ('val_type="a" ic_disp="3" ic_vel="4"', ("A", 3.0, 4.0)),
     ],
 )

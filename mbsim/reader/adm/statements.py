@@ -248,8 +248,8 @@ def _build_motion(entry: Entry) -> None:
         direction=_motion_direction(entry),
         val_type=val_type,
         expr=entry.get("FUNCTION"),
-        ic_disp=entry.get("ICDISP", 0.0) if val_type != "D" else 0.0,
-        ic_vel=entry.get("ICVEL", 0.0) if val_type == "A" else 0.0,
+        ic_disp=entry.get("ICDISP") if val_type != "D" else None,
+        ic_vel=entry.get("ICVEL") if val_type == "A" else None,
         source=entry.source,
     )
     entry.register(entry.draft.motions, motion)
