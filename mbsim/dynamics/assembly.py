@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
-from mbsim.system.arrays import CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
+from mbsim.system.arrays import ANGLE, CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
 from mbsim.system.build import System
 
 Array = np.ndarray[Any, Any]
@@ -63,6 +63,7 @@ def assemble(scene: Scene, y: Array, serve: Serve, starts: Array) -> Assembly:
     scene.sweep.multiplier[:] = 0.0
     serve(MATRIX, y)
     serve(DISPLACE, y)
+    _count_turns(scene, y, serve, starts[:, 0])
     _close(scene, y, serve, DISPLACE, 2, _RESIDUAL, starts[:, 0])
     _close(scene, y, serve, SPEED_UP, 1, _MISMATCH, starts[:, 1])
     serve(MATRIX, y)
@@ -104,6 +105,21 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
     A = A + np.tril(A, -1).T
     size = scene.sweep.size[:n]
     return A / np.outer(size, size), size
+
+
+def _count_turns(scene: Scene, y: Array, serve: Serve, starts: Array) -> None:
+    """Begin the angles that motions give with as many whole turns as the motions say."""
+    equations = scene.equations
+    serve(MATRIX, y)
+    for e in range(len(equations.program)):
+        k = int(equations.first[e])
+        is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
+        if not is_motion or equations.kind[k] != ANGLE:
+            continue
+        given = 0.0 if equations.level[e] == 2 else float(starts[e])
+        turns = (float(scene.sweep.rate[e, _RESIDUAL]) - given) / (2.0 * np.pi)
+        if np.isfinite(turns):
+            scene.state.angle[equations.angle[k]] -= 2.0 * np.pi * np.round(turns)
 
 
 def _close(

@@ -80,6 +80,7 @@ def test_a_cross_with_parallel_arms_is_refused(type, tmp_path):
     ("val_type", "extra", "start", "rate"),
     [
         ("V", 'ic_disp="0.5"', 0.5, 0.3),
+        ("V", 'ic_disp="6"', 6.0, 0.3),
         ("A", 'ic_vel="2"', 0.0, 2.0),
         ("A", 'ic_disp="-1" ic_vel="2"', -1.0, 2.0),
     ],
@@ -92,3 +93,12 @@ def test_initial_values_of_a_motion(val_type, extra, start, rate, tmp_path):
     expected = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     np.testing.assert_allclose(p, expected, rtol=0, atol=1e-8)
     np.testing.assert_allclose(results["bodies/2/angular_velocity"][:, 2], rate, atol=1e-8)
+
+
+@pytest.mark.parametrize("start", [6.0, -40.0])
+def test_a_motion_may_begin_turns_away(start, tmp_path):
+    scene = driven_arm(f"{start}+TIME")
+    results = scene.run(tmp_path, 1.0, 0.5)
+    angle = start + results["time"]
+    expected = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    np.testing.assert_allclose(results["bodies/2/position"], expected, rtol=0, atol=1e-8)
