@@ -104,7 +104,12 @@ class Runner:
         scene = self.system.scene
         if len(scene.tree.body) == 0:
             return
-        from mbsim.dynamics.assembly import ContradictionError, assemble, contradiction, describe
+        from mbsim.dynamics.assembly import (
+            ContradictionError,
+            assemble,
+            contradiction,
+            describe,
+        )
         from mbsim.system.arrays import JOINTS_DOOR
 
         pointer = ctypes.c_void_p
@@ -292,6 +297,7 @@ class Runner:
         where = []
         if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
             where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
+        where.extend(self._out_of_reach())
         if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
             where.extend(self._not_finite()[:1])
         if 0 <= contact < len(self.system.contact_ids):
@@ -301,6 +307,17 @@ class Runner:
             f"because {reason}; at {', '.join(where) or 'no single element'}. "
             "Results up to there are kept."
         )
+
+    def _out_of_reach(self) -> list[str]:
+        """Return the equation that the step tried last left by more than its error may be."""
+        from mbsim.system.arrays import DRIFT, DRIFTER
+
+        quality = self.system.scene.sweep.quality
+        if not quality[DRIFT] > self.settings.tol:
+            return []
+        from mbsim.dynamics.assembly import equation_name
+
+        return [equation_name(self.system, int(quality[DRIFTER]))]
 
     def _not_finite(self) -> list[str]:
         """Return the applied forces that were no numbers when last evaluated."""

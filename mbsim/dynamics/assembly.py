@@ -15,7 +15,7 @@ import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.start import MOST_DIRECTIONS, start_velocities
-from mbsim.system.arrays import CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
+from mbsim.system.arrays import ANGLE, CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
 from mbsim.system.build import System
 
 Array = np.ndarray[Any, Any]
@@ -71,6 +71,7 @@ def assemble(scene: Scene, y: Array, serve: Serve, given: dict[int, Array]) -> A
         scene.sweep.multiplier[:] = 0.0
         serve(MATRIX, y)
         serve(DISPLACE, y)
+        _count_turns(scene, y, serve)
         _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
     else:
         serve(PROJECT, positions := y.copy())
@@ -106,6 +107,21 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
     A = A + np.tril(A, -1).T
     size = scene.sweep.size[:n]
     return A / np.outer(size, size), size
+
+
+def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
+    """Begin the angles that motions give with as many whole turns as the motions say."""
+    equations = scene.equations
+    serve(MATRIX, y)
+    for e in range(len(equations.program)):
+        k = int(equations.first[e])
+        is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
+        if not is_motion or equations.kind[k] != ANGLE:
+            continue
+        given = 0.0 if equations.level[e] == 2 else float(equations.start[e, 0])
+        turns = (float(scene.sweep.rate[e, _RESIDUAL]) - given) / (2.0 * np.pi)
+        if np.isfinite(turns):
+            scene.state.angle[equations.angle[k]] -= 2.0 * np.pi * np.round(turns)
 
 
 def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:

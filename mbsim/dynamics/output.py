@@ -12,6 +12,7 @@ from mbsim.dynamics.kinematics import position
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
+    DRIFT,
     JOINTS_DOOR,
     LIVE,
     REACT,
@@ -180,6 +181,8 @@ def scaled_error(scene, h, e, y):
         first -= 1 if kept >= 0 else 0
     for c in range(first, len(e)):
         largest = max(largest, (e[c] / scene.world.scale[2]) ** 2)
+    # what was not integrated but put right, as after a motion that jumps
+    largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

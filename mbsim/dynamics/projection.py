@@ -28,6 +28,9 @@ CLOSED = 2e-14
 MOST_ROUNDS = 8
 #: A residual, over its unit, whose square is rounding.
 SMALL = 1e-8
+#: What of the way back onto the constraints counts as a step's error: its own estimate is to
+#: rule, unless the constraints themselves moved in a way that no stage of the step has met.
+FORGIVEN = 0.1
 
 
 @jitable
@@ -101,6 +104,18 @@ def largest_residual(scene, level, column):
 
 
 @jitable
+def note_drift(scene, level, column, part):
+    """Note the largest residual, over its unit and times `part`, if none was larger."""
+    quality = scene.sweep.quality
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        if scene.equations.level[e] >= level:
+            drift = part * abs(scene.sweep.rate[e, column]) / scene.equations.unit[e]
+            if not drift <= quality[DRIFT]:
+                quality[DRIFT], quality[DRIFTER] = drift, e
+
+
+@jitable
 def prepare_equations(scene, t, y):
     """Fill all that follows from y: bodies, tree, equations."""
     place_bodies(scene, y)
@@ -116,6 +131,7 @@ def close_loops(scene, t, y):
     different that the last round, or the velocities, would notice.
     """
     prepare_equations(scene, t, y)
+    note_drift(scene, 2, RESIDUAL, FORGIVEN)
     fill_matrix(scene)
     factor_matrix(scene)
     for _ in range(MOST_ROUNDS):
@@ -135,6 +151,7 @@ def close_loops(scene, t, y):
 @jitable
 def project(scene, t, y):
     """Bring y back onto all constraints, positions first."""
+    scene.sweep.quality[DRIFT] = 0.0
     place_bodies(scene, y)
     seat_all(scene, y)
     if active_count(scene) > 0:
@@ -142,5 +159,6 @@ def project(scene, t, y):
     carry_all(scene, y)
     if active_count(scene) > 0:
         fill_equations(scene, t, y)
+        note_drift(scene, 1, MISMATCH, FORGIVEN * scene.world.scale[0] / scene.world.scale[1])
         correct(scene, 1, MISMATCH)
         speed_up(scene, y)

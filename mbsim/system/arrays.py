@@ -80,8 +80,9 @@ TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 OFFSET, PERP, ANGLE, DISTANCE, GENERAL = range(5)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
-# the committed state is near a position in which a loop can fold
-CHOSEN, USUAL, NEAR_FOLD = range(3)
+# the committed state is near a position in which a loop can fold; how far the last step left
+# the equations before it was brought back onto them, as a local error, and which equation most
+CHOSEN, USUAL, NEAR_FOLD, DRIFT, DRIFTER = range(5)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -369,7 +370,7 @@ class Sweep(NamedTuple):
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
     size: F1  # (ne,) square root of what A would have if the bodies were free
-    quality: F1  # (3,) least pivot over its size squared, see the names above
+    quality: F1  # (5,) least pivot over its size squared, see the names above
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
 

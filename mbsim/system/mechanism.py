@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 
+from mbsim.errors import DeckError, Fault
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Array, Coupler, GeneralConstraint, Joint, Model, Motion
 from mbsim.system import arrays as a
@@ -35,6 +36,8 @@ _TURNS = {
 }
 #: A joint that holds less than this is cheaper as equations than as a limb of the tree.
 _LEAST_ROWS = 3
+#: Sine of an angle below which axes are parallel.
+_PARALLEL = 1e-6
 _LEVELS = {"A": 0, "V": 1, "D": 2}
 #: What a motion's direction means.
 _DIRECTIONS = {
@@ -221,8 +224,23 @@ class _Builder:
         connection = self.connect(statement, joint.id, i, j)
         self.joints[connection] = joint
         limb = _limb(connection, i, j, JOINTS[joint.type].equations)
+        if limb is not None and limb.turn == a.TURN_CROSS:
+            self.check_cross(statement, joint, limb)
         if limb is not None and limb.held >= _LEAST_ROWS:
             self.limbs[connection] = limb
+
+    def check_cross(self, statement: str, joint: Joint, limb: Limb) -> None:
+        """Refuse a cross whose arms start parallel: which way they are to turn is not said."""
+        arm_i = self.markers.frame(limb.i)[1][:, limb.axis_i]
+        arm_j = self.markers.frame(limb.j)[1][:, limb.axis_j]
+        if float(np.linalg.norm(np.cross(arm_i, arm_j))) < _PARALLEL:
+            name = f"Constraint_J{'oint' if statement == 'JOINT' else 'prim'}[{joint.id}]"
+            message = (
+                f"{_AXES[limb.axis_i]} of marker {joint.i_marker_id} (I) and {_AXES[limb.axis_j]} "
+                f"of marker {joint.j_marker_id} (J) are parallel; must be at right angles "
+                f"({joint.type})"
+            )
+            raise DeckError([Fault(joint.source.file, joint.source.line, name, message)])
 
     def add_joint_equations(self, in_tree: set[int]) -> None:
         """Add the equations of all joints that the tree does not hold."""
@@ -480,7 +498,7 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         rhs=np.zeros(ne),
         skyline=np.zeros(ne, dtype=np.int64),
         size=np.ones(ne),
-        quality=np.zeros(3),
+        quality=np.zeros(5),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
     )
