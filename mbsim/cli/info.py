@@ -203,11 +203,13 @@ def _shorten(about: dict[str, Any], results: Results) -> None:
 
     columns, units = results.signals(), UnitSystem.of(results)
     about["signals"] = {}
-    for short, names in compact(columns).items():
-        measured = [quantity_of(results, names[0], k) for k in range(columns[names[0]])]
-        unit = ", ".join(dict.fromkeys(filter(None, map(units.text, measured))))
+    measured: dict[str, str] = {}
+    for name in columns:
+        texts = (units.text(quantity_of(results, name, k)) for k in range(columns[name]))
+        measured[name] = ", ".join(dict.fromkeys(filter(None, texts)))
+    for short, names in compact(columns, measured).items():
         parts = " ".join(f"/{part}" for part in parts_of(columns[names[0]]))
-        about["signals"][short] = f"{parts:<32} {unit}".rstrip() or "-"
+        about["signals"][short] = f"{parts:<32} {measured[names[0]]}".rstrip() or "-"
     others = [name for name in results.keys() if name not in columns]
     about["other data"] = list(compact(others))
 

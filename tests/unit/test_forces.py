@@ -696,3 +696,30 @@ def test_info_of_a_result_file(tmp_path: Path) -> None:
     assert "joints/{1,2}/force /x /y /z /mag N" in lines
     assert "requests/7 /F1 /F2 /F3 /F4 /F5 /F6 /F7 /F8 N, N·m" in lines
     assert "energy/work_of_motions J" in lines
+
+
+def test_info_gives_every_request_its_own_units(tmp_path: Path) -> None:
+    turn = Expression("WX(21)", call("WX", 21))
+    wanted = [
+        of_element("JOINT", 1),
+        request("MARKER_VELOCITY", 21),
+        request("EXPRESSION", exprs=(None, turn)),
+        request("MARKER_VELOCITY", 31),
+        request("EXPRESSION", exprs=(None, text("1"))),
+    ]
+    wanted = [dataclasses.replace(one, id=id) for id, one in enumerate(wanted, 7)]
+    system = fake_system_of(model_of(tmp_path / "deck", *wanted))
+    add_rows(system, 0, 2)
+    run(system, tmp_path).close()
+    shown = CliRunner().invoke(main, ["info", str(tmp_path / "deck.h5")]).output
+    units = {
+        words[0]: " ".join(words[9:])
+        for words in map(str.split, shown.splitlines())
+        if words and words[0].startswith("requests/")
+    }
+    assert units == {
+        "requests/7": "N, N·m",
+        "requests/{8,10}": "m/s, rad/s",
+        "requests/9": "rad/s",
+        "requests/11": "",
+    }
