@@ -430,9 +430,10 @@ def simulate(
     model : Model
         As `read_model` returns it.
     end_time, print_interval : float, optional
-        Instead of the deck's [T].
+        Instead of the deck's [T]; of an Adams deck both are needed.
     integrator : str, optional
-        "DOPRI5" (order 5) or "DOP853" (order 8); default: the deck's, else the first.
+        "DOPRI5" (order 5), "DOP853" (order 8) or "VERLET" (order 2, free bodies in contact);
+        default: the deck's, else the first.
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default: the deck's, else 1e-5,
         of Adams decks 1e-8.
@@ -465,7 +466,7 @@ def simulate(
     settings = settle(model, end_time, print_interval, integrator, tol)
     tell = notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (up to half a minute); later runs load it"
+        "compiling what this model needs (up to a minute); later runs load it"
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
