@@ -20,6 +20,7 @@ import numpy as np
 from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError, PluginError, SolverError
 from mbsim.model.elements import Model
+from mbsim.model.names import element_name
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
@@ -291,7 +292,7 @@ class Runner:
         body, contact = int(trouble[0]), int(trouble[1])
         where = []
         if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
-            where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
+            where.append(self.system.body_name(body))
         if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
             where.extend(self._not_finite()[:1])
         if 0 <= contact < len(self.system.contact_ids):
@@ -304,9 +305,13 @@ class Runner:
 
     def _not_finite(self) -> list[str]:
         """Return the applied forces that were no numbers when last evaluated."""
+        from mbsim.results.elements import GROUPS
+
         applied = self.system.scene.work.applied
         broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
-        return [f"{statement}[{id}]" for statement, id in (self.system.applied[k] for k in broken)]
+        file = self.system.model.file
+        elements = (self.system.applied[k] for k in broken)
+        return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
 
     def fail(self, code: int, t: float) -> None:
         """Raise what the hooks' code says."""

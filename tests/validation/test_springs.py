@@ -180,7 +180,7 @@ def test_a_force_that_is_no_number_ends_the_run_and_is_named(text):
     model = free.model(free.body(2, p=(0, 0, 1)), scalar_forces=[force], end_time=1.0)
     with pytest.raises(SolverError, match="not finite") as caught:
         free.run(model)
-    assert "SFORCE[7]" in str(caught.value)
+    assert "Force_Scalar_TwoBody[7]" in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["TRANSLATIONAL", "ROTATIONAL"])
