@@ -20,6 +20,7 @@ import numpy as np
 from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError, PluginError, SolverError
 from mbsim.model.elements import Model
+from mbsim.model.names import element_name
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
@@ -296,7 +297,7 @@ class Runner:
         body, contact = int(trouble[0]), int(trouble[1])
         where = []
         if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
-            where.append(f"Body_Rigid[{self.system.body_ids[body]}]")
+            where.append(self.system.body_name(body))
         where.extend(self._out_of_reach())
         if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
             where.extend(self._not_finite()[:1])
@@ -321,9 +322,13 @@ class Runner:
 
     def _not_finite(self) -> list[str]:
         """Return the applied forces that were no numbers when last evaluated."""
+        from mbsim.results.elements import GROUPS
+
         applied = self.system.scene.work.applied
         broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
-        return [f"{statement}[{id}]" for statement, id in (self.system.applied[k] for k in broken)]
+        file = self.system.model.file
+        elements = (self.system.applied[k] for k in broken)
+        return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
 
     def fail(self, code: int, t: float) -> None:
         """Raise what the hooks' code says."""
@@ -447,9 +452,10 @@ def simulate(
     model : Model
         As `read_model` returns it.
     end_time, print_interval : float, optional
-        Instead of the deck's [T].
+        Instead of the deck's [T]; of an Adams deck both are needed.
     integrator : str, optional
-        "DOPRI5" (order 5) or "DOP853" (order 8); default: the deck's, else the first.
+        "DOPRI5" (order 5), "DOP853" (order 8) or "VERLET" (order 2, free bodies in contact);
+        default: the deck's, else the first.
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default: the deck's, else 1e-5,
         of Adams decks 1e-8.
@@ -482,7 +488,7 @@ def simulate(
     settings = settle(model, end_time, print_interval, integrator, tol)
     tell = notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (up to half a minute); later runs load it"
+        "compiling what this model needs (up to a minute); later runs load it"
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]

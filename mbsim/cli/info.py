@@ -127,6 +127,8 @@ _SHOWN = (
 
 def _facts(model: Model, element: Any) -> dict[str, Any]:
     """Return what an element says: its attributes, expression, and between what it acts."""
+    from mbsim.model.names import element_name
+
     about = {name: getattr(element, name, None) for name in _SHOWN}
     expr = getattr(element, "expr", None)
     about["expression"] = expr.text if expr is not None else None
@@ -134,7 +136,8 @@ def _facts(model: Model, element: Any) -> dict[str, Any]:
         marker_id = getattr(element, f"{side}_marker_id", 0)
         if marker_id:
             body_id = model.markers[marker_id].body_id
-            about[side] = f"Reference_Marker[{marker_id}] of Body_Rigid[{body_id}]"
+            marker = element_name(model.file, "Reference_Marker", marker_id)
+            about[side] = f"{marker} of {element_name(model.file, 'Body_Rigid', body_id)}"
     return {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in about.items()
@@ -203,11 +206,13 @@ def _shorten(about: dict[str, Any], results: Results) -> None:
 
     columns, units = results.signals(), UnitSystem.of(results)
     about["signals"] = {}
-    for short, names in compact(columns).items():
-        measured = [quantity_of(results, names[0], k) for k in range(columns[names[0]])]
-        unit = ", ".join(dict.fromkeys(filter(None, map(units.text, measured))))
+    measured: dict[str, str] = {}
+    for name in columns:
+        texts = (units.text(quantity_of(results, name, k)) for k in range(columns[name]))
+        measured[name] = ", ".join(dict.fromkeys(filter(None, texts)))
+    for short, names in compact(columns, measured).items():
         parts = " ".join(f"/{part}" for part in parts_of(columns[names[0]]))
-        about["signals"][short] = f"{parts:<32} {unit}".rstrip() or "-"
+        about["signals"][short] = f"{parts:<32} {measured[names[0]]}".rstrip() or "-"
     others = [name for name in results.keys() if name not in columns]
     about["other data"] = list(compact(others))
 

@@ -219,18 +219,16 @@ def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
             "reactions are those of least norm"
         )
     for b, way, turn in assembly.moved:
-        warnings.append(
-            f"assembly: Body_Rigid[{system.body_ids[b]}] moved by {way:.6g} and {turn:.6g} rad"
-        )
+        warnings.append(f"assembly: {system.body_name(b)} moved by {way:.6g} and {turn:.6g} rad")
     length, speed = system.scene.world.scale[:2]
     for b, v, w in assembly.sped:
         lines.append(
-            f"assembly: Body_Rigid[{system.body_ids[b]}] starts with velocity {_vector(v, speed)} "
+            f"assembly: {system.body_name(b)} starts with velocity {_vector(v, speed)} "
             f"and angular velocity {_vector(w, speed / length)}"
         )
     for b, name, given, is_ in assembly.lost:
         warnings.append(
-            f"assembly: Body_Rigid[{system.body_ids[b]}]: velocity {name} = {given:.6g} of the "
+            f"assembly: {system.body_name(b)}: velocity {name} = {given:.6g} of the "
             f"deck cannot hold with the joints and the other velocities: it is {is_:.6g}"
         )
     return lines, warnings

@@ -21,7 +21,7 @@ from mbsim.dynamics.equations import (
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.seating import carry_all, seat_all, set_spin, set_velocity, turn_body
 from mbsim.dynamics.tree import prepare, respond
-from mbsim.system.arrays import BODY_SIZE
+from mbsim.system.arrays import BODY_SIZE, DRIFT, DRIFTER
 
 #: Newton ends when no residual is above this part of its unit, or after so many rounds.
 CLOSED = 2e-14
@@ -105,11 +105,11 @@ def largest_residual(scene, level, column):
 
 @jitable
 def note_drift(scene, level, column, part):
-    """Note the largest residual, over its unit and times `part`, if none was larger."""
+    """Note the largest residual of motions, over its unit and times `part`, if none was larger."""
     quality = scene.sweep.quality
     for r in range(active_count(scene)):
         e = scene.equations.active[r]
-        if scene.equations.level[e] >= level:
+        if scene.equations.program[e] >= 0 and scene.equations.level[e] >= level:
             drift = part * abs(scene.sweep.rate[e, column]) / scene.equations.unit[e]
             if not drift <= quality[DRIFT]:
                 quality[DRIFT], quality[DRIFTER] = drift, e

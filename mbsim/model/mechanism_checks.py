@@ -157,10 +157,12 @@ def _two_bodies(model: Model) -> Iterator[Fault]:
                 yield _fault(element.source, name, message)
 
 
-def _allowed(type: str) -> str:
-    """Return in words which directions a joint has."""
+def _allowed(type: str, what: str) -> str:
+    """Return a joint's type and in words which directions a motion or a limit of it may have."""
     moves = JOINTS[type].moves
-    return " or ".join(moves) if moves else "none"
+    if not moves:
+        return f"{type}, which takes no {what}"
+    return f"{type}; a {what} of it may be {' or '.join(moves)}"
 
 
 def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
@@ -173,8 +175,8 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
         joint = model.joints.get(motion.joint_id or 0)
         if joint is not None and motion.direction not in JOINTS[joint.type].moves:
             given = f'motion_type="{motion.direction}"' if motion.direction else "motion_type"
-            what = f"{given}: joint {joint.id} is {joint.type}; a motion of it may be "
-            yield _fault(motion.source, name, what + _allowed(joint.type))
+            message = f"{given}: joint {joint.id} is {_allowed(joint.type, 'motion')}"
+            yield _fault(motion.source, name, message)
             continue
         if joint is not None or motion.joint_id is None:
             of = (motion.joint_id, motion.i_marker_id, motion.j_marker_id, motion.direction)
@@ -203,9 +205,10 @@ def _couplers(model: Model) -> Iterator[Fault]:
                 continue
             if direction not in JOINTS[joint.type].moves:
                 message = f'motion_types="{" ".join(coupler.motion_types)}": joint {id} is '
-                message += f"{joint.type} and does not {_DIRECTIONS[direction]} its z-axis; it has "
-                name = f"Constraint_Coupler[{coupler.id}]"
-                yield _fault(coupler.source, name, message + _allowed(joint.type))
+                message += f"{joint.type} and does not {_DIRECTIONS[direction]} its z-axis"
+                if moves := JOINTS[joint.type].moves:
+                    message += f"; it has {' or '.join(moves)}"
+                yield _fault(coupler.source, f"Constraint_Coupler[{coupler.id}]", message)
 
 
 def _frictions(model: Model) -> Iterator[Fault]:
@@ -246,8 +249,8 @@ def _limits(model: Model) -> Iterator[Fault]:
     for limit in model.joint_limits.values():
         joint = model.joints.get(limit.joint_id)
         if joint is not None and limit.direction not in JOINTS[joint.type].moves:
-            message = f'motion_type="{limit.direction}": joint {joint.id} is {joint.type}; '
-            message += f"a limit of it may be {_allowed(joint.type)}"
+            message = f'motion_type="{limit.direction}": joint {joint.id} is '
+            message += _allowed(joint.type, "limit")
             yield _fault(limit.source, f"Force_JointLimit[{limit.id}]", message)
 
 

@@ -12,6 +12,7 @@ from mbsim.errors import DeckError, Fault
 from mbsim.model.body_mass import BodyMassError, body_mass
 from mbsim.model.elements import Array, Body, Graphic, Model
 from mbsim.model.frames import GLOBAL, Frame, marker_frames, quaternion
+from mbsim.model.names import element_name
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,12 @@ def place(model: Model) -> Placement:
     """
     frames = marker_frames(model)
     faults = [
-        Fault(model.file, marker.source.line, f"Reference_Marker[{id}]", "has no place")
+        Fault(
+            model.file,
+            marker.source.line,
+            element_name(model.file, "Reference_Marker", id),
+            "has no place",
+        )
         for id, marker in model.markers.items()
         if id not in frames
     ]
@@ -102,7 +108,7 @@ def place(model: Model) -> Placement:
         try:
             bodies[body.id] = _place_body(model, frames, body)
         except BodyMassError as error:
-            name = f"Body_Rigid[{body.id}]"
+            name = element_name(model.file, "Body_Rigid", body.id)
             faults.append(Fault(model.file, body.source.line, name, str(error)))
     if faults:
         raise DeckError(faults)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mbsim.model.elements import Model
+from mbsim.model.names import element_name
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -51,9 +52,9 @@ def elements_of(model: Model, statement: str) -> dict[int, Any]:
 
 
 def title(model: Model, statement: str, id: int) -> str:
-    """Return an element's name and label: ``Constraint_Joint[1] crank``."""
+    """Return an element's name and label: ``Constraint_Joint[1] crank``, ``JOINT/1`` of Adams."""
     label = elements_of(model, statement)[id].label
-    return f"{GROUPS[statement].title}[{id}] {label}".rstrip()
+    return f"{element_name(model.file, GROUPS[statement].title, id)} {label}".rstrip()
 
 
 def acting(system: System) -> list[tuple[str, int]]:

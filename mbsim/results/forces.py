@@ -11,6 +11,7 @@ import numpy as np
 
 from mbsim.errors import DeckError, Fault
 from mbsim.model.elements import Array, Contact, Model, Request
+from mbsim.model.names import element_name
 from mbsim.results.elements import APPLIED, GROUPS, elements_of
 from mbsim.results.motion import Motion, rotate
 from mbsim.system.arrays import CONTACT_COLUMNS
@@ -173,7 +174,12 @@ def check_requests(model: Model) -> None:
     than one element to be seen.
     """
     faults = [
-        Fault(model.file, request.source.line, f"Post_Request[{request.id}]", text)
+        Fault(
+            model.file,
+            request.source.line,
+            element_name(model.file, "Post_Request", request.id),
+            text,
+        )
         for request in model.requests.values()
         if request.type == "ELEMENTAL_FORCE"
         for text in _faults(model, request)

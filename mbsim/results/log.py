@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
+from mbsim.model.names import element_name, statement_name
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
 from mbsim.results.elements import title as title_of
 from mbsim.results.files import replace_text
@@ -184,7 +185,8 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
     if system.connections:
         yield fact("scalar constraint equations", equations(model))
     if not model.requests:
-        yield fact("requests written as CSV", "none: the deck has no Post_Request")
+        missing = statement_name(model.file, "Post_Request")
+        yield fact("requests written as CSV", f"none: the deck has no {missing}")
     for note in model.notes:
         yield f"  note: {note}"
     for warning in model.warnings:
@@ -192,10 +194,10 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
     elements = actings(system)
     for request in model.requests.values():
         if request.type == "MARKER_FORCE" and not marker_actings(system, elements, request):
-            who = f"Reference_Marker[{request.i_marker_id}]"
-            if request.j_marker_id is not None:
-                who += f" and Reference_Marker[{request.j_marker_id}]"
-            yield f"  warning: Post_Request[{request.id}]: no element acts at {who}; it is 0"
+            ids = [id for id in (request.i_marker_id, request.j_marker_id) if id is not None]
+            who = " and ".join(element_name(model.file, "Reference_Marker", id) for id in ids)
+            name = element_name(model.file, "Post_Request", request.id)
+            yield f"  warning: {name}: no element acts at {who}; it is 0"
     yield ""
     yield "settings"
     shown = ("integrator", "tol", "end_time", "print_interval", "detector")

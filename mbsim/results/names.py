@@ -57,21 +57,36 @@ def _fits(segments: Sequence[str], wanted: Sequence[str]) -> bool:
     return len(segments) == len(wanted) and all(map(fnmatchcase, segments, wanted))
 
 
-def compact(names: Iterable[str]) -> dict[str, list[str]]:
+def compact(names: Iterable[str], kinds: Mapping[str, str] | None = None) -> dict[str, list[str]]:
     """Return the names with their ids taken together: ``bodies/{2,3}/position``.
 
     What stands in braces or as ``*`` can be typed: a shell expands the first, `plot` the second.
+
+    Parameters
+    ----------
+    names : iterable of str
+    kinds : mapping of str to str, optional
+        What a name is; only names of one kind are taken together.
 
     Returns
     -------
     dict of str to list of str
         Short name -> the names that it stands for, sorted.
     """
-    alike: dict[tuple[str, ...], list[str]] = {}
+    alike: dict[tuple[str, ...], dict[str, list[str]]] = {}
     for name in sorted(set(names), key=order):
         key = tuple("#" if segment.isdecimal() else segment for segment in name.split("/"))
-        alike.setdefault(key, []).append(name)
-    return {_short(key, same): same for key, same in alike.items()}
+        kind = kinds[name] if kinds else ""
+        alike.setdefault(key, {}).setdefault(kind, []).append(name)
+    made: dict[str, list[str]] = {}
+    for key, groups in alike.items():
+        for same in groups.values():
+            # a * would stand for the other kinds too
+            most = len(same) if len(groups) == 1 else _SPELLED
+            for first in range(0, len(same), most):
+                some = same[first : first + most]
+                made[_short(key, some)] = some
+    return made
 
 
 def _short(key: Sequence[str], names: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ _MEASURES = {
     "torque": ("TM", "TX", "TY", "TZ"),
 }
 #: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
-_FORCES_OF_ELEMENTS = ("JOINT", "JPRIM", "MOTION", "SFORCE", "SPRDP", "CONTACT")
+_FORCES_OF_ELEMENTS = ("JOINT", "JPRIM", "MOTION", "SFORCE", "SPDP", "CONTACT")
 #: F1 and F5 are magnitudes of the three columns behind them.
 _MAGNITUDES = (1, 5)
 

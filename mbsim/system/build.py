@@ -22,6 +22,7 @@ from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
+from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
 from mbsim.system.applied import applied_forces
@@ -92,9 +93,11 @@ class System:
     def connection_name(self, row: int) -> str:
         """Return the element of a row of `Connections` as its deck has it."""
         statement, id = self.connections[row]
-        if self.model.file.lower().endswith(".adm"):
-            return f"{statement}/{id}"
-        return f"{_STATEMENTS[statement]}[{id}]"
+        return element_name(self.model.file, _STATEMENTS[statement], id)
+
+    def body_name(self, row: int) -> str:
+        """Return the moving body of a row of `Bodies` as its deck has it."""
+        return element_name(self.model.file, "Body_Rigid", self.body_ids[row])
 
 
 def _adapt_pair(points: Callable[..., int], slots: int) -> Any:

@@ -37,6 +37,7 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time
 from mbsim.model.elements import Variable
+from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
 
@@ -116,8 +117,8 @@ class ProgramTable:
         except ExpressionError as fault:
             if owner is None:
                 raise
-            name = f"{_STATEMENTS.get(type(owner).__name__, type(owner).__name__)}[{owner.id}]"
-            source = owner.source
+            source, type_name = owner.source, type(owner).__name__
+            name = element_name(source.file, _STATEMENTS.get(type_name, type_name), owner.id)
             where = Fault(source.file, source.line, name, f"in {expression.text!r}: {fault}")
             raise DeckError([where]) from None
         self.programs.append(made)

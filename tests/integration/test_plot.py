@@ -529,7 +529,8 @@ def test_run_and_info_import_no_matplotlib(files, tmp_path):
 def test_info_lists_names_with_parts_and_units(files):
     shown = CliRunner().invoke(main, ["info", str(files[0])]).stdout
     assert re.search(r"bodies/\{2,3\}/position +/x /y /z /mag +m\n", shown)
-    assert re.search(r"requests/\{7,8\} +/F1 .* /F8 +m, rad\n", shown)
+    assert re.search(r"requests/7 +/F1 .* /F8 +m, rad\n", shown)
+    assert re.search(r"requests/8 +/F1 .* /F8 +m/s, rad/s\n", shown)
     assert re.search(r"energy/kinetic +J\n", shown)
     assert "other data\n" in shown
 
@@ -557,6 +558,14 @@ def test_compact_names():
         "contacts/*/force": many,
         "time": ["time"],
     }
+    # names of different kinds stand apart, and a * would stand for both
+    kinds = {name: "even" if int(name[9]) % 2 == 0 else "odd" for name in many}
+    assert list(compact(many, kinds)) == ["contacts/{1,3,5,7}/force", "contacts/{2,4,6,8}/force"]
+    assert list(compact(many, dict.fromkeys(many[:7], "a") | {many[7]: "b"})) == [
+        "contacts/{1,2,3,4,5,6}/force",
+        "contacts/7/force",
+        "contacts/8/force",
+    ]
 
 
 def test_names_of_files_are_as_long_as_needed():

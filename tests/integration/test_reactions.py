@@ -47,7 +47,7 @@ def of_markers(i: int, j: int, rm: int) -> str:
 
 
 def of_element(name: str, id: int, jflag: int, rm: int) -> str:
-    """Return expr2..4 and expr6..8 of JOINT, MOTION or SPRDP."""
+    """Return expr2..4 and expr6..8 of JOINT, MOTION or SPDP."""
     return " ".join(f'expr{k}="{name}({id},{jflag},{k},{rm})"' for k in (2, 3, 4, 6, 7, 8))
 
 
@@ -60,7 +60,7 @@ REQUESTS = f"""
 <Post_Request id="101" type="EXPRESSION" {of_element("JOINT", 1, 0, 30)}/>
 <Post_Request id="102" type="EXPRESSION" {of_markers(21, 10, 0)}/>
 <Post_Request id="103" type="EXPRESSION" {of_markers(10, 21, 20)}/>
-<Post_Request id="104" type="EXPRESSION" {of_element("SPRDP", 5, 1, 0)}/>
+<Post_Request id="104" type="EXPRESSION" {of_element("SPDP", 5, 1, 0)}/>
 <Post_Request id="105" type="EXPRESSION" {of_element("JOINT", 2, 1, 0)}/>
 """
 

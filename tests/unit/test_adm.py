@@ -237,6 +237,10 @@ def test_overrides(tmp_path: Path) -> None:
 FAULTS = {
     "no statement": ("123 foo", ("123 foo", "NAME/id")),
     "unknown statement": ("GRAHPICS/1, BOX", ("GRAHPICS[1]", "did you mean GRAPHICS?")),
+    "missing comma": (
+        "MARKER/301, PART=2\nREULER = 180D, 90D, 180D",
+        ("REULER", "no statement but an argument", "comma missing that continues the line before?"),
+    ),
     "not built": ("BUSHING/1, I=101", ("BUSHING[1]", "not built yet")),
     "contact": ("CONTACT/1, IGEOM=1", ("CONTACT[1]", "not built yet")),
     "second units": ("UNITS/LENGTH=METER", ("UNITS", "a second UNITS")),
@@ -283,6 +287,10 @@ FAULTS = {
         "MOTION/1, JOINT=1, TRANSLATION, FUNCTION=TIME",
         ("MOTION[1]", "joint 1 is REVOLUTE", "may be R"),
     ),
+    "motion of a ball": (
+        "JOINT/2, SPH, I=102, J=202\nMOTION/1, JOINT=2, ROTATION, FUNCTION=TIME",
+        ("MOTION[1]", "joint 2 is SPHERICAL, which takes no motion"),
+    ),
     "marker direction": ("MOTION/1, JOINT=1, X, FUNCTION=TIME", ("MOTION[1]", "X: must be ROTA")),
     "B1": ("MOTION/1, I=102, J=202, B1, FUNCTION=TIME", ("B1: must be one of X, Y, Z, B3",)),
     "no direction": ("MOTION/1, I=102, J=202, FUNCTION=TIME", ("direction: missing",)),
@@ -309,10 +317,16 @@ def test_names_the_fault(tmp_path: Path, name: str) -> None:
     with pytest.raises(DeckError) as caught:
         read(tmp_path, added(statement))
     lines = [str(fault) for fault in caught.value.faults]
-    line = f"{tmp_path / 'deck.adm'}:13:"
+    # the last line of the case is where the fault is
+    line = f"{tmp_path / 'deck.adm'}:{13 + statement.count(chr(10))}:"
     assert lines[0].startswith(line), lines
     assert all(part in lines[0] for part in parts), lines
     assert len(lines) <= 2, lines
+
+
+def test_a_name_that_only_ends_alike_is_not_suggested(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match=r"unknown statement SOLVER$"):
+        read(tmp_path, added("SOLVER/1"))
 
 
 def test_readme_has_a_deck_that_is_read(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -15,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import free_bodies as free
 
 from mbsim.errors import DeckError
-from mbsim.expressions.functions import FUNCTIONS, Kind
+from mbsim.expressions.functions import CONSTANTS, FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError, parse
 from mbsim.expressions.tree import Call, Number, Time, references
 from mbsim.model.elements import Request, ScalarForce, Source, Variable
@@ -250,3 +251,13 @@ def test_every_function_of_the_table_can_be_used():
             assert len(programs.programs[0]) == 1
             if function.kind in (Kind.DISPLACEMENT, Kind.ELEMENTARY):
                 programs.add(parse(text), differentiable=True)
+
+
+def test_every_function_is_in_the_readme() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    section = readme.split("## Expressions\n")[1].split("\n## ")[0]
+    named = " ".join(re.findall(r"`([^`]*)`", section))
+    words = set(re.findall(r"[A-Z][A-Z0-9]+", named))
+    assert not {*FUNCTIONS, *CONSTANTS, "TIME"} - words
+    # and nothing that is none: the rest are statements and other names of the text
+    assert words - {*FUNCTIONS, *CONSTANTS, "TIME"} == {"FUNCTION", "GCON"}

@@ -20,9 +20,10 @@ from mbsim.expressions import Expression
 from mbsim.expressions.tree import Call, Node, Number, Time
 from mbsim.model import elements as el
 from mbsim.model.frames import rotation_313
+from mbsim.model.names import element_name, statement_name
 from mbsim.results.curves import Choice, collect
-from mbsim.results.elements import equations
-from mbsim.results.log import RunLog, counts, freedom
+from mbsim.results.elements import acting, equations
+from mbsim.results.log import RunLog, _force_lines, counts, freedom, header
 from mbsim.results.motion import matrices, motion
 from mbsim.results.reading import Results
 from mbsim.results.recorder import Recorder
@@ -696,3 +697,53 @@ def test_info_of_a_result_file(tmp_path: Path) -> None:
     assert "joints/{1,2}/force /x /y /z /mag N" in lines
     assert "requests/7 /F1 /F2 /F3 /F4 /F5 /F6 /F7 /F8 N, N·m" in lines
     assert "energy/work_of_motions J" in lines
+
+
+def test_info_gives_every_request_its_own_units(tmp_path: Path) -> None:
+    turn = Expression("WX(21)", call("WX", 21))
+    wanted = [
+        of_element("JOINT", 1),
+        request("MARKER_VELOCITY", 21),
+        request("EXPRESSION", exprs=(None, turn)),
+        request("MARKER_VELOCITY", 31),
+        request("EXPRESSION", exprs=(None, text("1"))),
+    ]
+    wanted = [dataclasses.replace(one, id=id) for id, one in enumerate(wanted, 7)]
+    system = fake_system_of(model_of(tmp_path / "deck", *wanted))
+    add_rows(system, 0, 2)
+    run(system, tmp_path).close()
+    shown = CliRunner().invoke(main, ["info", str(tmp_path / "deck.h5")]).output
+    units = {
+        words[0]: " ".join(words[9:])
+        for words in map(str.split, shown.splitlines())
+        if words and words[0].startswith("requests/")
+    }
+    assert units == {
+        "requests/7": "N, N·m",
+        "requests/{8,10}": "m/s, rad/s",
+        "requests/9": "rad/s",
+        "requests/11": "",
+    }
+
+
+def test_the_log_of_an_adams_deck_has_its_names(tmp_path: Path) -> None:
+    made = model_of(tmp_path / "deck", request("MARKER_FORCE", 30, 32))
+    adams = dataclasses.replace(made, file="deck.adm")
+    assert "none: the deck has no REQUEST" in "\n".join(
+        header(fake_system_of(dataclasses.replace(adams, requests={})), {})
+    )
+    system = fake_system_of(adams)
+    lines = list(header(system, {}))
+    assert "  warning: REQUEST/7: no element acts at MARKER/30 and MARKER/32; it is 0" in lines
+    watch = Watch(acting(system))
+    lines = list(_force_lines(system, watch))
+    begins = [line.split()[0] for line in lines[2:]]
+    assert {"JOINT/1", "JPRIM/1", "MOTION/6", "SPRINGDAMPER/5", "SFORCE/7"} <= set(begins)
+    about = info._facts(adams, adams.joints[1])
+    assert about["i"] == "MARKER/21 of PART/2"
+
+
+def test_names_in_the_words_of_the_deck() -> None:
+    assert element_name("a.xml", "Body_Rigid", 2) == "Body_Rigid[2]"
+    assert element_name("a.ADM", "Body_Rigid", 2) == "PART/2"
+    assert statement_name("a.xml", "Post_Request") == "Post_Request"

@@ -272,7 +272,7 @@ def test_coincident_markers_give_numbers(text):
 
 def test_forces_between_markers_and_of_elements():
     texts = []
-    for element in ("SFORCE(1,{},{},11)", "SPRDP(2,{},{},11)"):
+    for element in ("SFORCE(1,{},{},11)", "SPDP(2,{},{},11)"):
         texts += [element.format(side, comp) for side in (0, 1) for comp in range(1, 9)]
     texts += [f"{name}(21,31,11)" for name in ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")]
     texts += [f"{name}(31,21,11)" for name in ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")]

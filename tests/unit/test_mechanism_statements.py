@@ -196,7 +196,7 @@ BAD = {
     "motion of a ball": (
         f'<{JOINT}"SPHERICAL" {ON}/>'
         '<Motion_Joint id="1" joint_id="1" motion_type="R" val_type="D" expr="1"/>',
-        ("joint 1 is SPHERICAL", "none"),
+        ("joint 1 is SPHERICAL, which takes no motion",),
     ),
     "twice": (
         f'{MOTION} val_type="D" expr="1"/>'

@@ -65,7 +65,7 @@ def test_torsion_spring_counts_whole_turns():
     k, c, inertia = 0.4, 0.02, 0.3
     spring = SpringDamper(1, "ROTATIONAL", "", 20, 10, k, c, 0.5, 0.1)
     body = free.body(2, inertia=(0.5, 0.5, inertia), w=(0, 0, 12.0))
-    request = Request(1, "EXPRESSION", exprs=(parse("AZ(20,10)"), None, parse("SPRDP(1,0,8)")))
+    request = Request(1, "EXPRESSION", exprs=(parse("AZ(20,10)"), None, parse("SPDP(1,0,8)")))
     model = free.model(body, spring_dampers=[spring], requests=[request], end_time=8.0)
     rows, runner = free.run(model)
     assert runner.system.values == [(1, 1), (1, 3)]
@@ -180,7 +180,7 @@ def test_a_force_that_is_no_number_ends_the_run_and_is_named(text):
     model = free.model(free.body(2, p=(0, 0, 1)), scalar_forces=[force], end_time=1.0)
     with pytest.raises(SolverError, match="not finite") as caught:
         free.run(model)
-    assert "SFORCE[7]" in str(caught.value)
+    assert "Force_Scalar_TwoBody[7]" in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["TRANSLATIONAL", "ROTATIONAL"])

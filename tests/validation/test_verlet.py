@@ -47,12 +47,36 @@ def test_free_top_is_of_order_two(tmp_path):
         bound = f'<Command><Param_Transient h_max="{h_max!r}"/>'
         deck = tmp_path / "top.xml"
         deck.write_text(text.replace("<Command>", bound), encoding="utf-8")
-        results = mbsim.simulate(mbsim.read_model(deck), integrator="VERLET", end_time=1.0)
+        results = mbsim.simulate(
+            mbsim.read_model(deck), integrator="VERLET", end_time=1.0, tol=1e-2
+        )
         assert results.stats["h_largest"] <= h_max
         runs.append(results["state/y"][-1][3:7])
     errors = [np.abs(run - runs[-1]).max() for run in runs[:3]]
     assert 3.0 < errors[0] / errors[1] < 5.5
     assert 3.0 < errors[1] / errors[2] < 5.5
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7])
+def test_a_free_body_bounds_its_step_by_its_turning(tol):
+    # nothing else does; the top turns over and over with w = 10
+    top = mbsim.simulate(mbsim.read_model(MODELS / "free_top.xml"), integrator="VERLET", tol=tol)
+    kinetic = top["energy/kinetic"]
+    assert np.abs(kinetic / kinetic[0] - 1.0).max() < 2.0 * tol
+    assert top.stats["h_largest"] * 10.0 < math.sqrt(25.0 * tol)
+    reference = (-0.000070815327, -0.043836051621, 0.000133685339, -0.999038726823)
+    if tol == 1e-7:
+        np.testing.assert_allclose(top["bodies/2/quaternion"][-1], reference, atol=1e-3)
+
+
+def test_a_free_ball_is_exact_where_it_turns(tmp_path):
+    # of a ball w stays as it is: the method is exact and only rows within a step need shorter ones
+    model = GROUND + sphere(0.0, w=(0.0, 0.0, 10.0))
+    results = run_deck(tmp_path, model, end_time=3.0, integrator="VERLET", tol=1e-5)
+    half = 5.0 * results["time"]
+    exact = np.stack([np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)], axis=1)
+    np.testing.assert_allclose(results["bodies/2/quaternion"], exact, atol=1e-5)
+    assert 0.02 < results.stats["h_largest"] < 0.05
 
 
 def test_energy_of_an_undamped_vibration_stays_bounded(tmp_path):

@@ -98,6 +98,10 @@ def to_node(raw: Raw, statements: Mapping[str, AdmStatement], fault: Fault) -> N
         what = f"longer than {LONGEST} characters" if head else "no statement: must be NAME/id, ..."
         fault(raw.lines[0], raw.text.split("\n")[0][:30].strip(), what)
         return None
+    if _NAMED.match(raw.text):
+        what = "no statement but an argument: is the comma missing that continues the line before?"
+        fault(raw.lines[0], head.group(1).upper(), what)
+        return None
     name, id = head.group(1), head.group(2)
     found = unique(name, (statement.name for statement in statements.values()))
     node = Node(found[0] if len(found) == 1 else name.upper(), raw.lines[0])

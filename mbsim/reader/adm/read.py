@@ -123,5 +123,6 @@ def _read_statement(node: Node, draft: AdmDraft) -> None:
         message = f"{node.tag} is documented but not built yet"
     else:
         known = [*(statement.name for statement in STATEMENTS), *NOT_BUILT]
-        message = f"unknown statement {node.tag}{nearest(node.tag, known)}"
+        # names end alike: SOLVER is no COUPLER
+        message = f"unknown statement {node.tag}{nearest(node.tag, known, 0.7)}"
     draft.fault(node.line, label, message)

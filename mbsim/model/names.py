@@ -1,0 +1,47 @@
+"""What elements are called in messages and logs: in the words of the deck that they come from."""
+
+from __future__ import annotations
+
+#: Adams' statements by the XML's.
+ADAMS = {
+    "Body_Rigid": "PART",
+    "Reference_Marker": "MARKER",
+    "Constraint_Joint": "JOINT",
+    "Constraint_Jprim": "JPRIM",
+    "Constraint_General": "GCON",
+    "Motion_Joint": "MOTION",
+    "Force_SpringDamper": "SPRINGDAMPER",
+    "Force_Scalar_TwoBody": "SFORCE",
+    "Reference_Variable": "VARIABLE",
+    "Post_Request": "REQUEST",
+}
+
+
+def statement_name(file: str, statement: str) -> str:
+    """Return an XML statement as the deck `file` calls it."""
+    return ADAMS.get(statement, statement) if is_adams(file) else statement
+
+
+def element_name(file: str, statement: str, id: int) -> str:
+    """Return an element of the deck `file` as it is written there.
+
+    Parameters
+    ----------
+    file : str
+        The deck, an Adams deck where it ends in ``.adm``.
+    statement : str
+        The XML's name of the statement: ``Body_Rigid``.
+    id : int
+
+    Returns
+    -------
+    str
+        ``Body_Rigid[2]``, of an Adams deck ``PART/2``.
+    """
+    name = statement_name(file, statement)
+    return f"{name}/{id}" if is_adams(file) else f"{name}[{id}]"
+
+
+def is_adams(file: str) -> bool:
+    """Return whether a deck is one of Adams, by its name."""
+    return file.lower().endswith(".adm")
