@@ -90,6 +90,11 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
     """
     tree, length = scene.tree, float(scene.world.scale[0])
     found = tree_map(scene)
+    if found.shape[1] == 0:
+        # all is fixed: nothing can move
+        for b in tree.body:
+            y[BODY_SIZE * b + 7 : BODY_SIZE * b + 13] = 0.0
+        return
     starts = np.where(scene.equations.level < 1, scene.equations.start[:, 1], np.nan)
     held = (scene.equations.level >= 1) | np.isfinite(starts)
     asked, wanted = _flows(scene, found, held, starts)
@@ -102,7 +107,7 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
             scale = length if row[3:6].any() else 1.0
             rows.append(scale * (row[:6] @ found[6 * k : 6 * k + 6]))
             sides.append(scale * row[6])
-    rate, free = _meet(rate, free, np.array(rows).reshape(-1, len(rate)), np.array(sides), size)
+    rate, free = _meet(rate, free, np.array(rows).reshape(-1, freedom), np.array(sides), size)
     unit = np.tile([1.0, 1.0, 1.0, length, length, length], len(tree.body))
     rate, _ = _meet(rate, free, unit[:, None] * found, np.zeros(len(found)), size)
     both = (found @ rate).reshape(-1, 6)
