@@ -16,6 +16,7 @@ import numpy as np
 from mbsim.errors import DeckError, Fault
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Array, Coupler, GeneralConstraint, Joint, Model, Motion
+from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
 from mbsim.system.programs import ProgramTable
@@ -289,6 +290,10 @@ class _Builder:
         rows = self.programs.looks_at(program)
         bodies = {self.markers.frames[row][0]: row for row in rows}
         fixed = bodies.pop(self.markers.ground, 0)
+        if not bodies:
+            name = element_name(self.model.file, "Constraint_General", constraint.id)
+            message = f"expr={constraint.expr.text!r}: must depend on where a moving body is"
+            raise DeckError([Fault(constraint.source.file, constraint.source.line, name, message)])
         i, j = ([*bodies.values(), fixed, 0])[:2]
         connection = self.connect("GCON", constraint.id, i, j)
         for row in bodies.values():

@@ -102,3 +102,9 @@ def test_a_motion_may_begin_turns_away(start, tmp_path):
     angle = start + results["time"]
     expected = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     np.testing.assert_allclose(results["bodies/2/position"], expected, rtol=0, atol=1e-8)
+
+
+def test_a_general_constraint_on_nothing_is_refused(tmp_path):
+    scene = Scene([ARM], [], extra='<Constraint_General id="3" expr="TIME-1"/>')
+    with pytest.raises(DeckError, match=r"Constraint_General\[3\]: .*where a moving body is"):
+        scene.run(tmp_path, 0.1, 0.1)
