@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from mbsim.errors import ModelError
 from mbsim.integrators.catalog import METHODS
 from mbsim.model.elements import Model, Simulation
+from mbsim.model.names import element_name
 
 DEFAULT_TOL = 1e-5
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
@@ -128,6 +130,29 @@ def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
     return next(iter(methods)), notes
 
 
+def _refuse_verlet(model: Model) -> None:
+    """Raise where VERLET cannot run a model: its step is found from stiffness on free bodies."""
+    constraints: dict[str, Mapping[int, Any]] = {
+        "Force_JointFriction": model.joint_frictions,
+        "Force_JointLimit": model.joint_limits,
+        "Constraint_Joint": model.joints,
+        "Constraint_Jprim": model.primitives,
+        "Constraint_Coupler": model.couplers,
+        "Motion_Joint": model.motions,
+        "Constraint_General": model.general_constraints,
+    }
+    for statement, elements in {**constraints, "Force_Scalar_TwoBody": model.scalar_forces}.items():
+        for element in elements.values():
+            name = element_name(model.file, statement, element.id)
+            why = "free bodies and this model has joints or other constraints"
+            if statement not in constraints:
+                why = "forces of known stiffness, which an expression does not say"
+            raise ModelError(
+                f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
+                "take DOPRI5 or DOP853"
+            )
+
+
 def settle(
     model: Model,
     end_time: float | None = None,
@@ -170,22 +195,8 @@ def settle(
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
     method, said_of_names = _method(asked)
-    if method == "VERLET" and model.scalar_forces:
-        force = next(iter(model.scalar_forces.values()))
-        raise ModelError(
-            f"{model.file}:{force.source.line}: Force_Scalar_TwoBody[{force.id}]: integrator "
-            "VERLET steps by stiffness, which is not known of an expression; use DOPRI5 or DOP853"
-        )
-    in_joints = [
-        *((f.source.line, f"Force_JointFriction[{f.id}]") for f in model.joint_frictions.values()),
-        *((f.source.line, f"Force_JointLimit[{f.id}]") for f in model.joint_limits.values()),
-    ]
-    if method == "VERLET" and in_joints:
-        line, name = in_joints[0]
-        raise ModelError(
-            f"{model.file}:{line}: {name}: integrator VERLET steps by stiffness, which is not "
-            "taken of forces in joints; use DOPRI5 or DOP853"
-        )
+    if method == "VERLET":
+        _refuse_verlet(model)
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 

@@ -59,11 +59,6 @@ class Runner:
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
         method = catalog.load(settings.integrator)
-        if method.order == 0.0 and len(system.scene.tree.body) > 0:
-            raise ModelError(
-                f"integrator={settings.integrator} is for free bodies; this model has joints or "
-                "other constraints: take DOPRI5 or DOP853"
-            )
         self.method = scheme.make(
             method,
             system.y0,

@@ -399,5 +399,7 @@ def test_angles_of_expressions_may_be_degrees(tmp_path: Path) -> None:
 
 def test_verlet_refuses_joints(tmp_path: Path) -> None:
     model = read(tmp_path, added(REVOLUTE))
-    with pytest.raises(ModelError, match=r"integrator=VERLET is for free bodies.*joints"):
+    with pytest.raises(
+        ModelError, match=r"Constraint_Joint\[1\]: integrator VERLET is for free bodies.*joints"
+    ):
         simulate(model, end_time=0.1, integrator="VERLET")
