@@ -10,11 +10,9 @@ from numba import carray, types
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.problem import BY_CHECK, HOOK, Problem
-from mbsim.dynamics.constraints import serve
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
-from mbsim.dynamics.limbs import serve_limbs
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
@@ -25,7 +23,6 @@ from mbsim.system.arrays import (
     LISTINGS,
     NEAR_DOOR,
     PROJECT,
-    SLIDE_FRICTION,
     Scene,
 )
 
@@ -143,23 +140,7 @@ def _follow(context, y):
     return 0
 
 
-def _joints(context, what, t, y, dy):
-    """All that joints are asked for; behind an address so that free bodies need not compile it."""
-    scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    return serve(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
-
-
-def _limbs(context, what, t, y, dy):
-    """The same where the tree holds all joints."""
-    scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    return serve_limbs(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
-
-
 _FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
-_POINTER = types.CPointer(types.float64)
-_JOINTS = types.int64(types.int64, types.int64, types.float64, _POINTER, _POINTER)
 _HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
 
 
@@ -188,7 +169,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     if len(scene.tree.body) > 0:
-        rubs = bool((scene.applied.kind >= SLIDE_FRICTION).any())
-        served = _joints if len(scene.equations.program) > 0 or rubs else _limbs
-        scene.world.doors[JOINTS_DOOR] = jit.address(served, _JOINTS)
+        from mbsim.dynamics.joint_door import open_joints
+
+        open_joints(scene)
     return Problem(int(table.ctypes.data), *addresses), table
