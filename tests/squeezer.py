@@ -138,3 +138,14 @@ def turn(angle):
     """Return the rotation about z by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def correct_digits(results):
+    """Return correct digits of coordinates and rates at the end, relative to 1 + their size."""
+    q = [results[f"bodies/{k}/quaternion"] for k in range(2, 9)]
+    angles = [np.unwrap(2 * np.arctan2(x[:, 3], x[:, 0]))[-1] for x in q]
+    rates = [results[f"bodies/{k}/angular_velocity"][-1, 2] for k in range(2, 9)]
+    return [
+        -np.log10(max(abs(found[n] - end) / (1 + abs(end)) for n, end in ends.items()))
+        for found, ends in ((coordinates(angles), END), (coordinates(rates), END_RATES))
+    ]
