@@ -12,14 +12,12 @@ import numpy as np
 from mbsim.errors import ModelError
 from mbsim.integrators.catalog import METHODS
 from mbsim.model.elements import Model, Simulation
-from mbsim.model.names import element_name
+from mbsim.model.names import element_name, is_adams
 
 DEFAULT_TOL = 1e-5
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
 INTEGRATORS = tuple(METHODS)
-#: `Model.compatibility` of a deck in Adams' language.
-ADAMS = "ADAMS"
 #: MotionSolve's names, all run by the first method.
 _MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
 
@@ -75,7 +73,7 @@ def _simulations(
                 "--end-time and --print-interval do not apply"
             )
         return (model.simulations[-1],)
-    if not planned and model.compatibility == ADAMS and None in (end_time, print_interval):
+    if not planned and is_adams(model.file) and None in (end_time, print_interval):
         raise ModelError(
             f"{model.file}: an .adm deck says neither end time nor output interval; "
             "give --end-time and --print-interval"
@@ -171,7 +169,7 @@ def settle(
     stages = []
     asked: dict[str, str] = {}
     from_deck = set()
-    adams = model.file.lower().endswith(".adm")
+    adams = is_adams(model.file)
     usual = DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -117,6 +118,11 @@ def outcome(results: Results, wall_s: float) -> Outcome:
     )
 
 
+def _repeat(deck: Model, setting: Setting, limit: float, count: int) -> Outcome:
+    """`run` with the number of repeats last, as `measured` calls it."""
+    return run(deck, setting, count, limit)
+
+
 def measure(
     scene: Scene,
     integrators: Sequence[str],
@@ -146,9 +152,7 @@ def measure(
                 OURS,
                 __version__,
                 setting.text,
-                lambda count, deck=deck, setting=setting: run(  # type: ignore[misc]
-                    deck, setting, count, scene.limit
-                ),
+                functools.partial(_repeat, deck, setting, scene.limit),
                 repeats,
             )
         except Interrupted:

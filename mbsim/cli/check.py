@@ -20,8 +20,9 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     Says what is in the model and how each pair of shapes will be tested.
     """
     from mbsim.cli.messages import warn
+    from mbsim.model.names import is_adams
     from mbsim.reader.xml import read_model
-    from mbsim.settings import ADAMS, settle
+    from mbsim.settings import settle
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)
@@ -39,7 +40,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
         for text in pair_texts(plans, contact_id):
             click.echo(f"  Force_Contact[{contact_id}]: {text}")
     if not deck.simulations:
-        more = " and --print-interval" if deck.compatibility == ADAMS else ""
+        more = " and --print-interval" if is_adams(deck.file) else ""
         click.echo(f"  no Simulate: a run needs --end-time{more}")
     for note in (*deck.notes, *notes):
         click.echo(f"  note: {note}")

@@ -10,6 +10,7 @@ from pathlib import Path
 from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
+from mbsim.model.names import is_adams
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
@@ -49,7 +50,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     data = _read_bytes(deck)
     draft: Draft
     said_so: Callable[[Fault], Fault] = _as_it_is
-    if deck.suffix.lower() == ".adm":
+    if is_adams(deck.name):
         from mbsim.reader.adm.read import fill, in_words
         from mbsim.reader.adm.statements import AdmDraft
 

@@ -53,7 +53,6 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
     first = {"units": 0, "part": 1}
     for node in sorted(nodes, key=lambda node: first.get(node.key, 2)):
         _read_statement(node, draft)
-    draft.compatibility = "ADAMS"
     draft.broken = {(BY_KEY[fold(name)].xml, id) for name, id in draft.broken}
     draft.broken |= {(_XML_NAMES[name], int(id)) for name, id in _named(draft.puzzling)}
     draft.faults.sort(key=lambda fault: fault.line)
