@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim import __version__
-from mbsim.errors import Interrupted, ModelError, PluginError, SolverError
+from mbsim.errors import Interrupted, ModelError
+from mbsim.failures import fail, give_up
 from mbsim.model.elements import Model
-from mbsim.model.names import element_name
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
@@ -135,14 +135,14 @@ class Runner:
         y, f = self.method.y, self.method.k[0]
         code = self.call(self.problem.rhs, t, 0.0, y, f)
         if code != 0.0:
-            self.fail(int(code), t)
+            fail(self.system, self.detector, int(code), t)
         scene, model = self.system.scene, self.system.model
         if self.system.plans.crowds:
             # nothing is listed yet: list what is near, then look again
             self.call(self.problem.commit, t, 0.0, y, f)
             code = self.call(self.problem.rhs, t, 0.0, y, f)
             if code != 0.0:
-                self.fail(int(code), t)
+                fail(self.system, self.detector, int(code), t)
         faults = []
         pairs = scene.pairs
         live = pairs.live[: pairs.count[LIVE]]
@@ -241,7 +241,7 @@ class Runner:
             method.counts[scheme.NEXT_OUTPUT] = 1
             code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
             if code < 0.0:
-                self.fail(int(-code), times[0])
+                fail(self.system, self.detector, int(-code), times[0])
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
@@ -263,9 +263,14 @@ class Runner:
             if outcome == problem.DONE:
                 return
             if outcome == problem.FAILED:
-                self.fail(int(method.counts[scheme.CODE]), method.memory[scheme.TIME])
+                fail(
+                    self.system,
+                    self.detector,
+                    int(method.counts[scheme.CODE]),
+                    method.memory[scheme.TIME],
+                )
             if outcome == problem.STEP_TOO_SMALL:
-                self.give_up()
+                give_up(self.system, self.settings, self.method)
             if self.interrupted:
                 raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
             if self.recorder.due():
@@ -273,110 +278,6 @@ class Runner:
             if progress is not None:
                 h = float(method.memory[scheme.STEP])
                 progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
-
-    def give_up(self) -> None:
-        """Raise why the step became too small."""
-        from mbsim.core import problem
-        from mbsim.integrators import scheme
-
-        memory, counts, trouble = (
-            self.method.memory,
-            self.method.counts,
-            self.system.scene.work.trouble,
-        )
-        reason = {
-            problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
-            problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
-            problem.BY_NOT_FINITE: "a force or acceleration is not finite",
-        }[int(counts[scheme.LAST_REASON])]
-        body, contact = int(trouble[0]), int(trouble[1])
-        where = []
-        if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(self.system.body_ids):
-            where.append(self.system.body_name(body))
-        where.extend(self._out_of_reach())
-        if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
-            where.extend(self._not_finite()[:1])
-        if 0 <= contact < len(self.system.contact_ids):
-            where.append(f"Force_Contact[{self.system.contact_ids[contact]}]")
-        raise SolverError(
-            f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
-            f"because {reason}; at {', '.join(where) or 'no single element'}. "
-            "Results up to there are kept."
-        )
-
-    def _out_of_reach(self) -> list[str]:
-        """Return the equation that the step tried last left by more than its error may be."""
-        from mbsim.system.arrays import DRIFT, DRIFTER
-
-        quality = self.system.scene.sweep.quality
-        if not quality[DRIFT] > self.settings.tol:
-            return []
-        from mbsim.dynamics.assembly import equation_name
-
-        return [equation_name(self.system, int(quality[DRIFTER]))]
-
-    def _not_finite(self) -> list[str]:
-        """Return the applied forces that were no numbers when last evaluated."""
-        from mbsim.results.elements import GROUPS
-
-        applied = self.system.scene.work.applied
-        broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
-        file = self.system.model.file
-        elements = (self.system.applied[k] for k in broken)
-        return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
-
-    def fail(self, code: int, t: float) -> None:
-        """Raise what the hooks' code says."""
-        from mbsim.core.problem import NOT_FINITE
-        from mbsim.dynamics.contact import USER_NOT_FINITE
-        from mbsim.dynamics.detection import CROWDED
-        from mbsim.geometry.fcl_detector import DETECTOR_FAILED
-        from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
-
-        if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
-            from mbsim.plugins import raise_failure
-
-            raise_failure()
-        from mbsim.dynamics.equations import CONTRADICTION
-
-        contact = int(self.system.scene.work.trouble[1])
-        if code == CONTRADICTION:
-            from mbsim.dynamics.assembly import equation_name
-
-            raise SolverError(
-                f"{equation_name(self.system, contact)} contradicts other constraints from time "
-                f"{t:.9g} on; results up to there are kept"
-            )
-        from mbsim.dynamics.joint_friction import JAMMED
-
-        if code == JAMMED:
-            raise SolverError(self._jammed(contact, t))
-        element = self.system.contact_ids[contact] if 0 <= contact else 0
-        if code in (RAISED_COMPILED, USER_NOT_FINITE):
-            from mbsim.plugins import reproduce
-
-            reproduce(self.system.user_friction[element], self.system.scene.work.law_in, element)
-            raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
-        if code == DETECTOR_FAILED and self.detector is not None:
-            raise SolverError(f"FCL failed at time {t:.9g}: {self.detector.failure}")
-        if code == CROWDED:
-            raise SolverError(
-                f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
-            )
-        if code == NOT_FINITE:
-            where = "".join(f" of {name}" for name in self._not_finite()[:1])
-            raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
-        raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
-
-    def _jammed(self, row: int, t: float) -> str:
-        """Return what is said of friction that no acceleration can bear."""
-        id = self.system.applied[row][1]
-        joint = self.system.model.joint_frictions[id].joint_id
-        return (
-            f"Force_JointFriction[{id}]: Constraint_Joint[{joint}] jams at time {t:.9g}: friction "
-            "and the reaction that it causes raise each other without end; results up to there "
-            "are kept"
-        )
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run."""

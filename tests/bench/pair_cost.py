@@ -15,7 +15,7 @@ from contracts.test_pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, tur
 
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import PAIRS, POINT
-from mbsim.system.build import pair_address
+from mbsim.system.contacts import pair_address
 
 SHAPES = {
     **SIZES,

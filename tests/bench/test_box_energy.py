@@ -21,7 +21,7 @@ from validation.test_flat_shapes import FLOATING, cube
 
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import PAIRS, POINT
-from mbsim.system.build import pair_address
+from mbsim.system.contacts import pair_address
 
 pytestmark = pytest.mark.bench
 

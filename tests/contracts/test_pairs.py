@@ -10,7 +10,7 @@ import pytest
 
 from mbsim.geometry.catalog import PAIRS, POINT
 from mbsim.geometry.support import support
-from mbsim.system.build import pair_address
+from mbsim.system.contacts import pair_address
 
 # radius, half edges, radius and half length, both radii and half length; a plane has no size
 SIZES = {

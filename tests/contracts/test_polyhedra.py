@@ -20,7 +20,7 @@ import mbsim
 from mbsim.geometry.catalog import PAIRS, POINT
 from mbsim.model import hull as packed
 from mbsim.model.hull import polyhedron_of
-from mbsim.system.build import pair_address
+from mbsim.system.contacts import pair_address
 from mbsim.system.pairing import plan_pairs
 
 POINTER = ctypes.c_void_p

@@ -1,0 +1,123 @@
+"""Why a run ends before its time, in the user's words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from mbsim.errors import PluginError, SolverError
+from mbsim.model.names import element_name
+
+if TYPE_CHECKING:
+    from mbsim.settings import Settings
+    from mbsim.system.build import System
+
+
+def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
+    """Raise why the step became too small."""
+    from mbsim.core import problem
+    from mbsim.integrators import scheme
+
+    memory, counts, trouble = (
+        method.memory,
+        method.counts,
+        system.scene.work.trouble,
+    )
+    reason = {
+        problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
+        problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
+        problem.BY_NOT_FINITE: "a force or acceleration is not finite",
+    }[int(counts[scheme.LAST_REASON])]
+    body, contact = int(trouble[0]), int(trouble[1])
+    where = []
+    if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(system.body_ids):
+        where.append(system.body_name(body))
+    where.extend(_out_of_reach(system, settings))
+    if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
+        where.extend(_not_finite(system)[:1])
+    if 0 <= contact < len(system.contact_ids):
+        where.append(f"Force_Contact[{system.contact_ids[contact]}]")
+    raise SolverError(
+        f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
+        f"because {reason}; at {', '.join(where) or 'no single element'}. "
+        "Results up to there are kept."
+    )
+
+
+def _out_of_reach(system: System, settings: Settings) -> list[str]:
+    """Return the equation that the step tried last left by more than its error may be."""
+    from mbsim.system.arrays import DRIFT, DRIFTER
+
+    quality = system.scene.sweep.quality
+    if not quality[DRIFT] > settings.tol:
+        return []
+    from mbsim.dynamics.assembly import equation_name
+
+    return [equation_name(system, int(quality[DRIFTER]))]
+
+
+def _not_finite(system: System) -> list[str]:
+    """Return the applied forces that were no numbers when last evaluated."""
+    from mbsim.results.elements import GROUPS
+
+    applied = system.scene.work.applied
+    broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
+    file = system.model.file
+    elements = (system.applied[k] for k in broken)
+    return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
+
+
+def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
+    """Raise what the hooks' code says."""
+    from mbsim.core.problem import NOT_FINITE
+    from mbsim.dynamics.contact import USER_NOT_FINITE
+    from mbsim.dynamics.detection import CROWDED
+    from mbsim.geometry.fcl_detector import DETECTOR_FAILED
+    from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
+
+    if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
+        from mbsim.plugins import raise_failure
+
+        raise_failure()
+    from mbsim.dynamics.equations import CONTRADICTION
+
+    contact = int(system.scene.work.trouble[1])
+    if code == CONTRADICTION:
+        from mbsim.dynamics.assembly import equation_name
+
+        raise SolverError(
+            f"{equation_name(system, contact)} contradicts other constraints from time "
+            f"{t:.9g} on; results up to there are kept"
+        )
+    from mbsim.dynamics.joint_friction import JAMMED
+
+    if code == JAMMED:
+        raise SolverError(_jammed(system, contact, t))
+    element = system.contact_ids[contact] if 0 <= contact else 0
+    if code in (RAISED_COMPILED, USER_NOT_FINITE):
+        from mbsim.plugins import reproduce
+
+        reproduce(system.user_friction[element], system.scene.work.law_in, element)
+        raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
+    if code == DETECTOR_FAILED and detector is not None:
+        raise SolverError(f"FCL failed at time {t:.9g}: {detector.failure}")
+    if code == CROWDED:
+        raise SolverError(
+            f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
+        )
+    if code == NOT_FINITE:
+        where = "".join(f" of {name}" for name in _not_finite(system)[:1])
+        raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
+    raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
+
+
+def _jammed(system: System, row: int, t: float) -> str:
+    """Return what is said of friction that no acceleration can bear."""
+    id = system.applied[row][1]
+    joint = system.model.joint_frictions[id].joint_id
+    return (
+        f"Force_JointFriction[{id}]: Constraint_Joint[{joint}] jams at time {t:.9g}: friction "
+        "and the reaction that it causes raise each other without end; results up to there "
+        "are kept"
+    )
