@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 
 def drop_height(times, z0, low, mass, stiffness, exponent, damping, dmax, g=9.81):
@@ -224,3 +225,46 @@ def falling_chain(times, node, angles, length, mass, radius, law, g=9.81):
             out[row] = place(state[:size], state[size:])[0]
         t, y = float(found.t[-1]), found.y[:, -1]
     return out
+
+
+def elastic_stop(times, mass, spring, stop, gap, v=0.0, push=0.0, frequency=0.0):
+    """Return position of a mass on a spring with a linear stop at x = gap, and events.
+
+    It starts at x = 0 with `v`, under push sin(frequency t). In each stretch (free, in the stop)
+    the motion is A cos(w s) + B sin(w s) + offset + P sin(frequency t), exact to the root finder
+    that joins them. Events are pairs of time and "touch" or "leave".
+    """
+    t, x = float(times[0]), 0.0
+    events, out = [], np.empty(len(times))
+    inside = x >= gap and v > 0.0
+    if inside:
+        events.append((t, "touch"))
+    while t <= times[-1]:
+        stiffness = spring + (stop if inside else 0.0)
+        w = np.sqrt(stiffness / mass)
+        offset = stop * gap / stiffness if inside else 0.0
+        P = push / (stiffness - mass * frequency**2)
+        A = x - offset - P * np.sin(frequency * t)
+        B = (v - P * frequency * np.cos(frequency * t)) / w
+
+        def place(s, t=t, w=w, A=A, B=B, P=P, offset=offset):
+            harmonic = P * np.sin(frequency * (t + s))
+            return A * np.cos(w * s) + B * np.sin(w * s) + offset + harmonic
+
+        step = 0.01 / w
+        end, sign = step, 1.0 if inside else -1.0
+        # out of x = gap first (s = 0 is a root), then to the next change of side
+        while t + end <= times[-1] and sign * (place(end) - gap) > 0.0:
+            end += step
+        found = t + end <= times[-1]
+        if found:
+            end = brentq(lambda s: place(s) - gap, end - step, end, xtol=1e-16)
+        rows = (times >= t) & (times <= t + end)
+        out[rows] = place(times[rows] - t)
+        if not found:
+            break
+        phase = frequency * (t + end)
+        v = w * (B * np.cos(w * end) - A * np.sin(w * end)) + P * frequency * np.cos(phase)
+        t, x, inside = t + end, gap, not inside
+        events.append((t, "touch" if inside else "leave"))
+    return out, events

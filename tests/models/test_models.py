@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -15,11 +17,14 @@ from decks_io import MODELS, USERFUNCS, run_model
 from models.reference import (
     angle_between,
     drop_height,
+    elastic_stop,
     falling_chain,
     slider_crank,
     top_attitude,
     wall_pendulum,
 )
+
+import mbsim
 
 REFERENCES = Path(__file__).resolve().parents[3] / "shared/data/references.json"
 BOTH = pytest.mark.parametrize("detector", ["auto", "fcl"])
@@ -239,7 +244,6 @@ def test_ellipsoid_on_box(detector):
 
 def test_mesh_on_plane():
     results = run_model("mesh_on_plane.xml", tol=1e-7)
-    import mbsim
     from mbsim.model.placement import place
 
     mass = place(mbsim.read_model(MODELS / "mesh_on_plane.xml")).bodies[2].mass
@@ -346,3 +350,69 @@ def test_chain_on_box(tol, allowed):
         assert np.abs(p[:, 1]).max() < 1e-6
     energy = chain_energy(results)
     assert np.abs(energy - energy[0]).max() < allowed * results["energy/dissipated"][-1]
+
+
+def test_elastic_stop_by_stretches_has_the_published_numbers():
+    # code_aster V5.01.101; the impulse follows from the law in the stop
+    x, events = elastic_stop(np.linspace(0, 0.7, 70001), 100.0, 1e4, 1e6, 0.0, v=1.0)
+    assert x.max() == pytest.approx(9.9503719e-3, rel=1e-7)
+    assert 1e6 * x.max() == pytest.approx(9950.3719, rel=1e-7)
+    assert events[1] == (pytest.approx(0.0312600153, abs=1e-10), "leave")
+    assert events[2] == (pytest.approx(0.3454192806, abs=1e-10), "touch")
+
+
+STOPS = {"contact": 2, "IMPACT": 3, "BISTOP": 4, "joint limit": 5}
+STOP_TOLS = pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-4), (1e-12, 1e-8)])
+
+
+@STOP_TOLS
+def test_sdnd101(tol, allowed):
+    results = run_model("sdnd101.xml", tol=tol)
+    exact, times = elastic_stop(results["time"], 100.0, 1e4, 1e6, 0.0, v=1.0)
+    for body in STOPS.values():
+        x = results[f"bodies/{body}/position/x"]
+        assert np.abs(x - exact).max() < allowed * np.abs(exact).max()
+    assert results["contacts/2/peak_penetration"] == pytest.approx(9.9503719021e-3, rel=allowed)
+    assert results["contacts/2/peak_force"] == pytest.approx(9950.3719021, rel=allowed)
+    events = results["events"]
+    assert [event["kind"] for event in events] == [kind for _, kind in times[: len(events)]]
+    for event, (time, _) in zip(events, times, strict=False):
+        assert event["time"] == pytest.approx(time, rel=allowed)
+    # 198.0198 N s in the first stay, from the force at its rows
+    inside = results["time"] <= times[1][0]
+    impulse = -trapezoid(results["contacts/2/force/x"][inside], results["time"][inside])
+    assert impulse == pytest.approx(198.0198, rel=2e-3)
+
+
+@STOP_TOLS
+@pytest.mark.parametrize("kind", STOPS)
+def test_each_stop_of_sdnd101_alone(kind, tol, allowed, tmp_path):
+    # steps end where a contact begins; at the others a step runs into the stop and is cut
+    if kind != "contact":
+        allowed = max(allowed, 8e-4 if tol == 1e-5 else 0.0)
+    head, *stops = re.split(r"(?=\n    <!-- )", (MODELS / "sdnd101.xml").read_text("utf-8"))
+    tail = stops[-1][stops[-1].index("  </Model>") :]
+    body = list(STOPS).index(kind)
+    deck = tmp_path / "stop.xml"
+    deck.write_text(head + stops[body].split("  </Model>")[0] + tail, encoding="utf-8")
+    results = mbsim.simulate(mbsim.read_model(deck), tol=tol)
+    exact, _ = elastic_stop(results["time"], 100.0, 1e4, 1e6, 0.0, v=1.0)
+    x = results[f"bodies/{STOPS[kind]}/position/x"]
+    assert np.abs(x - exact).max() < allowed * np.abs(exact).max()
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    # an expression's energy is in its work
+    energy = energy + results["energy/dissipated"]
+    assert np.abs(energy - 50.0).max() < 4 * allowed * 50.0
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-4), (1e-12, 1e-8)])
+def test_sdnd121(tol, allowed):
+    results = run_model("sdnd121.xml", tol=tol)
+    exact, times = elastic_stop(
+        results["time"], 156.0, 2e6, 1e10, 1e-3, push=3000.0, frequency=2 * np.pi * 5
+    )
+    x = results["bodies/2/position/x"]
+    assert np.abs(x - exact).max() < allowed * np.abs(exact).max()
+    assert len(results["events"]) == len(times) == 34
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    assert np.abs(sum(parts)).max() < allowed * np.ptp(parts[2])
