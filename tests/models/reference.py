@@ -268,3 +268,59 @@ def elastic_stop(times, mass, spring, stop, gap, v=0.0, push=0.0, frequency=0.0)
         t, x, inside = t + end, gap, not inside
         events.append((t, "touch" if inside else "leave"))
     return out, events
+
+
+def flat_follower(times, speed, e, mass, spring, preload, K, c, start, g=9.81):
+    """Return the lift of a flat follower on an eccentric cam that it does not leave, and its rate.
+
+    m s'' = K (l - s) + c (l' - s') - k s - F0 - m g with l = e (1 - cos(w t)), from s = `start`
+    at rest: mean, harmonic and decaying part of a linear oscillator.
+    """
+    mean = (K * e - preload - mass * g) / (K + spring)
+    spun = 1j * speed
+    wave = -e * (K + spun * c) / (K + spring + mass * spun**2 + spun * c)
+    roots = np.roots([mass, c, K + spring]).astype(complex)
+    rest = np.array([start - mean - wave.real, -(spun * wave).real])
+    parts = np.linalg.solve(np.vstack([np.ones(2), roots]), rest)
+    lift = mean + (wave * np.exp(spun * times)).real
+    rate = (spun * wave * np.exp(spun * times)).real
+    for root, part in zip(roots, parts, strict=True):
+        lift = lift + (part * np.exp(root * times)).real
+        rate = rate + (root * part * np.exp(root * times)).real
+    return lift, rate
+
+
+def hopping_follower(times, speed, e, mass, spring, preload, law, start, g=9.81):
+    """Return the lift of a flat follower that may leave its eccentric cam, and when it leaves.
+
+    As `flat_follower`, with the IMPACT law; steps end where it touches and leaves.
+    """
+
+    def depth(t, s):
+        return e * (1.0 - np.cos(speed * t)) - s
+
+    def rhs(t, y):
+        rate = e * speed * np.sin(speed * t) - y[1]
+        push = impact(depth(t, y[0]), rate, *law)
+        return [y[1], (push - spring * y[0] - preload) / mass - g]
+
+    def cross(t, y):
+        return depth(t, y[0])
+
+    cross.terminal = True
+    lift, leaves = np.full(len(times), np.nan), []
+    t, y, end = float(times[0]), [start, 0.0], float(times[-1])
+    inside = depth(t, start) > 0.0
+    while t < end:
+        cross.direction = -1.0 if inside else 1.0
+        found = solve_ivp(
+            rhs, (t, end), y, method="DOP853", rtol=1e-11, atol=1e-14, events=cross,
+            max_step=2e-5 if inside else 1e-3, dense_output=True,
+        )  # fmt: skip
+        rows = (times >= t) & (times <= found.t[-1])
+        lift[rows] = found.sol(times[rows])[0]
+        t, y = float(found.t[-1]), list(found.y[:, -1])
+        if found.status == 1 and inside:
+            leaves.append(t)
+        inside = not inside
+    return lift, leaves

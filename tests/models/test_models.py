@@ -19,6 +19,8 @@ from models.reference import (
     drop_height,
     elastic_stop,
     falling_chain,
+    flat_follower,
+    hopping_follower,
     slider_crank,
     top_attitude,
     wall_pendulum,
@@ -416,3 +418,56 @@ def test_sdnd121(tol, allowed):
     assert len(results["events"]) == len(times) == 34
     parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
     assert np.abs(sum(parts)).max() < allowed * np.ptp(parts[2])
+
+
+CAM = (0.01, 0.5, 2000.0, 100.0)  # eccentricity, mass, spring, preload
+CAM_START = 0.024987536 - 0.025
+
+
+def cam_balance(results):
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts) - results["energy/work_of_motions"]
+    return np.abs(total - total[0]).max() / results["energy/kinetic"].max()
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-7)])
+def test_cam(tol, allowed):
+    results = run_model("cam.xml", tol=tol)
+    t, (e, m, k, preload), w = results["time"], CAM, 20 * np.pi
+    lift = results["bodies/3/position/z"] - 0.025
+    exact, rate = flat_follower(t, w, *CAM, 1e7, 900.0, CAM_START)
+    cam = e * (1 - np.cos(w * t))
+    force = 1e7 * (cam - exact) + 900.0 * (e * w * np.sin(w * t) - rate)
+    assert np.abs(lift - exact).max() < allowed * 1.5e-5  # of the depth
+    assert np.abs(results["contacts/301/force/z"] - force).max() < allowed * force.max()
+    torque = force * e * np.sin(w * t)
+    assert np.abs(results["motions/1/torque/y"] - torque).max() < allowed * torque.max()
+    # a rigid follower: lift and force, but for the depth and what it rings at the start
+    assert np.abs(lift - cam).max() < 1.5e-5
+    rigid = m * e * w**2 * np.cos(w * t) + k * cam + preload + m * 9.81
+    assert np.abs(force - rigid).max() < 1e-3 * rigid.max()
+    assert all(event["kind"] == "touch" for event in results["events"])  # never leaves
+    assert cam_balance(results) < allowed
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-3), (1e-9, 3e-6)])
+@pytest.mark.parametrize("part", [0.98, 1.02, 1.2, 1.8])
+def test_cam_throws_its_follower_above_a_speed(part, tol, allowed):
+    e, m, k, preload = CAM
+    w = float(part * np.sqrt((2 * k * e + preload + m * 9.81) / (m * e)))
+    speed = [f"Motion_Joint[1].expr={w!r}*TIME"]
+    results = run_model("cam.xml", overrides=speed, tol=tol, end_time=0.15)
+    law = (1e7, 1.0, 900.0, 1e-7)
+    exact, leaves = hopping_follower(results["time"], w, *CAM, law, CAM_START)
+    lift = results["bodies/3/position/z"] - 0.025
+    assert np.abs(lift - exact).max() < allowed * 0.02  # of the stroke
+    # both ends of the line leave
+    seen = [event["time"] for event in results["events"] if event["kind"] == "leave"][::2]
+    assert (len(seen) > 0) == (part > 1)
+    np.testing.assert_allclose(seen, leaves, rtol=0, atol=(allowed + 1e-4) / w)
+    if leaves:
+        # m e w^2 cos(w t) + k e (1 - cos(w t)) + F0 + m g = 0 of a rigid follower
+        pressed = k * e + preload + m * 9.81
+        first = np.arccos(-pressed / (m * e * w**2 - k * e)) / w
+        assert seen[0] == pytest.approx(first, abs=0.1 / w)
+    assert cam_balance(results) < allowed / 5
