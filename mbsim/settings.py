@@ -139,12 +139,18 @@ def _refuse_verlet(model: Model) -> None:
         "Motion_Joint": model.motions,
         "Constraint_General": model.general_constraints,
     }
-    for statement, elements in {**constraints, "Force_Scalar_TwoBody": model.scalar_forces}.items():
+    unknown = {
+        "Force_Scalar_TwoBody": model.scalar_forces,
+        "Control_Diff": model.differentials,
+    }
+    for statement, elements in {**constraints, **unknown}.items():
         for element in elements.values():
             name = element_name(model.file, statement, element.id)
             why = "free bodies and this model has joints or other constraints"
             if statement not in constraints:
                 why = "forces of known stiffness, which an expression does not say"
+                if statement == "Control_Diff":
+                    why = "bodies alone, and this model has states of its own"
             raise ModelError(
                 f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
                 "take DOPRI5 or DOP853"

@@ -12,6 +12,7 @@ from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.states import add_slopes
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
@@ -33,6 +34,23 @@ def _apply(context, t, y, dy):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+
+
+def _slope(context, t, y, dy):
+    """The slopes of states, where nothing is applied."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,)))
+
+
+def _apply_and_slope(context, t, y, dy):
+    """The forces of springs and expressions, and the slopes of states."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    if code != 0:
+        return code
+    return add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,)))
 
 
 def _rub(context, t, y, dy):
@@ -71,8 +89,10 @@ def open_expressions(scene: Scene) -> None:
     doors = scene.world.doors
     if len(scene.programs.start) > 1:
         doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
-    if len(scene.applied.kind) > 0:
-        doors[APPLIED_DOOR] = jit.address(_apply, _APPLY)
+    applied, states = len(scene.applied.kind) > 0, len(scene.states.program) > 0
+    if applied or states:
+        acting = _apply if not states else _apply_and_slope if applied else _slope
+        doors[APPLIED_DOOR] = jit.address(acting, _APPLY)
     if (scene.applied.connection >= 0).any():
         doors[FRICTION_DOOR] = jit.address(_rub, _APPLY)
     if scene.rows.value.shape[1] > 0:

@@ -28,6 +28,7 @@ from mbsim.system.programs import (
     ORIENT,
     SPEED,
     SPIN,
+    STATE,
     TURN,
     TURNING,
     VELOCITY,
@@ -64,6 +65,8 @@ def rate_or_force(scene, y, code):
         return norm(relative_spin(scene, code[1], code[2]))
     if op == SPIN:
         return dot(relative_spin(scene, code[1], code[2]), marker_axis(scene, code[3], code[4]))
+    if op == STATE:
+        return y[code[1]]
     if op == NET:
         return net_force(scene, y, code[1], code[2], code[3], code[4])
     return element_force(scene, y, code[1], code[2], code[3], code[5], code[4])

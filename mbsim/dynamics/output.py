@@ -147,7 +147,7 @@ def beyond_noise(scene, b, h, dv, dw):
 
 @jitable
 def scaled_error(scene, h, e, y):
-    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and of incidents' X/L and energy.
+    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and of incidents' X/L, energy, states.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
     step can do to a velocity is not chased. The worst body is left in `trouble[0]`.
@@ -181,6 +181,10 @@ def scaled_error(scene, h, e, y):
         first -= 1 if kept >= 0 else 0
     for c in range(first, len(e)):
         largest = max(largest, (e[c] / scene.world.scale[2]) ** 2)
+    states = scene.states
+    for k in range(len(states.place)):
+        at = states.place[k]
+        largest = max(largest, (e[at] / max(abs(y[at]), states.scale[k])) ** 2)
     # what was not integrated but put right, as after a motion that jumps
     largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     scene.work.trouble[0] = worst

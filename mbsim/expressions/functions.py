@@ -15,6 +15,7 @@ i, j, k, l, where one that is left out or 0 is the global frame:
 | VR(i,j)                   | rate of DM(i,j)                                              |
 | VX, VY, VZ(i,j,k,l)       | (v_i - v_j) . x_k, y_k, z_k, seen from l                     |
 | WM(i,j), WX..(i,j,k)      | abs(w_i - w_j), (w_i - w_j) . x_k                            |
+| DIF(id), DIF1(id)         | z of a Control_Diff, and z'                                  |
 | FM, FX.. TM, TX..(i,j,k)  | of all that acts between i and j: force and torque on i      |
 | JOINT.. (id,jflag,comp,k) | force or torque of an element on I (jflag 0) or J (1)        |
 
@@ -35,6 +36,7 @@ class Kind(Enum):
     VELOCITY = "how markers move"
     FORCE = "forces"
     VARIABLE = "a variable"
+    STATE = "states"
 
 
 class Function(NamedTuple):
@@ -99,3 +101,5 @@ _put(Kind.FORCE, "MOTION", "MOTION jflag comp marker", 3)
 _put(Kind.FORCE, "SFORCE", "SFORCE jflag comp marker", 3)
 _put(Kind.FORCE, "SPDP", "SPRINGDAMPER jflag comp marker", 3)
 _put(Kind.VARIABLE, "VARVAL", "VARIABLE")
+_put(Kind.VARIABLE, "DIF1", "DIFF")
+_put(Kind.STATE, "DIF", "DIFF")

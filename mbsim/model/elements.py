@@ -347,6 +347,22 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Differential:
+    """Control_Diff, Adams' DIFF: a state z of the user's own, z' = expr, that starts at `ic`.
+
+    Others use z by DIF(id) and z' by DIF1(id). `scale`: below this size of z a local error
+    counts as one of z at this size (README, "Tolerance").
+    """
+
+    id: int
+    expr: Expression
+    ic: float = 0.0
+    scale: float = 1.0
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Request:
     """Post_Request, Adams' REQUEST.
 
@@ -391,6 +407,7 @@ class Model:
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
+    differentials: dict[int, Differential] = field(default_factory=dict)
     gravity: Gravity = Gravity()
     transient: Transient = Transient()
     simulations: tuple[Simulation, ...] = ()

@@ -24,6 +24,7 @@ STATEMENTS = {
     "JOINTLIMIT": "Force_JointLimit",
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
+    "DIFF": "Control_Diff",
 }
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
 #: Joints that may have friction, with the attribute that is the lever of what turns.
@@ -51,6 +52,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Force_JointFriction": model.joint_frictions,
         "Force_JointLimit": model.joint_limits,
         "Reference_Variable": model.variables,
+        "Control_Diff": model.differentials,
     }
 
 
@@ -254,34 +256,52 @@ def _limits(model: Model) -> Iterator[Fault]:
             yield _fault(limit.source, f"Force_JointLimit[{limit.id}]", message)
 
 
+def _put_in(expression: Expression) -> Iterator[tuple[str, int]]:
+    """Yield what an expression puts in place: variables by VARVAL, and by DIF1 what z' is."""
+    for call in _calls(expression):
+        if call.name in _PUT_IN and isinstance(call.args[0], Number):
+            yield call.name, int(call.args[0].value)
+
+
+_PUT_IN = {"VARVAL": "Reference_Variable", "DIF1": "Control_Diff"}
+
+
 def _circles(model: Model) -> Iterator[Fault]:
-    """Yield variables that depend on themselves."""
-    uses = {
-        id: [v for v, statement in _used(variable.expr) if statement == "Reference_Variable"]
-        for id, variable in model.variables.items()
+    """Yield variables and slopes of states that depend on themselves."""
+    elements: dict[tuple[str, int], Any] = {
+        ("VARVAL", id): variable for id, variable in model.variables.items()
     }
-    finished: set[int] = set()
+    elements.update({("DIF1", id): state for id, state in model.differentials.items()})
+    uses = {key: list(_put_in(element.expr)) for key, element in elements.items()}
+    finished: set[tuple[str, int]] = set()
     for start in uses:
-        path: list[int] = []
+        path: list[tuple[str, int]] = []
         stack = [(start, iter(uses[start]))]
         while stack:
-            id, rest = stack[-1]
-            if not path or path[-1] != id:
-                path.append(id)
+            key, rest = stack[-1]
+            if not path or path[-1] != key:
+                path.append(key)
             step = next((v for v in rest if v in uses and v not in finished), None)
             if step is None:
-                finished.add(id)
+                finished.add(key)
                 stack.pop()
                 path.pop()
             elif step in path:
-                ring = " -> ".join(map(str, [*path[path.index(step) :], step]))
-                source = model.variables[step].source
-                message = f"VARVAL leads back to the variable itself: {ring}"
-                yield _fault(source, f"Reference_Variable[{step}]", message)
+                yield _circle(elements[step].source, [*path[path.index(step) :], step])
                 finished.update(path)
                 break
             else:
                 stack.append((step, iter(uses[step])))
+
+
+def _circle(source: Source, ring: list[tuple[str, int]]) -> Fault:
+    """Return what is said of a ring of elements that need each other."""
+    function, id = ring[0]
+    alike = all(name == function for name, _ in ring)
+    shown = " -> ".join(str(id) if alike else f"{name}({id})" for name, id in ring)
+    what = "variable" if function == "VARVAL" else "slope"
+    message = f"{function} leads back to the {what} itself: {shown}"
+    return _fault(source, f"{_PUT_IN[function]}[{id}]", message)
 
 
 def _short(text: str) -> str:

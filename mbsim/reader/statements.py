@@ -12,6 +12,7 @@ from mbsim.reader.constraints import (
     MOTION_JOINT,
 )
 from mbsim.reader.contact import FORCE_CONTACT
+from mbsim.reader.controls import CONTROL_DIFF
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import FORCE_SCALAR_TWOBODY, FORCE_SPRINGDAMPER, REFERENCE_VARIABLE
 from mbsim.reader.graphics import POST_GRAPHIC
@@ -49,6 +50,7 @@ STATEMENTS = (
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
+    CONTROL_DIFF,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -62,7 +64,7 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 NOT_BUILT = (
     "Activate Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
     "Constraint_PTCV Constraint_PTdCV "
-    "Constraint_PTSF Constraint_UserConstr Control_Diff Control_FMU Control_PlantInput "
+    "Constraint_PTSF Constraint_UserConstr Control_FMU Control_PlantInput "
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
     "Force_Beam Force_Bushing Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody Force_Vector_OneBody "

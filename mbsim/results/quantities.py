@@ -80,6 +80,7 @@ _BY_NAME = {
     "penetration": Quantity("Penetration", length=1),
     "slip_speed": Quantity("Slip speed", length=1, time=-1),
     "incidents": INCIDENTS,
+    "value": Quantity("State"),
     "area": Quantity("Contact area", length=2),
     "kinetic": _ENERGY,
     "potential": _ENERGY,

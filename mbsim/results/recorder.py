@@ -169,6 +169,7 @@ class Recorder:
         """Return what elements are called and what requests hold, by group or dataset."""
         model = self.system.model
         named = {f"bodies/{id}": model.bodies[id].label for id in self.system.body_ids}
+        named |= {f"diffs/{id}": state.label for id, state in model.differentials.items()}
         named |= {f"contacts/{id}": model.contacts[id].label for id in self.system.contact_ids}
         labels = {name: {"label": label} for name, label in named.items() if label}
         return labels | {name: about for name, about in facts(model) if about}
@@ -320,6 +321,8 @@ class Recorder:
             path = f"{GROUPS[statement].path}/{id}"
             yield f"{path}/force", wrenches[:, k, 0:3]
             yield f"{path}/torque", wrenches[:, k, 3:6]
+        for place, id in zip(system.scene.states.place, system.model.differentials, strict=True):
+            yield f"diffs/{id}/value", block.y[:, place]
         forces = Forces(system, bodies, block.joint, block.applied, block.contact)
         for request in system.model.requests.values():
             markers = system.placement.markers
@@ -359,6 +362,7 @@ def _described(model: Model) -> Iterator[Any]:
     for statement in (*CONSTRAINTS, *APPLIED):
         yield from elements_of(model, statement).values()
     yield from model.variables.values()
+    yield from model.differentials.values()
     yield from model.requests.values()
 
 

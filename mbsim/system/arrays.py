@@ -8,7 +8,7 @@ units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
-slot whose law uses it; then the work of motions and what applied forces dissipated, where there
+slot whose law uses it; then the user's own states, one number each; then the work of motions and what applied forces dissipated, where there
 are any (`World.ledger`); last the energy that each contact has dissipated so far (one number
 where there is no contact, so that y is never empty).
 """
@@ -207,6 +207,14 @@ class Programs(NamedTuple):
     code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
+
+
+class States(NamedTuple):
+    """States of the user's own."""
+
+    program: I1  # (nz,) their slopes
+    place: I1  # (nz,) in y
+    scale: F1  # (nz,) size below which an error counts as one at this size
 
 
 class Applied(NamedTuple):
@@ -410,6 +418,7 @@ class Scene(NamedTuple):
     markers: Markers
     angles: Angles
     programs: Programs
+    states: States
     applied: Applied
     tree: Tree
     equations: Equations

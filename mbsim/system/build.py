@@ -35,7 +35,8 @@ from mbsim.system.pairing import (
     shape_class,
 )
 from mbsim.system.programs import ProgramTable
-from mbsim.system.scratch import empty_log, empty_rows, first_state, scratch
+from mbsim.system.scratch import empty_log, empty_rows, scratch, start_state
+from mbsim.system.states import states_table
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -222,14 +223,18 @@ def build(
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
 
     table = MarkerTable(placement, row)
-    programs = ProgramTable(table, model.variables)
+    first_state = a.BODY_SIZE * nb + 3 * len(carried)
+    programs = ProgramTable(table, model.variables, model.differentials, first_state)
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
+    states = states_table(model, programs)
     values = _values(model, programs)
-    ledger = _ledger(bool(model.motions), nf > 0, a.BODY_SIZE * nb + 3 * len(carried))
+    nz = len(states.program)
+    ledger = _ledger(bool(model.motions), nf > 0, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
-    y0 = _initial_y(placement, 3 * len(carried) + kept)
+    y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
+    y0[states.place] = [state.ic for state in model.differentials.values()]
     markers, angles = table.arrays()
 
     speed = _speed_scale(model, placement, end_time)
@@ -246,6 +251,7 @@ def build(
         markers=markers,
         angles=angles,
         programs=programs.arrays(mechanism.elements, applied_ids),
+        states=states,
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
@@ -257,7 +263,7 @@ def build(
             np.zeros(1, dtype=np.int64),
             ledger,
         ),
-        state=first_state(nb, len(graphic_ids), ns, table.start_angles()),
+        state=start_state(nb, len(graphic_ids), ns, table.start_angles()),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
         sweep=sweep(mechanism),

@@ -19,6 +19,7 @@ up to five numbers:
 | TURNING            | markers i, j                                                          |
 | SPIN               | markers i, j, k and axis of k                                         |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
+| STATE              | place in y                                                            |
 | ELEMENT            | 0 a connection or 1 an applied force, its row, jflag, comp, marker k  |
 """
 
@@ -36,14 +37,14 @@ from mbsim.expressions.elementary import CODES, FIRST_MEASURE, NUMBER, TIME
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time
-from mbsim.model.elements import Variable
+from mbsim.model.elements import Differential, Variable
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
 
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT = range(FIRST_MEASURE, FIRST_MEASURE + 5)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 5, FIRST_MEASURE + 10)
-NET, ELEMENT = range(FIRST_MEASURE + 10, FIRST_MEASURE + 12)
+NET, ELEMENT, STATE = range(FIRST_MEASURE + 10, FIRST_MEASURE + 13)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -56,6 +57,7 @@ _STATEMENTS = {
     "GeneralConstraint": "Constraint_General",
     "ScalarForce": "Force_Scalar_TwoBody",
     "Variable": "Reference_Variable",
+    "Differential": "Control_Diff",
     "Request": "Post_Request",
 }
 
@@ -75,6 +77,8 @@ class ProgramTable:
 
     markers: MarkerTable
     variables: Mapping[int, Variable] = field(default_factory=dict)
+    differentials: Mapping[int, Differential] = field(default_factory=dict)
+    first_state: int = 0  # where in y the first of their states stands
     programs: list[list[Instruction]] = field(default_factory=list)
 
     def add(
@@ -109,7 +113,7 @@ class ProgramTable:
         if not of_time:
             allowed.add(Kind.DISPLACEMENT)
             if not differentiable:
-                allowed.add(Kind.VELOCITY)
+                allowed |= {Kind.VELOCITY, Kind.STATE}
                 if forces:
                     allowed.add(Kind.FORCE)
         try:
@@ -181,8 +185,9 @@ class _Compiler:
 
     def __init__(self, table: ProgramTable, allowed: frozenset[Kind]) -> None:
         self.table, self.allowed = table, allowed
-        self.open: list[int] = []  # variables that are being put in
-        self.made: dict[int, list[Instruction]] = {}
+        # variables and slopes that are being put in, by function and id
+        self.open: list[tuple[str, int]] = []
+        self.made: dict[tuple[str, int], list[Instruction]] = {}
 
     def compile(self, root: Node) -> list[Instruction]:
         """Return the instructions of a tree, arguments before their function."""
@@ -227,16 +232,17 @@ class _Compiler:
         return self.variable(node) if kind is Kind.VARIABLE else [self.measure(node, kind)]
 
     def variable(self, node: Call) -> list[Instruction]:
-        """Return the instructions of another variable's expression."""
-        key = self.number(node, 0)
+        """Return the instructions of a variable's expression, or of a state's slope."""
+        slope, id = node.name == "DIF1", self.number(node, 0)
+        key, what = (node.name, id), "state" if slope else "variable"
         if key in self.made:
             return self.made[key]
-        variable = self.table.variables.get(key)
+        variable: Any = (self.table.differentials if slope else self.table.variables).get(id)
         if variable is None:
-            raise ExpressionError(f"there is no variable {key}", node.column)
-        ring = " -> ".join(map(str, [*self.open, key]))
+            raise ExpressionError(f"there is no {what} {id}", node.column)
+        ring = " -> ".join(str(id) for _, id in [*self.open, key])
         if key in self.open:
-            raise ExpressionError(f"variables that need each other: {ring}", node.column)
+            raise ExpressionError(f"{what}s that need each other: {ring}", node.column)
         if len(self.open) >= DEEPEST_VARIABLE:
             raise ExpressionError(
                 f"more than {DEEPEST_VARIABLE} variables that use one another", node.column
@@ -245,10 +251,10 @@ class _Compiler:
         try:
             made = self.compile(variable.expr.root)
         except ExpressionError as fault:
-            if fault.message.startswith("in variable"):
+            if fault.message.startswith(("in variable", "in state")):
                 raise
             raise ExpressionError(
-                f"in variable {key}, {variable.expr.text!r}: {fault.message}", fault.column
+                f"in {what} {id}, {variable.expr.text!r}: {fault.message}", fault.column
             ) from None
         self.open.pop()
         self.made[key] = made
@@ -275,6 +281,8 @@ class _Compiler:
         name, table = node.name, self.table.markers
         if kind is Kind.FORCE:
             return self.force(node)
+        if kind is Kind.STATE:
+            return self.state(node)
         if name == "ORIENT":
             which = self.number(node, 1) - 1
             return Instruction(ORIENT, (self.marker(node, 2), self.marker(node, 3), which))
@@ -292,6 +300,13 @@ class _Compiler:
         if name[0] == "V":
             return Instruction(VELOCITY, (i, j, k, self.marker(node, 3), axis))
         return Instruction({"D": OFFSET, "W": SPIN}[name[0]], (i, j, k, axis))
+
+    def state(self, node: Call) -> Instruction:
+        """Return a state of the user's own."""
+        id = self.number(node, 0)
+        if id not in self.table.differentials:
+            raise ExpressionError(f"there is no state {id}", node.column)
+        return Instruction(STATE, (self.table.first_state + [*self.table.differentials].index(id),))
 
     def force(self, node: Call) -> Instruction:
         """Return a force between markers, or of one element whose row is found later."""

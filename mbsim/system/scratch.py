@@ -15,7 +15,7 @@ EVENTS = 1024
 INCIDENTS = 100_000
 
 
-def first_state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.State:
+def start_state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.State:
     """Return the incident table before anything touched."""
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0

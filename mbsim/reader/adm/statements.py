@@ -338,6 +338,15 @@ def _build_variable(entry: Entry) -> None:
         entry.register(entry.draft.variables, variable)
 
 
+def _build_differential(entry: Entry) -> None:
+    """Add a state."""
+    if entry.get("FUNCTION") is not None:
+        state = el.Differential(
+            entry.get("id", 0), entry.get("FUNCTION"), entry.get("IC", 0.0), source=entry.source
+        )
+        entry.register(entry.draft.differentials, state)
+
+
 _FUNCTIONS = tuple(f"F{k}" for k in range(1, 9))
 
 
@@ -562,6 +571,19 @@ STATEMENTS = (
         xml="Reference_Variable",
     ),
     AdmStatement(
+        "DIFF",
+        {
+            **_ID,
+            "FUNCTION": Spec(EXPRESSION, required=True),
+            "IC": Spec(REAL),
+            "STATIC_HOLD": Spec(FLAG, note=_HARMLESS),
+            "IMPLICIT": Spec(FLAG, refused="an implicit equation is not built; solve it for z'"),
+        },
+        _build_differential,
+        words={"STATIC_HOLD": ("STATIC_HOLD", "TRUE"), "IMPLICIT": ("IMPLICIT", "TRUE")},
+        xml="Control_Diff",
+    ),
+    AdmStatement(
         "REQUEST",
         {
             **_ID,
@@ -603,7 +625,7 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
 # the others of the language, which would change the motion or what is known of it
 NOT_BUILT = (
-    "ARRAY BEAM BUSHING CONTACT COUPLER CURVE CVCV DIFF EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
+    "ARRAY BEAM BUSHING CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
     "GFORCE GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
     "PTCV PTSF SENSOR SPLINE STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
 ).split()
