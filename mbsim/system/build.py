@@ -231,6 +231,10 @@ def build(
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, 3 * len(carried) + kept)
     markers, angles = table.arrays()
+    instructions = programs.arrays(mechanism.elements, applied_ids)
+    if any(s.analysis_type == "STATIC" for s in model.simulations):
+        # the last number is TIME where it stands still
+        instructions = instructions._replace(number=np.append(instructions.number, 0.0))
 
     speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(
@@ -245,7 +249,7 @@ def build(
         slots=a.Slots(slot_pair, x),
         markers=markers,
         angles=angles,
-        programs=programs.arrays(mechanism.elements, applied_ids),
+        programs=instructions,
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
