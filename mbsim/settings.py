@@ -32,6 +32,11 @@ class Stage:
     h_min: float
     h0_max: float  # 0 if not given
 
+    @property
+    def is_static(self) -> bool:
+        """Whether it is the search for an equilibrium."""
+        return self.simulation.analysis_type == "STATIC"
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -82,11 +87,16 @@ def _simulations(
         _checked("end_time", end_time, 0.0, math.inf)
         if not planned:
             planned = [Simulation(end_time=end_time, print_interval=end_time / 100.0)]
-        planned = [s for s in planned if s.start_time < end_time]
+        planned = [
+            s
+            for s in planned
+            if s.start_time < end_time or (s.analysis_type == "STATIC" and s.start_time <= end_time)
+        ]
         if not planned:
             raise ModelError(f"end_time={end_time:g} is before the deck's first start_time")
         kept = [replace(s, end_time=min(s.end_time, end_time)) for s in planned]
-        kept[-1] = replace(kept[-1], end_time=end_time)
+        if kept[-1].analysis_type != "STATIC":
+            kept[-1] = replace(kept[-1], end_time=end_time)
         planned = kept
     if not planned:
         raise ModelError(f"{model.file}: the deck has no Simulate; give --end-time")

@@ -106,16 +106,8 @@ class Runner:
             contradiction,
             describe,
         )
-        from mbsim.system.arrays import JOINTS_DOOR
-
-        pointer = ctypes.c_void_p
-        door = ctypes.CFUNCTYPE(
-            ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer
-        )(int(scene.world.doors[JOINTS_DOOR]))
         t = self.settings.stages[0].simulation.start_time
-
-        def serve(what: int, y: Any) -> None:
-            door(self.problem.context, what, t, y.ctypes.data, y.ctypes.data)
+        serve = self._door(t)
 
         try:
             self.assembly = assemble(scene, self.method.y, serve, self.system.given_velocities())
@@ -126,6 +118,68 @@ class Runner:
             self.log.line(line)
         for line in warnings:
             self.tell(line)
+
+    def _door(self, t: float) -> Any:
+        """Return what asks the joints' door at time t, None where there are no joints."""
+        scene = self.system.scene
+        if len(scene.tree.body) == 0:
+            return None
+        from mbsim.system.arrays import JOINTS_DOOR
+
+        pointer = ctypes.c_void_p
+        door = ctypes.CFUNCTYPE(
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer
+        )(int(scene.world.doors[JOINTS_DOOR]))
+
+        def serve(what: int, y: Any) -> None:
+            door(self.problem.context, what, t, y.ctypes.data, y.ctypes.data)
+
+        return serve
+
+    def balance(self, stage: Stage) -> None:
+        """Put the bodies into equilibrium."""
+        from mbsim.dynamics.equilibrium import Hooks
+        from mbsim.statics import find
+
+        t, problem, scene = stage.simulation.start_time, self.problem, self.system.scene
+        hooks = Hooks(
+            lambda y, f: self.call(problem.rhs, t, 0.0, y, f),
+            lambda y: self.call(problem.project, t, 0.0, y, y),
+            lambda y, f: self.call(problem.commit, t, 0.0, y, f),
+            self._door(t),
+        )
+        groups = (scene.state, scene.pairs, scene.crowds, scene.log, scene.rows)
+        before = [[np.array(array) for array in group] for group in groups]
+
+        def say(line: str) -> None:
+            self.log.line(line)
+            self.tell(line)
+
+        y = self.method.y.copy()
+        find(self.system, y, t, hooks, stage.simulation.static, say)
+        # turns are counted on the way; all else is as if the bodies had jumped
+        turns = scene.state.angle.copy()
+        for group, kept in zip(groups, before, strict=True):
+            for array, old in zip(group, kept, strict=True):
+                array[...] = old
+        scene.state.angle[...] = turns
+        self.method.y[...] = y
+        for _ in range(2):
+            # near pairs of crowds are listed first, then looked at
+            self.call(problem.rhs, t, 0.0, self.method.y, self.method.k[0])
+            self.call(problem.commit, t, 0.0, self.method.y, self.method.k[0])
+
+    def assemble_again(self, t: float) -> None:
+        """Give the bodies the velocities that motions ask for, after a stage that had none."""
+        serve = self._door(t)
+        if serve is None:
+            return
+        from mbsim.dynamics.assembly import ContradictionError, assemble, contradiction
+
+        try:
+            assemble(self.system.scene, self.method.y, serve, {})
+        except ContradictionError as error:
+            raise ModelError(contradiction(self.system, error)) from None
 
     def settle_contacts(self, allow_overlap: bool) -> None:
         """Begin with the incidents that exist at the start; refuse those that are too deep."""
@@ -239,9 +293,18 @@ class Runner:
             method.memory[scheme.FIRST_MAX] = stage.h0_max
             method.memory[scheme.LAST_STEP] = 0.0
             method.counts[scheme.NEXT_OUTPUT] = 1
-            code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
-            if code < 0.0:
-                fail(self.system, self.detector, int(-code), times[0])
+            if simulation.analysis_type == "STATIC":
+                self.balance(stage)
+            elif self.stage and self.settings.stages[self.stage - 1].is_static:
+                # motions of velocity go on from rest
+                self.assemble_again(times[0])
+            if len(times):
+                code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
+                if code < 0.0:
+                    fail(self.system, self.detector, int(-code), times[0])
+        if simulation.analysis_type == "STATIC":
+            self.recorder.take()
+            return
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(

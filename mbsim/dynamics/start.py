@@ -45,10 +45,10 @@ def tree_map(scene: Scene) -> Array:
     return found.reshape(6 * n, -1)
 
 
-def _flows(scene: Scene, found: Array, held: Array, given: Array) -> tuple[Array, Array]:
-    """Return rows and right sides of the rates that equations ask for."""
+def equation_rows(scene: Scene, found: Array, held: Array) -> Array:
+    """Return what the rates of the held equations take of rates in the free directions."""
     equations, tree, sweep = scene.equations, scene.tree, scene.sweep
-    rows, sides = [], []
+    rows = []
     for e in np.flatnonzero(held):
         row = np.zeros(found.shape[1])
         for k in range(equations.first[e], equations.first[e + 1]):
@@ -62,9 +62,14 @@ def _flows(scene: Scene, found: Array, held: Array, given: Array) -> tuple[Array
                 at = found[6 * place : 6 * place + 6]
                 row += G[3:] @ at[:3] + torque @ at[3:]
         rows.append(row)
-        wanted = sweep.rate[e, _FLOW] - sweep.rate[e, _MISMATCH]
-        sides.append(given[e] if np.isfinite(given[e]) else wanted)
-    return np.array(rows).reshape(-1, found.shape[1]), np.array(sides)
+    return np.array(rows).reshape(-1, found.shape[1])
+
+
+def _flows(scene: Scene, found: Array, held: Array, given: Array) -> tuple[Array, Array]:
+    """Return rows and right sides of the rates that equations ask for."""
+    wanted = scene.sweep.rate[:, _FLOW] - scene.sweep.rate[:, _MISMATCH]
+    sides = np.where(np.isfinite(given), given, wanted[: len(given)])
+    return equation_rows(scene, found, held), sides[held]
 
 
 def _meet(rate: Array, free: Array, rows: Array, sides: Array, size: float) -> tuple[Array, Array]:

@@ -175,8 +175,20 @@ class Transient:
 
 
 @dataclass(frozen=True)
+class Static:
+    """Param_Static; None where the deck says nothing."""
+
+    max_num_iter: int | None = None
+    imbalance: float | None = None  # [F]
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Simulation:
-    """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`."""
+    """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`.
+
+    STATIC and ASSEMBLY take no time: both are where they stand.
+    """
 
     analysis_type: str = "TRANSIENT"
     start_time: float = 0.0
@@ -184,6 +196,7 @@ class Simulation:
     print_interval: float = 0.0
     transient: Transient | None = None  # a Param_Transient that stood before it in <Command>
     gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
+    static: Static = Static()
     source: Source = Source()
 
 

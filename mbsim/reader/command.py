@@ -92,17 +92,40 @@ def _times(entry: Entry) -> tuple[float, float] | None:
     return start, end
 
 
-def _build_assembly(entry: Entry) -> None:
-    """Add an assembly, which takes no time."""
-    draft = entry.draft
-    for name in ("start_time", "end_time", "duration", *_OUTPUTS, "print_increment"):
+def _build_timeless(entry: Entry) -> None:
+    """Add an assembly or an equilibrium, which take no time."""
+    draft, kind = entry.draft, entry.get("analysis_type")
+    if kind == "ASSEMBLY":
+        unused: tuple[str, ...] = ("start_time", "end_time", "duration", *_OUTPUTS)
+    else:
+        unused = ("end_time", "duration", *_OUTPUTS)
+    for name in (*unused, "print_increment"):
         if entry.given(name):
-            entry.note("has no effect with analysis_type ASSEMBLY, which takes no time", name)
+            entry.note(f"has no effect with analysis_type {kind}, which takes no time", name)
     now = draft.simulations[-1].end_time if draft.simulations else 0.0
+    if kind == "STATIC" and entry.get("start_time") is not None:
+        if draft.simulations and entry.get("start_time") != now:
+            message = f"a later Simulate starts where the one before ended, at {now:g}"
+            entry.fault(message, "start_time")
+            return
+        now = entry.get("start_time")
     simulation = el.Simulation(
-        "ASSEMBLY", now, now, 1.0, draft.command_transient, draft.command_gravity, entry.source
+        kind,
+        now,
+        now,
+        1.0,
+        draft.command_transient,
+        draft.command_gravity,
+        draft.static,
+        entry.source,
     )
     draft.simulations.append(simulation)
+
+
+def _build_static(entry: Entry) -> None:
+    """Set how equilibria are found from here on."""
+    given = {name: entry.get(name) for name in ("max_num_iter", "imbalance") if entry.given(name)}
+    entry.draft.static = replace(entry.draft.static, **given, source=entry.source)
 
 
 def _build_simulate(entry: Entry) -> None:
@@ -110,8 +133,8 @@ def _build_simulate(entry: Entry) -> None:
     draft = entry.draft
     if not entry.given("analysis_type"):
         entry.note("not given; taken as TRANSIENT", "analysis_type")
-    if entry.get("analysis_type") == "ASSEMBLY":
-        _build_assembly(entry)
+    if entry.get("analysis_type") in ("ASSEMBLY", "STATIC"):
+        _build_timeless(entry)
         return
     times = _times(entry)
     outputs = [name for name in _OUTPUTS if entry.given(name)]
@@ -177,6 +200,23 @@ PARAM_TRANSIENT = Statement(
         **{name: Spec(kind, note=_NO_EFFECT) for name, kind in _UNUSED.items()},
     },
     _build_transient,
+    in_command=True,
+)
+_ITS_OWN = (
+    "is not honoured: the search goes on until rounding allows no better; "
+    "imbalance and max_num_iter bound it"
+)
+PARAM_STATIC = Statement(
+    "Param_Static",
+    {
+        "max_num_iter": Spec(COUNT, alias="maxit"),
+        "imbalance": Spec(POSITIVE),
+        **{
+            name: Spec(TEXT, refused=_ITS_OWN)
+            for name in ("error", "kinetic_energy_error", "stability", "method")
+        },
+    },
+    _build_static,
     in_command=True,
 )
 FORCE_GRAVITY = Statement(

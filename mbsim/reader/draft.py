@@ -42,6 +42,7 @@ class Draft:
     display_graphics: dict[int, str] = field(default_factory=dict)
     gravity: el.Gravity | None = None
     transient: el.Transient | None = None
+    static: el.Static = field(default_factory=el.Static)
     simulations: list[el.Simulation] = field(default_factory=list)
     compatibility: str = ""
     in_command: bool = False  # the section being read

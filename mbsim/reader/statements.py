@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
-from mbsim.reader.command import FORCE_GRAVITY, PARAM_TRANSIENT, SIMULATE, STOP
+from mbsim.reader.command import FORCE_GRAVITY, PARAM_STATIC, PARAM_TRANSIENT, SIMULATE, STOP
 from mbsim.reader.constraints import (
     CONSTRAINT_COUPLER,
     CONSTRAINT_GENERAL,
@@ -47,6 +47,7 @@ STATEMENTS = (
     FORCE_CONTACT,
     FORCE_GRAVITY,
     PARAM_TRANSIENT,
+    PARAM_STATIC,
     CONSTRAINT_JOINT,
     CONSTRAINT_JPRIM,
     CONSTRAINT_COUPLER,
@@ -79,7 +80,7 @@ NOT_BUILT = (
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
     "Load_Command Load_Model Motion_Marker Param_Linear "
-    "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
+    "Param_Simulation Reference_Array Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_Spline Reference_String Save "
     "Sensor_Event Sensor_Proximity UserProgramControl"
@@ -125,6 +126,6 @@ def _read_statement(section: Node, node: Node, draft: Draft) -> None:
         what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
         draft.fault(node.line, label, what)
     else:
-        if draft.stop_line and statement in (SIMULATE, PARAM_TRANSIENT, FORCE_GRAVITY):
+        if draft.stop_line and statement in (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY):
             draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
         statement.read(node, draft)

@@ -236,6 +236,10 @@ def build(
     y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
     y0[states.place] = [state.ic for state in model.differentials.values()]
     markers, angles = table.arrays()
+    instructions = programs.arrays(mechanism.elements, applied_ids)
+    if any(s.analysis_type == "STATIC" for s in model.simulations):
+        # the last number is TIME where it stands still
+        instructions = instructions._replace(number=np.append(instructions.number, 0.0))
 
     speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(
@@ -250,7 +254,7 @@ def build(
         slots=a.Slots(slot_pair, x),
         markers=markers,
         angles=angles,
-        programs=programs.arrays(mechanism.elements, applied_ids),
+        programs=instructions,
         states=states,
         applied=applied,
         tree=mechanism.tree,
