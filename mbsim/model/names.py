@@ -13,6 +13,8 @@ ADAMS = {
     "Force_SpringDamper": "SPRINGDAMPER",
     "Force_Scalar_TwoBody": "SFORCE",
     "Reference_Variable": "VARIABLE",
+    "Reference_Spline": "SPLINE",
+    "Reference_Array": "ARRAY",
     "Post_Request": "REQUEST",
 }
 

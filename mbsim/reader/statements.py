@@ -20,6 +20,7 @@ from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
+from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
 
 
 def _everything(node: Node) -> bool:
@@ -49,6 +50,8 @@ STATEMENTS = (
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
+    REFERENCE_SPLINE,
+    REFERENCE_ARRAY,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -67,9 +70,9 @@ NOT_BUILT = (
     "Force_Beam Force_Bushing Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody Force_Vector_OneBody "
     "Force_Vector_TwoBody Load_Command Load_Model Motion_Marker Param_Linear "
-    "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
+    "Param_Simulation Param_Static Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
-    "Reference_ParamSurface Reference_Spline Reference_String Save "
+    "Reference_ParamSurface Reference_String Save "
     "Sensor_Event Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}

@@ -131,7 +131,15 @@ def counts(model: Model) -> dict[str, int]:
         "graphics": len(model.graphics),
         "contacts": len(model.contacts),
         **{name: count for name, count in between_markers.items() if count},
-        **({"variables": len(model.variables)} if model.variables else {}),
+        **{
+            name: len(table)
+            for name, table in (
+                ("variables", model.variables),
+                ("splines", model.splines),
+                ("arrays", model.arrays),
+            )
+            if table
+        },
         "requests": len(model.requests),
     }
 

@@ -359,6 +359,8 @@ def _described(model: Model) -> Iterator[Any]:
     for statement in (*CONSTRAINTS, *APPLIED):
         yield from elements_of(model, statement).values()
     yield from model.variables.values()
+    yield from model.splines.values()
+    yield from model.arrays.values()
     yield from model.requests.values()
 
 

@@ -222,7 +222,7 @@ def build(
     x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
 
     table = MarkerTable(placement, row)
-    programs = ProgramTable(table, model.variables)
+    programs = ProgramTable(table, model.variables, model.splines, model.arrays)
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
@@ -245,7 +245,7 @@ def build(
         slots=a.Slots(slot_pair, x),
         markers=markers,
         angles=angles,
-        programs=programs.arrays(mechanism.elements, applied_ids),
+        programs=programs.arrays(mechanism.elements, applied_ids, contact_ids),
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
