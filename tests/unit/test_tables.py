@@ -67,8 +67,8 @@ REFERENCES = {
 def test_cubics_are_those_of_scipy_with_their_derivatives(name, order):
     for x in (0.0, 0.03, 0.1, 0.2, 0.49, 0.55, 0.6, 0.99, 1.0):
         found = evaluate(f"{name}(TIME, 0, 1, {order})", x)
-        wanted = [REFERENCES[name](x, order + k) if order + k < 4 else 0.0 for k in range(3)]
-        # at a knot scipy takes the piece behind it, but for the last
+        # at a knot scipy takes the piece behind it, but for the last, as is done here
+        wanted = [float(REFERENCES[name](x, order + k)) if order + k < 4 else 0.0 for k in range(3)]
         assert found == pytest.approx(wanted, rel=1e-11, abs=1e-11)
 
 
@@ -88,7 +88,7 @@ def test_outside_go_on_a_parabola_or_a_line(name, x, ends):
     two = slice(0, 2) if x < 0 else slice(-2, None)
     line = np.polyfit(X[two], Y[two], 1)
     for spline, curve in ((1, parabola), (2, line)):
-        wanted = [np.polyval(np.polyder(curve, k), x) for k in range(3)]
+        wanted = [float(np.polyval(np.polyder(curve, k), x)) for k in range(3)]
         assert evaluate(f"{name}(TIME, 0, {spline})", x) == pytest.approx(wanted, rel=1e-10)
         slope = evaluate(f"{name}(TIME, 0, {spline}, 1)", x)[0]
         assert slope == pytest.approx(wanted[1], rel=1e-10)
@@ -183,8 +183,8 @@ def test_a_spline_by_text_by_attributes_and_by_file(tmp_path):
             '<Reference_Variable id="1" expr="ARYVAL(1,3)"/>',
             "array 1 has 2 numbers, no number 3",
         ),
-        ('<Reference_Variable id="1" expr="CUBSPL(1,0,7)"/>', "Reference_Spline 7"),
-        ('<Reference_Variable id="1" expr="ARYVAL(7,1)"/>', "Reference_Array 7"),
+        ('<Reference_Variable id="1" expr="CUBSPL(1,0,7)"/>', "no Reference_Spline has this id"),
+        ('<Reference_Variable id="1" expr="ARYVAL(7,1)"/>', "no Reference_Array has this id"),
         ('<Reference_Variable id="1" expr="CUBSPL(1,0,7,3)"/>', "fourth argument of CUBSPL must"),
     ],
 )
