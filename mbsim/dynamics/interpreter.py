@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, norm
+from mbsim.dynamics.curves import spline
 from mbsim.dynamics.markers import marker_axis
 from mbsim.dynamics.measures import (
     AS_THEY_ARE,
@@ -13,21 +14,27 @@ from mbsim.dynamics.measures import (
     element_force,
     euler_angle,
     euler_parameter,
+    included_angle,
     net_force,
     offset,
+    relative_acceleration,
     relative_spin,
+    relative_spin_up,
     relative_velocity,
 )
-from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, put
+from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, get, put
 from mbsim.system.programs import (
+    ACCELERATION,
     ANGLE,
     CLOSING,
     DISTANCE,
+    INCLUDED,
     NET,
     OFFSET,
-    ORIENT,
     SPEED,
     SPIN,
+    SPIN_UP,
+    SPLINE,
     STATE,
     TURN,
     TURNING,
@@ -47,6 +54,8 @@ def displacement(scene, y, code, body, way):
         return angle(scene, code[1], body, way)
     if op == TURN:
         return euler_angle(scene, code[1], code[2], code[3], body, way)
+    if op == INCLUDED:
+        return included_angle(scene, y, code[1], code[2], code[3], body, way)
     return euler_parameter(scene, code[1], code[2], code[3], body, way)
 
 
@@ -67,6 +76,12 @@ def rate_or_force(scene, y, code):
         return dot(relative_spin(scene, code[1], code[2]), marker_axis(scene, code[3], code[4]))
     if op == STATE:
         return y[code[1]]
+    if op == ACCELERATION:
+        a = relative_acceleration(scene, y, code[1], code[2], code[4])
+        return norm(a) if code[5] == 3 else dot(a, marker_axis(scene, code[3], code[5]))
+    if op == SPIN_UP:
+        a = relative_spin_up(scene, code[1], code[2], code[4])
+        return norm(a) if code[5] == 3 else dot(a, marker_axis(scene, code[3], code[5]))
     if op == NET:
         return net_force(scene, y, code[1], code[2], code[3], code[4])
     return element_force(scene, y, code[1], code[2], code[3], code[5], code[4])
@@ -88,9 +103,13 @@ def interpret(scene, t, y, program, body, way):
             top += 1
         elif op < FIRST_MEASURE:
             top = apply(op, code[1], stack, top)
-        elif op <= ORIENT:
+        elif op <= INCLUDED:
             put(stack, top, displacement(scene, y, code, body, way))
             top += 1
+        elif op == SPLINE:
+            top -= 1
+            x, z = get(stack, top - 1), get(stack, top)
+            put(stack, top - 1, spline(programs, code[1], code[2], code[3], x, z))
         else:
             put(stack, top, constant(rate_or_force(scene, y, code)))
             top += 1

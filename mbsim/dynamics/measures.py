@@ -12,6 +12,7 @@ from __future__ import annotations
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.angles import nearest_turn
+from mbsim.dynamics.contact import FORCE, TORQUE, contact_of, sides
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
@@ -87,6 +88,20 @@ def distance(scene, y, i, j, body, way):
 def offset(scene, y, i, j, k, axis, body, way):
     """Return (P_i - P_j) along an axis of k."""
     return dot_jet(between(scene, y, i, j, body, way), axis_jet(scene, k, axis, body, way))
+
+
+@jitable
+def included_angle(scene, y, i, j, k, body, way):
+    """Return INCANG: the angle between P_i - P_j and P_k - P_j, atan2(|a x b|, a . b)."""
+    a = between(scene, y, i, j, body, way)
+    b = between(scene, y, k, j, body, way)
+    twice = scale(2.0, cross(a[1], b[1]))
+    turn = (
+        cross(a[0], b[0]),
+        add(cross(a[1], b[0]), cross(a[0], b[1])),
+        add(add(cross(a[2], b[0]), twice), cross(a[0], b[2])),
+    )
+    return arc_tangent2(root(dot_jet(turn, turn)), dot_jet(a, b))
 
 
 @jitable
@@ -192,6 +207,48 @@ def relative_spin(scene, i, j):
 
 
 @jitable
+def spin_up(scene, b):
+    """Return the angular acceleration of body b at the output row that is being written."""
+    if b >= len(scene.bodies.mass):
+        return 0.0, 0.0, 0.0
+    return vector(scene.rows.accel[scene.rows.used[0], 6 * b + 3 : 6 * b + 6])
+
+
+@jitable
+def marker_acceleration(scene, m):
+    """Return the acceleration of marker m's origin, a + alpha x r + w x (w x r), at that row."""
+    b = scene.markers.body[m]
+    if b >= len(scene.bodies.mass):
+        return 0.0, 0.0, 0.0
+    arm, w = marker_arm(scene, m), vector(scene.work.w[b])
+    a = vector(scene.rows.accel[scene.rows.used[0], 6 * b : 6 * b + 3])
+    return add(a, add(cross(spin_up(scene, b), arm), cross(w, cross(w, arm))))
+
+
+@jitable
+def relative_acceleration(scene, y, i, j, k):
+    """Return how i's origin accelerates against j's, as seen from marker k's body.
+
+    With r, v, a the differences in the global frame: a - alpha x r - 2 w x v + w x (w x r).
+    """
+    b = scene.markers.body[k]
+    w = vector(scene.work.w[b])
+    r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    a = sub(marker_acceleration(scene, i), marker_acceleration(scene, j))
+    carried = add(cross(spin_up(scene, b), r), cross(w, sub(scale(2.0, v), cross(w, r))))
+    return sub(a, carried)
+
+
+@jitable
+def relative_spin_up(scene, i, j, k):
+    """Return the derivative of i's angular velocity against j's, as seen from marker k's body."""
+    body = scene.markers.body
+    alpha = sub(spin_up(scene, body[i]), spin_up(scene, body[j]))
+    return sub(alpha, cross(vector(scene.work.w[body[k]]), relative_spin(scene, i, j)))
+
+
+@jitable
 def closing(scene, y, i, j):
     """Return VR, the rate of DM; 0 where the points coincide."""
     r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
@@ -233,8 +290,30 @@ def floats(scene, applied, row):
 
 
 @jitable
+def contact_force(scene, y, contact, jflag, k, comp):
+    """Return a component of all incidents of a contact: force, torque about the body's cg."""
+    work = scene.work
+    force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for h in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[h]
+        if contact_of(scene, s) == contact:
+            values, point = work.slot[s], work.points[s]
+            graphic = sides(scene, s)[jflag]
+            push = vector(values[FORCE : FORCE + 3])
+            arm = sub(
+                (point[1], point[2], point[3]), position(scene, y, scene.graphics.body[graphic])
+            )
+            force = add(force, push)
+            torque = add(torque, add(cross(arm, push), vector(values[TORQUE : TORQUE + 3])))
+    sign = 1.0 if jflag == 0 else -1.0
+    return component(scene, scale(sign, force), scale(sign, torque), k, comp)
+
+
+@jitable
 def element_force(scene, y, applied, row, jflag, k, comp):
-    """Return a component of the force of a connection or an applied force on I or J."""
+    """Return a component of the force of a connection, applied force or contact (0, 1, 2)."""
+    if applied == 2:
+        return contact_force(scene, y, row, jflag, k, comp)
     force, torque = on_i(scene, applied, row)
     if jflag == 1:
         if applied == 1 and scene.applied.alone[row] == 1:

@@ -34,6 +34,7 @@ ATAN2, MOD, SIGN, DIM = (CODES[name] for name in ("ATAN2", "MOD", "SIGN", "DIM")
 MIN, MAX, IF, STEP, STEP5 = (CODES[name] for name in ("MIN", "MAX", "IF", "STEP", "STEP5"))
 HAVSIN, SHF, POLY, CHEBY = (CODES[name] for name in ("HAVSIN", "SHF", "POLY", "CHEBY"))
 FORSIN, FORCOS, IMPACT, BISTOP = (CODES[name] for name in ("FORSIN", "FORCOS", "IMPACT", "BISTOP"))
+SWEEP = CODES["SWEEP"]
 
 LN10 = math.log(10.0)
 
@@ -218,6 +219,28 @@ def two_stops(stack, at):
 
 
 @jitable
+def chirp(stack, at):
+    """Return SWEEP(x, a, x0, f0, x1, f1, dx) = STEP5(x, x0, 0, x0 + dx, 1) a sin(2 pi h(x)).
+
+    h = f0 x up to x0, then h' goes from f0 to f1 along a line, and h' = f1 from x1 on. Source: MSC
+    Adams Solver, "SWEEP"; SolidWorks Motion, "SWEEP".
+    """
+    x, a = get(stack, at), get(stack, at + 1)
+    x0, f0 = get(stack, at + 2), get(stack, at + 3)
+    x1, f1 = get(stack, at + 4), get(stack, at + 5)
+    if x[0] <= x0[0]:
+        cycles = times(f0, x)
+    elif x[0] < x1[0]:
+        way = sub(x, x0)
+        growth = over(sub(f1, f0), scale(2.0, sub(x1, x0)))
+        cycles = add(times(f0, x), times(growth, times(way, way)))
+    else:
+        cycles = sub(times(f1, x), scale(0.5, times(sub(f1, f0), add(x1, x0))))
+    on = blend(x, x0, constant(0.0), add(x0, get(stack, at + 6)), constant(1.0), True)
+    return times(times(on, a), sine(scale(2.0 * math.pi, cycles)))
+
+
+@jitable
 def polynomial(stack, at, count):
     """Return POLY(x, x0, a0, a1..): the sum of a_j (x - x0)^j."""
     x = sub(get(stack, at), get(stack, at + 1))
@@ -358,6 +381,8 @@ def of_many(op, stack, at, count):
         return harmonic(stack, at, count)
     if op == BISTOP:
         return two_stops(stack, at)
+    if op == SWEEP:
+        return chirp(stack, at)
     a, b, c = get(stack, at), get(stack, at + 1), get(stack, at + 2)
     d = get(stack, at + 3)
     if op == IF:

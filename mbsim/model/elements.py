@@ -427,6 +427,32 @@ class Differential:
 
 
 @dataclass(frozen=True)
+class Spline:
+    """Reference_Spline, Adams' SPLINE: points of a curve, or of one curve for each z of a surface.
+
+    `y` holds one row of values for each of `z`, or one row where there is no `z`.
+    """
+
+    id: int
+    x: tuple[float, ...]
+    y: tuple[tuple[float, ...], ...]
+    z: tuple[float, ...] = ()
+    linear_extrapolate: bool = False
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class ArrayOfNumbers:
+    """Reference_Array of type IC, Adams' ARRAY: numbers that expressions name by ARYVAL(id, n)."""
+
+    id: int
+    values: tuple[float, ...]
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Request:
     """Post_Request, Adams' REQUEST.
 
@@ -475,6 +501,8 @@ class Model:
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
+    splines: dict[int, Spline] = field(default_factory=dict)
+    arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
     gravity: Gravity = Gravity()
     transient: Transient = Transient()
     simulations: tuple[Simulation, ...] = ()

@@ -7,7 +7,7 @@ from typing import Any
 
 from mbsim.errors import Fault
 from mbsim.expressions import Expression
-from mbsim.expressions.functions import FUNCTIONS, Kind
+from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.tree import Call, Number
 from mbsim.joints.catalog import JOINTS
 from mbsim.model.elements import Model, Source
@@ -28,6 +28,8 @@ STATEMENTS = {
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
     "DIFF": "Control_Diff",
+    "SPLINE": "Reference_Spline",
+    "ARRAY": "Reference_Array",
 }
 #: Attributes of vector forces that are expressions.
 COMPONENTS = tuple(f"{name}_expression" for name in ("fx", "fy", "fz", "tx", "ty", "tz"))
@@ -64,6 +66,8 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Force_JointLimit": model.joint_limits,
         "Reference_Variable": model.variables,
         "Control_Diff": model.differentials,
+        "Reference_Spline": model.splines,
+        "Reference_Array": model.arrays,
     }
 
 
@@ -148,6 +152,7 @@ def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
     yield from _frictions(model)
     yield from _limits(model)
     yield from _circles(model)
+    yield from _tables(model)
 
 
 def _fault(source: Source, element: str, message: str) -> Fault:
@@ -318,6 +323,22 @@ def _circle(source: Source, ring: list[tuple[str, int]]) -> Fault:
     what = "variable" if function == "VARVAL" else "slope"
     message = f"{function} leads back to the {what} itself: {shown}"
     return _fault(source, f"{_PUT_IN[function]}[{id}]", message)
+
+
+def _tables(model: Model) -> Iterator[Fault]:
+    """Yield expressions that ask more of splines and arrays than these have."""
+    for source, name, attribute, expression in expressions(model):
+        for call in _calls(expression):
+            ids = [int(arg.value) if isinstance(arg, Number) else 0 for arg in call.args]
+            said = f'{attribute}="{_short(expression.text)}": '
+            spline = model.splines.get(ids[2]) if call.name in SPLINE_POINTS else None
+            if spline is not None and len(spline.x) < SPLINE_POINTS[call.name]:
+                said += f"{call.name} needs {SPLINE_POINTS[call.name]} points or more; spline "
+                yield _fault(source, name, said + f"{spline.id} has {len(spline.x)}")
+            array = model.arrays.get(ids[0]) if call.name == "ARYVAL" else None
+            if array is not None and ids[1] > len(array.values):
+                said += f"array {array.id} has {len(array.values)} numbers, no number {ids[1]}"
+                yield _fault(source, name, said)
 
 
 def _short(text: str) -> str:

@@ -15,6 +15,8 @@ ADAMS = {
     "Force_Bushing": "BUSHING",
     "Force_Vector_TwoBody": "GFORCE",
     "Reference_Variable": "VARIABLE",
+    "Reference_Spline": "SPLINE",
+    "Reference_Array": "ARRAY",
     "Post_Request": "REQUEST",
 }
 

@@ -38,6 +38,8 @@ class Draft:
     joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
+    splines: dict[int, el.Spline] = field(default_factory=dict)
+    arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
     requests: dict[int, el.Request] = field(default_factory=dict)
     display_graphics: dict[int, str] = field(default_factory=dict)
     gravity: el.Gravity | None = None

@@ -22,7 +22,8 @@ class Spec:
     """One documented attribute.
 
     `note` says why it is accepted without effect, `refused` why it cannot be accepted;
-    `harmless` is the value (folded) at which neither is worth a word.
+    `harmless` is the value (folded) at which neither is worth a word. What `repeats` may be given
+    more than once; its values are then put together with a ``|`` between.
     """
 
     kind: Kind = TEXT
@@ -31,6 +32,7 @@ class Spec:
     refused: str = ""
     harmless: str = ""
     alias: str = ""
+    repeats: bool = False
 
 
 def _needs_no_names(node: Node) -> bool:
@@ -46,7 +48,8 @@ class Statement:
     """One statement: its attributes, its children, where it may stand, and what it becomes.
 
     `build` gets the parsed attributes and adds an element to the draft. `any_attribute`
-    tells of a node whose attributes are not looked at, because nothing in it can matter.
+    tells of a node whose attributes are not looked at, because nothing in it can matter. `text`
+    is the attribute that may be given as the element's text as well.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Statement:
     in_command: bool = False
     note: str = ""
     any_attribute: Callable[[Node], bool] = _needs_no_names
+    text: str = ""
 
     def spec_names(self) -> dict[str, str]:
         """Return folded spelling -> attribute name, aliases included."""
@@ -155,6 +159,10 @@ class Entry:
                 help = close or f"; known: {known}"
                 message = f'{attribute.name}="{_short(attribute.value)}": unknown attribute{help}'
                 self.draft.fault(attribute.line, self.label, message)
+            elif name in self._attributes and self.statement.attributes[name].repeats:
+                first = self._attributes[name]
+                joined = f"{first.value} | {attribute.value}"
+                self._attributes[name] = Attribute(first.name, joined, first.line, first.origin)
             elif name in self._attributes:
                 self.fault(f"given twice, the second time as {attribute.name}", name)
             else:
@@ -182,7 +190,12 @@ class Entry:
             if child.key not in allowed:
                 close = nearest(child.tag, self.statement.children)
                 self.draft.fault(child.line, self.label, f"unknown element <{child.tag}>{close}")
-        if self.node.text:
+        text = self.statement.text
+        if self.node.text and text and text not in self._attributes:
+            self._attributes[text] = Attribute(text, self.node.text, self.node.line)
+        elif self.node.text and text:
+            self.fault("given as text of the element too; must be one of both", text)
+        elif self.node.text:
             self.fault(f"text {_short(self.node.text)!r} inside the element is not accepted")
 
 

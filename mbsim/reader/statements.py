@@ -28,6 +28,7 @@ from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
+from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
 
 
 def _everything(node: Node) -> bool:
@@ -62,6 +63,8 @@ STATEMENTS = (
     FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
+    REFERENCE_SPLINE,
+    REFERENCE_ARRAY,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -80,9 +83,9 @@ NOT_BUILT = (
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
     "Load_Command Load_Model Motion_Marker Param_Linear "
-    "Param_Simulation Reference_Array Reference_DeformCurve "
+    "Param_Simulation Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
-    "Reference_ParamSurface Reference_Spline Reference_String Save "
+    "Reference_ParamSurface Reference_String Save "
     "Sensor_Event Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
@@ -126,6 +129,11 @@ def _read_statement(section: Node, node: Node, draft: Draft) -> None:
         what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
         draft.fault(node.line, label, what)
     else:
-        if draft.stop_line and statement in (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY):
+        if draft.stop_line and statement in (
+            SIMULATE,
+            PARAM_TRANSIENT,
+            PARAM_STATIC,
+            FORCE_GRAVITY,
+        ):
             draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
         statement.read(node, draft)

@@ -165,6 +165,8 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         joint_limits=draft.joint_limits,
         variables=draft.variables,
         differentials=draft.differentials,
+        splines=draft.splines,
+        arrays=draft.arrays,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),
         simulations=tuple(draft.simulations),

@@ -131,8 +131,16 @@ def counts(model: Model) -> dict[str, int]:
         "graphics": len(model.graphics),
         "contacts": len(model.contacts),
         **{name: count for name, count in between_markers.items() if count},
-        **({"diffs": len(model.differentials)} if model.differentials else {}),
-        **({"variables": len(model.variables)} if model.variables else {}),
+        **{
+            name: len(table)
+            for name, table in (
+                ("diffs", model.differentials),
+                ("variables", model.variables),
+                ("splines", model.splines),
+                ("arrays", model.arrays),
+            )
+            if table
+        },
         "requests": len(model.requests),
     }
 

@@ -26,9 +26,11 @@ COLUMNS = {
 #: What functions of the language measure.
 _MEASURES = {
     "displacement": ("DM", "DX", "DY", "DZ"),
-    "angle": ("AX", "AY", "AZ", "PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL"),
+    "angle": ("AX", "AY", "AZ", "PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL", "INCANG"),
     "velocity": ("VM", "VR", "VX", "VY", "VZ"),
     "angular_velocity": ("WM", "WX", "WY", "WZ"),
+    "acceleration": ("ACCM", "ACCX", "ACCY", "ACCZ"),
+    "angular_acceleration": ("WDTM", "WDTX", "WDTY", "WDTZ"),
     "force": ("FM", "FX", "FY", "FZ"),
     "torque": ("TM", "TX", "TY", "TZ"),
 }

@@ -224,7 +224,9 @@ def build(
 
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + 3 * len(carried)
-    programs = ProgramTable(table, model.variables, model.differentials, first_state)
+    programs = ProgramTable(
+        table, model.variables, model.differentials, first_state, model.splines, model.arrays
+    )
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
@@ -236,7 +238,7 @@ def build(
     y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
     y0[states.place] = [state.ic for state in model.differentials.values()]
     markers, angles = table.arrays()
-    instructions = programs.arrays(mechanism.elements, applied_ids)
+    instructions = programs.arrays(mechanism.elements, applied_ids, contact_ids)
     if any(s.analysis_type == "STATIC" for s in model.simulations):
         # the last number is TIME where it stands still
         instructions = instructions._replace(number=np.append(instructions.number, 0.0))

@@ -18,9 +18,15 @@ up to five numbers:
 | VELOCITY           | markers i, j, k, l and axis of k                                      |
 | TURNING            | markers i, j                                                          |
 | SPIN               | markers i, j, k and axis of k                                         |
+| INCLUDED           | markers i, j, k                                                       |
+| ACCELERATION       | markers i, j, k, l and axis of k, 3 for the magnitude                 |
+| SPIN_UP            | the same                                                              |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
 | STATE              | place in y                                                            |
-| ELEMENT            | 0 a connection or 1 an applied force, its row, jflag, comp, marker k  |
+| ELEMENT            | 0 a connection, 1 an applied force, 2 a contact, its row, jflag,      |
+|                    | comp, marker k                                                        |
+| SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
+|                    | topmost jets                                                          |
 """
 
 from __future__ import annotations
@@ -34,17 +40,19 @@ import numpy as np
 from mbsim.errors import DeckError, Fault
 from mbsim.expressions import elementary
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, NUMBER, TIME
-from mbsim.expressions.functions import FUNCTIONS, Kind
+from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time
-from mbsim.model.elements import Differential, Variable
+from mbsim.model.elements import ArrayOfNumbers, Differential, Spline, Variable
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
+from mbsim.system.splines import SplineTable
 
-DISTANCE, OFFSET, ANGLE, TURN, ORIENT = range(FIRST_MEASURE, FIRST_MEASURE + 5)
-SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 5, FIRST_MEASURE + 10)
-NET, ELEMENT, STATE = range(FIRST_MEASURE + 10, FIRST_MEASURE + 13)
+DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEASURE + 6)
+SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
+ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
+STATE, SPLINE = FIRST_MEASURE + 15, FIRST_MEASURE + 16
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -81,7 +89,10 @@ class ProgramTable:
     variables: Mapping[int, Variable] = field(default_factory=dict)
     differentials: Mapping[int, Differential] = field(default_factory=dict)
     first_state: int = 0  # where in y the first of their states stands
+    splines: Mapping[int, Spline] = field(default_factory=dict)
+    arrays_of_numbers: Mapping[int, ArrayOfNumbers] = field(default_factory=dict)
     programs: list[list[Instruction]] = field(default_factory=list)
+    curves: SplineTable = field(default_factory=SplineTable)
 
     def add(
         self,
@@ -104,20 +115,21 @@ class ProgramTable:
         of_time : bool
             Only TIME.
         forces : bool
-            Forces too: these are known when an output row is written, not while forces are summed.
+            Forces and accelerations too: these are known when an output row is written, not while
+            forces are summed.
 
         Raises
         ------
         DeckError, or ExpressionError if no owner is given
             Where the expression has what may not be used.
         """
-        allowed = {Kind.ELEMENTARY, Kind.VARIABLE}
+        allowed = {Kind.ELEMENTARY, Kind.VARIABLE, Kind.TABLE}
         if not of_time:
             allowed.add(Kind.DISPLACEMENT)
             if not differentiable:
                 allowed |= {Kind.VELOCITY, Kind.STATE}
                 if forces:
-                    allowed.add(Kind.FORCE)
+                    allowed |= {Kind.FORCE, Kind.ACCELERATION}
         try:
             made = _Compiler(self, frozenset(allowed)).compile(expression.root)
         except ExpressionError as fault:
@@ -137,7 +149,7 @@ class ProgramTable:
         for op, rows, _, _ in self.programs[program]:
             if op in (DISTANCE, TURN, ORIENT):
                 found.update(dict.fromkeys(rows[:2]))
-            elif op == OFFSET:
+            elif op == OFFSET or op == INCLUDED:
                 found.update(dict.fromkeys(rows[:3]))
             elif op == ANGLE:
                 found.update(dict.fromkeys(angles[rows[0]]))
@@ -147,10 +159,12 @@ class ProgramTable:
         self,
         connections: Sequence[tuple[str, int]] = (),
         applied: Sequence[tuple[str, int]] = (),
+        contacts: Sequence[int] = (),
     ) -> a.Programs:
         """Return the programs; force measures find their rows by (statement, id) in these lists."""
         rows = {element: (1, k) for k, element in enumerate(applied)}
         rows.update({element: (0, k) for k, element in enumerate(connections)})
+        rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         numbers: dict[float, int] = {}
         code = np.zeros((sum(map(len, self.programs)), 6), dtype=np.int64)
         at = 0
@@ -170,6 +184,7 @@ class ProgramTable:
             code,
             np.array(list(numbers), dtype=np.float64),
             np.zeros((max(map(_deepest, self.programs), default=0), 3)),
+            *self.curves.arrays(),
         )
 
 
@@ -177,7 +192,7 @@ def _deepest(program: list[Instruction]) -> int:
     """Return how many jets stand on the stack at most."""
     depth, most = 0, 0
     for op, rows, _, _ in program:
-        depth += 1 - (rows[0] if TIME < op < FIRST_MEASURE else 0)
+        depth += 1 - (rows[0] if TIME < op < FIRST_MEASURE else 2 if op == SPLINE else 0)
         most = max(most, depth)
     return most
 
@@ -198,12 +213,13 @@ class _Compiler:
         waiting: list[tuple[Node, bool]] = [(root, False)]
         while waiting:
             node, complete = waiting.pop()
-            if isinstance(node, Call) and self.is_elementary(node):
+            operands = self.operands(node)
+            if operands:
                 if complete:
-                    _combine(node, made, starts)
+                    self.combine(node, made, starts)
                 else:
                     waiting.append((node, True))
-                    waiting.extend((arg, False) for arg in reversed(node.args))
+                    waiting.extend((arg, False) for arg in reversed(operands))
                 continue
             starts.append(len(made))
             made.extend(self.leaf(node))
@@ -214,15 +230,44 @@ class _Compiler:
                 )
         return made
 
-    def is_elementary(self, node: Call) -> bool:
-        """Return whether a function takes its arguments from the stack; refuse what may not be."""
+    def operands(self, node: Node) -> tuple[Node, ...]:
+        """Return the arguments that a function takes from the stack; refuse what may not be."""
+        if not isinstance(node, Call):
+            return ()
         function = FUNCTIONS.get(node.name)
         kind = function.kind if function else Kind.ELEMENTARY
         if kind not in self.allowed:
             raise ExpressionError(
                 f"{node.name} looks at {kind.value}, which cannot be used here", node.column
             )
-        return kind is Kind.ELEMENTARY
+        if kind is Kind.ELEMENTARY:
+            return node.args
+        return node.args[:2] if node.name in SPLINE_POINTS else ()
+
+    def combine(self, node: Call, made: list[Instruction], starts: list[int]) -> None:
+        """Put a function behind its arguments, or the number that it makes of numbers there."""
+        if node.name in SPLINE_POINTS:
+            starts.pop()
+            made.append(self.spline(node))
+        else:
+            _combine(node, made, starts)
+
+    def spline(self, node: Call) -> Instruction:
+        """Return the instruction that evaluates a spline at x and z."""
+        key, order = self.number(node, 2), self.number(node, 3)
+        spline = self.table.splines.get(key)
+        if spline is None:
+            raise ExpressionError(f"{node.name}: there is no spline {key}", node.column)
+        first, count = self.table.curves.rows(spline, node.name)
+        return Instruction(SPLINE, (first, count, order))
+
+    def entry(self, node: Call) -> Instruction:
+        """Return a number of an array."""
+        key, place = self.number(node, 0), self.number(node, 1)
+        array = self.table.arrays_of_numbers.get(key)
+        if array is None:
+            raise ExpressionError(f"ARYVAL: there is no array {key}", node.column)
+        return Instruction(NUMBER, value=array.values[place - 1])
 
     def leaf(self, node: Node) -> list[Instruction]:
         """Return the instructions of what takes nothing from the stack."""
@@ -231,7 +276,9 @@ class _Compiler:
         if isinstance(node, Time):
             return [Instruction(TIME)]
         kind = FUNCTIONS[node.name].kind
-        return self.variable(node) if kind is Kind.VARIABLE else [self.measure(node, kind)]
+        if kind is Kind.VARIABLE:
+            return self.variable(node)
+        return [self.entry(node) if kind is Kind.TABLE else self.measure(node, kind)]
 
     def variable(self, node: Call) -> list[Instruction]:
         """Return the instructions of a variable's expression, or of a state's slope."""
@@ -291,6 +338,10 @@ class _Compiler:
         i, j = self.marker(node, 0), self.marker(node, 1)
         if name in ("DM", "VR", "WM"):
             return Instruction({"DM": DISTANCE, "VR": CLOSING, "WM": TURNING}[name], (i, j))
+        if name[:3] in ("ACC", "WDT"):
+            return self.acceleration(node)
+        if name == "INCANG":
+            return Instruction(INCLUDED, (i, j, self.marker(node, 2)))
         if name in TURNS:
             return Instruction(TURN, (i, j, TURNS.index(name)))
         k = self.marker(node, 2)
@@ -309,6 +360,14 @@ class _Compiler:
         if id not in self.table.differentials:
             raise ExpressionError(f"there is no state {id}", node.column)
         return Instruction(STATE, (self.table.first_state + [*self.table.differentials].index(id),))
+
+    def acceleration(self, node: Call) -> Instruction:
+        """Return the derivative of a velocity; of a magnitude the third marker is the observer."""
+        axis = "XYZM".index(node.name[3])
+        i, j, third, fourth = (self.marker(node, place) for place in range(4))
+        k, observer = (third, fourth) if axis < 3 else (self.table.markers.row(0), third)
+        op = ACCELERATION if node.name[0] == "A" else SPIN_UP
+        return Instruction(op, (i, j, k, observer, axis))
 
     def force(self, node: Call) -> Instruction:
         """Return a force between markers, or of one element whose row is found later."""

@@ -104,6 +104,19 @@ CLOSED_FORMS = [
         lambda t: 100 * (1 - t) ** 1.5 + 3 * step(1 - t, 0, 0, 0.9, 2),
     ),
     (
+        "SWEEP(TIME, 2, 0.1, 0.5, 2, 1.5, 0.15)",
+        lambda t: (
+            2
+            * step5_derivative(t, 0.1, 0, 0.25, 1, 0)
+            * math.sin(2 * math.pi * (0.5 * (t - 0.1) + (t - 0.1) ** 2 / 3.8 + 0.05))
+        ),
+    ),
+    (
+        "SWEEP(TIME, 2, 0, 0.5, 0.2, 1.5, 0.1)",
+        lambda t: 2 * math.sin(math.pi * (3 * t - 0.2)),
+    ),
+    ("SWEEP(TIME, 2, 3, 0.5, 4, 1.5, 0.1)", lambda t: 0.0),
+    (
         "BISTOP(TIME, -3, 1, 2, 100, 1.5, 2, 0.9)",
         lambda t: 100 * (1 - t) ** 1.5 + 3 * step(1 - t, 0, 0, 0.9, 2),
     ),

@@ -19,7 +19,14 @@ from mbsim.errors import DeckError
 from mbsim.expressions.functions import CONSTANTS, FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError, parse
 from mbsim.expressions.tree import Call, Number, Time, references
-from mbsim.model.elements import Request, ScalarForce, Source, Variable
+from mbsim.model.elements import (
+    ArrayOfNumbers,
+    Request,
+    ScalarForce,
+    Source,
+    Spline,
+    Variable,
+)
 from mbsim.model.placement import place
 from mbsim.system.markers import MarkerTable
 from mbsim.system.programs import ProgramTable
@@ -241,16 +248,23 @@ def test_programs_say_which_markers_they_look_at():
 
 def test_every_function_of_the_table_can_be_used():
     variables = [(1, "TIME")]
+    points = (0.0, 1.0, 2.0, 3.0)
+    splines, arrays = {1: Spline(1, points, (points,))}, {1: ArrayOfNumbers(1, points)}
     numbers = {"number": "0.5", "marker": "20", "jflag": "1", "comp": "2", "parameter": "3"}
     for function in FUNCTIONS.values():
         args = [numbers.get(kind, "27" if kind == "measure" else "1") for kind in function.args]
         for count in {function.least, len(args)}:
             text = f"{function.name}({', '.join(args[:count])})"
             programs = table(variables)
+            programs.splines, programs.arrays_of_numbers = splines, arrays
             programs.add(parse(text), forces=True)
-            assert len(programs.programs[0]) == 1
-            if function.kind in (Kind.DISPLACEMENT, Kind.ELEMENTARY):
+            # a spline stands behind its x and z
+            assert len(programs.programs[0]) == (3 if function.name.endswith("SPL") else 1)
+            if function.kind in (Kind.DISPLACEMENT, Kind.ELEMENTARY, Kind.TABLE):
                 programs.add(parse(text), differentiable=True)
+
+
+NOT_FUNCTIONS = set("FUNCTION GCON SPLINE ARRAY NUMBERS IC".split())
 
 
 def test_every_function_is_in_the_readme() -> None:
@@ -260,4 +274,4 @@ def test_every_function_is_in_the_readme() -> None:
     words = set(re.findall(r"[A-Z][A-Z0-9]+", named))
     assert not {*FUNCTIONS, *CONSTANTS, "TIME"} - words
     # and nothing that is none: the rest are statements and other names of the text
-    assert words - {*FUNCTIONS, *CONSTANTS, "TIME"} == {"FUNCTION", "GCON"}
+    assert words - {*FUNCTIONS, *CONSTANTS, "TIME"} == NOT_FUNCTIONS

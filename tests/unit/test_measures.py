@@ -113,6 +113,7 @@ DISPLACEMENTS = [
     *("AX(21,31)", "AY(21,31)", "AZ(21,31)", "AZ(31)", "AX(11,21)"),
     *("PSI(21,31)", "THETA(21,31)", "PHI(21,31)", "YAW(21,31)", "PITCH(21,31)", "ROLL(21,31)"),
     *(f"ORIENT(27,{n},21,31)" for n in (1, 2, 3, 4)),
+    *("INCANG(21,31,11)", "INCANG(11,21,31)", "INCANG(21,11,31)"),
     "DX(21,31,11)*SIN(AZ(21,31)) + TIME**2*DM(21,31)",
 ]
 
@@ -251,6 +252,61 @@ def test_velocities():
     assert measured("VM(21,31,31)")[0] == pytest.approx(np.linalg.norm(seen), rel=1e-12)
     assert measured("WY(21,31,11)")[0] == pytest.approx((w_i - w_j) @ R_k[:, 1], rel=1e-12)
     assert measured("WM(21)")[0] == pytest.approx(np.linalg.norm(w_i), rel=1e-12)
+
+
+def test_included_angle():
+    for text in ("INCANG(21,31,11)", "INCANG(31,11,21)"):
+        found, moving = measured(text, seed=4)
+        i, j, k = (moving.marker(int(id))[0] for id in text[7:-1].split(","))
+        a, b = i - j, k - j
+        cosine = a @ b / np.linalg.norm(a) / np.linalg.norm(b)
+        assert found == pytest.approx(np.arccos(cosine), rel=1e-12)
+
+
+@pytest.mark.parametrize("observer", [0, 11, 21, 31])
+def test_accelerations_are_rates_of_velocities_resolved_in_the_observer(observer):
+    """The derivative taken in l is that of the components along axes that l carries."""
+    names = ("VX", "VY", "VZ", "WX", "WY", "WZ")
+    velocities = [
+        f"{name}(21,31,{observer}" + (f",{observer})" if name[0] == "V" else ")") for name in names
+    ]
+    accelerations = [
+        f"{new}(21,31,{observer},{observer})"
+        for new in ("ACCX", "ACCY", "ACCZ", "WDTX", "WDTY", "WDTZ")
+    ]
+    sizes = [f"ACCM(21,31,{observer})", f"WDTM(21,31,{observer})"]
+    moving = Moving(*velocities, *accelerations, *sizes, seed=5)
+    # bodies of `Moving` do not accelerate, so that their own accelerations are zero
+    moving.at(0.0)
+    wanted = [differences(lambda t, k=k: moving.value(t, k))[1] for k in range(6)]
+    found = [moving.value(0.0, k) for k in range(6, 14)]
+    assert found[:6] == pytest.approx(wanted, abs=1e-8)
+    assert found[6] == pytest.approx(np.linalg.norm(wanted[:3]), rel=1e-8)
+    assert found[7] == pytest.approx(np.linalg.norm(wanted[3:]), abs=1e-8)
+
+
+def test_accelerations_of_bodies_count_with_their_arms():
+    texts = ["ACCX(21,31,11)", "ACCX(21,0,0,31)", "WDTY(21,31,11)", "ACCM(21,11)"]
+    moving = Moving(*texts, seed=5)
+    rng = np.random.default_rng(3)
+    given = rng.normal(size=12)
+    moving.scene.rows.accel[0] = given
+    (P, _, v, _), (_, _, _, w_3) = moving.marker(21), moving.marker(31)
+    R_k = moving.marker(11)[1]
+    a = {}
+    for k, id in enumerate((21, 31)):
+        arm = moving.R[k] @ moving.frames[id].p_B
+        spin = np.cross(moving.w[k], np.cross(moving.w[k], arm))
+        a[id] = given[6 * k : 6 * k + 3] + np.cross(given[6 * k + 3 : 6 * k + 6], arm) + spin
+    alpha, alpha_3 = given[3:6], given[9:12]
+    seen = a[21] - np.cross(alpha_3, P) - 2 * np.cross(w_3, v) + np.cross(w_3, np.cross(w_3, P))
+    wanted = [
+        (a[21] - a[31]) @ R_k[:, 0],
+        seen[0],
+        (alpha - alpha_3) @ R_k[:, 1],
+        np.linalg.norm(a[21]),
+    ]
+    assert [moving.value(0.0, k) for k in range(4)] == pytest.approx(wanted, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import mbsim
-from mbsim.errors import SolverError
 from tests.decks_io import GROUND, sphere
 
 G = 9.81

@@ -69,6 +69,14 @@ def numbers(*counts: int) -> Kind:
     return Kind(f"{some} numbers {LIST}", lambda text: _parse_items(text, False, counts))
 
 
+def _parse_numbers(text: str) -> tuple[float, ...]:
+    return tuple(parse_real(word.strip()) for word in text.split(","))
+
+
+def _parse_rows(text: str) -> tuple[tuple[float, ...], ...]:
+    return tuple(_parse_numbers(row) for row in text.split("|"))
+
+
 def angles(count: int) -> Kind:
     """Return the kind of lists of so many angles."""
     allowed = f"{count} angles (radians, or degrees with a D as in 90D) {LIST}"
@@ -77,3 +85,5 @@ def angles(count: int) -> Kind:
 
 ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
 ANY = Kind(f"items {LIST}", str)
+NUMBERS = Kind(f"numbers {LIST}", _parse_numbers)
+ROWS = Kind(f"numbers {LIST}", _parse_rows)

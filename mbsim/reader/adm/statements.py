@@ -9,13 +9,24 @@ import numpy as np
 from mbsim.model import elements as el
 from mbsim.model.frames import GLOBAL, Frame, rotation_313
 from mbsim.reader import units
-from mbsim.reader.adm.declare import ANGLE, ANY, AdmStatement, angles, numbers
+from mbsim.reader.adm.declare import ANGLE, ANY, NUMBERS, ROWS, AdmStatement, angles, numbers
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, POSITIVE, REAL, TEXT, keyword
+from mbsim.reader.kinds import (
+    COUNT,
+    EXPRESSION,
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    TEXT,
+    keyword,
+)
 from mbsim.reader.parse import Node
 from mbsim.reader.statement import Entry, Spec
+from mbsim.reader.tables import add_spline
 
 
 @dataclass
@@ -347,6 +358,28 @@ def _build_differential(entry: Entry) -> None:
         entry.register(entry.draft.differentials, state)
 
 
+def _build_spline(entry: Entry) -> None:
+    """Add a spline; of a surface each Y is a value of z and the curve there."""
+    x, rows = entry.get("X"), entry.get("Y")
+    if x is None or rows is None:
+        return
+    z: tuple[float, ...] = ()
+    if len(rows) > 1 or len(rows[0]) == len(x) + 1:
+        z, rows = tuple(row[0] for row in rows), tuple(row[1:] for row in rows)
+    add_spline(entry, x, rows, z, "X", "Y")
+
+
+def _build_array(entry: Entry) -> None:
+    """Add an array of numbers."""
+    values, size = entry.get("NUMBERS"), entry.get("SIZE")
+    if values is None:
+        return
+    if size is not None and size != len(values):
+        entry.fault(f"there are {len(values)} NUMBERS", "SIZE")
+    array = el.ArrayOfNumbers(entry.get("id", 0), values, source=entry.source)
+    entry.register(entry.draft.arrays, array)
+
+
 _FUNCTIONS = tuple(f"F{k}" for k in range(1, 9))
 
 
@@ -584,6 +617,34 @@ STATEMENTS = (
         xml="Control_Diff",
     ),
     AdmStatement(
+        "SPLINE",
+        {
+            **_ID,
+            "X": Spec(NUMBERS, required=True),
+            "Y": Spec(ROWS, required=True, repeats=True),
+            "LINEAR_EXTRAPOLATE": _TRUE,
+            "FILE": Spec(refused=f"{_NOT_BUILT}; give X and Y"),
+            "BLOCK": Spec(refused=f"{_NOT_BUILT}; give X and Y"),
+            "CHANNEL": Spec(refused=f"{_NOT_BUILT}; give X and Y"),
+        },
+        _build_spline,
+        words={"LINEAR_EXTRAPOLATE": ("LINEAR_EXTRAPOLATE", "TRUE")},
+        xml="Reference_Spline",
+    ),
+    AdmStatement(
+        "ARRAY",
+        {
+            **_ID,
+            "KIND": Spec(keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"})),
+            "SIZE": Spec(COUNT),
+            "NUMBERS": Spec(NUMBERS, required=True),
+            "VARIABLES": Spec(refused=_NOT_BUILT),
+        },
+        _build_array,
+        words=_words("KIND", "IC", "X", "Y", "U"),
+        xml="Reference_Array",
+    ),
+    AdmStatement(
         "REQUEST",
         {
             **_ID,
@@ -625,7 +686,7 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
 # the others of the language, which would change the motion or what is known of it
 NOT_BUILT = (
-    "ARRAY BEAM BUSHING CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
+    "BEAM BUSHING CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
     "GFORCE GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
-    "PTCV PTSF SENSOR SPLINE STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
+    "PTCV PTSF SENSOR STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
 ).split()
