@@ -324,3 +324,68 @@ def hopping_follower(times, speed, e, mass, spring, preload, law, start, g=9.81)
             leaves.append(t)
         inside = not inside
     return lift, leaves
+
+
+def four_bar_place(a, bars, base):
+    """Return crank pin B and rocker pin C of a four-bar over (0, 0) and (base, 0), crank at `a`.
+
+    Together with what they, coupler and rocker move per crank angle. `a` may be complex.
+    """
+    r, length, rocker = bars
+    B, dB = r * np.array([np.cos(a), np.sin(a)]), r * np.array([-np.sin(a), np.cos(a)])
+    d = np.array([base, 0.0]) - B
+    square = d @ d
+    along = (length**2 - rocker**2 + square) / (2 * square)
+    p = along * d + np.sqrt(length**2 / square - along**2) * np.array([-d[1], d[0]])
+    s = B + p - np.array([base, 0.0])
+    # dB + u perp(p) = w perp(s)
+    cross = p[0] * s[1] - p[1] * s[0]
+    u, w = -(dB @ s) / cross, -(dB @ p) / cross
+    return B, B + p, dB, w * np.array([-s[1], s[0]]), u, w
+
+
+def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81):
+    """Return crank angle and place of the rocker's ball of a four-bar that falls on a stop.
+
+    Bars are slender and uniform. `spring` is (anchor, stiffness, free length, damping) to the
+    rocker pin; `wall` is (place, outward normal, radius of the ball at the pin). The kinetic
+    energy is M(a) a'^2 / 2; M' by the complex step.
+    """
+    anchor, stiffness, free, damping = spring
+    foot, normal, radius = wall
+
+    def terms(a):
+        B, C, dB, dC, u, w = four_bar_place(a, bars, base)
+        M = masses[0] * bars[0] ** 2 / 3 + masses[2] * bars[2] ** 2 * w**2 / 3
+        middle = (dB + dC) / 2
+        M = M + masses[1] * (middle @ middle + bars[1] ** 2 * u**2 / 12)
+        height = masses[0] * B[1] / 2 + masses[1] * (B[1] + C[1]) / 2 + masses[2] * C[1] / 2
+        return M, g * height, C, dC
+
+    def gap(t, y):
+        return normal @ (four_bar_place(y[0], bars, base)[1] - foot) - radius
+
+    def rhs(t, y):
+        h = 1e-30
+        M, V, C, dC = terms(y[0] + 1j * h)
+        C, dC, v = C.real, dC.real, dC.real * y[1]
+        away = C - anchor
+        x = np.sqrt(away @ away)
+        pull = -(stiffness * (x - free) + damping * (away @ v) / x) * (away @ dC) / x
+        push = impact(-gap(t, y), -(normal @ v), *law) * (normal @ dC)
+        return [y[1], (pull + push - V.imag / h - 0.5 * M.imag / h * y[1] ** 2) / M.real]
+
+    gap.terminal = True
+    angles, t, y = np.full(len(times), np.nan), float(times[0]), [start, 0.0]
+    free_now = gap(t, y) > 0.0
+    while t < times[-1]:
+        gap.direction = -1.0 if free_now else 1.0
+        found = solve_ivp(
+            rhs, (t, times[-1]), y, method="DOP853", rtol=1e-11, atol=1e-13, events=gap,
+            max_step=5e-3 if free_now else 1e-4, dense_output=True,
+        )  # fmt: skip
+        rows = (times >= t) & (times <= found.t[-1])
+        angles[rows] = found.sol(times[rows])[0]
+        t, y = float(found.t[-1]), list(found.y[:, -1])
+        free_now = not free_now
+    return angles, np.array([four_bar_place(a, bars, base)[1] for a in angles])

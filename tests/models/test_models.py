@@ -20,6 +20,7 @@ from models.reference import (
     elastic_stop,
     falling_chain,
     flat_follower,
+    four_bar_on_stop,
     hopping_follower,
     slider_crank,
     top_attitude,
@@ -472,3 +473,24 @@ def test_cam_throws_its_follower_above_a_speed(part, tol, allowed):
         first = np.arccos(-pressed / (m * e * w**2 - k * e)) / w
         assert seen[0] == pytest.approx(first, abs=0.1 / w)
     assert cam_balance(results) < allowed / 5
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-5), (1e-9, 2e-8)])
+def test_four_bar_stop(tol, allowed):
+    results = run_model("four_bar_stop.xml", tol=tol)
+    spring = (np.array([-0.1, 0.15]), 400.0, 0.15, 2.0)
+    wall = (np.array([0.16, 0.0]), np.array([1.0, 0.0]), 0.02)
+    exact, pins = four_bar_on_stop(
+        results["time"], np.pi / 3, (0.1, 0.3, 0.2), (0.5, 1.0, 0.8), 0.3,
+        spring, wall, (1e6, 1.5, 200.0, 1e-4),
+    )  # fmt: skip
+    p = results["bodies/2/position"]
+    assert np.abs(np.arctan2(p[:, 2], p[:, 0]) - exact).max() < allowed
+    middle = (pins + np.array([0.3, 0.0])) / 2
+    assert np.abs(results["bodies/4/position"][:, [0, 2]] - middle).max() < allowed * 0.1
+    kinds = [event["kind"] for event in results["events"]]
+    assert kinds == ["touch", "leave"] * 3 + ["touch"]  # three hops, then it stays
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts)
+    assert np.abs(total - total[0]).max() < allowed * parts[2][-1]
+    assert parts[0][-1] < 1e-4 * parts[0].max()  # and rests
