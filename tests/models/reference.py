@@ -389,3 +389,61 @@ def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81
         t, y = float(found.t[-1]), list(found.y[:, -1])
         free_now = not free_now
     return angles, np.array([four_bar_place(a, bars, base)[1] for a in angles])
+
+
+class Governor:
+    """The stiff flyball governor: angle b of the rods below the horizontal, and slider height s.
+
+    I(b) turns with the angular momentum h about the shaft: 2 J b'' = I'(b) (h / I)^2 / 2 + ...
+    """
+
+    def __init__(self, speed=2 * np.pi, g=9.81):
+        self.hinge, self.g = 0.05, g
+        self.rod, self.ball, self.slider = 0.3, 5.0, 3.0
+        self.J = self.ball + self.rod * (1 / 3 + 1e-4 / 12)
+        self.h = self.inertia(np.pi / 6) * speed
+
+    def inertia(self, b):
+        """Return the inertia about the shaft: shaft, slider, rods with their width, balls."""
+        cos, a, width = np.cos(b), self.hinge, 1e-4 / 12
+        rod = a**2 + a * cos + cos**2 / 3 + width * (1 + np.sin(b) ** 2)
+        return 5e-6 + 0.005 + 2 * (self.rod * rod + self.ball * (a + cos) ** 2)
+
+    def coupler(self, b, s):
+        """Return the coupler from the slider to the middle of a rod: radial and upward part."""
+        return 0.5 * np.cos(b), 1.0 - 0.5 * np.sin(b) - s
+
+    def rhs(self, t, y):
+        """Return the rates of (b, s, b', s', turn of the shaft)."""
+        b, s, db, ds, _ = y
+        x, z = self.coupler(b, s)
+        dx, dz = -0.5 * np.sin(b) * db, -0.5 * np.cos(b) * db - ds
+        length = np.hypot(x, z)
+        tension = 8e5 * (length - 0.5) + 4e4 * (x * dx + z * dz) / length
+        step = 1e-30
+        slope = self.inertia(b + 1j * step).imag / step
+        spin = self.h / self.inertia(b)
+        weight = self.g * (2 * self.ball + self.rod) * np.cos(b)
+        pull = 2 * tension * (0.5 * x * np.sin(b) + 0.5 * z * np.cos(b)) / length
+        ddb = (slope * spin**2 / 2 + weight + pull) / (2 * self.J)
+        dds = 2 * tension * z / (length * self.slider) - self.g
+        return [db, ds, ddb, dds, spin]
+
+    def solve(self, times):
+        """Return b, s, b', s' and the shaft's angle at the times."""
+        return solve_ivp(
+            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method="DOP853",
+            t_eval=times, rtol=1e-10, atol=1e-12,
+        ).y  # fmt: skip
+
+    def energy(self, y):
+        """Return kinetic and potential energy, the springs' included."""
+        b, s, db, ds, _ = y
+        x, z = self.coupler(b, s)
+        kinetic = self.h**2 / self.inertia(b) / 2 + self.J * db**2 + self.slider * ds**2 / 2
+        height = (
+            self.slider * s
+            + (2 * self.ball + 2 * self.rod)
+            - (2 * self.ball + self.rod) * np.sin(b)
+        )
+        return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from decks_io import MODELS, USERFUNCS, run_model
 from models.reference import (
+    Governor,
     angle_between,
     drop_height,
     elastic_stop,
@@ -494,3 +495,59 @@ def test_four_bar_stop(tol, allowed):
     total = sum(parts)
     assert np.abs(total - total[0]).max() < allowed * parts[2][-1]
     assert parts[0][-1] < 1e-4 * parts[0].max()  # and rests
+
+
+def governor_momentum(results):
+    """Return the angular momentum about the shaft at the rows."""
+    inertia = {2: (0.0250025, 0.0250025, 5e-6), 3: (0.005,) * 3, 4: ROD, 5: ROD}
+    masses = {2: 0.3, 3: 3.0, 4: 5.3, 5: 5.3}
+    total = 0.0
+    for body, mass in masses.items():
+        p, v, w, q = (
+            results[f"bodies/{body}/{name}"]
+            for name in ("position", "velocity", "angular_velocity", "quaternion")
+        )
+        R = rotation_matrices(q)
+        spin = np.einsum("nij,j,nkj,nk->ni", R, np.array(inertia[body]), R, w)
+        total = total + spin[:, 2] + mass * (p[:, 0] * v[:, 1] - p[:, 1] * v[:, 0])
+    return total
+
+
+# a rod of 0.3 kg with 5 kg at its end, about their common centre
+GOVERNOR_CENTRE = (0.3 * 0.5 + 5.0) / 5.3
+ACROSS = 0.3 * ((1 + 1e-4) / 12 + (0.5 - GOVERNOR_CENTRE) ** 2) + 5.0 * (1.0 - GOVERNOR_CENTRE) ** 2
+ROD = (0.3 * 2e-4 / 12, ACROSS, ACROSS)
+
+
+def check_governor(results, governor, allowed):
+    t = results["time"]
+    exact = governor.solve(t)
+    assert np.abs(results["bodies/3/position/z"] - exact[1]).max() < allowed
+    p = results["bodies/4/position"]
+    assert np.abs(np.arcsin((1.0 - p[:, 2]) / GOVERNOR_CENTRE) - exact[0]).max() < allowed
+    turn = np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
+    assert np.abs(turn - exact[4]).max() < allowed
+    kinetic, potential = governor.energy(exact)
+    assert np.abs(results["energy/kinetic"] - kinetic).max() < 100 * allowed
+    momentum = governor_momentum(results)
+    np.testing.assert_allclose(momentum, governor.h, rtol=min(allowed, 1e-6))
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts)
+    assert np.abs(total - total[0]).max() < 1e3 * allowed
+    # what the dampers took, which is little: 3.1 mJ in 10 s
+    lost = (kinetic + potential)[0] - (kinetic + potential)[-1]
+    assert parts[2][-1] == pytest.approx(lost, abs=1e3 * allowed)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 1e-10)])
+def test_flyball_governor(tol, allowed):
+    check_governor(run_model("flyball_governor.xml", tol=tol, end_time=1.0), Governor(), allowed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-5), (1e-9, 1e-9)])
+def test_flyball_governor_for_ten_seconds(tol, allowed):
+    results = run_model("flyball_governor.xml", tol=tol)
+    check_governor(results, Governor(), allowed)
+    # what is stiff costs: steps of the default tolerance are those of stability
+    assert tol < 1e-5 or results.stats["steps"] > 15000
