@@ -447,3 +447,40 @@ class Governor:
             - (2 * self.ball + self.rod) * np.sin(b)
         )
         return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2
+
+
+def geneva_wheel(times, speed, a, pin, walls, inertia, damper, law):
+    """Return the angle of a Geneva wheel at (0, 0), its crank at (a, 0) turning from -90 deg.
+
+    `pin` is (crank radius, pin radius); `walls` is (near end, far end, half width of the slot,
+    thickness). The pin is a disc that meets eight rectangles without friction; two contact points
+    (the ends of the line) share one law each, so the push is twice `law`.
+    """
+    radius, disc = pin
+    near, far, half, thick = walls
+    angles = np.repeat(np.pi / 4 + np.arange(4) * np.pi / 2, 2)
+    sides = np.tile([1.0, -1.0], 4)
+    reach = np.array([(far - near) / 2, thick / 2])
+    middle = np.column_stack([np.full(8, (near + far) / 2), sides * (half + thick / 2)])
+
+    def rhs(t, y):
+        turn = speed * t - np.pi / 2
+        p = np.array([a - radius * np.cos(turn), radius * np.sin(turn)])
+        v = radius * speed * np.array([np.sin(turn), np.cos(turn)])
+        v = v - y[1] * np.array([-p[1], p[0]])  # as the wheel sees it
+        cos, sin = np.cos(y[0] + angles), np.sin(y[0] + angles)
+        local = np.column_stack([cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]]) - middle
+        away = local - np.clip(local, -reach, reach)
+        gap = np.hypot(away[:, 0], away[:, 1])
+        torque = -damper * y[1]
+        for k in np.flatnonzero(gap < disc):
+            n = away[k] / gap[k]
+            n = np.array([cos[k] * n[0] - sin[k] * n[1], sin[k] * n[0] + cos[k] * n[1]])
+            push = 2 * impact(disc - gap[k], -(n @ v), *law)
+            torque -= push * (p[0] * n[1] - p[1] * n[0])
+        return [y[1], torque / inertia]
+
+    return solve_ivp(
+        rhs, (times[0], times[-1]), [0.0, 0.0], method="DOP853", t_eval=times,
+        rtol=1e-9, atol=1e-11, max_step=5e-4,
+    ).y[0]  # fmt: skip

@@ -22,6 +22,7 @@ from models.reference import (
     falling_chain,
     flat_follower,
     four_bar_on_stop,
+    geneva_wheel,
     hopping_follower,
     slider_crank,
     top_attitude,
@@ -551,3 +552,39 @@ def test_flyball_governor_for_ten_seconds(tol, allowed):
     check_governor(results, Governor(), allowed)
     # what is stiff costs: steps of the default tolerance are those of stability
     assert tol < 1e-5 or results.stats["steps"] > 15000
+
+
+def wheel_angle(results):
+    q = results["bodies/3/quaternion"]
+    return np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))
+
+
+def test_geneva_indexes_by_a_quarter_a_turn():
+    results = run_model("geneva.xml")
+    t, angle = results["time"], wheel_angle(results)
+    a, r = 0.1, 0.1 / np.sqrt(2)
+    crank = np.mod(2 * np.pi * t + np.pi / 2, 2 * np.pi) - np.pi  # from the line of centres
+    across, along = r * np.sin(crank), a - r * np.cos(crank)
+    exact = np.arctan2(across, along) + np.pi / 4 + np.floor(t + 1e-12) * np.pi / 2
+    engaged = np.abs(crank) < np.pi / 4
+    off = np.abs(angle - exact) * np.hypot(across, along)
+    assert off[engaged].max() < 5e-5 + results["contacts/1/peak_penetration"] + 1e-6
+    # a quarter a turn, kept while the pin is out, without adding up
+    for turn in range(4):
+        resting = angle[(t > turn + 0.42) & (t < turn + 1.1)]
+        assert np.abs(resting - (turn + 1) * np.pi / 2).max() < 2e-4
+        assert np.ptp(resting) < 1e-5
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts) - results["energy/work_of_motions"]
+    assert np.abs(total - total[0]).max() < 1e-3 * parts[2][-1]
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 1e-9)])
+def test_geneva_as_the_law_has_it(tol, allowed):
+    results = run_model("geneva.xml", tol=tol, end_time=1.4)
+    r = 0.1 / np.sqrt(2)
+    walls, law = (0.023, r, 0.00505, 0.006), (1e8, 1.5, 300.0, 1e-5)
+    exact = geneva_wheel(
+        results["time"], 2 * np.pi, 0.1, (r, 0.005), walls, 5e-4, damper=0.1, law=law
+    )
+    assert np.abs(wheel_angle(results) - exact).max() < allowed
