@@ -324,3 +324,163 @@ def hopping_follower(times, speed, e, mass, spring, preload, law, start, g=9.81)
             leaves.append(t)
         inside = not inside
     return lift, leaves
+
+
+def four_bar_place(a, bars, base):
+    """Return crank pin B and rocker pin C of a four-bar over (0, 0) and (base, 0), crank at `a`.
+
+    Together with what they, coupler and rocker move per crank angle. `a` may be complex.
+    """
+    r, length, rocker = bars
+    B, dB = r * np.array([np.cos(a), np.sin(a)]), r * np.array([-np.sin(a), np.cos(a)])
+    d = np.array([base, 0.0]) - B
+    square = d @ d
+    along = (length**2 - rocker**2 + square) / (2 * square)
+    p = along * d + np.sqrt(length**2 / square - along**2) * np.array([-d[1], d[0]])
+    s = B + p - np.array([base, 0.0])
+    # dB + u perp(p) = w perp(s)
+    cross = p[0] * s[1] - p[1] * s[0]
+    u, w = -(dB @ s) / cross, -(dB @ p) / cross
+    return B, B + p, dB, w * np.array([-s[1], s[0]]), u, w
+
+
+def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81):
+    """Return crank angle and place of the rocker's ball of a four-bar that falls on a stop.
+
+    Bars are slender and uniform. `spring` is (anchor, stiffness, free length, damping) to the
+    rocker pin; `wall` is (place, outward normal, radius of the ball at the pin). The kinetic
+    energy is M(a) a'^2 / 2; M' by the complex step.
+    """
+    anchor, stiffness, free, damping = spring
+    foot, normal, radius = wall
+
+    def terms(a):
+        B, C, dB, dC, u, w = four_bar_place(a, bars, base)
+        M = masses[0] * bars[0] ** 2 / 3 + masses[2] * bars[2] ** 2 * w**2 / 3
+        middle = (dB + dC) / 2
+        M = M + masses[1] * (middle @ middle + bars[1] ** 2 * u**2 / 12)
+        height = masses[0] * B[1] / 2 + masses[1] * (B[1] + C[1]) / 2 + masses[2] * C[1] / 2
+        return M, g * height, C, dC
+
+    def gap(t, y):
+        return normal @ (four_bar_place(y[0], bars, base)[1] - foot) - radius
+
+    def rhs(t, y):
+        h = 1e-30
+        M, V, C, dC = terms(y[0] + 1j * h)
+        C, dC, v = C.real, dC.real, dC.real * y[1]
+        away = C - anchor
+        x = np.sqrt(away @ away)
+        pull = -(stiffness * (x - free) + damping * (away @ v) / x) * (away @ dC) / x
+        push = impact(-gap(t, y), -(normal @ v), *law) * (normal @ dC)
+        return [y[1], (pull + push - V.imag / h - 0.5 * M.imag / h * y[1] ** 2) / M.real]
+
+    gap.terminal = True
+    angles, t, y = np.full(len(times), np.nan), float(times[0]), [start, 0.0]
+    free_now = gap(t, y) > 0.0
+    while t < times[-1]:
+        gap.direction = -1.0 if free_now else 1.0
+        found = solve_ivp(
+            rhs, (t, times[-1]), y, method="DOP853", rtol=1e-11, atol=1e-13, events=gap,
+            max_step=5e-3 if free_now else 1e-4, dense_output=True,
+        )  # fmt: skip
+        rows = (times >= t) & (times <= found.t[-1])
+        angles[rows] = found.sol(times[rows])[0]
+        t, y = float(found.t[-1]), list(found.y[:, -1])
+        free_now = not free_now
+    return angles, np.array([four_bar_place(a, bars, base)[1] for a in angles])
+
+
+class Governor:
+    """The stiff flyball governor: angle b of the rods below the horizontal, and slider height s.
+
+    I(b) turns with the angular momentum h about the shaft: 2 J b'' = I'(b) (h / I)^2 / 2 + ...
+    """
+
+    def __init__(self, speed=2 * np.pi, g=9.81):
+        self.hinge, self.g = 0.05, g
+        self.rod, self.ball, self.slider = 0.3, 5.0, 3.0
+        self.J = self.ball + self.rod * (1 / 3 + 1e-4 / 12)
+        self.h = self.inertia(np.pi / 6) * speed
+
+    def inertia(self, b):
+        """Return the inertia about the shaft: shaft, slider, rods with their width, balls."""
+        cos, a, width = np.cos(b), self.hinge, 1e-4 / 12
+        rod = a**2 + a * cos + cos**2 / 3 + width * (1 + np.sin(b) ** 2)
+        return 5e-6 + 0.005 + 2 * (self.rod * rod + self.ball * (a + cos) ** 2)
+
+    def coupler(self, b, s):
+        """Return the coupler from the slider to the middle of a rod: radial and upward part."""
+        return 0.5 * np.cos(b), 1.0 - 0.5 * np.sin(b) - s
+
+    def rhs(self, t, y):
+        """Return the rates of (b, s, b', s', turn of the shaft)."""
+        b, s, db, ds, _ = y
+        x, z = self.coupler(b, s)
+        dx, dz = -0.5 * np.sin(b) * db, -0.5 * np.cos(b) * db - ds
+        length = np.hypot(x, z)
+        tension = 8e5 * (length - 0.5) + 4e4 * (x * dx + z * dz) / length
+        step = 1e-30
+        slope = self.inertia(b + 1j * step).imag / step
+        spin = self.h / self.inertia(b)
+        weight = self.g * (2 * self.ball + self.rod) * np.cos(b)
+        pull = 2 * tension * (0.5 * x * np.sin(b) + 0.5 * z * np.cos(b)) / length
+        ddb = (slope * spin**2 / 2 + weight + pull) / (2 * self.J)
+        dds = 2 * tension * z / (length * self.slider) - self.g
+        return [db, ds, ddb, dds, spin]
+
+    def solve(self, times):
+        """Return b, s, b', s' and the shaft's angle at the times."""
+        return solve_ivp(
+            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method="DOP853",
+            t_eval=times, rtol=1e-10, atol=1e-12,
+        ).y  # fmt: skip
+
+    def energy(self, y):
+        """Return kinetic and potential energy, the springs' included."""
+        b, s, db, ds, _ = y
+        x, z = self.coupler(b, s)
+        kinetic = self.h**2 / self.inertia(b) / 2 + self.J * db**2 + self.slider * ds**2 / 2
+        height = (
+            self.slider * s
+            + (2 * self.ball + 2 * self.rod)
+            - (2 * self.ball + self.rod) * np.sin(b)
+        )
+        return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2
+
+
+def geneva_wheel(times, speed, a, pin, walls, inertia, damper, law):
+    """Return the angle of a Geneva wheel at (0, 0), its crank at (a, 0) turning from -90 deg.
+
+    `pin` is (crank radius, pin radius); `walls` is (near end, far end, half width of the slot,
+    thickness). The pin is a disc that meets eight rectangles without friction; two contact points
+    (the ends of the line) share one law each, so the push is twice `law`.
+    """
+    radius, disc = pin
+    near, far, half, thick = walls
+    angles = np.repeat(np.pi / 4 + np.arange(4) * np.pi / 2, 2)
+    sides = np.tile([1.0, -1.0], 4)
+    reach = np.array([(far - near) / 2, thick / 2])
+    middle = np.column_stack([np.full(8, (near + far) / 2), sides * (half + thick / 2)])
+
+    def rhs(t, y):
+        turn = speed * t - np.pi / 2
+        p = np.array([a - radius * np.cos(turn), radius * np.sin(turn)])
+        v = radius * speed * np.array([np.sin(turn), np.cos(turn)])
+        v = v - y[1] * np.array([-p[1], p[0]])  # as the wheel sees it
+        cos, sin = np.cos(y[0] + angles), np.sin(y[0] + angles)
+        local = np.column_stack([cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]]) - middle
+        away = local - np.clip(local, -reach, reach)
+        gap = np.hypot(away[:, 0], away[:, 1])
+        torque = -damper * y[1]
+        for k in np.flatnonzero(gap < disc):
+            n = away[k] / gap[k]
+            n = np.array([cos[k] * n[0] - sin[k] * n[1], sin[k] * n[0] + cos[k] * n[1]])
+            push = 2 * impact(disc - gap[k], -(n @ v), *law)
+            torque -= push * (p[0] * n[1] - p[1] * n[0])
+        return [y[1], torque / inertia]
+
+    return solve_ivp(
+        rhs, (times[0], times[-1]), [0.0, 0.0], method="DOP853", t_eval=times,
+        rtol=1e-9, atol=1e-11, max_step=5e-4,
+    ).y[0]  # fmt: skip

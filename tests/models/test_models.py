@@ -15,11 +15,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from decks_io import MODELS, USERFUNCS, run_model
 from models.reference import (
+    Governor,
     angle_between,
     drop_height,
     elastic_stop,
     falling_chain,
     flat_follower,
+    four_bar_on_stop,
+    geneva_wheel,
     hopping_follower,
     slider_crank,
     top_attitude,
@@ -472,3 +475,116 @@ def test_cam_throws_its_follower_above_a_speed(part, tol, allowed):
         first = np.arccos(-pressed / (m * e * w**2 - k * e)) / w
         assert seen[0] == pytest.approx(first, abs=0.1 / w)
     assert cam_balance(results) < allowed / 5
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-5), (1e-9, 2e-8)])
+def test_four_bar_stop(tol, allowed):
+    results = run_model("four_bar_stop.xml", tol=tol)
+    spring = (np.array([-0.1, 0.15]), 400.0, 0.15, 2.0)
+    wall = (np.array([0.16, 0.0]), np.array([1.0, 0.0]), 0.02)
+    exact, pins = four_bar_on_stop(
+        results["time"], np.pi / 3, (0.1, 0.3, 0.2), (0.5, 1.0, 0.8), 0.3,
+        spring, wall, (1e6, 1.5, 200.0, 1e-4),
+    )  # fmt: skip
+    p = results["bodies/2/position"]
+    assert np.abs(np.arctan2(p[:, 2], p[:, 0]) - exact).max() < allowed
+    middle = (pins + np.array([0.3, 0.0])) / 2
+    assert np.abs(results["bodies/4/position"][:, [0, 2]] - middle).max() < allowed * 0.1
+    kinds = [event["kind"] for event in results["events"]]
+    assert kinds == ["touch", "leave"] * 3 + ["touch"]  # three hops, then it stays
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts)
+    assert np.abs(total - total[0]).max() < allowed * parts[2][-1]
+    assert parts[0][-1] < 1e-4 * parts[0].max()  # and rests
+
+
+def governor_momentum(results):
+    """Return the angular momentum about the shaft at the rows."""
+    inertia = {2: (0.0250025, 0.0250025, 5e-6), 3: (0.005,) * 3, 4: ROD, 5: ROD}
+    masses = {2: 0.3, 3: 3.0, 4: 5.3, 5: 5.3}
+    total = 0.0
+    for body, mass in masses.items():
+        p, v, w, q = (
+            results[f"bodies/{body}/{name}"]
+            for name in ("position", "velocity", "angular_velocity", "quaternion")
+        )
+        R = rotation_matrices(q)
+        spin = np.einsum("nij,j,nkj,nk->ni", R, np.array(inertia[body]), R, w)
+        total = total + spin[:, 2] + mass * (p[:, 0] * v[:, 1] - p[:, 1] * v[:, 0])
+    return total
+
+
+# a rod of 0.3 kg with 5 kg at its end, about their common centre
+GOVERNOR_CENTRE = (0.3 * 0.5 + 5.0) / 5.3
+ACROSS = 0.3 * ((1 + 1e-4) / 12 + (0.5 - GOVERNOR_CENTRE) ** 2) + 5.0 * (1.0 - GOVERNOR_CENTRE) ** 2
+ROD = (0.3 * 2e-4 / 12, ACROSS, ACROSS)
+
+
+def check_governor(results, governor, allowed):
+    t = results["time"]
+    exact = governor.solve(t)
+    assert np.abs(results["bodies/3/position/z"] - exact[1]).max() < allowed
+    p = results["bodies/4/position"]
+    assert np.abs(np.arcsin((1.0 - p[:, 2]) / GOVERNOR_CENTRE) - exact[0]).max() < allowed
+    turn = np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
+    assert np.abs(turn - exact[4]).max() < allowed
+    kinetic, potential = governor.energy(exact)
+    assert np.abs(results["energy/kinetic"] - kinetic).max() < 100 * allowed
+    momentum = governor_momentum(results)
+    np.testing.assert_allclose(momentum, governor.h, rtol=min(allowed, 1e-6))
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts)
+    assert np.abs(total - total[0]).max() < 1e3 * allowed
+    # what the dampers took, which is little: 3.1 mJ in 10 s
+    lost = (kinetic + potential)[0] - (kinetic + potential)[-1]
+    assert parts[2][-1] == pytest.approx(lost, abs=1e3 * allowed)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 1e-10)])
+def test_flyball_governor(tol, allowed):
+    check_governor(run_model("flyball_governor.xml", tol=tol, end_time=1.0), Governor(), allowed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-5), (1e-9, 1e-9)])
+def test_flyball_governor_for_ten_seconds(tol, allowed):
+    results = run_model("flyball_governor.xml", tol=tol)
+    check_governor(results, Governor(), allowed)
+    # what is stiff costs: steps of the default tolerance are those of stability
+    assert tol < 1e-5 or results.stats["steps"] > 15000
+
+
+def wheel_angle(results):
+    q = results["bodies/3/quaternion"]
+    return np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))
+
+
+def test_geneva_indexes_by_a_quarter_a_turn():
+    results = run_model("geneva.xml")
+    t, angle = results["time"], wheel_angle(results)
+    a, r = 0.1, 0.1 / np.sqrt(2)
+    crank = np.mod(2 * np.pi * t + np.pi / 2, 2 * np.pi) - np.pi  # from the line of centres
+    across, along = r * np.sin(crank), a - r * np.cos(crank)
+    exact = np.arctan2(across, along) + np.pi / 4 + np.floor(t + 1e-12) * np.pi / 2
+    engaged = np.abs(crank) < np.pi / 4
+    off = np.abs(angle - exact) * np.hypot(across, along)
+    assert off[engaged].max() < 5e-5 + results["contacts/1/peak_penetration"] + 1e-6
+    # a quarter a turn, kept while the pin is out, without adding up
+    for turn in range(4):
+        resting = angle[(t > turn + 0.42) & (t < turn + 1.1)]
+        assert np.abs(resting - (turn + 1) * np.pi / 2).max() < 2e-4
+        assert np.ptp(resting) < 1e-5
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts) - results["energy/work_of_motions"]
+    assert np.abs(total - total[0]).max() < 1e-3 * parts[2][-1]
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 1e-9)])
+def test_geneva_as_the_law_has_it(tol, allowed):
+    results = run_model("geneva.xml", tol=tol, end_time=1.4)
+    r = 0.1 / np.sqrt(2)
+    walls, law = (0.023, r, 0.00505, 0.006), (1e8, 1.5, 300.0, 1e-5)
+    exact = geneva_wheel(
+        results["time"], 2 * np.pi, 0.1, (r, 0.005), walls, 5e-4, damper=0.1, law=law
+    )
+    assert np.abs(wheel_angle(results) - exact).max() < allowed
