@@ -19,6 +19,7 @@ from mbsim.dynamics.measures import (
     relative_velocity,
 )
 from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, put
+from mbsim.system.arrays import SHOWN
 from mbsim.system.programs import (
     ANGLE,
     CLOSING,
@@ -26,6 +27,7 @@ from mbsim.system.programs import (
     NET,
     OFFSET,
     ORIENT,
+    SENSED,
     SPEED,
     SPIN,
     STATE,
@@ -67,6 +69,8 @@ def rate_or_force(scene, y, code):
         return dot(relative_spin(scene, code[1], code[2]), marker_axis(scene, code[3], code[4]))
     if op == STATE:
         return y[code[1]]
+    if op == SENSED:
+        return scene.state.sensed[code[1], SHOWN]
     if op == NET:
         return net_force(scene, y, code[1], code[2], code[3], code[4])
     return element_force(scene, y, code[1], code[2], code[3], code[5], code[4])

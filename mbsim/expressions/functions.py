@@ -16,6 +16,7 @@ i, j, k, l, where one that is left out or 0 is the global frame:
 | VX, VY, VZ(i,j,k,l)       | (v_i - v_j) . x_k, y_k, z_k, seen from l                     |
 | WM(i,j), WX..(i,j,k)      | abs(w_i - w_j), (w_i - w_j) . x_k                            |
 | DIF(id), DIF1(id)         | z of a Control_Diff, and z'                                  |
+| SENVAL(id)                | what a Sensor_Event evaluated when it acted last, 0 before   |
 | FM, FX.. TM, TX..(i,j,k)  | of all that acts between i and j: force and torque on i      |
 | JOINT.. (id,jflag,comp,k) | force or torque of an element on I (jflag 0) or J (1)        |
 
@@ -103,3 +104,4 @@ _put(Kind.FORCE, "SPDP", "SPRINGDAMPER jflag comp marker", 3)
 _put(Kind.VARIABLE, "VARVAL", "VARIABLE")
 _put(Kind.VARIABLE, "DIF1", "DIFF")
 _put(Kind.STATE, "DIF", "DIFF")
+_put(Kind.STATE, "SENVAL", "SENSOR")

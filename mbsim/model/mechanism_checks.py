@@ -25,6 +25,7 @@ STATEMENTS = {
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
     "DIFF": "Control_Diff",
+    "SENSOR": "Sensor_Event",
 }
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
 #: Joints that may have friction, with the attribute that is the lever of what turns.
@@ -53,6 +54,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Force_JointLimit": model.joint_limits,
         "Reference_Variable": model.variables,
         "Control_Diff": model.differentials,
+        "Sensor_Event": model.sensors,
     }
 
 
@@ -87,6 +89,9 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
             expression = getattr(element, "expr", None)
             if expression is not None:
                 yield element.source, f"{statement}[{element.id}]", "expr", expression
+    for sensor in model.sensors.values():
+        if sensor.evaluate is not None:
+            yield sensor.source, f"Sensor_Event[{sensor.id}]", "evaluate", sensor.evaluate
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs, start=1):
             if expression is not None:

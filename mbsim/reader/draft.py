@@ -34,6 +34,7 @@ class Draft:
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
+    sensors: dict[int, el.Sensor] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     requests: dict[int, el.Request] = field(default_factory=dict)
     display_graphics: dict[int, str] = field(default_factory=dict)

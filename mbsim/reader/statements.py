@@ -12,7 +12,7 @@ from mbsim.reader.constraints import (
     MOTION_JOINT,
 )
 from mbsim.reader.contact import FORCE_CONTACT
-from mbsim.reader.controls import CONTROL_DIFF
+from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import FORCE_SCALAR_TWOBODY, FORCE_SPRINGDAMPER, REFERENCE_VARIABLE
 from mbsim.reader.graphics import POST_GRAPHIC
@@ -51,6 +51,7 @@ STATEMENTS = (
     FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
+    SENSOR_EVENT,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -72,7 +73,7 @@ NOT_BUILT = (
     "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_Spline Reference_String Save "
-    "Sensor_Event Sensor_Proximity UserProgramControl"
+    "Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 

@@ -162,6 +162,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         joint_limits=draft.joint_limits,
         variables=draft.variables,
         differentials=draft.differentials,
+        sensors=draft.sensors,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),
         simulations=tuple(draft.simulations),

@@ -131,6 +131,7 @@ def counts(model: Model) -> dict[str, int]:
         "graphics": len(model.graphics),
         "contacts": len(model.contacts),
         **{name: count for name, count in between_markers.items() if count},
+        **({"sensors": len(model.sensors)} if model.sensors else {}),
         **({"diffs": len(model.differentials)} if model.differentials else {}),
         **({"variables": len(model.variables)} if model.variables else {}),
         "requests": len(model.requests),

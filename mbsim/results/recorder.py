@@ -363,6 +363,7 @@ def _described(model: Model) -> Iterator[Any]:
         yield from elements_of(model, statement).values()
     yield from model.variables.values()
     yield from model.differentials.values()
+    yield from model.sensors.values()
     yield from model.requests.values()
 
 

@@ -20,6 +20,7 @@ up to five numbers:
 | SPIN               | markers i, j, k and axis of k                                         |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
 | STATE              | place in y                                                            |
+| SENSED             | row of `Sensors`                                                      |
 | ELEMENT            | 0 a connection or 1 an applied force, its row, jflag, comp, marker k  |
 """
 
@@ -44,7 +45,7 @@ from mbsim.system.markers import MarkerTable
 
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT = range(FIRST_MEASURE, FIRST_MEASURE + 5)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 5, FIRST_MEASURE + 10)
-NET, ELEMENT, STATE = range(FIRST_MEASURE + 10, FIRST_MEASURE + 13)
+NET, ELEMENT, STATE, SENSED = range(FIRST_MEASURE + 10, FIRST_MEASURE + 14)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -58,6 +59,7 @@ _STATEMENTS = {
     "ScalarForce": "Force_Scalar_TwoBody",
     "Variable": "Reference_Variable",
     "Differential": "Control_Diff",
+    "Sensor": "Sensor_Event",
     "Request": "Post_Request",
 }
 
@@ -79,6 +81,7 @@ class ProgramTable:
     variables: Mapping[int, Variable] = field(default_factory=dict)
     differentials: Mapping[int, Differential] = field(default_factory=dict)
     first_state: int = 0  # where in y the first of their states stands
+    sensors: Sequence[int] = ()  # ids, row by row
     programs: list[list[Instruction]] = field(default_factory=list)
 
     def add(
@@ -302,8 +305,12 @@ class _Compiler:
         return Instruction({"D": OFFSET, "W": SPIN}[name[0]], (i, j, k, axis))
 
     def state(self, node: Call) -> Instruction:
-        """Return a state of the user's own."""
+        """Return a state of the user's own, or what a sensor has evaluated."""
         id = self.number(node, 0)
+        if node.name == "SENVAL":
+            if id not in self.table.sensors:
+                raise ExpressionError(f"there is no sensor {id}", node.column)
+            return Instruction(SENSED, (list(self.table.sensors).index(id),))
         if id not in self.table.differentials:
             raise ExpressionError(f"there is no state {id}", node.column)
         return Instruction(STATE, (self.table.first_state + [*self.table.differentials].index(id),))
