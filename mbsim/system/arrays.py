@@ -9,8 +9,8 @@ units, global frame unless said otherwise.
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
 slot whose law uses it; then the user's own states, one number each; then the work of motions and
-what applied forces dissipated, where there are any (`World.ledger`); last the energy that each contact has dissipated so far (one number
-where there is no contact, so that y is never empty).
+what applied forces dissipated, where there are any (`World.ledger`); last the energy that each
+contact has dissipated so far (one number where there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations
