@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -55,6 +56,7 @@ class Runner:
         from mbsim.core.problem import Problem
         from mbsim.dynamics.hooks import mechanism
         from mbsim.integrators import catalog, driver, scheme
+        from mbsim.sensing import Sensing
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
@@ -76,6 +78,7 @@ class Runner:
             ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
         self.stage = 0  # which Simulate
+        self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
         self.interrupted = False
 
@@ -257,7 +260,7 @@ class Runner:
         }
         arrays["stage"] = np.array(self.stage)
         arrays["time"] = np.array(self.method.memory[0])
-        return arrays
+        return arrays | self.sensing.saved()
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
@@ -266,6 +269,7 @@ class Runner:
             for field, array in zip(group._fields, group, strict=True):
                 array[...] = saved[f"{name}/{field}"]
         self.stage = int(saved["stage"])
+        self.sensing.restore(saved)
 
     def run(self, progress: Progress | None, resumed: bool) -> None:
         """Run all Simulate statements from the current stage on."""
@@ -274,6 +278,61 @@ class Runner:
             fresh = not (resumed and stage == first)
             self.stage = stage
             self._run_stage(self.settings.stages[stage], fresh, progress)
+            if self.sensing.halted_by:
+                return
+
+    def _sense(self, end: float, start: bool = False) -> bool:
+        """Do what sensors that became true ask for; return whether the Simulate goes on."""
+        from mbsim.integrators import scheme
+        from mbsim.sensing import GO_ON
+
+        t, y, error = float(self.method.memory[scheme.TIME]), self.method.y, self.method.error
+        last = self.stage == len(self.settings.stages) - 1
+        follows, row = self.sensing.act(t, end, last)
+        # the first row of a Simulate is there anyway
+        if row and not start:
+            code = self.call(self.problem.output, t, 0.0, y, error)
+            if code < 0.0:
+                fail(self.system, self.detector, int(-code), t)
+            self.recorder.take()
+        return follows == GO_ON
+
+    def _begin_stage(self, stage: Stage) -> bool:
+        """Begin one Simulate statement with its first row; return whether it goes on."""
+        from mbsim.integrators import scheme
+
+        method, simulation = self.method, stage.simulation
+        if self.stage > 0:
+            # a sensor may have ended the one before early
+            now = float(method.memory[scheme.TIME])
+            simulation = replace(simulation, start_time=now)
+        last = self.stage == len(self.settings.stages) - 1
+        self.sensing.begin(output_times(simulation, last), stage.h_max)
+        # the statement may have changed what acts: f and the step begin anew
+        method.memory[scheme.HAVE_F] = 0.0
+        method.memory[scheme.STEP] = 0.0
+        method.memory[scheme.FIRST_MAX] = stage.h0_max
+        method.memory[scheme.LAST_STEP] = 0.0
+        method.counts[scheme.NEXT_OUTPUT] = 1
+        t, goes_on = simulation.start_time, True
+        if simulation.analysis_type == "STATIC":
+            self.balance(stage)
+            goes_on = False
+        elif self.stage and self.settings.stages[self.stage - 1].is_static:
+            # motions of velocity go on from rest
+            self.assemble_again(t)
+        if (
+            goes_on
+            and self.problem.arrive
+            and self.call(self.problem.arrive, t, 0.0, method.y, method.error)
+        ):
+            goes_on = self._sense(simulation.end_time, start=True)
+        if len(self.sensing.times):
+            code = self.call(self.problem.output, t, 0.0, method.y, method.error)
+            if code < 0.0:
+                fail(self.system, self.detector, int(-code), t)
+        self.recorder.take()
+        return goes_on
 
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
@@ -285,36 +344,22 @@ class Runner:
         for passed in self.settings.stages[: self.stage + 1]:
             if passed.simulation.gravity is not None:
                 scene.world.gravity[:] = passed.simulation.gravity.g
-        times = output_times(simulation, self.stage == len(self.settings.stages) - 1)
         budget = FIRST_BUDGET
         if fresh:
-            # the statement may have changed what acts: f and the step begin anew
-            method.memory[scheme.HAVE_F] = 0.0
-            method.memory[scheme.STEP] = 0.0
-            method.memory[scheme.FIRST_MAX] = stage.h0_max
-            method.memory[scheme.LAST_STEP] = 0.0
-            method.counts[scheme.NEXT_OUTPUT] = 1
-            if simulation.analysis_type == "STATIC":
-                self.balance(stage)
-            elif self.stage and self.settings.stages[self.stage - 1].is_static:
-                # motions of velocity go on from rest
-                self.assemble_again(times[0])
-            if len(times):
-                code = self.call(self.problem.output, times[0], 0.0, method.y, method.error)
-                if code < 0.0:
-                    fail(self.system, self.detector, int(-code), times[0])
-        if simulation.analysis_type == "STATIC":
-            self.recorder.take()
-            return
+            if not self._begin_stage(stage):
+                return
+        elif not self.system.model.sensors:
+            last = self.stage == len(self.settings.stages) - 1
+            self.sensing.begin(output_times(simulation, last), stage.h_max)
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
                 self._steps,
                 simulation.end_time,
                 stage.tol,
-                stage.h_max,
+                self.sensing.h_max,
                 stage.h_min,
-                times,
+                self.sensing.times,
                 budget,
             )
             elapsed = time.perf_counter() - began
@@ -325,6 +370,8 @@ class Runner:
             budget = int(min(max(wanted, 1.0), 4.0 * budget))
             self.recorder.take()
             if outcome == problem.DONE:
+                return
+            if outcome == problem.HAPPENED and not self._sense(simulation.end_time):
                 return
             if outcome == problem.FAILED:
                 fail(
@@ -350,6 +397,7 @@ class Runner:
 
         counts, memory = self.method.counts, self.method.memory
         counters = self.system.scene.log.counters
+        halted = self.sensing.halted_by
         return {
             "steps": int(counts[scheme.STEPS]),
             "rejected": int(counts[scheme.REJECTED]),
@@ -369,6 +417,7 @@ class Runner:
             "loop_s": self.loop_seconds,
             "wall_s": wall,
             "compile_s": compiled,
+            **({"halted_by_sensor": halted} if halted else {}),
         }
 
 

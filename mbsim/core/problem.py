@@ -17,6 +17,10 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | look   | y at an inner point, -      | code; called where `commit` before asked for it       |
 | inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
 | limit  | y, f                        | longest step that may be tried                        |
+| happens| y, scratch                  | 1 if an event that is to be located has happened     |
+|        |                             | between the committed point and this one, else 0     |
+| arrive | y committed, scratch        | 1 if something happened by this committed point that  |
+|        |                             | the caller of `advance` must act on, else 0           |
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
@@ -47,6 +51,8 @@ class Problem(NamedTuple):
     output: int
     reject: int
     stable: int = 0  # only for methods without error estimate
+    happens: int = 0  # this and the next only for problems with events
+    arrive: int = 0
 
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
@@ -58,7 +64,7 @@ NOT_FINITE = 3
 AT_ONCE = 100
 
 # what `advance` returns
-DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL = range(5)
+DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED = range(6)
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE = range(3)

@@ -172,4 +172,12 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.joint_door import open_joints
 
         open_joints(scene)
-    return Problem(int(table.ctypes.data), *addresses), table
+    problem = Problem(int(table.ctypes.data), *addresses)
+    if len(scene.sensors.id) > 0:
+        from mbsim.dynamics.sensors import arrive_hook, happens_hook
+
+        arrive = jit.address(arrive_hook, HOOK)
+        # where none is located, steps need not be looked into
+        happens = jit.address(happens_hook, HOOK) if scene.sensors.located.any() else 0
+        problem = problem._replace(happens=happens, arrive=arrive)
+    return problem, table

@@ -23,6 +23,7 @@ from mbsim.dynamics.measures import (
     relative_velocity,
 )
 from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, get, put
+from mbsim.system.arrays import SHOWN
 from mbsim.system.programs import (
     ACCELERATION,
     ANGLE,
@@ -31,6 +32,7 @@ from mbsim.system.programs import (
     INCLUDED,
     NET,
     OFFSET,
+    SENSED,
     SPEED,
     SPIN,
     SPIN_UP,
@@ -82,6 +84,8 @@ def rate_or_force(scene, y, code):
     if op == SPIN_UP:
         a = relative_spin_up(scene, code[1], code[2], code[4])
         return norm(a) if code[5] == 3 else dot(a, marker_axis(scene, code[3], code[5]))
+    if op == SENSED:
+        return scene.state.sensed[code[1], SHOWN]
     if op == NET:
         return net_force(scene, y, code[1], code[2], code[3], code[4])
     return element_force(scene, y, code[1], code[2], code[3], code[5], code[4])

@@ -147,7 +147,7 @@ def beyond_noise(scene, b, h, dv, dw):
 
 @jitable
 def scaled_error(scene, h, e, y):
-    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, and of incidents' X/L, energy, states.
+    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
     step can do to a velocity is not chased. The worst body is left in `trouble[0]`.

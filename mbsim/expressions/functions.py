@@ -19,6 +19,7 @@ i, j, k, l, where one that is left out or 0 is the global frame:
 | INCANG(i,j,k)             | angle at P_j between the lines to P_i and P_k, 0 to pi       |
 | ACCM(i,j,l), ACCX..(i,j,k,l) | as VM, VX.. of the second derivative, taken in l's body   |
 | WDTM(i,j,l), WDTX..(i,j,k,l) | as WM, WX.. of the derivative of w_i - w_j, taken in l's  |
+| SENVAL(id)                | what a Sensor_Event evaluated when it acted last, 0 before   |
 | FM, FX.. TM, TX..(i,j,k)  | of all that acts between i and j: force and torque on i      |
 | JOINT.. (id,jflag,comp,k) | force or torque of an element on I (jflag 0) or J (1)        |
 
@@ -129,3 +130,4 @@ _put(Kind.FORCE, "CONTACT", "CONTACT jflag comp marker", 3)
 _put(Kind.VARIABLE, "VARVAL", "VARIABLE")
 _put(Kind.TABLE, "AKISPL CUBSPL LINSPL", "number number SPLINE iord", 3)
 _put(Kind.TABLE, "ARYVAL", "ARRAY place")
+_put(Kind.STATE, "SENVAL", "SENSOR")

@@ -17,6 +17,7 @@ from mbsim.core.problem import (
     BY_NOT_FINITE,
     DONE,
     FAILED,
+    HAPPENED,
     NOT_FINITE,
     PAUSED,
     ROWS_FULL,
@@ -29,6 +30,7 @@ from mbsim.integrators.scheme import (
     CODE,
     ERROR_BEFORE,
     EVALUATIONS,
+    EVENT_DUE,
     FAILURES,
     FIRST_MAX,
     H_LARGEST,
@@ -48,6 +50,14 @@ from mbsim.integrators.scheme import (
     TOL,
     on_bench,
 )
+
+#: An event is located to so much of a time unit, or of the time where that is larger.
+LOCATED = 1e-11
+#: A step is looked into for events at so many points, and at one more for each row within it,
+#: up to so many.
+LOOKS, MOST_LOOKS = 4, 64
+#: So often at most a step is taken again to end at its first event.
+MOST_RETAKES = 40
 
 #: A hook that fails is tried again at a tenth of the step, so many times.
 MOST_FAILURES = 8
@@ -153,6 +163,52 @@ def output_within(m, times, t):
 
 
 @jitable
+def looks_within(m, times, t):
+    """Return at how many points a step to time t is looked into for events."""
+    looks, row = LOOKS, m.counts[NEXT_OUTPUT]
+    while looks < MOST_LOOKS and row < len(times) and times[row] < t:
+        looks += 1
+        row += 1
+    return looks
+
+
+@jitable
+def happens_at(p, m, t, h, s):
+    """Return whether an event has happened by the part s of the step, its end being m.trial."""
+    if s == 1.0:
+        return call_float(p.happens, (p.context, t + h, 0.0, m.trial, m.error)) > 0.0
+    interpolate(m, s, m.error)
+    return call_float(p.happens, (p.context, t + s * h, 0.0, m.error, m.error)) > 0.0
+
+
+@jitable
+def first_event(p, m, t, h, times):
+    """Return the length of the fitted step up to just behind its first event, 2 h for none.
+
+    Bisection on whether it has happened, to the last digit of the time. The problem is left
+    evaluated at another point.
+    """
+    looks, low, high = looks_within(m, times, t + h), 0.0, 2.0
+    for k in range(1, looks + 1):
+        s = k / looks if k < looks else 1.0
+        if happens_at(p, m, t, h, s):
+            high = s
+            break
+        low = s
+    if high > 1.0:
+        return 2.0 * h
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if t + middle * h <= t + low * h or t + middle * h >= t + high * h:
+            break
+        if happens_at(p, m, t, h, middle):
+            high = middle
+        else:
+            low = middle
+    return high * h
+
+
+@jitable
 def outputs(p, m, steps, times):
     """Write a row for every output time within the last step; return 0 or what stopped it."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
@@ -161,7 +217,8 @@ def outputs(p, m, steps, times):
     within = h if steps.order == 0.0 else 0.0
     while m.counts[NEXT_OUTPUT] < len(times):
         when = times[m.counts[NEXT_OUTPUT]]
-        if when > t_new:
+        # a row at the time of an event holds what is after it
+        if when > t_new or (when == t_new and m.memory[EVENT_DUE] == 1.0):
             return 0.0
         interpolate(m, min(1.0, (when - t) / h), m.trial)
         call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
@@ -190,9 +247,42 @@ def attempt(p, m, steps, t, h, times):
         if part < 1.0:
             return 0.0, part, -1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-    if asked >= 0.0 or output_within(m, times, t + h):
+    if asked >= 0.0 or p.happens != 0 or output_within(m, times, t + h):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     return code, 1.0, asked
+
+
+@jitable
+def attempt_to_event(p, m, steps, t, h, times, floor):
+    """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
+
+    A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
+    the state there is no interpolated one; where that ends before the event after all, it is
+    tried a little longer.
+    """
+    code, part, asked = attempt(p, m, steps, t, h, times)
+    if p.happens == 0:
+        return code, part, asked, h
+    near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
+    shortened = False
+    for _ in range(MOST_RETAKES):
+        if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0:
+            return code, part, asked, h
+        cut = first_event(p, m, t, h, times)
+        if cut > h:
+            if not shortened or nudge > near:
+                break
+            h += nudge
+            nudge *= 2.0
+        elif h - cut <= near or h <= floor:
+            break
+        else:
+            h = max(cut, floor)
+            shortened = True
+        code, part, asked = attempt(p, m, steps, t, h, times)
+    # the problem's hooks expect its last evaluation at the trial point
+    happens_at(p, m, t, h, 1.0)
+    return code, part, asked, h
 
 
 @jitable
@@ -263,6 +353,9 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if full != 0.0:
             m.counts[CODE] = int(-full)
             return ROWS_FULL if full > 0.0 else FAILED
+        if m.memory[EVENT_DUE] == 1.0:
+            m.memory[EVENT_DUE] = 0.0
+            return HAPPENED
     stop_at = m.counts[EVALUATIONS] + budget
     while m.memory[TIME] < t_end:
         if m.counts[EVALUATIONS] >= stop_at:
@@ -272,10 +365,10 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if steps.order == 0.0 and m.counts[FAILURES] == 0 and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
             m.memory[STALE] = 0.0
-        h = length(p, m, steps, t, t_end, h_max, floor)
+        whole = length(p, m, steps, t, t_end, h_max, floor)
 
         # try
-        code, part, asked = attempt(p, m, steps, t, h, times)
+        code, part, asked, h = attempt_to_event(p, m, steps, t, whole, times, floor)
         error = m.memory[LAST_ERROR]
         if code != 0.0:
             if gives_up(m, code, h, floor):
@@ -304,12 +397,18 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
 
         # take
         choose_next(m, steps, h, h_max)
+        if h < whole:
+            # it was good enough, and ended for an event
+            m.memory[STEP] = max(m.memory[STEP], whole)
         word = accept(p, m, steps, t, h, asked)
         if t + h >= t_end:
             m.memory[TIME] = t_end
         if word < 0.0:
             m.counts[CODE] = int(-word)
             return FAILED
+        if p.arrive != 0:
+            arrived = call_float(p.arrive, (p.context, m.memory[TIME], 0.0, m.y, m.error))
+            m.memory[EVENT_DUE] = arrived
         full = outputs(p, m, steps, times)
         if full < 0.0:
             m.counts[CODE] = int(-full)
@@ -322,4 +421,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
                 return FAILED
         if full > 0.0 or word >= 2.0:
             return ROWS_FULL
+        if m.memory[EVENT_DUE] == 1.0:
+            m.memory[EVENT_DUE] = 0.0
+            return HAPPENED
     return DONE

@@ -33,7 +33,7 @@ from mbsim.core.problem import HOOK, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
-LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE = range(7, 13)
+LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(7, 14)
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 
@@ -58,7 +58,7 @@ class Method(NamedTuple):
     trial: F1  # (n,)
     error: F1  # (n,)
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
-    memory: F1  # (12,) see the names above
+    memory: F1  # (14,) see the names above
     counts: I1  # (8,) see the names above
     bodies: I1  # (1,) how many bodies begin y, for methods that know positions from velocities
 
@@ -66,7 +66,7 @@ class Method(NamedTuple):
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (12,) the fields of `Problem`
+    problem: I1  # (14,) the fields of `Problem`
     method: Method
 
 
@@ -84,7 +84,7 @@ class Steps(NamedTuple):
 def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
     """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies."""
     n = len(y0)
-    memory = np.zeros(13)
+    memory = np.zeros(14)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
     memory[H_SMALLEST] = math.inf
@@ -117,7 +117,8 @@ def on_bench(context):
     """Return the problem and the method that stand behind `context`."""
     bench = view(context, Bench)
     w = bench.problem
-    problem = Problem(w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9], w[10], w[11])
+    first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
+    problem = Problem(*first, w[7], w[8], w[9], w[10], w[11], w[12], w[13])
     return problem, bench.method
 
 

@@ -453,6 +453,33 @@ class ArrayOfNumbers:
 
 
 @dataclass(frozen=True)
+class Sensor:
+    """Sensor_Event, Adams' SENSOR: acts when its condition becomes true (README, "Sensors").
+
+    `zero_crossing`: a step ends where it becomes true. What it does: `halt` ends the run,
+    `stops` (return) the Simulate, `prints` adds a row; `dt` [T] is the print interval, `stepsize`
+    the next step, `h_max` the longest from then on; `evaluate` is what SENVAL(id) shows.
+    """
+
+    id: int
+    expr: Expression
+    compare: str = "EQ"  # GE, LE, GT, LT or EQ
+    value: float = 0.0
+    error_tol: float = 0.0
+    zero_crossing: bool = False
+    evaluate: Expression | None = None
+    halt: bool = False
+    stops: bool = False
+    prints: bool = False
+    dt: float | None = None
+    stepsize: float | None = None
+    h_max: float | None = None
+    verbose: bool = False
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Request:
     """Post_Request, Adams' REQUEST.
 
@@ -503,6 +530,7 @@ class Model:
     differentials: dict[int, Differential] = field(default_factory=dict)
     splines: dict[int, Spline] = field(default_factory=dict)
     arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
+    sensors: dict[int, Sensor] = field(default_factory=dict)
     gravity: Gravity = Gravity()
     transient: Transient = Transient()
     simulations: tuple[Simulation, ...] = ()

@@ -30,6 +30,7 @@ STATEMENTS = {
     "DIFF": "Control_Diff",
     "SPLINE": "Reference_Spline",
     "ARRAY": "Reference_Array",
+    "SENSOR": "Sensor_Event",
 }
 #: Attributes of vector forces that are expressions.
 COMPONENTS = tuple(f"{name}_expression" for name in ("fx", "fy", "fz", "tx", "ty", "tz"))
@@ -68,6 +69,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Control_Diff": model.differentials,
         "Reference_Spline": model.splines,
         "Reference_Array": model.arrays,
+        "Sensor_Event": model.sensors,
     }
 
 
@@ -110,6 +112,9 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
             for attribute, expression in zip(COMPONENTS, force.exprs, strict=True):
                 if expression is not None:
                     yield force.source, f"{statement}[{force.id}]", attribute, expression
+    for sensor in model.sensors.values():
+        if sensor.evaluate is not None:
+            yield sensor.source, f"Sensor_Event[{sensor.id}]", "evaluate", sensor.evaluate
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs, start=1):
             if expression is not None:

@@ -1,11 +1,20 @@
-"""Control_Diff: states of the user's own."""
+"""Control_Diff and Sensor_Event: states of the user's own, and what acts when something happens."""
 
 from __future__ import annotations
 
 from mbsim.model import elements as el
 from mbsim.reader.constraints import USERSUB_REFUSED
 from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, POSITIVE, REAL, TEXT, keyword
+from mbsim.reader.kinds import (
+    EXPRESSION,
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    TEXT,
+    keyword,
+)
 from mbsim.reader.statement import Entry, Spec, Statement
 
 _IMPLICIT = "an implicit equation 0 = f(z, z') is not built; solve it for z' and leave it out"
@@ -42,4 +51,72 @@ CONTROL_DIFF = Statement(
         **USERSUB_REFUSED,
     },
     _build_differential,
+)
+
+
+_COMPARE = {name.lower(): name for name in ("GE", "LE", "GT", "LT", "EQ")}
+
+
+def add_sensor(entry: Entry, sensor: el.Sensor) -> None:
+    """Add a sensor; one that does nothing is worth a word."""
+    acts = (sensor.evaluate, sensor.dt, sensor.stepsize, sensor.h_max)
+    flags = (sensor.halt, sensor.stops, sensor.prints)
+    if all(action is None for action in acts) and not any(flags):
+        entry.warn("has no action: it only notes when it becomes true")
+    if sensor.compare == "EQ" and not sensor.zero_crossing and sensor.error_tol == 0.0:
+        entry.warn("compare EQ without error_tol and zero_crossing: only a change of sign is seen")
+    entry.register(entry.draft.sensors, sensor)
+
+
+def _build_sensor(entry: Entry) -> None:
+    """Add a sensor."""
+    if entry.get("expr") is None or (entry.given("compare") and entry.get("compare") is None):
+        return
+    sensor = el.Sensor(
+        id=entry.get("id", 0),
+        expr=entry.get("expr"),
+        compare=entry.get("compare", "EQ"),
+        value=entry.get("value", 0.0),
+        error_tol=entry.get("error_tol", 0.0),
+        zero_crossing=entry.get("zero_crossing", False),
+        evaluate=entry.get("evaluate"),
+        halt=entry.get("halt", False),
+        stops=entry.get("return", False),
+        prints=entry.get("print", False),
+        dt=entry.get("dt"),
+        stepsize=entry.get("stepsize"),
+        h_max=entry.get("hmax"),
+        verbose=entry.get("verbose", False),
+        label=entry.get("label", ""),
+        source=entry.source,
+    )
+    add_sensor(entry, sensor)
+
+
+_NO_IDS = "what it refers to is not documented; give the expression itself as evaluate"
+
+SENSOR_EVENT = Statement(
+    "Sensor_Event",
+    {
+        "id": Spec(ID, required=True),
+        "label": Spec(TEXT),
+        "full_label": Spec(TEXT),
+        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
+        "expr": Spec(EXPRESSION, required=True),
+        "compare": Spec(keyword(_COMPARE)),
+        "value": Spec(REAL),
+        "error_tol": Spec(NOT_NEGATIVE),
+        "zero_crossing": Spec(FLAG),
+        "evaluate": Spec(EXPRESSION),  # ours; Adams' EVALUATE
+        "evaluate_id": Spec(TEXT, refused=_NO_IDS),
+        "halt": Spec(FLAG),
+        "return": Spec(FLAG),
+        "print": Spec(FLAG),
+        "dt": Spec(POSITIVE),
+        "stepsize": Spec(POSITIVE),
+        "hmax": Spec(POSITIVE),
+        "verbose": Spec(FLAG),
+        **USERSUB_REFUSED,
+    },
+    _build_sensor,
 )

@@ -37,6 +37,7 @@ class Draft:
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
+    sensors: dict[int, el.Sensor] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     splines: dict[int, el.Spline] = field(default_factory=dict)
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)

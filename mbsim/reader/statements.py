@@ -12,7 +12,7 @@ from mbsim.reader.constraints import (
     MOTION_JOINT,
 )
 from mbsim.reader.contact import FORCE_CONTACT
-from mbsim.reader.controls import CONTROL_DIFF
+from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import (
     FORCE_BUSHING,
@@ -65,6 +65,7 @@ STATEMENTS = (
     CONTROL_DIFF,
     REFERENCE_SPLINE,
     REFERENCE_ARRAY,
+    SENSOR_EVENT,
     POST_REQUEST,
     SIMULATE,
     STOP,
@@ -86,7 +87,7 @@ NOT_BUILT = (
     "Param_Simulation Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_String Save "
-    "Sensor_Event Sensor_Proximity UserProgramControl"
+    "Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 

@@ -167,6 +167,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         differentials=draft.differentials,
         splines=draft.splines,
         arrays=draft.arrays,
+        sensors=draft.sensors,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),
         simulations=tuple(draft.simulations),

@@ -134,6 +134,7 @@ def counts(model: Model) -> dict[str, int]:
         **{
             name: len(table)
             for name, table in (
+                ("sensors", model.sensors),
                 ("diffs", model.differentials),
                 ("variables", model.variables),
                 ("splines", model.splines),

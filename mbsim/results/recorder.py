@@ -365,6 +365,7 @@ def _described(model: Model) -> Iterator[Any]:
     yield from model.differentials.values()
     yield from model.splines.values()
     yield from model.arrays.values()
+    yield from model.sensors.values()
     yield from model.requests.values()
 
 

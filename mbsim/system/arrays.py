@@ -8,9 +8,9 @@ units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
-slot whose law uses it; then the user's own states, one number each; then the work of motions and what applied forces dissipated, where there
-are any (`World.ledger`); last the energy that each contact has dissipated so far (one number
-where there is no contact, so that y is never empty).
+slot whose law uses it; then the user's own states, one number each; then the work of motions and
+what applied forces dissipated, where there are any (`World.ledger`); last the energy that each
+contact has dissipated so far (one number where there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations
@@ -91,7 +91,14 @@ CHOSEN, USUAL, NEAR_FOLD, DRIFT, DRIFTER = range(5)
 STORED_ENERGY, LOST_POWER = 6, 7
 
 # kinds of `Rows.events`
-TOUCH, LEAVE = range(2)
+TOUCH, LEAVE, STICK, SLIP, SENSOR = range(5)
+
+# entries of `Sensors.compare`
+NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
+
+# columns of `State.sensed`: expression less value at the committed state, whether it was true,
+# what SENVAL shows, what it will show, whether it became true and Python has not yet acted
+EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
 
 
 class Bodies(NamedTuple):
@@ -223,6 +230,18 @@ class States(NamedTuple):
     scale: F1  # (nz,) size below which an error counts as one at this size
 
 
+class Sensors(NamedTuple):
+    """What is watched, and acted on in Python when it becomes true."""
+
+    id: I1  # (n,)
+    program: I1  # (n,)
+    evaluate: I1  # (n,) program whose value SENVAL shows, -1 for none
+    compare: I1  # (n,) NOT_LESS, ...
+    value: F1  # (n,)
+    width: F1  # (n,) how far from the value counts as there
+    located: I1  # (n,) 1 where a step ends at the crossing
+
+
 class Applied(NamedTuple):
     """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
 
@@ -321,6 +340,7 @@ class State(NamedTuple):
     rate: F1  # (ns,) of depth
     normal: F1  # (ns,) normal force
     hit: I1  # (ns + 1,) slots that touched, their number last
+    sensed: F2  # (sensors, 5) see the names above
 
 
 class Log(NamedTuple):
@@ -428,6 +448,7 @@ class Scene(NamedTuple):
     angles: Angles
     programs: Programs
     states: States
+    sensors: Sensors
     applied: Applied
     tree: Tree
     equations: Equations

@@ -36,7 +36,7 @@ from mbsim.system.pairing import (
 )
 from mbsim.system.programs import ProgramTable
 from mbsim.system.scratch import empty_log, empty_rows, scratch, start_state
-from mbsim.system.states import states_table
+from mbsim.system.states import sensors_table, states_table
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -225,12 +225,19 @@ def build(
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + 3 * len(carried)
     programs = ProgramTable(
-        table, model.variables, model.differentials, first_state, model.splines, model.arrays
+        table,
+        model.variables,
+        model.differentials,
+        first_state,
+        tuple(model.sensors),
+        model.splines,
+        model.arrays,
     )
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
     states = states_table(model, programs)
+    sensors = sensors_table(model, programs)
     values = _values(model, programs)
     nz = len(states.program)
     ledger = _ledger(bool(model.motions), nf > 0, first_state + nz)
@@ -258,6 +265,7 @@ def build(
         angles=angles,
         programs=instructions,
         states=states,
+        sensors=sensors,
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
@@ -269,11 +277,11 @@ def build(
             np.zeros(1, dtype=np.int64),
             ledger,
         ),
-        state=start_state(nb, len(graphic_ids), ns, table.start_angles()),
+        state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(sensors.id)),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
         sweep=sweep(mechanism),
-        rows=empty_rows(len(y0), nb, len(contact_ids), ns, nj, nf, len(values)),
+        rows=empty_rows(len(y0), nb, len(contact_ids), ns, nj, nf, len(values), len(sensors.id)),
     )
     needs_fcl = any(not kind.closed_form for kind in kinds)
     return System(

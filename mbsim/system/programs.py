@@ -23,6 +23,7 @@ up to five numbers:
 | SPIN_UP            | the same                                                              |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
 | STATE              | place in y                                                            |
+| SENSED             | row of `Sensors`                                                      |
 | ELEMENT            | 0 a connection, 1 an applied force, 2 a contact, its row, jflag,      |
 |                    | comp, marker k                                                        |
 | SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
@@ -52,7 +53,7 @@ from mbsim.system.splines import SplineTable
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEASURE + 6)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
-STATE, SPLINE = FIRST_MEASURE + 15, FIRST_MEASURE + 16
+STATE, SENSED, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 18)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -68,6 +69,7 @@ _STATEMENTS = {
     "BodyForce": "Force_Vector_OneBody",
     "Variable": "Reference_Variable",
     "Differential": "Control_Diff",
+    "Sensor": "Sensor_Event",
     "Request": "Post_Request",
 }
 
@@ -89,6 +91,7 @@ class ProgramTable:
     variables: Mapping[int, Variable] = field(default_factory=dict)
     differentials: Mapping[int, Differential] = field(default_factory=dict)
     first_state: int = 0  # where in y the first of their states stands
+    sensors: Sequence[int] = ()  # ids, row by row
     splines: Mapping[int, Spline] = field(default_factory=dict)
     arrays_of_numbers: Mapping[int, ArrayOfNumbers] = field(default_factory=dict)
     programs: list[list[Instruction]] = field(default_factory=list)
@@ -355,8 +358,12 @@ class _Compiler:
         return Instruction({"D": OFFSET, "W": SPIN}[name[0]], (i, j, k, axis))
 
     def state(self, node: Call) -> Instruction:
-        """Return a state of the user's own."""
+        """Return a state of the user's own, or what a sensor has evaluated."""
         id = self.number(node, 0)
+        if node.name == "SENVAL":
+            if id not in self.table.sensors:
+                raise ExpressionError(f"there is no sensor {id}", node.column)
+            return Instruction(SENSED, (list(self.table.sensors).index(id),))
         if id not in self.table.differentials:
             raise ExpressionError(f"there is no state {id}", node.column)
         return Instruction(STATE, (self.table.first_state + [*self.table.differentials].index(id),))

@@ -15,8 +15,12 @@ EVENTS = 1024
 INCIDENTS = 100_000
 
 
-def start_state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.State:
+def start_state(
+    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0
+) -> a.State:
     """Return the incident table before anything touched."""
+    sensed = np.zeros((sensors, 5))
+    sensed[:, a.EXCESS] = np.nan
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
     return a.State(
@@ -31,6 +35,7 @@ def start_state(nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any]) -> a.Sta
         rate=np.zeros(ns),
         normal=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
+        sensed=sensed,
     )
 
 
@@ -88,7 +93,9 @@ def scratch(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, 
     )
 
 
-def empty_rows(n: int, nb: int, nc: int, ns: int, nj: int, nf: int, values: int) -> a.Rows:
+def empty_rows(
+    n: int, nb: int, nc: int, ns: int, nj: int, nf: int, values: int, sensors: int = 0
+) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
     return a.Rows(
         time=np.zeros(ROWS),
@@ -101,6 +108,6 @@ def empty_rows(n: int, nb: int, nc: int, ns: int, nj: int, nf: int, values: int)
         value=np.zeros((ROWS, values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
         incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), 14)),
-        events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS), 4)),
+        events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + sensors, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

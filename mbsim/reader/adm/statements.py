@@ -11,6 +11,7 @@ from mbsim.model.frames import GLOBAL, Frame, rotation_313
 from mbsim.reader import units
 from mbsim.reader.adm.declare import ANGLE, ANY, NUMBERS, ROWS, AdmStatement, angles, numbers
 from mbsim.reader.constraints import note_unused_starts
+from mbsim.reader.controls import add_sensor
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
@@ -380,6 +381,30 @@ def _build_array(entry: Entry) -> None:
     entry.register(entry.draft.arrays, array)
 
 
+def _build_sensor(entry: Entry) -> None:
+    """Add a sensor."""
+    if entry.get("FUNCTION") is None:
+        return
+    sensor = el.Sensor(
+        entry.get("id", 0),
+        entry.get("FUNCTION"),
+        compare=entry.get("COMPARE", "EQ"),
+        value=entry.get("VALUE", 0.0),
+        error_tol=entry.get("ERROR", 1e-3),
+        evaluate=entry.get("EVALUATE"),
+        halt=entry.get("HALT", False),
+        stops=entry.get("RETURN", False),
+        prints=entry.get("PRINT", False),
+        dt=entry.get("DT"),
+        stepsize=entry.get("STEPSIZE"),
+        source=entry.source,
+    )
+    add_sensor(entry, sensor)
+
+
+_COMPARE = ("EQ", "GE", "LE")
+_SENSOR_FLAGS = ("HALT", "PRINT", "RETURN")
+_OF_RESTARTS = ("CODGEN", "YYDUMP", "RESTART")
 _FUNCTIONS = tuple(f"F{k}" for k in range(1, 9))
 
 
@@ -645,6 +670,28 @@ STATEMENTS = (
         xml="Reference_Array",
     ),
     AdmStatement(
+        "SENSOR",
+        {
+            **_ID,
+            "FUNCTION": Spec(EXPRESSION, required=True),
+            "VALUE": Spec(REAL),
+            "ERROR": Spec(NOT_NEGATIVE),
+            "COMPARE": _choice(*_COMPARE),
+            "EVALUATE": Spec(EXPRESSION),
+            "DT": Spec(POSITIVE),
+            "STEPSIZE": Spec(POSITIVE),
+            **{name: Spec(FLAG) for name in _SENSOR_FLAGS},
+            "BISECTION": Spec(FLAG, refused=f"{_NOT_BUILT}; of XML decks zero_crossing locates"),
+            "CODGEN": Spec(FLAG, note=_HARMLESS),
+            "YYDUMP": Spec(FLAG, note=_HARMLESS),
+            "RESTART": Spec(FLAG, note=_HARMLESS),
+        },
+        _build_sensor,
+        words=_words("COMPARE", *_COMPARE)
+        | {name: (name, "TRUE") for name in (*_SENSOR_FLAGS, "BISECTION", *_OF_RESTARTS)},
+        xml="Sensor_Event",
+    ),
+    AdmStatement(
         "REQUEST",
         {
             **_ID,
@@ -688,5 +735,5 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 NOT_BUILT = (
     "BEAM BUSHING CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
     "GFORCE GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
-    "PTCV PTSF SENSOR STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
+    "PTCV PTSF STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
 ).split()
