@@ -106,6 +106,7 @@ class Runner:
             contradiction,
             describe,
         )
+
         t = self.settings.stages[0].simulation.start_time
         serve = self._door(t)
 

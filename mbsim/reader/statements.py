@@ -114,6 +114,11 @@ def _read_statement(section: Node, node: Node, draft: Draft) -> None:
         what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
         draft.fault(node.line, label, what)
     else:
-        if draft.stop_line and statement in (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY):
+        if draft.stop_line and statement in (
+            SIMULATE,
+            PARAM_TRANSIENT,
+            PARAM_STATIC,
+            FORCE_GRAVITY,
+        ):
             draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
         statement.read(node, draft)
