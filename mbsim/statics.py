@@ -88,7 +88,7 @@ def _report(system: System, found: Balance, before: Array, y: Array, t: float) -
         b = int(ways.argmax())
         lines.append(f"static: {system.body_name(b)} moved furthest, by {ways[b]:.6g}")
     if found.unstable:
-        lines.append("static: the equilibrium is unstable: a small push would end it")
+        lines.append("static: without friction this equilibrium is unstable")
     return lines
 
 

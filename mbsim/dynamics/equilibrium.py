@@ -37,6 +37,8 @@ _MOST_WAY, _MOST_OF_SIDE, _MOST_TURN = 0.1, 0.5, 0.2
 #: Bodies that have gone further than this many lengths rest on nothing.
 FAR_AWAY = 1e3
 _MOST_CUTS = 40
+#: What the pseudo-transient's mu fades to, at least, of that of the begin.
+_LEAST_MU = 1e-9
 
 
 @dataclass(frozen=True)
@@ -333,7 +335,7 @@ def balance(
     scale = max(weight, float(search.sizes(a).max(initial=0.0)) if weight == 0.0 else 0.0)
     size = float(search.sizes(a).max(initial=0.0))
     strongest = float(np.abs(a[:, :3]).max(initial=0.0))
-    mu = strongest / search.longest
+    mu = first_mu = strongest / search.longest
     worst, loose, unstable, far, done = 0, False, False, False, False
     k = 0
     while True:
@@ -370,7 +372,7 @@ def balance(
                 break
             continue
         mu = mu / 4.0 if part == 1.0 else min(2.0 * mu, max(stiffest, mu))
-        mu = max(mu, LOOSE * stiffest)
+        mu = max(mu, LOOSE * stiffest, _LEAST_MU * first_mu)
         found = search.keep(new)
         if found is None:
             break

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import GROUND, sphere
+
 import mbsim
-from tests.decks_io import GROUND, sphere
+from mbsim.errors import SolverError
 
 G = 9.81
 STATIC = '<Simulate analysis_type="Static"/>'
@@ -30,11 +37,13 @@ def box(body, z, edge=0.2, mass=2.0, x=0.0):
 <Body_Rigid id="{body}" cg_id="{10 * body}" mass="{mass}" inertia_xx="{inertia}"
   inertia_yy="{inertia}" inertia_zz="{inertia}"/>
 <Reference_Marker id="{10 * body}" body_id="{body}" pos_x="{x}" pos_z="{z}"/>
-<Post_Graphic id="{100 * body}" type="Box" cm_id="{10 * body}" x="{edge}" y="{edge}" z="{edge}"/>
+<Post_Graphic id="{100 * body}" type="BoxDefinedFromCenter"
+  center_marker_id="{10 * body}" length_x="{edge}" length_y="{edge}"
+  length_z="{edge}"/>
 """
 
 
-def contact(id, i, j, stiffness=1e6, exponent=1.5, damping=2e4, dmax=1e-4, more=""):
+def contact(id, i, j, stiffness=1e6, exponent=1.5, damping=200, dmax=1e-4, more=""):
     """Return statements of an IMPACT contact."""
     return f"""
 <Force_Contact id="{id}" num_i_graphics="1" i_graphics_id="{i}" num_j_graphics="1"
@@ -49,10 +58,10 @@ def test_mass_on_a_spring_hangs_at_its_closed_form(tmp_path):
 <Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"
   stiffness="500" damping="3" length="0.5"/>"""
     results = run(tmp_path, model)
-    assert results.time.tolist() == [0.0]
-    z = results.bodies[2].position[-1]
+    assert results["time"].tolist() == [0.0]
+    z = results["bodies/2/position"][-1]
     assert z == pytest.approx([0.0, 0.0, -(0.5 + 3.0 * G / 500.0)], abs=1e-13)
-    assert not results.bodies[2].velocity.any()
+    assert not results["bodies/2/velocity"].any()
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
@@ -61,5 +70,82 @@ def test_sphere_dropped_on_a_plane_rests_at_the_depth_of_its_law(tmp_path, expon
     model = GROUND + sphere(1.0, mass=2.0) + GRAVITY
     results = run(tmp_path, model + contact(1, 200, 100, exponent=exponent))
     depth = (2.0 * G / 1e6) ** (1.0 / exponent)
-    assert 0.1 - results.bodies[2].position[-1, 2] == pytest.approx(depth, rel=1e-9)
-    assert results.bodies[2].position[-1, :2] == pytest.approx([0.0, 0.0], abs=1e-15)
+    assert 0.1 - results["bodies/2/position"][-1, 2] == pytest.approx(depth, rel=1e-9)
+    assert results["bodies/2/position"][-1, :2] == pytest.approx([0.0, 0.0], abs=1e-15)
+
+
+def test_static_of_a_stack_is_where_the_transient_ends(tmp_path):
+    """Three boxes on each other: static = late transient to 1e-8 of the model's size."""
+    stack = box(2, 0.1) + box(3, 0.3) + box(4, 0.5)
+    pairs = [(200, 100), (300, 200), (400, 300)]
+    friction = (
+        'cff_type="COULOMB_ON" mu_static="0.5" mu_dynamic="0.4" stiction_trans_vel="1e-3" '
+        'friction_trans_vel="1e-2"'
+    )
+    contacts = "".join(contact(k, i, j, more=friction) for k, (i, j) in enumerate(pairs, 1))
+    model = GROUND + stack + contacts + GRAVITY
+    still = run(tmp_path, model)
+    late = run(
+        tmp_path,
+        model,
+        '<Simulate analysis_type="Transient" end_time="3" print_interval="0.5"/>',
+        tol=1e-9,
+    )
+    for body in (2, 3, 4):
+        name = f"bodies/{body}/position"
+        assert np.abs(still[name][-1] - late[name][-1]).max() < 1e-8
+        turns = still[f"bodies/{body}/quaternion"][-1] - late[f"bodies/{body}/quaternion"][-1]
+        assert np.abs(turns).max() < 1e-8
+    # four corners bear each face: k d^1.5 = weight above / 4
+    for body, above in ((2, 3), (3, 2), (4, 1)):
+        below = still[f"bodies/{body - 1}/position"][-1, 2] + 0.1 if body > 2 else 0.0
+        depth = below - (still[f"bodies/{body}/position"][-1, 2] - 0.1)
+        assert depth == pytest.approx((2.0 * G * above / 4.0 / 1e6) ** (1.0 / 1.5), rel=1e-7)
+
+
+def test_sphere_rests_in_a_v_of_planes(tmp_path):
+    """Both planes at 45 degrees press with m g / sqrt(2): depth by the law, exponent 2."""
+    planes = "".join(
+        f"""<Reference_Marker id="{k}" body_id="1" theta="{sign * math.pi / 4.0!r}"/>
+<Post_Graphic id="{10 * k}" type="Plane" rm_id="{k}"/>"""
+        for k, sign in ((11, 1.0), (12, -1.0))
+    )
+    contacts = contact(1, 200, 110, exponent=2.0) + contact(2, 200, 120, exponent=2.0)
+    model = EARTH + planes + sphere(0.5, x=0.2) + contacts + GRAVITY
+    position = run(tmp_path, model)["bodies/2/position"][-1]
+    depth = math.sqrt(G / math.sqrt(2.0) / 1e6)
+    assert position == pytest.approx([0.2, 0.0, math.sqrt(2.0) * (0.1 - depth)], abs=1e-9)
+
+
+PENDULUM = f"""{EARTH}
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"/>
+<Reference_Marker id="20" body_id="2" pos_x="0.5"/>
+<Reference_Marker id="21" body_id="2" pos_x="0"/>
+<Reference_Marker id="12" body_id="1" theta="-1.5707963267948966"/>
+<Reference_Marker id="22" body_id="2" theta="-1.5707963267948966"/>
+<Constraint_Joint id="1" type="REVOLUTE" i_marker_id="22" j_marker_id="12"/>
+"""
+
+
+def test_pendulum_hangs_down(tmp_path):
+    """From the horizontal to below its pivot, not to the balance on top of it."""
+    results = run(tmp_path, PENDULUM + GRAVITY)
+    assert results["bodies/2/position"][-1] == pytest.approx([0.0, 0.0, -0.5], abs=1e-10)
+
+
+def test_body_without_support_is_named(tmp_path):
+    """Nothing to rest on: one line that names the body, exit code 3."""
+    with pytest.raises(SolverError, match=r"nothing holds Body_Rigid\[2\]|rests on nothing"):
+        run(tmp_path, GROUND + sphere(1.0) + GRAVITY)
+    assert SolverError.exit_code == 3
+
+
+def test_static_then_transient_stays(tmp_path):
+    """A transient that follows begins at rest and stays there."""
+    model = GROUND + sphere(0.3) + contact(1, 200, 100) + GRAVITY
+    command = STATIC + '<Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/>'
+    results = run(tmp_path, model, command)
+    z = results["bodies/2/position"][:, 2]
+    assert len(z) == 11
+    assert np.abs(z - z[0]).max() < 1e-9
+    assert 0.1 - z[0] == pytest.approx((G / 1e6) ** (1 / 1.5), rel=1e-9)
