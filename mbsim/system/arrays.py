@@ -54,8 +54,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     VALUES_DOOR,
     ANGLES_DOOR,
     FRICTION_DOOR,
-) = range(8)
-DOORS = 8
+    VALUE_DOOR,
+) = range(9)
+DOORS = 9
 
 # entries of `Applied.kind`
 (
@@ -207,6 +208,7 @@ class Programs(NamedTuple):
     code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
+    values: F1  # (deepest,) scratch: values alone
     level: F1  # (curves,) z of a curve of a spline
     curve: I1  # (curves + 1,) first piece of each
     piece: F2  # (pieces, 5) where it begins, and the factors of 1, s, s^2, s^3, see system.splines

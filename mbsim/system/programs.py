@@ -172,12 +172,14 @@ class ProgramTable:
                 code[at, 0] = op
                 code[at, 1 : 1 + len(given)] = given
                 at += 1
+        deepest = max(map(_deepest, self.programs), default=0)
         lengths = [len(program) for program in self.programs]
         return a.Programs(
             np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
             code,
             np.array(list(numbers), dtype=np.float64),
-            np.zeros((max(map(_deepest, self.programs), default=0), 3)),
+            np.zeros((deepest, 3)),
+            np.zeros(deepest),
             *self.curves.arrays(),
         )
 
