@@ -11,9 +11,34 @@ from mbsim.dynamics.curves import spline_value
 from mbsim.dynamics.interpreter import displacement, rate_or_force
 from mbsim.dynamics.markers import marker_axis, marker_point
 from mbsim.dynamics.measures import AT_REST, relative_velocity
-from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME
-from mbsim.expressions.values import apply_value
-from mbsim.system.programs import ANGLE, DISTANCE, INCLUDED, OFFSET, SPLINE, VELOCITY
+from mbsim.expressions.elementary import (
+    ADD,
+    COS,
+    DIV,
+    EXP,
+    FIRST_MEASURE,
+    MUL,
+    NUMBER,
+    SIN,
+    SUB,
+    TIME,
+)
+from mbsim.expressions.values import apply_value, power_value
+from mbsim.system.programs import (
+    ADD_N,
+    ANGLE,
+    DISTANCE,
+    DIV_N,
+    INCLUDED,
+    MUL_N,
+    N_DIV,
+    N_SUB,
+    OFFSET,
+    POW_N,
+    SPLINE,
+    SUB_N,
+    VELOCITY,
+)
 
 
 @jitable
@@ -39,27 +64,70 @@ def rate_value(scene, y, code):
 
 @jitable
 def evaluate_program(scene, t, y, program):
-    """Return the value of a program; a program without instructions is no number."""
+    """Return the value of a program.
+
+    The topmost value is `x`; those below it stand in `values` from row 1 on.
+    """
     programs = scene.programs
-    s, top = programs.values, 0
-    for at in range(programs.start[program], programs.start[program + 1]):
-        code = programs.code[at]
+    s, number = programs.values, programs.number
+    top, x = 0, 0.0
+    for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
+        code = programs.quick[at]
         op = code[0]
+        # what is frequent in one chain of equalities, of which a table of jumps is made
         if op == NUMBER:
-            s[top] = programs.number[code[1]]
+            s[top] = x
             top += 1
+            x = number[code[1]]
         elif op == TIME:
-            s[top] = t
+            s[top] = x
             top += 1
-        elif op < FIRST_MEASURE:
-            top = apply_value(op, code[1], s, top)
-        elif op <= INCLUDED:
-            s[top] = displacement_value(scene, y, code)
+            x = t
+        elif op == ADD:
+            top -= 1
+            x = s[top] + x
+        elif op == SUB:
+            top -= 1
+            x = s[top] - x
+        elif op == MUL:
+            top -= 1
+            x = s[top] * x
+        elif op == DIV:
+            top -= 1
+            x = s[top] / x
+        elif op == ADD_N:
+            x = x + number[code[1]]
+        elif op == SUB_N:
+            x = x - number[code[1]]
+        elif op == MUL_N:
+            x = x * number[code[1]]
+        elif op == DIV_N:
+            x = x / number[code[1]]
+        elif op == N_SUB:
+            x = number[code[1]] - x
+        elif op == N_DIV:
+            x = number[code[1]] / x
+        elif op == POW_N:
+            x = power_value(x, number[code[1]])
+        elif op == SIN:
+            x = math.sin(x)
+        elif op == COS:
+            x = math.cos(x)
+        elif op == EXP:
+            x = math.exp(x)
+        elif op == OFFSET or op == DISTANCE:
+            s[top] = x
             top += 1
+            x = displacement_value(scene, y, code)
         elif op == SPLINE:
             top -= 1
-            s[top - 1] = spline_value(programs, code[1], code[2], code[3], s[top - 1], s[top])
+            x = spline_value(programs, code[1], code[2], code[3], s[top], x)
+        elif op < FIRST_MEASURE:
+            s[top] = x
+            top = apply_value(op, code[1], s, top + 1) - 1
+            x = s[top]
         else:
-            s[top] = rate_value(scene, y, code)
+            s[top] = x
             top += 1
-    return s[0] if top > 0 else math.nan
+            x = displacement_value(scene, y, code) if op <= INCLUDED else rate_value(scene, y, code)
+    return x

@@ -208,7 +208,9 @@ class Programs(NamedTuple):
     code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
-    values: F1  # (deepest,) scratch: values alone
+    quick_start: I1  # (programs + 1,) the same for values alone
+    quick: I2  # (instructions, 6) with operations by a number in one, see system.programs
+    values: F1  # (deepest + 1,) scratch: values alone
     level: F1  # (curves,) z of a curve of a spline
     curve: I1  # (curves + 1,) first piece of each
     piece: F2  # (pieces, 5) where it begins, and the factors of 1, s, s^2, s^3, see system.splines
