@@ -64,3 +64,15 @@ def spline(programs, first, count, order, x, z):
     a, b = programs.level[low], programs.level[low + 1]
     share = scale(1.0 / (b - a), sub(z, constant(a)))
     return add(below, times(share, sub(above, below)))
+
+
+@jitable
+def spline_value(programs, first, count, order, x, z):
+    """Return the value of a spline at x and z."""
+    if count == 1:
+        return derivatives(programs, first, order, x)[0]
+    low = level_below(programs, first, count, z)
+    f = derivatives(programs, low, order, x)[0]
+    g = derivatives(programs, low + 1, order, x)[0]
+    a, b = programs.level[low], programs.level[low + 1]
+    return f + 1.0 / (b - a) * (z - a) * (g - f)

@@ -13,6 +13,7 @@ from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.states import add_slopes
+from mbsim.dynamics.values import evaluate_program
 from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
@@ -20,6 +21,7 @@ from mbsim.system.arrays import (
     EXPRESSION_DOOR,
     FRICTION_DOOR,
     SLIDE_LIMIT,
+    VALUE_DOOR,
     VALUES_DOOR,
     VECTOR_FORCE,
     WRENCH_DOOR,
@@ -30,6 +32,7 @@ _POINTER = types.CPointer(types.float64)
 _APPLY = types.int64(types.int64, types.float64, _POINTER, _POINTER)
 _WRENCH = types.int64(types.int64, types.float64, _POINTER, types.int64)
 _EXPRESS = types.int64(types.int64, types.float64, _POINTER, types.int64, types.int64, types.int64)
+_VALUE = types.float64(types.int64, types.float64, _POINTER, types.int64)
 _VALUES = types.int64(types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
 
@@ -77,6 +80,12 @@ def _express(context, t, y, program, body, way):
     return interpret(scene, t, carray(y, (scene.rows.y.shape[1],)), program, body, way)
 
 
+def _evaluate(context, t, y, program):
+    """The value of an expression."""
+    scene = view(context, Scene)
+    return evaluate_program(scene, t, carray(y, (scene.rows.y.shape[1],)), program)
+
+
 def _evaluate_requests(context, t, y):
     """The expressions of requests at an output row."""
     scene = view(context, Scene)
@@ -95,11 +104,18 @@ def limit_turn(context, t, h, a, b):
     return longest_turn(scene, longest_step(scene, carray(a, (n,)), carray(b, (n,)), h))
 
 
+def open_jets(scene: Scene) -> None:
+    """Open the door of derivatives, which equations need and forces do not."""
+    scene.world.doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
+
+
 def open_expressions(scene: Scene) -> None:
     """Open the doors that the scene needs."""
     doors = scene.world.doors
     if len(scene.programs.start) > 1:
-        doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
+        doors[VALUE_DOOR] = jit.address(_evaluate, _VALUE)
+    if (scene.equations.program >= 0).any():
+        open_jets(scene)
     applied, states = len(scene.applied.kind) > 0, len(scene.states.program) > 0
     if applied or states:
         acting = _apply if not states else _apply_and_slope if applied else _slope

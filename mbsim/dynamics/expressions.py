@@ -10,11 +10,12 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.interpreter import interpret
-from mbsim.dynamics.measures import AS_THEY_ARE, AT_REST
-from mbsim.system.arrays import EXPRESSION_DOOR
+from mbsim.dynamics.measures import AS_THEY_ARE
+from mbsim.dynamics.values import evaluate_program
+from mbsim.system.arrays import EXPRESSION_DOOR, VALUE_DOOR
 
 
 def run(scene, t, y, program, body, way):
@@ -32,11 +33,19 @@ def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
     return compiled
 
 
-@jitable
 def value(scene, t, y, program):
     """Return the value of a program at time t and state y."""
-    run(scene, t, y, program, AT_REST, 0)
-    return scene.programs.stack[0, 0]
+    return evaluate_program(scene, t, y, program)
+
+
+@overload(value)
+def _value(scene: Any, t: Any, y: Any, program: Any) -> Any:
+    """Give compiled code its form of `value`: a call through the door."""
+
+    def compiled(scene: Any, t: Any, y: Any, program: Any) -> Any:
+        return call_float(scene.world.doors[VALUE_DOOR], (scene, t, y, program))
+
+    return compiled
 
 
 @jitable

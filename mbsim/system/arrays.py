@@ -55,8 +55,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     ANGLES_DOOR,
     FRICTION_DOOR,
     WRENCH_DOOR,
-) = range(9)
-DOORS = 9
+    VALUE_DOOR,
+) = range(10)
+DOORS = 10
 
 # entries of `Applied.kind`
 (
@@ -217,6 +218,9 @@ class Programs(NamedTuple):
     code: I2  # (instructions, 6) operation and up to five numbers, see system.programs
     number: F1  # constants
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
+    quick_start: I1  # (programs + 1,) the same for values alone
+    quick: I2  # (instructions, 6) with operations by a number in one, see system.programs
+    values: F1  # (deepest + 1,) scratch: values alone
     level: F1  # (curves,) z of a curve of a spline
     curve: I1  # (curves + 1,) first piece of each
     piece: F2  # (pieces, 5) where it begins, and the factors of 1, s, s^2, s^3, see system.splines

@@ -54,12 +54,27 @@ DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEA
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
 STATE, SENSED, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 18)
+#: Of values alone: the topmost with a number, x + n and so on, then n - x and n / x.
+ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
 DEEPEST_VARIABLE = 50
 LONGEST_PROGRAM = 50_000
 
+_BY_RIGHT = {
+    elementary.ADD: ADD_N,
+    elementary.SUB: SUB_N,
+    elementary.MUL: MUL_N,
+    elementary.DIV: DIV_N,
+    elementary.POW: POW_N,
+}
+_BY_LEFT = {
+    elementary.ADD: ADD_N,
+    elementary.SUB: N_SUB,
+    elementary.MUL: MUL_N,
+    elementary.DIV: N_DIV,
+}
 _COMPONENTS = ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")
 _STATEMENTS = {
     "Motion": "Motion_Joint",
@@ -72,6 +87,9 @@ _STATEMENTS = {
     "Sensor": "Sensor_Event",
     "Request": "Post_Request",
 }
+
+
+Rows = Mapping[tuple[str, int], tuple[int, int]]
 
 
 class Instruction(NamedTuple):
@@ -169,33 +187,76 @@ class ProgramTable:
         rows.update({element: (0, k) for k, element in enumerate(connections)})
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         numbers: dict[float, int] = {}
-        code = np.zeros((sum(map(len, self.programs)), 6), dtype=np.int64)
-        at = 0
-        for program in self.programs:
-            for op, given, value, element in program:
-                if op == NUMBER:
-                    # the sign of a zero counts, but neither gives another result than the other
-                    given = (numbers.setdefault(value, len(numbers)),)
-                elif element is not None:
-                    given = (*rows[element], *given)
-                code[at, 0] = op
-                code[at, 1 : 1 + len(given)] = given
-                at += 1
-        lengths = [len(program) for program in self.programs]
+        start, code = _table(self.programs, rows, numbers)
+        quick_start, quick = _table([_quick(program) for program in self.programs], rows, numbers)
+        deepest = max(map(_deepest, self.programs), default=0)
         return a.Programs(
-            np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
+            start,
             code,
             np.array(list(numbers), dtype=np.float64),
-            np.zeros((max(map(_deepest, self.programs), default=0), 3)),
+            np.zeros((deepest, 3)),
+            quick_start,
+            quick,
+            np.zeros(deepest + 1),
             *self.curves.arrays(),
         )
+
+
+def _table(
+    programs: list[list[Instruction]], rows: Rows, numbers: dict[float, int]
+) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """Return where each program starts, and all instructions; numbers are put into their table."""
+    code = np.zeros((sum(map(len, programs)), 6), dtype=np.int64)
+    at = 0
+    for program in programs:
+        for op, given, value, element in program:
+            if op == NUMBER or op >= ADD_N:
+                # the sign of a zero counts, but neither gives another result than the other
+                given = (numbers.setdefault(value, len(numbers)),)
+            elif element is not None:
+                given = (*rows[element], *given)
+            code[at, 0] = op
+            code[at, 1 : 1 + len(given)] = given
+            at += 1
+    lengths = [len(program) for program in programs]
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64), code
+
+
+def _quick(program: list[Instruction]) -> list[Instruction]:
+    """Return a program with what is done by a number as one instruction."""
+    made: list[Instruction] = []
+    starts: list[int] = []  # of what stands on the stack
+    for instruction in program:
+        taken = _taken(instruction)
+        first = starts[-taken] if taken else len(made)
+        right = starts[-1] if taken == 2 else 0
+        if taken == 2 and instruction.op in _BY_RIGHT and _is_number(made[right:]):
+            made[-1] = Instruction(_BY_RIGHT[instruction.op], value=made[-1].value)
+        elif taken == 2 and instruction.op in _BY_LEFT and _is_number(made[first:right]):
+            made.append(Instruction(_BY_LEFT[instruction.op], value=made.pop(first).value))
+        else:
+            made.append(instruction)
+        if taken:
+            del starts[-taken:]
+        starts.append(first)
+    return made
+
+
+def _is_number(part: list[Instruction]) -> bool:
+    return len(part) == 1 and part[0].op == NUMBER
+
+
+def _taken(instruction: Instruction) -> int:
+    """Return how many jets an instruction takes from the stack."""
+    op = instruction.op
+    return instruction.rows[0] if TIME < op < FIRST_MEASURE else 2 if op == SPLINE else 0
 
 
 def _deepest(program: list[Instruction]) -> int:
     """Return how many jets stand on the stack at most."""
     depth, most = 0, 0
-    for op, rows, _, _ in program:
-        depth += 1 - (rows[0] if TIME < op < FIRST_MEASURE else 2 if op == SPLINE else 0)
+    for instruction in program:
+        depth += 1 - _taken(instruction)
         most = max(most, depth)
     return most
 

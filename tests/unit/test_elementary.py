@@ -16,7 +16,7 @@ import free_bodies as free
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.blend import step, step5_derivative, step_derivative
-from mbsim.dynamics.doors import open_expressions
+from mbsim.dynamics.doors import open_expressions, open_jets
 from mbsim.dynamics.expressions import jet, value
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
@@ -146,6 +146,7 @@ def test_every_elementary_function_is_in_the_list():
 def test_compiled_jets_are_those_of_plain_python():
     system = scene_of(*(text for text, _ in CLOSED_FORMS))
     open_expressions(system.scene)
+    open_jets(system.scene)
     many = jit.function(_all_jets)
     found = np.zeros((len(CLOSED_FORMS), 3))
     address, table = _context(system.scene)
@@ -153,6 +154,23 @@ def test_compiled_jets_are_those_of_plain_python():
     assert len(table)
     wanted = [jet(system.scene, 0.37, system.y0, k) for k in range(len(CLOSED_FORMS))]
     np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-13)
+
+
+def test_compiled_values_are_those_of_plain_python():
+    system = scene_of(*(text for text, _ in CLOSED_FORMS))
+    open_expressions(system.scene)
+    found = np.zeros(len(CLOSED_FORMS))
+    address, table = _context(system.scene)
+    jit.function(_all_values)(address, 0.37, system.y0, found)
+    assert len(table)
+    wanted = [value(system.scene, 0.37, system.y0, k) for k in range(len(CLOSED_FORMS))]
+    np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-13)
+
+
+def _all_values(address, t, y, out):
+    scene = view(address, Scene)
+    for k in range(len(out)):
+        out[k] = value(scene, t, y, k)
 
 
 def _all_jets(address, t, y, out):

@@ -18,7 +18,7 @@ import free_bodies as free
 
 from mbsim.core import jit
 from mbsim.core.address import pack, view
-from mbsim.dynamics.doors import open_expressions
+from mbsim.dynamics.doors import open_expressions, open_jets
 from mbsim.dynamics.expressions import jet, value
 from mbsim.errors import DeckError
 from mbsim.expressions.parse import parse
@@ -129,6 +129,7 @@ def test_compiled_splines_are_those_of_plain_python():
     texts = ["AKISPL(TIME, 0, 1)", "CUBSPL(TIME, 2*TIME, 3, 1)", "LINSPL(SIN(9*TIME), 0, 2)"]
     system = scene_of(*texts)
     open_expressions(system.scene)
+    open_jets(system.scene)
     table, found = pack(system.scene), np.zeros(4)
     for k, text in enumerate(texts):
         for t in (-0.2, 0.3, 0.77, 1.2):
