@@ -12,6 +12,7 @@ from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.subroutines import failure_or
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
@@ -32,7 +33,8 @@ def _apply(context, t, y, dy):
     """The forces of springs and expressions."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    scene.users.failed[0] = 0
+    return failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
 
 
 def _rub(context, t, y, dy):
@@ -51,7 +53,8 @@ def _express(context, t, y, program, body, way):
 def _evaluate_requests(context, t, y):
     """The expressions of requests at an output row."""
     scene = view(context, Scene)
-    return fill_values(scene, t, carray(y, (scene.rows.y.shape[1],)))
+    scene.users.failed[0] = 0
+    return failure_or(scene, fill_values(scene, t, carray(y, (scene.rows.y.shape[1],))))
 
 
 def _commit_angles(context):

@@ -18,6 +18,7 @@ from mbsim.dynamics.measures import (
     relative_spin,
     relative_velocity,
 )
+from mbsim.dynamics.subroutines import user_result
 from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, put
 from mbsim.system.programs import (
     ANGLE,
@@ -30,6 +31,7 @@ from mbsim.system.programs import (
     SPIN,
     TURN,
     TURNING,
+    USER,
     VELOCITY,
 )
 
@@ -87,6 +89,9 @@ def interpret(scene, t, y, program, body, way):
             top = apply(op, code[1], stack, top)
         elif op <= ORIENT:
             put(stack, top, displacement(scene, y, code, body, way))
+            top += 1
+        elif op == USER:
+            put(stack, top, constant(user_result(scene, t, y, code[1], code[2])))
             top += 1
         else:
             put(stack, top, constant(rate_or_force(scene, y, code)))

@@ -284,6 +284,7 @@ class ScalarForce:
     i_marker_id: int = 0
     j_marker_id: int = 0
     action_only: bool = False
+    user: Subroutine | None = None  # `expr` is then what it returns
     source: Source = Source()
 
 
@@ -343,6 +344,7 @@ class Variable:
     id: int
     expr: Expression
     label: str = ""
+    user: Subroutine | None = None  # `expr` is then what it returns
     source: Source = Source()
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from mbsim.model import elements as el
-from mbsim.reader.constraints import USERSUB_REFUSED
-from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB, SCALAR_TYPES, SPRING_TYPES
+from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, TEXT, keyword
 from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
 
 
 def _build_spring(entry: Entry) -> None:
@@ -33,17 +33,20 @@ def _build_spring(entry: Entry) -> None:
 
 
 def _build_scalar(entry: Entry) -> None:
-    """Add a scalar force by an expression."""
-    if entry.get("type") is None or entry.get("expr") is None:
+    """Add a scalar force by an expression or a user subroutine."""
+    user = subroutine(entry, "usrsub", "SFOSUB") if by_user(entry) else None
+    expr = entry.get("expr") if user is None else result(entry, "SFORCE", user)
+    if entry.get("type") is None or expr is None:
         return
     force = el.ScalarForce(
         id=entry.get("id", 0),
         type=entry.get("type"),
-        expr=entry.get("expr"),
+        expr=expr,
         label=entry.get("label", ""),
         i_marker_id=entry.get("i_marker_id", 0),
         j_marker_id=entry.get("j_marker_id", 0),
         action_only=entry.get("action_only", False),
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.scalar_forces, force)
@@ -51,12 +54,17 @@ def _build_scalar(entry: Entry) -> None:
 
 def _build_variable(entry: Entry) -> None:
     """Add a variable."""
-    if entry.get("expr") is None:
+    user = None
+    if by_user(entry, type=entry.get("type", "")):
+        user = subroutine(entry, "usrsub", "VARSUB")
+    expr = entry.get("expr") if user is None else result(entry, "VARIABLE", user)
+    if expr is None:
         return
     variable = el.Variable(
         id=entry.get("id", 0),
-        expr=entry.get("expr"),
+        expr=expr,
         label=entry.get("label", ""),
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.variables, variable)
@@ -84,9 +92,9 @@ FORCE_SCALAR_TWOBODY = Statement(
         **_NAMED,
         "type": Spec(keyword(SCALAR_TYPES), required=True),
         **_MARKERS,
-        "expr": Spec(EXPRESSION, required=True),
+        "expr": Spec(EXPRESSION),
+        **USERSUB,
         "action_only": Spec(FLAG),  # ours; Adams' ACTIONONLY
-        **USERSUB_REFUSED,
     },
     _build_scalar,
 )
@@ -94,9 +102,9 @@ REFERENCE_VARIABLE = Statement(
     "Reference_Variable",
     {
         **_NAMED,
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION, required=True),
-        **USERSUB_REFUSED,
+        "type": Spec(BY_EITHER),
+        "expr": Spec(EXPRESSION),
+        **USERSUB,
     },
     _build_variable,
 )

@@ -209,6 +209,14 @@ class Programs(NamedTuple):
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
 
 
+class Users(NamedTuple):
+    """User subroutines of forces and variables, see dynamics.subroutines."""
+
+    address: I1  # (nu,) of their guarded C functions
+    result: F2  # (nu, 6) what each returned last
+    failed: I1  # (1,) code of the first that failed in this evaluation, or 0
+
+
 class Applied(NamedTuple):
     """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
 
@@ -410,6 +418,7 @@ class Scene(NamedTuple):
     markers: Markers
     angles: Angles
     programs: Programs
+    users: Users
     applied: Applied
     tree: Tree
     equations: Equations

@@ -20,6 +20,7 @@ up to five numbers:
 | SPIN               | markers i, j, k and axis of k                                         |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
 | ELEMENT            | 0 a connection or 1 an applied force, its row, jflag, comp, marker k  |
+| USER               | row of `Users`, which of its results; 0 calls it, others read         |
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from mbsim.expressions import elementary
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, NUMBER, TIME
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
-from mbsim.expressions.tree import Call, Expression, Node, Number, Time
+from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
 from mbsim.model.elements import Variable
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
@@ -44,6 +45,7 @@ from mbsim.system.markers import MarkerTable
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT = range(FIRST_MEASURE, FIRST_MEASURE + 5)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 5, FIRST_MEASURE + 10)
 NET, ELEMENT = range(FIRST_MEASURE + 10, FIRST_MEASURE + 12)
+USER = FIRST_MEASURE + 30
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -76,6 +78,8 @@ class ProgramTable:
     markers: MarkerTable
     variables: Mapping[int, Variable] = field(default_factory=dict)
     programs: list[list[Instruction]] = field(default_factory=list)
+    #: Row of `arrays.Users` of each user subroutine, by statement and id of its element.
+    users: Mapping[tuple[str, int], int] = field(default_factory=dict)
 
     def add(
         self,
@@ -223,6 +227,11 @@ class _Compiler:
             return [Instruction(NUMBER, value=node.value)]
         if isinstance(node, Time):
             return [Instruction(TIME)]
+        if isinstance(node, UserResult):
+            if Kind.VELOCITY not in self.allowed:
+                raise ExpressionError("what a user subroutine returns cannot be used here", 1)
+            row = self.table.users[node.statement, node.id]
+            return [Instruction(USER, (row, node.component))]
         kind = FUNCTIONS[node.name].kind
         return self.variable(node) if kind is Kind.VARIABLE else [self.measure(node, kind)]
 
