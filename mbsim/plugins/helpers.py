@@ -37,10 +37,12 @@ class Host:
         #: What looks at it: (name, ids) -> [value, errflg] and -> [values, errflg].
         self.sysfnc: Look = _nothing
         self.sysary: Look = _nothing
+        self.warned: set[str] = set()
 
     def forget(self) -> None:
         """Look at nothing, before a new run."""
         self.state, self.sysfnc, self.sysary = None, _nothing, _nothing
+        self.warned.clear()
 
 
 #: The one run of this process. The simulation sets `host.log`; the guard sets `host.time`.
@@ -101,13 +103,10 @@ def py_sysary(name: str, ids: Sequence[float]) -> list[Any]:
     return host.sysary(name, ids)
 
 
-_warned: set[str] = set()
-
-
 def _no_state(name: str) -> None:
     """Say once that a subroutine cannot look at the state."""
-    if name not in _warned:
-        _warned.add(name)
+    if name not in host.warned:
+        host.warned.add(name)
         host.log(f"warning: {name} is called where there is no state to look at: errflg is 1")
 
 

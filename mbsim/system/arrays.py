@@ -213,7 +213,7 @@ class Users(NamedTuple):
     """User subroutines of forces and variables, see dynamics.subroutines."""
 
     address: I1  # (nu,) of their guarded C functions
-    result: F2  # (nu, 6) what each returned last
+    result: F2  # (nu, most) what each returned last
     failed: I1  # (1,) code of the first that failed in this evaluation, or 0
 
 

@@ -128,6 +128,11 @@ class ProgramTable:
         self.programs.append(made)
         return len(self.programs) - 1
 
+    def measure(self, node: Call) -> Instruction:
+        """Return the instruction of a displacement or velocity of markers."""
+        allowed = frozenset({Kind.DISPLACEMENT, Kind.VELOCITY})
+        return _Compiler(self, allowed).measure(node, FUNCTIONS[node.name].kind)
+
     def looks_at(self, program: int) -> list[int]:
         """Return the rows of the markers that displacements of a program are measured between."""
         angles = list(self.markers.angle_rows)
