@@ -15,7 +15,7 @@ length); its damper loses c x'^2. What an expression's force does, F x', counts 
 with the sign turned, for nothing says what part of it could come back. Where the origins
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
-later (`dynamics.joint_friction`).
+later (`dynamics.joint_friction`); bushings and vector forces are in `dynamics.wrenches`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.angles import followed_angle
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.wrenches import wrench
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -38,6 +39,7 @@ from mbsim.system.arrays import (
     SLIDE_LIMIT,
     STORED_ENERGY,
     TURN_LIMIT,
+    VECTOR_FORCE,
 )
 
 
@@ -122,6 +124,12 @@ def add_applied(scene, t, y, dy):
         if kind >= SLIDE_FRICTION:
             for k in range(len(work.applied[f])):
                 work.applied[f, k] = 0.0
+            continue
+        if VECTOR_FORCE <= kind < SLIDE_LIMIT:
+            code = wrench(scene, t, y, f)
+            if code != 0:
+                return code
+            lost += work.applied[f, LOST_POWER]
             continue
         if kind == LINE_FORCE:
             n, x, rate = along_line(scene, y, f)

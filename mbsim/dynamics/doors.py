@@ -13,17 +13,22 @@ from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.subroutines import failure_or
+from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
     EXPRESSION_DOOR,
     FRICTION_DOOR,
+    SLIDE_LIMIT,
     VALUES_DOOR,
+    VECTOR_FORCE,
+    WRENCH_DOOR,
     Scene,
 )
 
 _POINTER = types.CPointer(types.float64)
 _APPLY = types.int64(types.int64, types.float64, _POINTER, _POINTER)
+_WRENCH = types.int64(types.int64, types.float64, _POINTER, types.int64)
 _EXPRESS = types.int64(types.int64, types.float64, _POINTER, types.int64, types.int64, types.int64)
 _VALUES = types.int64(types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
@@ -35,6 +40,12 @@ def _apply(context, t, y, dy):
     n = scene.rows.y.shape[1]
     scene.users.failed[0] = 0
     return failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
+
+
+def _wrench(context, t, y, f):
+    """A bushing or a vector force."""
+    scene = view(context, Scene)
+    return add_wrench(scene, t, carray(y, (scene.rows.y.shape[1],)), f)
 
 
 def _rub(context, t, y, dy):
@@ -76,6 +87,9 @@ def open_expressions(scene: Scene) -> None:
         doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
     if len(scene.applied.kind) > 0:
         doors[APPLIED_DOOR] = jit.address(_apply, _APPLY)
+    kind = scene.applied.kind
+    if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
+        doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
     if (scene.applied.connection >= 0).any():
         doors[FRICTION_DOOR] = jit.address(_rub, _APPLY)
     if scene.rows.value.shape[1] > 0:

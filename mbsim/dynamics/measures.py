@@ -15,6 +15,7 @@ from mbsim.dynamics.angles import nearest_turn
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
+from mbsim.system.arrays import VECTOR_FORCE
 
 AT_REST, AS_THEY_ARE = -2, -1
 
@@ -226,6 +227,12 @@ def on_i(scene, applied, row):
 
 
 @jitable
+def floats(scene, applied, row):
+    """Return whether a row's J marker is a floating one, which is wherever I is."""
+    return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
+
+
+@jitable
 def element_force(scene, y, applied, row, jflag, k, comp):
     """Return a component of the force of a connection or an applied force on I or J."""
     force, torque = on_i(scene, applied, row)
@@ -234,6 +241,8 @@ def element_force(scene, y, applied, row, jflag, k, comp):
             return 0.0
         i = scene.applied.i[row] if applied == 1 else scene.connections.i[row]
         j = scene.applied.j[row] if applied == 1 else scene.connections.j[row]
+        if floats(scene, applied, row):
+            j = i
         force, torque = on_j(scene, y, i, j, force, torque)
     return component(scene, force, torque, k, comp)
 
@@ -247,7 +256,7 @@ def add_between(scene, y, i, j, applied, row, force, torque):
     if first == i and second == j:
         return add(force, F), add(torque, T)
     if first == j and second == i:
-        F, T = on_j(scene, y, j, i, F, T)
+        F, T = on_j(scene, y, j, j if floats(scene, applied, row) else i, F, T)
         return add(force, F), add(torque, T)
     return force, torque
 

@@ -27,7 +27,7 @@ from mbsim.dynamics.incidents import deepest_of_impact
 from mbsim.dynamics.kinematics import place_bodies, position
 from mbsim.dynamics.limits import longest_way
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point
-from mbsim.system.arrays import AXIS_TORQUE, LIVE
+from mbsim.system.arrays import AXIS_TORQUE, BUSHING, LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
@@ -149,6 +149,33 @@ def add_touching(scene, y, s, out):
 
 
 @jitable
+def add_bushing(scene, f):
+    """Add the largest stiffness and damping of bushing f, along every axis and about it.
+
+    A turn moves I's origin along by its arm, and by a stretched spring's moment too: that
+    is within what the arm of the largest stiffness gives twice.
+    """
+    applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
+    i, j, par = applied.i[f], applied.j[f], applied.par[f]
+    both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
+    k, c = max(par[0], max(par[1], par[2])), max(par[6], max(par[7], par[8]))
+    turn_k, turn_c = max(par[3], max(par[4], par[5])), max(par[9], max(par[10], par[11]))
+    for side in range(2):
+        m = i if side == 0 else j
+        b = markers.body[m]
+        if b == ground:
+            continue
+        block, inverse, arm = scene.work.block[b], scene.bodies.inverse[b], marker_arm(scene, m)
+        square = 2.0 * dot(arm, arm)
+        most = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
+        for r in range(3):
+            block[4 * r] += both * k
+            block[10 + 4 * r] += both * c
+        block[9] += both * (k * square + turn_k) * most
+        block[19] += both * (c * square + turn_c) * most
+
+
+@jitable
 def add_spring(scene, y, f):
     """Add stiffness and damping of spring f to the blocks of its bodies.
 
@@ -156,6 +183,9 @@ def add_spring(scene, y, f):
     torque F r. Stiffness across and by F is bounded by what the smallest moment of inertia gives.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
+    if applied.kind[f] == BUSHING:
+        add_bushing(scene, f)
+        return
     i, j, par = applied.i[f], applied.j[f], applied.par[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
     k, damping = both * par[0], both * par[1]

@@ -289,6 +289,58 @@ class ScalarForce:
 
 
 @dataclass(frozen=True)
+class Bushing:
+    """Force_Bushing, Adams' BUSHING: springs and dampers along and about the axes of J.
+
+    Six numbers each: x, y, z [F/L, F T/L, F], then about x, y, z [F L/rad, F L T/rad, F L].
+    """
+
+    id: int
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    stiffness: tuple[float, ...] = (0.0,) * 6
+    damping: tuple[float, ...] = (0.0,) * 6
+    preload: tuple[float, ...] = (0.0,) * 6
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class VectorForce:
+    """Force_Vector_TwoBody, Adams' VFORCE, VTORQUE and GFORCE: six expressions.
+
+    `exprs` are force and torque on I along the axes of the reference marker (None and 0: global),
+    None where there is none. The body of the floating J marker takes the opposite at the origin
+    of I, wherever that marker is.
+    """
+
+    id: int
+    type: str = "FORCEANDTORQUE"
+    exprs: tuple[Expression | None, ...] = (None,) * 6
+    label: str = ""
+    i_marker_id: int = 0
+    j_floating_marker_id: int = 0
+    ref_marker_id: int | None = None
+    user: Subroutine | None = None  # `exprs` are then what it returns
+    source: Source = Source()
+
+    @property
+    def action_only(self) -> bool:
+        """Whether nothing acts on a second body."""
+        return False
+
+
+@dataclass(frozen=True)
+class BodyForce(VectorForce):
+    """Force_Vector_OneBody: the same on I alone."""
+
+    @property
+    def action_only(self) -> bool:
+        """Whether nothing acts on a second body."""
+        return True
+
+
+@dataclass(frozen=True)
 class JointFriction:
     """Force_JointFriction: a friction law in a joint, pressed by the joint's own reaction.
 
@@ -364,7 +416,7 @@ class Request:
     i_marker_id: int = 0
     j_marker_id: int | None = None
     ref_marker_id: int | None = None
-    elem_type: str = ""  # JOINT JPRIM MOTION SPRINGDAMPER SFORCE JOINTFRICTION JOINTLIMIT CONTACT
+    elem_type: str = ""  # of keywords.FORCE_ELEMENTS
     elem_id: int = 0
     jflag: bool = False  # the force on J's side instead of I's
     exprs: tuple[Expression | None, ...] = ()
@@ -390,6 +442,9 @@ class Model:
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
     spring_dampers: dict[int, SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
+    bushings: dict[int, Bushing] = field(default_factory=dict)
+    vector_forces: dict[int, VectorForce] = field(default_factory=dict)
+    body_forces: dict[int, BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)

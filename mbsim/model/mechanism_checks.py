@@ -20,11 +20,16 @@ STATEMENTS = {
     "MOTION": "Motion_Joint",
     "SFORCE": "Force_Scalar_TwoBody",
     "SPRINGDAMPER": "Force_SpringDamper",
+    "BUSHING": "Force_Bushing",
+    "VECTORFORCE": "Force_Vector_TwoBody",
+    "BODYFORCE": "Force_Vector_OneBody",
     "JOINTFRICTION": "Force_JointFriction",
     "JOINTLIMIT": "Force_JointLimit",
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
 }
+#: Attributes of vector forces that are expressions.
+COMPONENTS = tuple(f"{name}_expression" for name in ("fx", "fy", "fz", "tx", "ty", "tz"))
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
 #: Joints that may have friction, with the attribute that is the lever of what turns.
 _LEVERS = {
@@ -33,6 +38,9 @@ _LEVERS = {
     "CYLINDRICAL": "pin_radius",
     "SPHERICAL": "ball_radius",
 }
+
+#: Attributes that name markers.
+_MARKERS = ("i_marker_id", "j_marker_id", "j_floating_marker_id", "ref_marker_id")
 
 Wanted = tuple[Source, str, str, int | None, str]
 Exists = Callable[[str, int], bool]
@@ -48,6 +56,9 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Motion_Joint": model.motions,
         "Force_SpringDamper": model.spring_dampers,
         "Force_Scalar_TwoBody": model.scalar_forces,
+        "Force_Bushing": model.bushings,
+        "Force_Vector_TwoBody": model.vector_forces,
+        "Force_Vector_OneBody": model.body_forces,
         "Force_JointFriction": model.joint_frictions,
         "Force_JointLimit": model.joint_limits,
         "Reference_Variable": model.variables,
@@ -61,7 +72,7 @@ def wanted(model: Model) -> Iterator[Wanted]:
             name = f"{statement}[{element.id}]"
             # a motion of a joint has the joint's markers
             if getattr(element, "joint_id", None) is None:
-                for attribute in ("i_marker_id", "j_marker_id"):
+                for attribute in _MARKERS:
                     id = getattr(element, attribute, 0) or None
                     yield element.source, name, attribute, id, "Reference_Marker"
             else:
@@ -85,6 +96,14 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
             expression = getattr(element, "expr", None)
             if expression is not None:
                 yield element.source, f"{statement}[{element.id}]", "expr", expression
+    for statement, forces in (
+        ("Force_Vector_TwoBody", model.vector_forces),
+        ("Force_Vector_OneBody", model.body_forces),
+    ):
+        for force in forces.values():
+            for attribute, expression in zip(COMPONENTS, force.exprs, strict=True):
+                if expression is not None:
+                    yield force.source, f"{statement}[{force.id}]", attribute, expression
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs, start=1):
             if expression is not None:
@@ -140,11 +159,8 @@ def _two_bodies(model: Model) -> Iterator[Fault]:
         for element in table.values():
             if getattr(element, "joint_id", None) is not None:
                 continue
-            pair = [
-                model.markers.get(getattr(element, name, 0))
-                for name in ("i_marker_id", "j_marker_id")
-            ]
-            i, j = pair
+            other = getattr(element, "j_marker_id", getattr(element, "j_floating_marker_id", 0))
+            i, j = (model.markers.get(id) for id in (getattr(element, "i_marker_id", 0), other))
             if i is None or j is None:
                 continue
             both = f"markers {i.id} (I) and {j.id} (J)"

@@ -12,6 +12,8 @@ ADAMS = {
     "Motion_Joint": "MOTION",
     "Force_SpringDamper": "SPRINGDAMPER",
     "Force_Scalar_TwoBody": "SFORCE",
+    "Force_Bushing": "BUSHING",
+    "Force_Vector_TwoBody": "GFORCE",
     "Reference_Variable": "VARIABLE",
     "Post_Request": "REQUEST",
 }

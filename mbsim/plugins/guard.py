@@ -209,8 +209,11 @@ def callback(
 
 
 def state_callback(
-    function: Callable[..., Any], element: tuple[str, int], place: tuple[str, str],
-    par: Sequence[float], count: int,
+    function: Callable[..., Any],
+    element: tuple[str, int],
+    place: tuple[str, str],
+    par: Sequence[float],
+    count: int,
 ) -> tuple[int, object]:
     """Return the address of a subroutine that may look at the trial state, and its keeper.
 

@@ -1,9 +1,12 @@
-"""Force_SpringDamper, Force_Scalar_TwoBody and Reference_Variable."""
+"""Force_SpringDamper, _Scalar_TwoBody, _Bushing, _Vector_..., and Reference_Variable."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from mbsim.model import elements as el
-from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES
+from mbsim.model.mechanism_checks import COMPONENTS
+from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES, VECTOR_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, TEXT, keyword
 from mbsim.reader.statement import Entry, Spec, Statement
 from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
@@ -52,6 +55,86 @@ def _build_scalar(entry: Entry) -> None:
     entry.register(entry.draft.scalar_forces, force)
 
 
+_AXES = ("x", "y", "z", "tx", "ty", "tz")
+
+
+def _build_bushing(entry: Entry) -> None:
+    """Add a bushing."""
+    stiffness, damping, preload = (
+        tuple(entry.get(f"{prefix}{axis}", 0.0) for axis in _AXES)
+        for prefix in ("k", "c", "preload_")
+    )
+    if not any((*stiffness, *damping, *preload)):
+        entry.warn("all stiffnesses, dampings and preloads are 0: the bushing does nothing")
+    bushing = el.Bushing(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        i_marker_id=entry.get("i_marker_id", 0),
+        j_marker_id=entry.get("j_marker_id", 0),
+        stiffness=stiffness,
+        damping=damping,
+        preload=preload,
+        source=entry.source,
+    )
+    entry.register(entry.draft.bushings, bushing)
+
+
+#: Which of COMPONENTS a type does not have.
+_NOT_OF_TYPE = {
+    "FORCEONLY": COMPONENTS[3:],
+    "TORQUEONLY": COMPONENTS[:3],
+    "FORCEANDTORQUE": (),
+}
+
+
+#: What the subroutine of a type is called where the deck does not say.
+_VECTOR_SUBROUTINES = {
+    "FORCEONLY": "VFOSUB",
+    "TORQUEONLY": "VTOSUB",
+    "FORCEANDTORQUE": "GFOSUB",
+}
+
+
+def _vector_parts(entry: Entry, statement: str) -> dict[str, Any]:
+    """Return what vector forces on one and on two bodies have in common."""
+    type = entry.get("type", "FORCEANDTORQUE")
+    for name in _NOT_OF_TYPE[type]:
+        if entry.given(name):
+            has = ", ".join(each for each in COMPONENTS if each not in _NOT_OF_TYPE[type])
+            entry.fault(f"does not belong to type {type}, which has {has}", name)
+    user, exprs = None, tuple(entry.get(name) for name in COMPONENTS)
+    if by_user(entry, COMPONENTS):
+        user = subroutine(entry, "usrsub", _VECTOR_SUBROUTINES[type])
+        has = [name not in _NOT_OF_TYPE[type] for name in COMPONENTS]
+        exprs = tuple(
+            result(entry, statement, user, sum(has[:k])) if has[k] else None for k in range(6)
+        )
+    elif not any(entry.given(name) for name in COMPONENTS):
+        entry.fault(f"{COMPONENTS[0]} ... {COMPONENTS[-1]}: missing; at least one must be given")
+    return {
+        "id": entry.get("id", 0),
+        "type": type,
+        "exprs": exprs,
+        "user": user,
+        "label": entry.get("label", ""),
+        "i_marker_id": entry.get("i_marker_id", 0),
+        "ref_marker_id": entry.get("ref_marker_id"),
+        "source": entry.source,
+    }
+
+
+def _build_vector(entry: Entry) -> None:
+    """Add a vector force between two bodies."""
+    j = entry.get("j_floating_marker_id", 0)
+    force = el.VectorForce(**_vector_parts(entry, "VECTORFORCE"), j_floating_marker_id=j)
+    entry.register(entry.draft.vector_forces, force)
+
+
+def _build_body_force(entry: Entry) -> None:
+    """Add a vector force on one body."""
+    entry.register(entry.draft.body_forces, el.BodyForce(**_vector_parts(entry, "BODYFORCE")))
+
+
 def _build_variable(entry: Entry) -> None:
     """Add a variable."""
     user = None
@@ -97,6 +180,37 @@ FORCE_SCALAR_TWOBODY = Statement(
         "action_only": Spec(FLAG),  # ours; Adams' ACTIONONLY
     },
     _build_scalar,
+)
+FORCE_BUSHING = Statement(
+    "Force_Bushing",
+    {
+        **_NAMED,
+        **_MARKERS,
+        **{f"{prefix}{axis}": Spec(NOT_NEGATIVE) for prefix in "kc" for axis in _AXES},
+        **{f"preload_{axis}": Spec(REAL) for axis in _AXES},
+    },
+    _build_bushing,
+)
+_VECTOR: dict[str, Spec] = {
+    "type": Spec(keyword(VECTOR_TYPES), required=True),
+    "ref_marker_id": Spec(ID),
+    **{name: Spec(EXPRESSION) for name in COMPONENTS},
+    **USERSUB,
+}
+FORCE_VECTOR_TWOBODY = Statement(
+    "Force_Vector_TwoBody",
+    {
+        **_NAMED,
+        "i_marker_id": Spec(ID, required=True),
+        "j_floating_marker_id": Spec(ID, required=True),
+        **_VECTOR,
+    },
+    _build_vector,
+)
+FORCE_VECTOR_ONEBODY = Statement(
+    "Force_Vector_OneBody",
+    {**_NAMED, "i_marker_id": Spec(ID, required=True), **_VECTOR},
+    _build_body_force,
 )
 REFERENCE_VARIABLE = Statement(
     "Reference_Variable",

@@ -13,7 +13,14 @@ from mbsim.reader.constraints import (
 )
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.draft import Draft
-from mbsim.reader.forces import FORCE_SCALAR_TWOBODY, FORCE_SPRINGDAMPER, REFERENCE_VARIABLE
+from mbsim.reader.forces import (
+    FORCE_BUSHING,
+    FORCE_SCALAR_TWOBODY,
+    FORCE_SPRINGDAMPER,
+    FORCE_VECTOR_ONEBODY,
+    FORCE_VECTOR_TWOBODY,
+    REFERENCE_VARIABLE,
+)
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest
@@ -46,6 +53,9 @@ STATEMENTS = (
     MOTION_JOINT,
     FORCE_SPRINGDAMPER,
     FORCE_SCALAR_TWOBODY,
+    FORCE_BUSHING,
+    FORCE_VECTOR_TWOBODY,
+    FORCE_VECTOR_ONEBODY,
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
     REFERENCE_VARIABLE,
@@ -64,9 +74,9 @@ NOT_BUILT = (
     "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_Diff Control_FMU Control_PlantInput "
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
-    "Force_Beam Force_Bushing Force_Field Force_MultiPoint Force_Penalty "
-    "Force_StateEqn Force_TwoBody Force_Vector_OneBody "
-    "Force_Vector_TwoBody Load_Command Load_Model Motion_Marker Param_Linear "
+    "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
+    "Force_StateEqn Force_TwoBody "
+    "Load_Command Load_Model Motion_Marker Param_Linear "
     "Param_Simulation Param_Static Reference_Array Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_Spline Reference_String Save "

@@ -34,7 +34,9 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
     """
     dll = entry.get(f"{prefix}_dll_name", "NULL")
     if dll.upper() not in ("", "NULL"):
-        entry.fault('shared libraries are not built yet; "NULL" names no file', f"{prefix}_dll_name")
+        entry.fault(
+            'shared libraries are not built yet; "NULL" names no file', f"{prefix}_dll_name"
+        )
     script = entry.get("script_name", "")
     if script:
         path = Path(script.replace("\\", "/"))

@@ -34,6 +34,9 @@ GROUPS = {
     ),
     "SPRINGDAMPER": Group("spring_dampers", "springs", "spring", "Force_SpringDamper"),
     "SFORCE": Group("scalar_forces", "scalar_forces", "scalar force", "Force_Scalar_TwoBody"),
+    "BUSHING": Group("bushings", "bushings", "bushing", "Force_Bushing"),
+    "VECTORFORCE": Group("vector_forces", "vector_forces", "vector force", "Force_Vector_TwoBody"),
+    "BODYFORCE": Group("body_forces", "body_forces", "body force", "Force_Vector_OneBody"),
     "JOINTFRICTION": Group(
         "joint_frictions", "joint_frictions", "joint friction", "Force_JointFriction"
     ),
@@ -42,7 +45,10 @@ GROUPS = {
 }
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
-APPLIED = ("SPRINGDAMPER", "SFORCE", "JOINTFRICTION", "JOINTLIMIT")
+APPLIED = (
+    *("SPRINGDAMPER", "SFORCE", "BUSHING", "VECTORFORCE", "BODYFORCE"),
+    *("JOINTFRICTION", "JOINTLIMIT"),
+)
 
 
 def elements_of(model: Model, statement: str) -> dict[int, Any]:

@@ -121,6 +121,9 @@ class Forces:
             return on_i
         if acting.one_sided:
             return self.nothing()
+        if acting.statement == "VECTORFORCE":
+            # its J floats with I
+            return on_i.reaction(np.zeros((1, 3)))
         return on_i.reaction(self.origin(acting.i) - self.origin(acting.j))
 
     def nothing(self) -> Wrench:

@@ -33,7 +33,10 @@ _MEASURES = {
     "torque": ("TM", "TX", "TY", "TZ"),
 }
 #: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
-_FORCES_OF_ELEMENTS = ("JOINT", "JPRIM", "MOTION", "SFORCE", "SPDP", "CONTACT")
+_FORCES_OF_ELEMENTS = (
+    *("JOINT", "JPRIM", "MOTION", "SFORCE", "SPDP", "CONTACT"),
+    *("BUSH", "VFORCE", "VTORQ", "GFORCE"),
+)
 #: F1 and F5 are magnitudes of the three columns behind them.
 _MAGNITUDES = (1, 5)
 

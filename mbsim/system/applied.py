@@ -1,15 +1,24 @@
-"""Springs, dampers, scalar forces, and what acts in joints, as rows."""
+"""Springs, dampers, bushings, scalar and vector forces, and what acts in joints, as rows."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
-from mbsim.model.elements import JointFriction, JointLimit, Model
+from mbsim.model.elements import (
+    Bushing,
+    JointFriction,
+    JointLimit,
+    Model,
+    ScalarForce,
+    SpringDamper,
+    VectorForce,
+)
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
 from mbsim.system.programs import ProgramTable
@@ -26,58 +35,120 @@ def applied_forces(
     model: Model, markers: MarkerTable, programs: ProgramTable
 ) -> tuple[a.Applied, list[tuple[str, int]]]:
     """Return the forces between markers, and for each row its element: (statement, id)."""
-    springs, forces = model.spring_dampers.values(), model.scalar_forces.values()
-    frictions, limits = list(model.joint_frictions.values()), list(model.joint_limits.values())
-    elements = [("SPRINGDAMPER", spring.id) for spring in springs]
-    elements += [("SFORCE", force.id) for force in forces]
-    first = len(elements)
-    elements += [("JOINTFRICTION", friction.id) for friction in frictions]
-    elements += [("JOINTLIMIT", limit.id) for limit in limits]
-    n = len(elements)
-    laws = [_law(element) for element in (*frictions, *limits)]
+    given = [
+        (statement, element)
+        for statement, table in _tables(model).items()
+        for element in table.values()
+    ]
+    n = len(given)
+    laws = [_law(element) for _, element in given]
     made = a.Applied(
         kind=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
         j=np.zeros(n, dtype=np.int64),
-        par=np.zeros((n, 4)),
+        par=np.zeros((n, 18 if model.bushings else 4)),
         program=np.full(n, -1, dtype=np.int64),
+        components=np.full((n, 6), -1, dtype=np.int64),
+        axes=np.zeros(n, dtype=np.int64),
         angle=np.full(n, -1, dtype=np.int64),
         alone=np.zeros(n, dtype=np.int64),
         bounds=np.zeros((n, 2)),
         law=np.zeros(n, dtype=np.int64),
         law_par=np.zeros((n, max([1, *(len(values) for _, values in laws)]))),
-        id=np.array([id for _, id in elements], dtype=np.int64),
+        id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
     )
-    for k, element in enumerate([*springs, *forces]):
-        made.i[k], made.j[k] = markers.row(element.i_marker_id), markers.row(element.j_marker_id)
-        made.kind[k] = a.AXIS_TORQUE if element.type == "ROTATIONAL" else a.LINE_FORCE
-    for k, spring in enumerate(springs):
-        made.par[k] = spring.stiffness, spring.damping, spring.length, spring.preload
-        if made.kind[k] == a.AXIS_TORQUE:
-            made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
-    for k, force in enumerate(forces, len(springs)):
-        made.program[k] = programs.add(force.expr, force)
-        if force.action_only:
-            made.alone[k] = 1
-            if made.kind[k] == a.LINE_FORCE:
-                made.kind[k] = a.AXIS_FORCE
-    for k, (address, values) in enumerate(laws, first):
-        made.law[k] = address
+    for k, (statement, element) in enumerate(given):
+        made.law[k], values = laws[k]
         made.law_par[k, : len(values)] = values
-    for k, friction in enumerate(frictions, first):
-        _add_friction(model, markers, made, k, friction)
-    for k, limit in enumerate(limits, first + len(frictions)):
-        _add_limit(model, markers, made, k, limit)
-    return made, elements
+        _FILL[statement](model, markers, programs, made, k, element)
+    return made, [(statement, element.id) for statement, element in given]
 
 
-def _law(element: JointFriction | JointLimit) -> tuple[int, np.ndarray[Any, Any]]:
-    """Return address and parameters of the law of an element; address 0 for COULOMB_OFF."""
+def _tables(model: Model) -> dict[str, dict[int, Any]]:
+    """Return the elements that push, by statement."""
+    return {
+        "SPRINGDAMPER": model.spring_dampers,
+        "SFORCE": model.scalar_forces,
+        "BUSHING": model.bushings,
+        "VECTORFORCE": model.vector_forces,
+        "BODYFORCE": model.body_forces,
+        "JOINTFRICTION": model.joint_frictions,
+        "JOINTLIMIT": model.joint_limits,
+    }
+
+
+def _add_spring(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    spring: SpringDamper,
+) -> None:
+    """Fill row k with a spring-damper."""
+    made.i[k], made.j[k] = markers.row(spring.i_marker_id), markers.row(spring.j_marker_id)
+    made.par[k, :4] = spring.stiffness, spring.damping, spring.length, spring.preload
+    made.kind[k] = a.LINE_FORCE
+    if spring.type == "ROTATIONAL":
+        made.kind[k] = a.AXIS_TORQUE
+        made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
+
+
+def _add_scalar(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    force: ScalarForce,
+) -> None:
+    """Fill row k with a scalar force by an expression."""
+    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
+    made.program[k] = programs.add(force.expr, force)
+    made.alone[k] = int(force.action_only)
+    along = a.AXIS_FORCE if force.action_only else a.LINE_FORCE
+    made.kind[k] = a.AXIS_TORQUE if force.type == "ROTATIONAL" else along
+
+
+def _add_bushing(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    bushing: Bushing,
+) -> None:
+    """Fill row k with a bushing."""
+    made.i[k], made.j[k] = markers.row(bushing.i_marker_id), markers.row(bushing.j_marker_id)
+    made.kind[k] = a.BUSHING
+    made.par[k] = *bushing.stiffness, *bushing.damping, *bushing.preload
+
+
+def _add_vector(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    force: VectorForce,
+) -> None:
+    """Fill row k with a vector force by expressions."""
+    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_floating_marker_id)
+    made.kind[k] = a.VECTOR_FORCE
+    made.alone[k] = int(force.action_only)
+    made.axes[k] = markers.row(force.ref_marker_id)
+    for c, expression in enumerate(force.exprs):
+        if expression is not None:
+            made.components[k, c] = programs.add(expression, force)
+
+
+def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:
+    """Return address and parameters of the law of an element; address 0 where it has none."""
     if isinstance(element, JointLimit):
         normal = NORMAL_LAWS[element.cnf_type]
         return abi.normal_address(normal), abi.normal_constants(normal, element)
-    if element.cff_type == "COULOMB_OFF":
+    if not isinstance(element, JointFriction) or element.cff_type == "COULOMB_OFF":
         return 0, np.zeros(0)
     friction = FRICTION_LAWS[element.cff_type]
     return abi.friction_address(friction), abi.friction_parameters(friction, element)
@@ -90,19 +161,29 @@ def _place(model: Model, markers: MarkerTable, made: a.Applied, k: int, joint_id
 
 
 def _add_friction(
-    model: Model, markers: MarkerTable, made: a.Applied, k: int, friction: JointFriction
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    friction: JointFriction,
 ) -> None:
     """Fill row k with friction in a joint."""
     _place(model, markers, made, k, friction.joint_id)
     made.kind[k] = _FRICTIONS[model.joints[friction.joint_id].type]
     radius = friction.pin_radius or friction.ball_radius or 0.0
-    made.par[k] = radius, friction.preload, friction.bending_reaction_arm, 0.0
+    made.par[k, :4] = radius, friction.preload, friction.bending_reaction_arm, 0.0
     # joints are the first connections, in the order of the model
     made.connection[k] = list(model.joints).index(friction.joint_id)
 
 
 def _add_limit(
-    model: Model, markers: MarkerTable, made: a.Applied, k: int, limit: JointLimit
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    limit: JointLimit,
 ) -> None:
     """Fill row k with a limit of a joint."""
     _place(model, markers, made, k, limit.joint_id)
@@ -111,3 +192,15 @@ def _add_limit(
     made.bounds[k, 1] = math.inf if limit.upper is None else limit.upper
     if limit.direction == "R":
         made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
+
+
+#: What fills a row, by statement.
+_FILL: dict[str, Callable[..., None]] = {
+    "SPRINGDAMPER": _add_spring,
+    "SFORCE": _add_scalar,
+    "BUSHING": _add_bushing,
+    "VECTORFORCE": _add_vector,
+    "BODYFORCE": _add_vector,
+    "JOINTFRICTION": _add_friction,
+    "JOINTLIMIT": _add_limit,
+}

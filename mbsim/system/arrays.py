@@ -54,21 +54,24 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     VALUES_DOOR,
     ANGLES_DOOR,
     FRICTION_DOOR,
-) = range(8)
-DOORS = 8
+    WRENCH_DOOR,
+) = range(9)
+DOORS = 9
 
 # entries of `Applied.kind`
 (
     LINE_FORCE,
     AXIS_FORCE,
     AXIS_TORQUE,
+    VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of dynamics.wrenches
+    BUSHING,
     SLIDE_LIMIT,
     TURN_LIMIT,
     SLIDE_FRICTION,  # the kinds from here on are frictions in joints
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(9)
+) = range(11)
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
@@ -223,8 +226,11 @@ class Applied(NamedTuple):
     kind: I1  # (nf,) see dynamics.applied
     i: I1  # (nf,) markers
     j: I1  # (nf,)
-    par: F2  # (nf, 4) stiffness, damping, length, preload; of friction radius, preload, arm
+    par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
+    # of bushings six stiffnesses, six dampings, six preloads
     program: I1  # (nf,) -1 for none
+    components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
+    axes: I1  # (nf,) marker whose axes those components are along
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
     bounds: F2  # (nf, 2) of limits

@@ -174,7 +174,12 @@ def _load_subroutines(
     scripts: dict[Path, Script],
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Load the users' subroutines of forces and variables."""
-    elements = (*model.scalar_forces.values(), *model.variables.values())
+    elements = (
+        *model.scalar_forces.values(),
+        *model.variables.values(),
+        *model.vector_forces.values(),
+        *model.body_forces.values(),
+    )
     if all(element.user is None for element in elements):
         return {}
     from mbsim.plugins.subroutine import begin_run

@@ -57,6 +57,8 @@ _STATEMENTS = {
     "Motion": "Motion_Joint",
     "GeneralConstraint": "Constraint_General",
     "ScalarForce": "Force_Scalar_TwoBody",
+    "VectorForce": "Force_Vector_TwoBody",
+    "BodyForce": "Force_Vector_OneBody",
     "Variable": "Reference_Variable",
     "Request": "Post_Request",
 }

@@ -51,6 +51,14 @@ def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
     for variable in model.variables.values():
         if variable.user is not None:
             found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
+    for statement, xml, table in (
+        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
+        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
+    ):
+        for vector in table.values():
+            if vector.user is not None:
+                count = sum(expr is not None for expr in vector.exprs)
+                found.append((statement, xml, vector.id, vector.user, count))
     return found
 
 
@@ -102,9 +110,7 @@ class StateReader:
         """Return the door of expressions, which opens after the scene is made."""
         if self.run is None:
             number = ctypes.c_int64
-            kind = ctypes.CFUNCTYPE(
-                number, number, ctypes.c_double, number, number, number, number
-            )
+            kind = ctypes.CFUNCTYPE(number, number, ctypes.c_double, number, number, number, number)
             self.run = kind(int(self.scene.world.doors[a.EXPRESSION_DOOR]))
         return self.run
 
@@ -151,8 +157,7 @@ class StateReader:
         return value
 
     def resolve(self, name: str, ids: Sequence[float]) -> bytes | int | None:
-        """Return an instruction as it stands in `Programs.code`, the program of a variable,
-        or None where there is none."""
+        """Return an instruction as `Programs.code` has it, or a variable's program, or None."""
         name = str(name).strip().upper()
         if any(float(id) != int(id) for id in ids):
             return None
