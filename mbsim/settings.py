@@ -149,7 +149,7 @@ def _refuse_verlet(model: Model) -> None:
         "Motion_Joint": model.motions,
         "Constraint_General": model.general_constraints,
     }
-    unknown = {
+    unknown: dict[str, Mapping[int, Any]] = {
         "Force_Scalar_TwoBody": model.scalar_forces,
         "Control_Diff": model.differentials,
     }

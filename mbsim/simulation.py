@@ -508,6 +508,10 @@ def simulate(
     for number, user in system.user_friction.items():
         how = "compiled" if user.compiled else f"interpreted: {user.reason}"
         tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
+    for user_subroutine in system.subroutines.values():
+        statement, number = user_subroutine.element
+        source = user_subroutine.source.name
+        tell(f"{statement}[{number}]: {user_subroutine.name} of {source}, interpreted")
     attributes: dict[str, str | float | int] = {
         "mbsim_version": __version__,
         "model_file": model.file,
@@ -523,7 +527,7 @@ def simulate(
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
-    if system.user_friction:
+    if system.user_friction or system.subroutines:
         from mbsim.plugins import host
 
         host.log = log.line

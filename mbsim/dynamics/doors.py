@@ -13,6 +13,7 @@ from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.states import add_slopes
+from mbsim.dynamics.subroutines import failure_or
 from mbsim.dynamics.values import evaluate_program
 from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
@@ -41,7 +42,8 @@ def _apply(context, t, y, dy):
     """The forces of springs and expressions."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    scene.users.failed[0] = 0
+    return failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
 
 
 def _slope(context, t, y, dy):
@@ -89,7 +91,8 @@ def _evaluate(context, t, y, program):
 def _evaluate_requests(context, t, y):
     """The expressions of requests at an output row."""
     scene = view(context, Scene)
-    return fill_values(scene, t, carray(y, (scene.rows.y.shape[1],)))
+    scene.users.failed[0] = 0
+    return failure_or(scene, fill_values(scene, t, carray(y, (scene.rows.y.shape[1],))))
 
 
 def _commit_angles(context):

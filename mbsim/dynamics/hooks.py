@@ -112,7 +112,11 @@ def _output(context, t, h, a, b):
     code = evaluate(scene, t, h, carray(a, (n,)), f)
     if code != 0:
         return -float(code)
-    return 1.0 if write_row(scene, t, carray(a, (n,)), f) else 0.0
+    full = write_row(scene, t, carray(a, (n,)), f)
+    if scene.users.failed[0] != 0:
+        # a subroutine that only a request asks for
+        return -float(scene.users.failed[0])
+    return 1.0 if full else 0.0
 
 
 def _reject(context, t, h, a, b):

@@ -11,6 +11,7 @@ from mbsim.dynamics.curves import spline_value
 from mbsim.dynamics.interpreter import displacement, rate_or_force
 from mbsim.dynamics.markers import marker_axis, marker_point
 from mbsim.dynamics.measures import AT_REST, relative_velocity
+from mbsim.dynamics.subroutines import user_result
 from mbsim.expressions.elementary import (
     ADD,
     COS,
@@ -37,6 +38,7 @@ from mbsim.system.programs import (
     POW_N,
     SPLINE,
     SUB_N,
+    USER,
     VELOCITY,
 )
 
@@ -122,6 +124,10 @@ def evaluate_program(scene, t, y, program):
         elif op == SPLINE:
             top -= 1
             x = spline_value(programs, code[1], code[2], code[3], s[top], x)
+        elif op == USER:
+            s[top] = x
+            top += 1
+            x = user_result(scene, t, y, code[1], code[2])
         elif op < FIRST_MEASURE:
             s[top] = x
             top = apply_value(op, code[1], s, top + 1) - 1

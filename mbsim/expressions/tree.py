@@ -33,7 +33,19 @@ class Call:
     column: int = 0
 
 
-Node: TypeAlias = "Number | Time | Call"
+@dataclass(frozen=True)
+class UserResult:
+    """What a user subroutine returns in place of an expression: number `component` of it.
+
+    `statement` and `id` name the element, SFORCE or VARIABLE for example, whose subroutine it is.
+    """
+
+    statement: str
+    id: int
+    component: int = 0
+
+
+Node: TypeAlias = "Number | Time | Call | UserResult"
 
 
 @dataclass(frozen=True)

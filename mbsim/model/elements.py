@@ -297,6 +297,7 @@ class ScalarForce:
     i_marker_id: int = 0
     j_marker_id: int = 0
     action_only: bool = False
+    user: Subroutine | None = None  # `expr` is then what it returns
     source: Source = Source()
 
 
@@ -333,6 +334,7 @@ class VectorForce:
     i_marker_id: int = 0
     j_floating_marker_id: int = 0
     ref_marker_id: int | None = None
+    user: Subroutine | None = None  # `exprs` are then what it returns
     source: Source = Source()
 
     @property
@@ -407,6 +409,7 @@ class Variable:
     id: int
     expr: Expression
     label: str = ""
+    user: Subroutine | None = None  # `expr` is then what it returns
     source: Source = Source()
 
 

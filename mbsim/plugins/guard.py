@@ -23,6 +23,10 @@ C_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
 
+STATE_FUNCTION = ctypes.CFUNCTYPE(
+    ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64
+)
+
 
 class NotAForce(Exception):
     """A user function returned something else than three finite numbers."""
@@ -37,15 +41,15 @@ class Failure:
     def clear(self) -> None:
         """Forget what happened, before a new run."""
         self.error: BaseException | None = None
-        self.element = 0
+        self.element = ""
         self.time = 0.0
         self.name = ""
         self.source = ""
 
     def store(
-        self, error: BaseException, element: int, time: float, name: str, source: str
+        self, error: BaseException, element: str, time: float, name: str, source: str
     ) -> None:
-        """Keep an exception and what it belongs to.
+        """Keep an exception and what it belongs to, `element` as messages name it.
 
         The integrator comes nearer before it gives up, so the last one is nearest to where
         the run stands.
@@ -77,9 +81,9 @@ def raise_failure() -> NoReturn:
     raise PluginError(text) from error
 
 
-def _report(error: BaseException, element: int, time: float, name: str, source: str) -> str:
+def _report(error: BaseException, element: str, time: float, name: str, source: str) -> str:
     """Return the message: who, when, what, and the user's frames with their lines."""
-    head = f"Force_Contact[{element}]: {name} failed at time {time:.12g}: "
+    head = f"{element}: {name} failed at time {time:.12g}: "
     if isinstance(error, NotAForce):
         return f"{head}{error} ({source})"
     frames = [
@@ -101,24 +105,45 @@ def _report(error: BaseException, element: int, time: float, name: str, source: 
 
 def three_numbers(result: Any) -> list[float]:
     """Return a user function's result as three finite floats, or raise `NotAForce`."""
+    return numbers(result, 3, " [Fx, Fy, Tz]")
+
+
+def numbers(result: Any, count: int, names: str = "") -> list[float]:
+    """Return a user function's result as `count` finite floats, or raise `NotAForce`."""
     shown = repr(result)
     shown = shown if len(shown) <= 80 else shown[:77] + "..."
     # numpy arrays have no common base with list; length and indexing make a sequence
     sized = hasattr(result, "__len__") and hasattr(result, "__getitem__")
     if not sized or isinstance(result, (str, bytes, dict)):
         hint = " (no return statement?)" if result is None else ""
-        raise NotAForce(f"returned {shown}{hint}, not 3 finite numbers [Fx, Fy, Tz]")
-    if len(result) != 3:
-        raise NotAForce(f"returned {len(result)} values, {shown}, not 3 finite numbers")
+        raise NotAForce(f"returned {shown}{hint}, not {count} finite numbers{names}")
+    if len(result) != count:
+        raise NotAForce(f"returned {len(result)} values, {shown}, not {count} finite numbers")
     try:
         if any(isinstance(value, (str, bytes)) for value in result):
             raise TypeError
         values = [float(value) for value in result]
     except (TypeError, ValueError, OverflowError) as error:
-        raise NotAForce(f"returned {shown}, not 3 finite numbers") from error
+        raise NotAForce(f"returned {shown}, not {count} finite numbers") from error
     if any(value - value != 0.0 for value in values):
-        raise NotAForce(f"returned {shown}, not 3 finite numbers")
+        raise NotAForce(f"returned {shown}, not {count} finite numbers")
     return values
+
+
+def one_number(result: Any) -> list[float]:
+    """Return a user function's result as one finite float in a list, or raise `NotAForce`."""
+    shown = repr(result)
+    shown = shown if len(shown) <= 80 else shown[:77] + "..."
+    hint = " (no return statement?)" if result is None else ""
+    try:
+        if isinstance(result, (str, bytes)):
+            raise TypeError
+        value = float(result)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise NotAForce(f"returned {shown}{hint}, not one finite number") from error
+    if value - value != 0.0:
+        raise NotAForce(f"returned {shown}, not one finite number")
+    return [value]
 
 
 class _Views(dict[int, Any]):
@@ -176,10 +201,75 @@ def callback(
             force[2] = force[3] = 0.0
             return 0
         except BaseException as error:
-            failure.store(error, element, time, name, source)
+            failure.store(error, f"Force_Contact[{element}]", time, name, source)
             return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
 
     entry = C_FUNCTION(guarded)
+    return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
+
+
+def state_callback(
+    function: Callable[..., Any],
+    element: tuple[str, int],
+    place: tuple[str, str],
+    par: Sequence[float],
+    count: int,
+) -> tuple[int, object]:
+    """Return the address of a subroutine that may look at the trial state, and its keeper.
+
+    Parameters
+    ----------
+    function : callable
+        Of (id, time, par, npar, dflag, iflag); it returns a number, or `count` of them.
+    element : (str, int)
+        Its statement and id.
+    place : (str, str)
+        Name of the function, and its file.
+    par : sequence of float
+    count : int
+        How many numbers it returns.
+
+    Returns
+    -------
+    int
+        Of a C function of (scene, time, y, results) that returns 0 or a code. Before its first
+        call the subroutine is called once with iflag 1, and what it returns is not looked at.
+    object
+        What must live as long as the address is used.
+    """
+    from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+
+    results_at = _Views(count)
+    title, id = f"{element[0]}[{element[1]}]", element[1]
+    name, source = place
+    values, npar = [float(value) for value in par], len(par)
+    started = False
+
+    def guarded(scene: int, time: float, y: int, results: int) -> int:
+        nonlocal started
+        outer, host.time = host.state, time
+        host.state = (scene, time, y)
+        try:
+            if not started:
+                started = True
+                function(id, time, values.copy(), npar, 0, 1)
+            result = function(id, time, values.copy(), npar, 0, 0)
+            if count == 1:
+                if type(result) is not float or result - result != 0.0:
+                    result = one_number(result)[0]
+                results_at[results][0] = result
+            else:
+                room = results_at[results]
+                for k, number in enumerate(numbers(result, count)):
+                    room[k] = number
+            return 0
+        except BaseException as error:
+            failure.store(error, title, time, name, source)
+            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+        finally:
+            host.state = outer
+
+    entry = STATE_FUNCTION(guarded)
     return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
 
 
@@ -211,7 +301,7 @@ def reproduce(
         )
     except BaseException as error:
         failure.clear()
-        failure.store(error, element, given[0], name, source)
+        failure.store(error, f"Force_Contact[{element}]", given[0], name, source)
         raise_failure()
     raise PluginError(
         f"Force_Contact[{element}]: {name} ({source}) failed at time {given[0]:.12g} when "

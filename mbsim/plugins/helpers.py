@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from mbsim.plugins import kernels
@@ -19,12 +19,30 @@ def _to_stderr(line: str) -> None:
     sys.stderr.write(line + "\n")
 
 
+Look = Callable[[str, Sequence[float]], list[Any]]
+
+
+def _nothing(name: str, ids: Sequence[float]) -> list[Any]:
+    return [0.0, 1]
+
+
 class Host:
-    """What the scripts see of the run: the time, and where messages go."""
+    """What the scripts see of the run: the time, the trial state, and where messages go."""
 
     def __init__(self) -> None:
         self.time = 0.0
         self.log: Callable[[str], None] = _to_stderr
+        #: While a subroutine that may look at it runs: scene, time, and where y lies.
+        self.state: tuple[int, float, int] | None = None
+        #: What looks at it: (name, ids) -> [value, errflg] and -> [values, errflg].
+        self.sysfnc: Look = _nothing
+        self.sysary: Look = _nothing
+        self.warned: set[str] = set()
+
+    def forget(self) -> None:
+        """Look at nothing, before a new run."""
+        self.state, self.sysfnc, self.sysary = None, _nothing, _nothing
+        self.warned.clear()
 
 
 #: The one run of this process. The simulation sets `host.log`; the guard sets `host.time`.
@@ -65,6 +83,33 @@ def py_usrmes(msgflg: Any, message: Any = "", id: Any = 0, msgtyp: Any = "INFO")
         host.log(f"USRMES:USER [{id}] {kind}: {message}")
 
 
+def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
+    """Return [value, errflg] of a function of the language, DX for example, at the trial state.
+
+    errflg is 1 and the value 0 where the function or a marker is not known, forces and
+    accelerations among them, and outside subroutines of forces and variables.
+    """
+    if host.state is None:
+        _no_state("py_sysfnc")
+        return [0.0, 1]
+    return host.sysfnc(name, ids)
+
+
+def py_sysary(name: str, ids: Sequence[float]) -> list[Any]:
+    """Return [values, errflg] of DISP, TDISP, RDISP, VEL, TVEL or RVEL at the trial state."""
+    if host.state is None:
+        _no_state("py_sysary")
+        return [[], 1]
+    return host.sysary(name, ids)
+
+
+def _no_state(name: str) -> None:
+    """Say once that a subroutine cannot look at the state."""
+    if name not in host.warned:
+        host.warned.add(name)
+        host.log(f"warning: {name} is called where there is no state to look at: errflg is 1")
+
+
 def py_getstm() -> float:
     """Return the simulation time of the present call."""
     return host.time
@@ -83,7 +128,10 @@ def print_to_stderr(*args: Any, file: Any = None, **options: Any) -> None:
 def namespace() -> dict[str, Any]:
     """Return the names that a script starts with: all of `math`, and the helpers."""
     names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
-    for helper in (py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area):
+    for helper in (
+        py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area,
+        py_sysfnc, py_sysary,
+    ):  # fmt: skip
         names[helper.__name__] = helper
     names["print"] = print_to_stderr
     return names

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.errors import ModelError
-from mbsim.model.elements import Contact
+from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
 from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
@@ -129,7 +129,7 @@ def load_friction(
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
-    function = _function(script, name, element)
+    function = user_function(script, name, element)
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
     if script.text is not None:
@@ -202,26 +202,44 @@ def find_subroutine(
     ModelError
         If no file is named, or none that is named can be used.
     """
+    element = f"Force_Contact[{contact.id}]"
+    name = contact.cff.fnc_name or "CFFSUB"
+    return find_script(contact.cff, name, element, "cff", plugin_files, scripts)
+
+
+def find_script(
+    user: Subroutine,
+    name: str,
+    element: str,
+    prefix: str,
+    plugin_files: Sequence[Path] = (),
+    scripts: Scripts | None = None,
+) -> Script:
+    """Return the script that defines function `name` of an element; see `find_subroutine`.
+
+    `element` is how messages name it, `prefix` (cff, usrsub) what its attributes begin with.
+    """
     scripts = {} if scripts is None else scripts
-    cff, element = contact.cff, f"Force_Contact[{contact.id}]"
-    name = cff.fnc_name or "CFFSUB"
-    if cff.interpreter and cff.interpreter.upper() != "PYTHON":
-        raise ModelError(f'{element}: interpreter="{cff.interpreter}" is not built yet, use Python')
-    if cff.script_name:
-        script = _load(Path(cff.script_name), element, scripts)
-        _require(script, name, element)
+    attribute = f"{prefix}_fnc_name"
+    if user.interpreter and user.interpreter.upper() != "PYTHON":
+        raise ModelError(
+            f'{element}: interpreter="{user.interpreter}" is not built yet, use Python'
+        )
+    if user.script_name:
+        script = _load(Path(user.script_name), element, scripts)
+        _require(script, name, element, attribute)
         return script
 
-    dll_name = cff.dll_name.strip()
+    dll_name = user.dll_name.strip()
     if not plugin_files:
         if dll_name.upper() not in ("", "NULL"):
             raise ModelError(
-                f'{element}: cff_dll_name="{dll_name}": shared libraries are not built yet; '
+                f'{element}: {prefix}_dll_name="{dll_name}": shared libraries are not built yet; '
                 "name a Python twin with --plugin FILE.py"
             )
-        said = f'cff_dll_name="{dll_name}"' if dll_name else "no script_name"
+        said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
         raise ModelError(
-            f'{element}: cff_fnc_name="{name}" names no file ({said}); '
+            f'{element}: {attribute}="{name}" names no file ({said}); '
             "name one with --plugin FILE.py"
         )
     files = dict.fromkeys(Path(file).absolute() for file in plugin_files)
@@ -232,7 +250,7 @@ def find_subroutine(
         raise ModelError(f"{element}: {name} is defined twice: {both}")
     if not found:
         defined = "; ".join(f"{script.path} defines {_listed(script)}" for script in loaded)
-        raise ModelError(f'{element}: no plugin file defines cff_fnc_name="{name}": {defined}')
+        raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
     return found[0]
 
 
@@ -252,16 +270,19 @@ def _listed(script: Script) -> str:
     return ", ".join(functions) or "no function"
 
 
-def _require(script: Script, name: str, element: str) -> None:
+def _require(script: Script, name: str, element: str, attribute: str) -> None:
     if name not in _own(script):
         raise ModelError(
-            f'{element}: {script.path} does not define cff_fnc_name="{name}"; '
+            f'{element}: {script.path} does not define {attribute}="{name}"; '
             f"it defines {_listed(script)}"
         )
 
 
-def _function(script: Script, name: str, element: str) -> Callable[..., Any]:
-    """Return the function of a script after a look at whether 11 arguments fit."""
+def user_function(
+    script: Script, name: str, element: str, arguments: str = _ARGUMENTS
+) -> Callable[..., Any]:
+    """Return the function of a script after a look at whether its arguments fit."""
+    count = len(arguments.split(","))
     function = script.values[name]
     if not callable(function):
         kind = type(function).__name__
@@ -276,13 +297,13 @@ def _function(script: Script, name: str, element: str) -> Callable[..., Any]:
     except (TypeError, ValueError):  # some functions written in C tell nothing
         return function  # type: ignore[no-any-return]
     try:
-        signature.bind(*range(11))
+        signature.bind(*range(count))
     except TypeError as error:
         code = getattr(function, "__code__", None)
         place = f"{script.path}:{code.co_firstlineno}" if code else str(script.path)
         raise ModelError(
-            f"{element}: {place}: {name}{signature} cannot be called with the 11 arguments "
-            f"({_ARGUMENTS}): {error}"
+            f"{element}: {place}: {name}{signature} cannot be called with the {count} arguments "
+            f"({arguments}): {error}"
         ) from None
     return function  # type: ignore[no-any-return]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
     CFF_TYPES,
@@ -28,6 +26,7 @@ from mbsim.reader.kinds import (
 )
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
 from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 CFF_USES: dict[str, set[str]] = {
@@ -82,7 +81,7 @@ def _build_contact(entry: Entry) -> None:
         mu_dynamic=entry.get("mu_dynamic", 0.0),
         stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
-        cff=_subroutine(entry) if cff_type == "USERCFF" else el.Subroutine(),
+        cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
         source=entry.source,
     )
     entry.register(entry.draft.contacts, contact)
@@ -115,29 +114,6 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
     mu_static, mu_dynamic = entry.get("mu_static", 0.0), entry.get("mu_dynamic", 0.0)
     if mu_dynamic > mu_static:
         entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
-
-
-def _subroutine(entry: Entry) -> el.Subroutine:
-    """Return the user friction subroutine as the deck names it."""
-    dll = entry.get("cff_dll_name", "NULL")
-    if dll.upper() not in ("", "NULL"):
-        entry.fault('shared libraries are not built yet; "NULL" names no file', "cff_dll_name")
-    script = entry.get("script_name", "")
-    if script:
-        path = Path(script.replace("\\", "/"))
-        path = path if path.is_absolute() else entry.draft.directory / path
-        script = str(path.resolve())
-        if not path.is_file():
-            entry.fault("no such file (the path is relative to the deck)", "script_name")
-    if not entry.given("cff_fnc_name"):
-        entry.note("not given; taken as CFFSUB", "cff_fnc_name")
-    return el.Subroutine(
-        par=entry.get("cff_param_string", ()),
-        fnc_name=entry.get("cff_fnc_name", "CFFSUB"),
-        dll_name="",
-        script_name=script,
-        interpreter=entry.get("interpreter", "PYTHON"),
-    )
 
 
 _NOT_BUILT = "is documented but not built yet"

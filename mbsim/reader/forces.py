@@ -6,16 +6,10 @@ from typing import Any
 
 from mbsim.model import elements as el
 from mbsim.model.mechanism_checks import COMPONENTS
-from mbsim.reader.constraints import USERSUB_REFUSED
-from mbsim.reader.keywords import (
-    BY_EXPRESSION,
-    BY_USERSUB,
-    SCALAR_TYPES,
-    SPRING_TYPES,
-    VECTOR_TYPES,
-)
+from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES, VECTOR_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, TEXT, keyword
 from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
 
 
 def _build_spring(entry: Entry) -> None:
@@ -42,17 +36,20 @@ def _build_spring(entry: Entry) -> None:
 
 
 def _build_scalar(entry: Entry) -> None:
-    """Add a scalar force by an expression."""
-    if entry.get("type") is None or entry.get("expr") is None:
+    """Add a scalar force by an expression or a user subroutine."""
+    user = subroutine(entry, "usrsub", "SFOSUB") if by_user(entry) else None
+    expr = entry.get("expr") if user is None else result(entry, "SFORCE", user)
+    if entry.get("type") is None or expr is None:
         return
     force = el.ScalarForce(
         id=entry.get("id", 0),
         type=entry.get("type"),
-        expr=entry.get("expr"),
+        expr=expr,
         label=entry.get("label", ""),
         i_marker_id=entry.get("i_marker_id", 0),
         j_marker_id=entry.get("j_marker_id", 0),
         action_only=entry.get("action_only", False),
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.scalar_forces, force)
@@ -90,19 +87,35 @@ _NOT_OF_TYPE = {
 }
 
 
-def _vector_parts(entry: Entry) -> dict[str, Any]:
+#: What the subroutine of a type is called where the deck does not say.
+_VECTOR_SUBROUTINES = {
+    "FORCEONLY": "VFOSUB",
+    "TORQUEONLY": "VTOSUB",
+    "FORCEANDTORQUE": "GFOSUB",
+}
+
+
+def _vector_parts(entry: Entry, statement: str) -> dict[str, Any]:
     """Return what vector forces on one and on two bodies have in common."""
     type = entry.get("type", "FORCEANDTORQUE")
     for name in _NOT_OF_TYPE[type]:
         if entry.given(name):
             has = ", ".join(each for each in COMPONENTS if each not in _NOT_OF_TYPE[type])
             entry.fault(f"does not belong to type {type}, which has {has}", name)
-    if not any(entry.given(name) for name in COMPONENTS):
+    user, exprs = None, tuple(entry.get(name) for name in COMPONENTS)
+    if by_user(entry, COMPONENTS):
+        user = subroutine(entry, "usrsub", _VECTOR_SUBROUTINES[type])
+        has = [name not in _NOT_OF_TYPE[type] for name in COMPONENTS]
+        exprs = tuple(
+            result(entry, statement, user, sum(has[:k])) if has[k] else None for k in range(6)
+        )
+    elif not any(entry.given(name) for name in COMPONENTS):
         entry.fault(f"{COMPONENTS[0]} ... {COMPONENTS[-1]}: missing; at least one must be given")
     return {
         "id": entry.get("id", 0),
         "type": type,
-        "exprs": tuple(entry.get(name) for name in COMPONENTS),
+        "exprs": exprs,
+        "user": user,
         "label": entry.get("label", ""),
         "i_marker_id": entry.get("i_marker_id", 0),
         "ref_marker_id": entry.get("ref_marker_id"),
@@ -113,23 +126,28 @@ def _vector_parts(entry: Entry) -> dict[str, Any]:
 def _build_vector(entry: Entry) -> None:
     """Add a vector force between two bodies."""
     j = entry.get("j_floating_marker_id", 0)
-    force = el.VectorForce(**_vector_parts(entry), j_floating_marker_id=j)
+    force = el.VectorForce(**_vector_parts(entry, "VECTORFORCE"), j_floating_marker_id=j)
     entry.register(entry.draft.vector_forces, force)
 
 
 def _build_body_force(entry: Entry) -> None:
     """Add a vector force on one body."""
-    entry.register(entry.draft.body_forces, el.BodyForce(**_vector_parts(entry)))
+    entry.register(entry.draft.body_forces, el.BodyForce(**_vector_parts(entry, "BODYFORCE")))
 
 
 def _build_variable(entry: Entry) -> None:
     """Add a variable."""
-    if entry.get("expr") is None:
+    user = None
+    if by_user(entry, type=entry.get("type", "")):
+        user = subroutine(entry, "usrsub", "VARSUB")
+    expr = entry.get("expr") if user is None else result(entry, "VARIABLE", user)
+    if expr is None:
         return
     variable = el.Variable(
         id=entry.get("id", 0),
-        expr=entry.get("expr"),
+        expr=expr,
         label=entry.get("label", ""),
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.variables, variable)
@@ -157,9 +175,9 @@ FORCE_SCALAR_TWOBODY = Statement(
         **_NAMED,
         "type": Spec(keyword(SCALAR_TYPES), required=True),
         **_MARKERS,
-        "expr": Spec(EXPRESSION, required=True),
+        "expr": Spec(EXPRESSION),
+        **USERSUB,
         "action_only": Spec(FLAG),  # ours; Adams' ACTIONONLY
-        **USERSUB_REFUSED,
     },
     _build_scalar,
 )
@@ -177,7 +195,7 @@ _VECTOR: dict[str, Spec] = {
     "type": Spec(keyword(VECTOR_TYPES), required=True),
     "ref_marker_id": Spec(ID),
     **{name: Spec(EXPRESSION) for name in COMPONENTS},
-    **USERSUB_REFUSED,
+    **USERSUB,
 }
 FORCE_VECTOR_TWOBODY = Statement(
     "Force_Vector_TwoBody",
@@ -198,9 +216,9 @@ REFERENCE_VARIABLE = Statement(
     "Reference_Variable",
     {
         **_NAMED,
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION, required=True),
-        **USERSUB_REFUSED,
+        "type": Spec(BY_EITHER),
+        "expr": Spec(EXPRESSION),
+        **USERSUB,
     },
     _build_variable,
 )

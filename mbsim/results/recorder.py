@@ -410,6 +410,9 @@ def _digests(system: System) -> dict[str, Value]:
     for contact_id, user in system.user_friction.items():
         users.update(f"{contact_id} {user.name} {user.compiled}\n".encode())
         users.update(Path(user.source).read_bytes())
+    for element, subroutine in system.subroutines.items():
+        users.update(f"{element} {subroutine.name}\n".encode())
+        users.update(Path(subroutine.source).read_bytes())
     return {"system_sha256": model.hexdigest(), "subroutines_sha256": users.hexdigest()}
 
 

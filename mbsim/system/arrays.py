@@ -246,6 +246,14 @@ class Sensors(NamedTuple):
     located: I1  # (n,) 1 where a step ends at the crossing
 
 
+class Users(NamedTuple):
+    """User subroutines of forces and variables, see dynamics.subroutines."""
+
+    address: I1  # (nu,) of their guarded C functions
+    result: F2  # (nu, most) what each returned last
+    failed: I1  # (1,) code of the first that failed in this evaluation, or 0
+
+
 class Applied(NamedTuple):
     """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
 
@@ -453,6 +461,7 @@ class Scene(NamedTuple):
     programs: Programs
     states: States
     sensors: Sensors
+    users: Users
     applied: Applied
     tree: Tree
     equations: Equations

@@ -40,6 +40,9 @@ from mbsim.system.states import sensors_table, states_table
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
+    from mbsim.plugins.loader import Script
+    from mbsim.plugins.subroutine import UserSubroutine
+    from mbsim.system.subroutines import StateReader
 
 #: XML statements of connections.
 _STATEMENTS = {
@@ -70,6 +73,7 @@ class System:
     marker_rows: dict[int, int]  # of `Markers` by id, of those that joints, forces, ... look at
     values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
     equation_names: list[str]  # of each row of `Equations`, for messages
+    subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
@@ -146,20 +150,64 @@ def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
 
 
 def _load_user_friction(
-    model: Model, plugins: Sequence[Path], interpret: bool, log: Callable[[str], None] | None
+    model: Model,
+    plugins: Sequence[Path],
+    interpret: bool,
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
 ) -> dict[int, UserFriction]:
     """Load the users' CFFSUBs; scenes without one do not import what that needs."""
     wanted = [c for c in model.contacts.values() if c.cff_type == "USERCFF"]
     if not wanted:
         return {}
     from mbsim.plugins import failure, host, load_friction
-    from mbsim.plugins.loader import Script
 
     failure.clear()
     if log is not None:
         host.log = log
-    scripts: dict[Path, Script] = {}
     return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
+
+
+def _load_subroutines(
+    model: Model,
+    plugins: Sequence[Path],
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> dict[tuple[str, int], UserSubroutine]:
+    """Load the users' subroutines of forces and variables."""
+    elements = (
+        *model.scalar_forces.values(),
+        *model.variables.values(),
+        *model.vector_forces.values(),
+        *model.body_forces.values(),
+    )
+    if all(element.user is None for element in elements):
+        return {}
+    from mbsim.plugins.subroutine import begin_run
+    from mbsim.system.subroutines import load
+
+    begin_run(log)
+    return load(model, plugins, scripts)
+
+
+def _state_reader(
+    model: Model, programs: ProgramTable, users: dict[tuple[str, int], UserSubroutine]
+) -> StateReader | None:
+    """Return what serves py_sysfnc where a script has it."""
+    if not any(user.looks for user in users.values()):
+        return None
+    from mbsim.system.subroutines import StateReader
+
+    return StateReader(model, programs)
+
+
+def _users(users: dict[tuple[str, int], UserSubroutine]) -> a.Users:
+    """Return the rows of user subroutines."""
+    return a.Users(
+        np.array([user.address for user in users.values()], dtype=np.int64),
+        np.zeros((len(users), max((user.count for user in users.values()), default=1))),
+        np.zeros(1, dtype=np.int64),
+    )
 
 
 def build(
@@ -193,7 +241,9 @@ def build(
     placement = place(model)
     plans = plan_pairs(model, detector)
     kinds = plans.kinds
-    user = _load_user_friction(model, plugins, interpret, log)
+    scripts: dict[Path, Script] = {}
+    user = _load_user_friction(model, plugins, interpret, log, scripts)
+    subroutines = _load_subroutines(model, plugins, log, scripts)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
     row = {body.id: nb for body in model.bodies.values()}
@@ -233,11 +283,13 @@ def build(
         model.splines,
         model.arrays,
     )
+    programs.users = {element: k for k, element in enumerate(subroutines)}
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
     states = states_table(model, programs)
     sensors = sensors_table(model, programs)
+    reader = _state_reader(model, programs, subroutines)
     values = _values(model, programs)
     nz = len(states.program)
     ledger = _ledger(bool(model.motions), nf > 0, first_state + nz)
@@ -266,6 +318,7 @@ def build(
         programs=instructions,
         states=states,
         sensors=sensors,
+        users=_users(subroutines),
         applied=applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
@@ -283,6 +336,8 @@ def build(
         sweep=sweep(mechanism),
         rows=empty_rows(len(y0), nb, len(contact_ids), ns, nj, nf, len(values), len(sensors.id)),
     )
+    if reader is not None:
+        reader.open(scene)
     needs_fcl = any(not kind.closed_form for kind in kinds)
     return System(
         model,
@@ -300,4 +355,5 @@ def build(
         table.rows,
         values,
         mechanism.names,
+        subroutines,
     )

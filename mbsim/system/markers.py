@@ -25,6 +25,8 @@ class MarkerTable:
     angle_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     turned_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     frames: list[tuple[int, Array, Array]] = field(default_factory=list)
+    #: Rows of `arrays.Angles` that are of the global frame until somebody needs them.
+    spare_angles: int = 0
 
     def __post_init__(self) -> None:
         self.frames.append((self.ground, np.zeros(3), np.eye(3)))
@@ -83,12 +85,14 @@ class MarkerTable:
 
     def start_angles(self) -> Array:
         """Return all followed angles at the start [rad]."""
-        return np.array([self.start_angle(i, j) for i, j in self.angle_rows], dtype=np.float64)
+        found = [self.start_angle(i, j) for i, j in self.angle_rows]
+        return np.array(found + [0.0] * self.spare_angles, dtype=np.float64)
 
     def arrays(self) -> tuple[a.Markers, a.Angles]:
         """Return the tables as they are now."""
         body, p, R = zip(*self.frames, strict=True)
-        pairs = np.array(list(self.angle_rows), dtype=np.int64).reshape(-1, 2)
+        rows = [*self.angle_rows, *[(0, 0)] * self.spare_angles]
+        pairs = np.array(rows, dtype=np.int64).reshape(-1, 2)
         return (
             a.Markers(np.array(body, dtype=np.int64), np.array(p), np.array(R)),
             a.Angles(pairs[:, 0].copy(), pairs[:, 1].copy()),

@@ -28,6 +28,7 @@ up to five numbers:
 |                    | comp, marker k                                                        |
 | SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
 |                    | topmost jets                                                          |
+| USER               | row of `Users`, which of its results; 0 calls it, others read         |
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from mbsim.expressions import elementary
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, NUMBER, TIME
 from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
-from mbsim.expressions.tree import Call, Expression, Node, Number, Time
+from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
 from mbsim.model.elements import ArrayOfNumbers, Differential, Spline, Variable
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
@@ -53,7 +54,7 @@ from mbsim.system.splines import SplineTable
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEASURE + 6)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
-STATE, SENSED, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 18)
+STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
 #: Of values alone: the topmost with a number, x + n and so on, then n - x and n / x.
 ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
@@ -114,6 +115,8 @@ class ProgramTable:
     arrays_of_numbers: Mapping[int, ArrayOfNumbers] = field(default_factory=dict)
     programs: list[list[Instruction]] = field(default_factory=list)
     curves: SplineTable = field(default_factory=SplineTable)
+    #: Row of `arrays.Users` of each user subroutine, by statement and id of its element.
+    users: Mapping[tuple[str, int], int] = field(default_factory=dict)
 
     def add(
         self,
@@ -162,6 +165,11 @@ class ProgramTable:
             raise DeckError([where]) from None
         self.programs.append(made)
         return len(self.programs) - 1
+
+    def measure(self, node: Call) -> Instruction:
+        """Return the instruction of a displacement or velocity of markers."""
+        allowed = frozenset({Kind.DISPLACEMENT, Kind.VELOCITY})
+        return _Compiler(self, allowed).measure(node, FUNCTIONS[node.name].kind)
 
     def looks_at(self, program: int) -> list[int]:
         """Return the rows of the markers that displacements of a program are measured between."""
@@ -339,6 +347,11 @@ class _Compiler:
             return [Instruction(NUMBER, value=node.value)]
         if isinstance(node, Time):
             return [Instruction(TIME)]
+        if isinstance(node, UserResult):
+            if Kind.VELOCITY not in self.allowed:
+                raise ExpressionError("what a user subroutine returns cannot be used here", 1)
+            row = self.table.users[node.statement, node.id]
+            return [Instruction(USER, (row, node.component))]
         kind = FUNCTIONS[node.name].kind
         if kind is Kind.VARIABLE:
             return self.variable(node)

@@ -113,6 +113,7 @@ def fake_system_of(model: Model) -> Any:
         marker_rows=table.rows,
         values=values,
         user_friction={},
+        subroutines={},
     )
 
 

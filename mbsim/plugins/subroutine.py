@@ -1,0 +1,79 @@
+"""User subroutines of forces and variables: SFOSUB, GFOSUB, VARSUB and their like.
+
+All are called as (id, time, par, npar, dflag, iflag) and return a number or a list of them.
+They stay interpreted: what they ask by `py_sysfnc` is looked up in Python.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mbsim.model.elements import Subroutine
+from mbsim.plugins import guard
+from mbsim.plugins.helpers import host
+from mbsim.plugins.loader import Scripts, find_script, user_function
+
+ARGUMENTS = "id, time, par, npar, dflag, iflag"
+
+
+@dataclass(frozen=True, eq=False)
+class UserSubroutine:
+    """A user subroutine, ready to be called; keep it alive as long as `address` is in use.
+
+    Attributes
+    ----------
+    address : int
+        Of the C function that `guard.state_callback` made.
+    count : int
+        How many numbers it returns.
+    source : Path
+        The user's file.
+    name : str
+        The function in that file.
+    element : (str, int)
+        Statement and id of the element that names it.
+    looks : bool
+        Whether its script may ask for functions of the language by `py_sysfnc`.
+    """
+
+    address: int
+    count: int
+    source: Path
+    name: str
+    element: tuple[str, int]
+    looks: bool
+    keep: object = field(default=None, repr=False)
+
+
+def load_subroutine(
+    user: Subroutine,
+    element: tuple[str, int],
+    count: int,
+    plugin_files: Sequence[Path],
+    scripts: Scripts,
+) -> UserSubroutine:
+    """Return the subroutine of an element (its statement and id) that gives `count` numbers.
+
+    Raises
+    ------
+    ModelError
+        If the file or the function cannot be used; the message says what to change.
+    """
+    title = f"{element[0]}[{element[1]}]"
+    script = find_script(user, user.fnc_name, title, "usrsub", plugin_files, scripts)
+    function = user_function(script, user.fnc_name, title, ARGUMENTS)
+    place = user.fnc_name, str(script.path)
+    address, keep = guard.state_callback(function, element, place, user.par, count)
+    looks = script.text is None or bool(re.search("py_sysfnc|py_sysary", script.text))
+    return UserSubroutine(address, count, script.path, user.fnc_name, element, looks, keep)
+
+
+def begin_run(log: Callable[[str], None] | None) -> None:
+    """Forget what an earlier run of this process left behind."""
+    guard.failure.clear()
+    host.forget()
+    if log is not None:
+        host.log = log

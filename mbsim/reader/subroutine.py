@@ -1,0 +1,81 @@
+"""User subroutines as a statement names them: values, function, file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mbsim.expressions.tree import Expression, UserResult
+from mbsim.model import elements as el
+from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB
+from mbsim.reader.kinds import TEXT, USER, keyword
+from mbsim.reader.statement import Entry, Spec
+
+#: Attributes of a statement that takes a user subroutine in place of an expression.
+USERSUB = {
+    "usrsub_param_string": Spec(USER),
+    "usrsub_fnc_name": Spec(TEXT),
+    "usrsub_dll_name": Spec(TEXT),
+    "script_name": Spec(TEXT),
+    "interpreter": Spec(TEXT),
+}
+BY_EITHER = keyword({**BY_EXPRESSION, **BY_USERSUB})
+
+
+def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
+    """Return the user subroutine of an element.
+
+    Parameters
+    ----------
+    entry : Entry
+    prefix : str
+        Of its attributes: ``cff``, ``usrsub``.
+    default : str
+        The function, where ``<prefix>_fnc_name`` does not name one.
+    """
+    dll = entry.get(f"{prefix}_dll_name", "NULL")
+    if dll.upper() not in ("", "NULL"):
+        entry.fault(
+            'shared libraries are not built yet; "NULL" names no file', f"{prefix}_dll_name"
+        )
+    script = entry.get("script_name", "")
+    if script:
+        path = Path(script.replace("\\", "/"))
+        path = path if path.is_absolute() else entry.draft.directory / path
+        script = str(path.resolve())
+        if not path.is_file():
+            entry.fault("no such file (the path is relative to the deck)", "script_name")
+    if not entry.given(f"{prefix}_fnc_name"):
+        entry.note(f"not given; taken as {default}", f"{prefix}_fnc_name")
+    return el.Subroutine(
+        par=entry.get(f"{prefix}_param_string", ()),
+        fnc_name=entry.get(f"{prefix}_fnc_name", default),
+        dll_name="",
+        script_name=script,
+        interpreter=entry.get("interpreter", "PYTHON"),
+    )
+
+
+def by_user(entry: Entry, expressions: tuple[str, ...] = ("expr",), type: str = "") -> bool:
+    """Return whether a user subroutine stands in place of an element's expressions.
+
+    `type` is what the deck's ``type`` says of it, empty where it says something else. Fault
+    attributes of the other way, and an element that gives neither.
+    """
+    given = [name for name in USERSUB if entry.given(name)]
+    found = [name for name in expressions if entry.given(name)]
+    user = type == "USERSUB" or (type == "" and bool(given))
+    for name in found if user else given:
+        other = "a user subroutine" if user else "an expression"
+        entry.fault(f"this element is given by {other}; must not be there", name)
+    if user and "usrsub_param_string" not in given:
+        entry.fault(f"usrsub_param_string: missing; must be {USER.allowed}")
+    if not user and not found and len(expressions) == 1:
+        entry.fault(f"{expressions[0]}: missing; must be an expression, or usrsub_param_string")
+    return user
+
+
+def result(entry: Entry, statement: str, user: el.Subroutine, component: int = 0) -> Expression:
+    """Return what a user subroutine gives as an expression, with a text for messages."""
+    values = ", ".join(f"{value:g}" for value in user.par)
+    tree = UserResult(statement, entry.get("id", 0), component)
+    return Expression(f"USER({values}) by {user.fnc_name}", tree)

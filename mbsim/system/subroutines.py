@@ -1,0 +1,190 @@
+"""User subroutines of a model as rows of `Users`, and what they may ask of the trial state.
+
+`py_sysfnc("DX", [i, j])` becomes an instruction of the stack machine, kept by name and ids. It
+is put in the place of one spare program and run through the door of expressions, so that it
+measures at the state at which the subroutine is called, and by the same code as an expression.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbsim.errors import DeckError
+from mbsim.expressions.elementary import TIME
+from mbsim.expressions.functions import FUNCTIONS, Kind
+from mbsim.expressions.parse import ExpressionError
+from mbsim.expressions.tree import Call, Number
+from mbsim.model.elements import Model, Subroutine
+from mbsim.plugins.helpers import host
+from mbsim.plugins.loader import Scripts
+from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
+from mbsim.system import arrays as a
+from mbsim.system.programs import ANGLE, Instruction, ProgramTable
+
+#: Angles that subroutines may follow over whole turns, beyond those that the deck names.
+SPARE_ANGLES = 32
+#: `dynamics.measures.AT_REST`: only the value is wanted.
+_AT_REST = -2
+
+#: What py_sysary gives: functions and how many of the ids each takes.
+ARRAYS = {
+    "TDISP": (("DX", 3), ("DY", 3), ("DZ", 3)),
+    "RDISP": (("PSI", 2), ("THETA", 2), ("PHI", 2)),
+    "TVEL": (("VX", 4), ("VY", 4), ("VZ", 4)),
+    "RVEL": (("WX", 3), ("WY", 3), ("WZ", 3)),
+}
+ARRAYS["DISP"] = ARRAYS["TDISP"] + ARRAYS["RDISP"]
+ARRAYS["VEL"] = ARRAYS["TVEL"] + ARRAYS["RVEL"]
+
+
+def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
+    """Return statement, XML statement, id, subroutine and number of results of all users'."""
+    found = []
+    for force in model.scalar_forces.values():
+        if force.user is not None:
+            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
+    for variable in model.variables.values():
+        if variable.user is not None:
+            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
+    for statement, xml, table in (
+        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
+        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
+    ):
+        for vector in table.values():
+            if vector.user is not None:
+                count = sum(expr is not None for expr in vector.exprs)
+                found.append((statement, xml, vector.id, vector.user, count))
+    return found
+
+
+def load(
+    model: Model, plugins: Sequence[Path], scripts: Scripts
+) -> dict[tuple[str, int], UserSubroutine]:
+    """Return the subroutines of forces and variables by (statement, id), in order of their rows."""
+    return {
+        (statement, id): load_subroutine(user, (xml, id), count, plugins, scripts)
+        for statement, xml, id, user, count in wanted(model)
+    }
+
+
+class StateReader:
+    """What `py_sysfnc` and `py_sysary` look at; made before the programs become arrays."""
+
+    def __init__(self, model: Model, programs: ProgramTable) -> None:
+        self.programs, self.markers = programs, programs.markers
+        for id in self.markers.placement.markers:
+            for axis in (0, 1):
+                self.markers.turned(self.markers.row(id), axis)
+        for axis in (0, 1):
+            self.markers.turned(0, axis)
+        self.markers.spare_angles = SPARE_ANGLES
+        self.variables: dict[int, int] = {}
+        for variable in model.variables.values():
+            try:
+                self.variables[variable.id] = programs.add(variable.expr, variable)
+            except DeckError:
+                continue  # one of forces, which are not known while they are summed
+        self.spare = len(programs.programs)
+        programs.programs.append([Instruction(TIME)])
+        self.known: dict[tuple[Any, ...], bytes | int | None] = {}
+
+    def open(self, scene: a.Scene) -> None:
+        """Look at this scene from now on."""
+        self.scene = scene
+        at = int(scene.programs.start[self.spare])
+        self.place = scene.programs.code[at].ctypes.data
+        self.words = scene.programs.code.shape[1]
+        self.first = memoryview(scene.programs.stack[0])
+        self.bytes = self.first.cast("B")
+        self.stack = memoryview(scene.programs.stack.reshape(-1)).cast("B")
+        self.shown = b""
+        self.run: Callable[..., int] | None = None
+        host.sysfnc, host.sysary = self.sysfnc, self.sysary
+
+    def door(self) -> Callable[..., int]:
+        """Return the door of expressions, which opens after the scene is made."""
+        if self.run is None:
+            number = ctypes.c_int64
+            kind = ctypes.CFUNCTYPE(number, number, ctypes.c_double, number, number, number, number)
+            self.run = kind(int(self.scene.world.doors[a.EXPRESSION_DOOR]))
+        return self.run
+
+    def sysfnc(self, name: str, ids: Sequence[float]) -> list[Any]:
+        """Return [value, errflg] of a function at the state of the call that is being served."""
+        key = (name, *ids)
+        try:
+            found = self.known[key]
+        except KeyError:
+            found = self.known[key] = self.resolve(name, ids)
+        if found is None or host.state is None:
+            return [0.0, 1]
+        return [self.value(found), 0]
+
+    def sysary(self, name: str, ids: Sequence[float]) -> list[Any]:
+        """Return [values, errflg] of several functions of the same markers."""
+        parts = ARRAYS.get(str(name).strip().upper())
+        if parts is None:
+            return [[], 1]
+        found = [self.sysfnc(part, tuple(ids)[:count]) for part, count in parts]
+        if any(flag for _, flag in found):
+            return [[0.0] * len(parts), 1]
+        return [[value for value, _ in found], 0]
+
+    def value(self, found: bytes | int) -> float:
+        """Return the value of an instruction, or of the program of a variable."""
+        assert host.state is not None
+        scene, time, y = host.state
+        run = self.door()
+        if isinstance(found, int):
+            # an expression that is half done may stand on the stack
+            kept = self.stack.tobytes()
+            run(scene, time, y, found, _AT_REST, 0)
+            value = self.first[0]
+            self.stack[:] = kept
+            return value
+        if found is not self.shown:
+            ctypes.memmove(self.place, found, len(found))
+            self.shown = found
+        kept = self.bytes.tobytes()
+        run(scene, time, y, self.spare, _AT_REST, 0)
+        value = self.first[0]
+        self.bytes[:] = kept
+        return value
+
+    def resolve(self, name: str, ids: Sequence[float]) -> bytes | int | None:
+        """Return an instruction as `Programs.code` has it, or a variable's program, or None."""
+        name = str(name).strip().upper()
+        if any(float(id) != int(id) for id in ids):
+            return None
+        if name == "VARVAL":
+            return self.variables.get(int(ids[0])) if len(ids) == 1 else None
+        function = FUNCTIONS.get(name)
+        if function is None or function.kind not in (Kind.DISPLACEMENT, Kind.VELOCITY):
+            return None
+        if not function.least <= len(ids) <= len(function.args):
+            return None
+        node = Call(name, tuple(Number(float(id)) for id in ids))
+        try:
+            instruction = self.programs.measure(node)
+        except ExpressionError:
+            return None
+        if instruction.op == ANGLE and not self.follow(instruction.rows[0]):
+            return None
+        words = np.zeros(self.words, dtype=np.int64)
+        words[0] = instruction.op
+        words[1 : 1 + len(instruction.rows)] = instruction.rows
+        return words.tobytes()
+
+    def follow(self, row: int) -> bool:
+        """Follow a new angle from now on; return whether there is room."""
+        angles = self.scene.angles
+        if row >= len(angles.i):
+            host.log(f"warning: py_sysfnc follows no more than {SPARE_ANGLES} angles: errflg is 1")
+            return False
+        angles.i[row], angles.j[row] = list(self.markers.angle_rows)[row]
+        return True
