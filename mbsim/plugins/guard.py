@@ -32,6 +32,10 @@ class NotAForce(Exception):
     """A user function returned something else than three finite numbers."""
 
 
+class PassedOn(BaseException):
+    """Another subroutine, which this one needed, failed; `failure` already holds why."""
+
+
 class Failure:
     """The last exception of a user function that the run has not yet raised."""
 
@@ -263,6 +267,8 @@ def state_callback(
                 for k, number in enumerate(numbers(result, count)):
                     room[k] = number
             return 0
+        except PassedOn:
+            return RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, title, time, name, source)
             return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED

@@ -102,12 +102,13 @@ def _vector_parts(entry: Entry, statement: str) -> dict[str, Any]:
         if entry.given(name):
             has = ", ".join(each for each in COMPONENTS if each not in _NOT_OF_TYPE[type])
             entry.fault(f"does not belong to type {type}, which has {has}", name)
-    user, exprs = None, tuple(entry.get(name) for name in COMPONENTS)
+    user: el.Subroutine | None = None
+    exprs = tuple(entry.get(name) for name in COMPONENTS)
     if by_user(entry, COMPONENTS):
         user = subroutine(entry, "usrsub", _VECTOR_SUBROUTINES[type])
-        has = [name not in _NOT_OF_TYPE[type] for name in COMPONENTS]
+        built = [name not in _NOT_OF_TYPE[type] for name in COMPONENTS]
         exprs = tuple(
-            result(entry, statement, user, sum(has[:k])) if has[k] else None for k in range(6)
+            result(entry, statement, user, sum(built[:k])) if built[k] else None for k in range(6)
         )
     elif not any(entry.given(name) for name in COMPONENTS):
         entry.fault(f"{COMPONENTS[0]} ... {COMPONENTS[-1]}: missing; at least one must be given")

@@ -20,6 +20,7 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Model, Subroutine
+from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
 from mbsim.plugins.loader import Scripts
 from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
@@ -91,6 +92,7 @@ class StateReader:
                 continue  # one of forces, which are not known while they are summed
         self.spare = len(programs.programs)
         programs.programs.append([Instruction(TIME)])
+        self.open_programs: list[int] = []
         self.known: dict[tuple[Any, ...], bytes | int | None] = {}
 
     def open(self, scene: a.Scene) -> None:
@@ -141,12 +143,7 @@ class StateReader:
         scene, time, y = host.state
         run = self.door()
         if isinstance(found, int):
-            # an expression that is half done may stand on the stack
-            kept = self.stack.tobytes()
-            run(scene, time, y, found, _AT_REST, 0)
-            value = self.first[0]
-            self.stack[:] = kept
-            return value
+            return self.variable(found)
         if found is not self.shown:
             ctypes.memmove(self.place, found, len(found))
             self.shown = found
@@ -154,6 +151,25 @@ class StateReader:
         run(scene, time, y, self.spare, _AT_REST, 0)
         value = self.first[0]
         self.bytes[:] = kept
+        return value
+
+    def variable(self, program: int) -> float:
+        """Return the value of the program of a variable."""
+        assert host.state is not None
+        if program in self.open_programs:
+            raise RecursionError("variables that need each other by py_sysfnc")
+        scene, time, y = host.state
+        # an expression that is half done may stand on the stack
+        kept = self.stack.tobytes()
+        self.open_programs.append(program)
+        try:
+            self.door()(scene, time, y, program, _AT_REST, 0)
+        finally:
+            self.open_programs.pop()
+        value = self.first[0]
+        self.stack[:] = kept
+        if self.scene.users.failed[0] != 0:
+            raise PassedOn
         return value
 
     def resolve(self, name: str, ids: Sequence[float]) -> bytes | int | None:

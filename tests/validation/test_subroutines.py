@@ -7,10 +7,8 @@ import numpy as np
 import mbsim
 
 SCRIPT = """
-calls = []
 
 def SFOSUB(id, time, par, npar, dflag, iflag):
-    calls.append(iflag)
     i, j, stiffness, damping = par
     distance, wrong = py_sysfnc("DM", [i, j])
     rate, wrong_too = py_sysfnc("VR", [int(i), int(j)])
@@ -52,8 +50,8 @@ BODIES = """<MotionSolve><Model>
   <Reference_Marker id="31" body_id="3" pos_x="0.4"/>
   <Force_Gravity grav_z="-9.81"/>
 """
-END = """</Model><Simulate analysis_type="Transient" end_time="1.5" print_interval="0.1"/>
-</MotionSolve>"""
+END = """</Model><Command><Simulate analysis_type="Transient" end_time="1.5" print_interval="0.1"/>
+</Command></MotionSolve>"""
 BY = 'usrsub_param_string="USER({par})" usrsub_fnc_name="{name}" script_name="sub.py"'
 
 
@@ -101,20 +99,170 @@ def run(folder, elements, script=SCRIPT, **options):
     return mbsim.simulate(mbsim.read_model(deck), **options)
 
 
-def table(results, group):
-    found = results.tables(group) if callable(results.tables) else results.tables[group]
-    return found
-
-
 def test_subroutines_do_what_the_same_expressions_do(tmp_path):
     user, twin = run(tmp_path, USERS), run(tmp_path, EXPRESSIONS)
     assert user.stats["steps"] == twin.stats["steps"]
     assert user.stats["python_calls"] > user.stats["rhs_evaluations"]
     assert twin.stats["python_calls"] == 0
-    compared = 0
-    for signal in twin.signals():
-        np.testing.assert_allclose(
-            user.find(signal), twin.find(signal), rtol=1e-11, atol=1e-12, err_msg=str(signal)
-        )
-        compared += 1
-    assert compared > 20
+    names = [
+        name for name in twin.keys() if np.issubdtype(np.asarray(twin[name]).dtype, np.float64)
+    ]
+    assert len(names) > 20
+    for name in names:
+        if "stats" not in name:
+            np.testing.assert_allclose(user[name], twin[name], rtol=1e-11, atol=1e-11, err_msg=name)
+
+
+def scalar(body, name="SFOSUB", par="20"):
+    """Return a script of one subroutine, and an element that calls it."""
+    script = f"def {name}(id, time, par, npar, dflag, iflag):\n" + body
+    return script, (
+        f'<Force_Scalar_TwoBody id="1" type="Force" i_marker_id="20" j_marker_id="10" '
+        f"{by(name, par)}/>"
+    )
+
+
+def test_iflag_is_set_once_and_first(tmp_path):
+    script, element = scalar("    seen.append((id, npar, par, dflag, iflag))\n    return 0.0\n")
+    seen_at = tmp_path / "seen.txt"
+    script = f"""
+from pathlib import Path
+seen_at, seen = Path({str(seen_at)!r}), []
+{script}"""
+    script = script.replace(
+        "    return", "    seen_at.write_text(chr(10).join(map(repr, seen)))\n    return"
+    )
+    results = run(tmp_path, element, script, end_time=0.01, print_interval=0.01)
+    lines = seen_at.read_text().splitlines()
+    assert lines[0] == "(1, 1, [20.0], 0, 1)"
+    assert set(lines[1:]) == {"(1, 1, [20.0], 0, 0)"}
+    assert len(lines) == 1 + results.stats["python_calls"]
+
+
+def test_what_a_subroutine_raises_ends_the_run_with_its_line(tmp_path):
+    script, element = scalar("    return 1.0 / (time < 0.5 or 0)\n")
+    with pytest.raises(PluginError) as caught:
+        run(tmp_path, element, script, output=tmp_path / "out")
+    text = str(caught.value)
+    assert text.startswith("Force_Scalar_TwoBody[1]: SFOSUB failed at time 0.5")
+    assert "ZeroDivisionError" in text
+    assert f"{tmp_path / 'sub.py'}:2" in text
+    with mbsim.open_results(next((tmp_path / "out").glob("*.h5"))) as kept:
+        assert kept.status == "failed"
+        assert len(kept["time"]) >= 5
+
+
+def test_a_failure_that_an_expression_would_hide_ends_the_run(tmp_path):
+    script, _ = scalar("    raise ValueError('no such height')\n", "VARSUB")
+    elements = f"""<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>
+      <Force_Scalar_TwoBody id="1" type="Force" i_marker_id="20" j_marker_id="10"
+       expr="IF(0*VARVAL(7): 1, 1, 1)"/>"""
+    with pytest.raises(PluginError, match=r"Reference_Variable\[7\]: VARSUB.*no such height"):
+        run(tmp_path, elements, script)
+
+
+def test_a_failure_in_a_request_alone_ends_the_run(tmp_path):
+    script, _ = scalar("    return 0.0 if time < 1 else None\n", "VARSUB")
+    elements = f"""<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>
+      <Post_Request id="1" type="EXPRESSION" expr2="VARVAL(7)"/>"""
+    with pytest.raises(PluginError, match=r"VARSUB failed at time 1.*no return statement"):
+        run(tmp_path, elements, script)
+
+
+@pytest.mark.parametrize(
+    ("result", "said"),
+    [
+        ("None", "returned None .no return statement.., not one finite number"),
+        ("float('nan')", "returned nan, not one finite number"),
+        ("'3'", "returned '3', not one finite number"),
+        ("[1.0, 2.0]", "not one finite number"),
+    ],
+)
+def test_what_is_no_number_is_refused(tmp_path, result, said):
+    script, element = scalar(f"    return {result}\n")
+    with pytest.raises(PluginError, match=said):
+        run(tmp_path, element, script)
+
+
+def test_six_numbers_are_wanted(tmp_path):
+    script, _ = scalar("    return [1, 2, 3]\n", "GFOSUB")
+    element = (
+        f'<Force_Vector_OneBody id="4" type="ForceAndTorque" i_marker_id="20" {by("GFOSUB")}/>'
+    )
+    with pytest.raises(PluginError, match=r"OneBody\[4\].*returned 3 values.*not 6 finite"):
+        run(tmp_path, element, script)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        '"DX", [99]', '"DX", [20.5]', '"DX", []', '"NONE", [20]', '"FX", [20]', '"ACCX", [20]',
+        '"SFORCE", [1, 0, 1, 0]', '"VARVAL", [3]', '"SIN", [1]',
+    ],
+)  # fmt: skip
+def test_what_is_not_known_sets_errflg(tmp_path, asked):
+    body = f"    value, wrong = py_sysfnc({asked})\n    return 0.0 if wrong == 1 else None\n"
+    script, element = scalar(body)
+    results = run(tmp_path, element, script, end_time=0.01, print_interval=0.01)
+    assert results.status == "finished"
+
+
+def test_variables_that_ask_for_each_other_end_the_run(tmp_path):
+    script, _ = scalar("    return py_sysfnc('VARVAL', [7])[0]\n", "VARSUB")
+    elements = f"""<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>
+      <Post_Request id="1" type="EXPRESSION" expr2="VARVAL(7)"/>"""
+    with pytest.raises(PluginError, match=r"VARSUB failed.*need each other by py_sysfnc"):
+        run(tmp_path, elements, script)
+
+
+def test_a_script_may_come_with_plugin(tmp_path):
+    script, element = scalar("    return 1.0\n")
+    element = element.replace('script_name="sub.py"', 'usrsub_dll_name="NULL"')
+    with pytest.raises(ModelError, match=r'usrsub_fnc_name="SFOSUB" names no file.*--plugin'):
+        run(tmp_path, element, script)
+    results = run(
+        tmp_path, element, script, plugins=[tmp_path / "sub.py"], end_time=0.01, print_interval=0.01
+    )
+    assert results.status == "finished"
+
+
+@pytest.mark.parametrize(
+    ("attributes", "said"),
+    [
+        ('expr="1" usrsub_param_string="USER()"', 'expr="1": this element is given by a user'),
+        ("", "expr: missing; must be an expression, or usrsub_param_string"),
+        ('usrsub_fnc_name="F" script_name="sub.py"', "usrsub_param_string: missing"),
+        ('usrsub_param_string="USER(1)" script_name="no.py"', "no such file"),
+        ('usrsub_param_string="USER(1)" usrsub_dll_name="a.dll"', "shared libraries are not"),
+    ],
+)
+def test_faults_of_the_deck(tmp_path, attributes, said):
+    force = '<Force_Scalar_TwoBody id="1" type="Force" i_marker_id="20" j_marker_id="10"'
+    with pytest.raises(DeckError, match=r"deck.xml:\d+: Force_Scalar_TwoBody\[1\]: ") as caught:
+        run(tmp_path, f"{force} {attributes}/>")
+    assert said in str(caught.value)
+
+
+def test_a_constraint_takes_no_subroutine(tmp_path):
+    script, _ = scalar("    return 0.0\n", "VARSUB")
+    elements = f"""<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>
+      <Constraint_General id="1" expr="DX(20)-VARVAL(7)"/>"""
+    with pytest.raises(DeckError, match="what a user subroutine returns cannot be used here"):
+        run(tmp_path, elements, script)
+
+
+def test_too_many_arguments_and_missing_functions(tmp_path):
+    _, element = scalar("    return 0.0\n")
+    with pytest.raises(ModelError, match="cannot be called with the 6 arguments"):
+        run(tmp_path, element, "def SFOSUB(id, time):\n    return 0.0\n")
+    with pytest.raises(ModelError, match='does not define usrsub_fnc_name="SFOSUB"'):
+        run(tmp_path, element, "def OTHER(id, time):\n    return 0.0\n")
+
+
+def test_exit_code_and_message(tmp_path):
+    script, element = scalar("    return par[7]\n")
+    (tmp_path / "sub.py").write_text(script)
+    (tmp_path / "deck.xml").write_text(BODIES + element + END)
+    outcome = CliRunner().invoke(main, ["run", str(tmp_path / "deck.xml"), "-o", str(tmp_path)])
+    assert outcome.exit_code == 4
+    assert "IndexError" in outcome.output
