@@ -37,6 +37,7 @@ from mbsim.system.programs import (
     POW_N,
     SPLINE,
     SUB_N,
+    TIME_N,
     VELOCITY,
 )
 
@@ -83,6 +84,10 @@ def evaluate_program(scene, t, y, program):
             s[top] = x
             top += 1
             x = t
+        elif op == TIME_N:
+            s[top] = x
+            top += 1
+            x = t * number[code[1]]
         elif op == ADD:
             top -= 1
             x = s[top] + x
