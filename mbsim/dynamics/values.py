@@ -39,6 +39,7 @@ from mbsim.system.programs import (
     SPLINE,
     SUB_N,
     USER,
+    TIME_N,
     VELOCITY,
 )
 
@@ -85,6 +86,10 @@ def evaluate_program(scene, t, y, program):
             s[top] = x
             top += 1
             x = t
+        elif op == TIME_N:
+            s[top] = x
+            top += 1
+            x = t * number[code[1]]
         elif op == ADD:
             top -= 1
             x = s[top] + x

@@ -55,8 +55,8 @@ DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEA
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
 STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
-#: Of values alone: the topmost with a number, x + n and so on, then n - x and n / x.
-ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
+#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x; TIME n.
+ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV, TIME_N = range(SPLINE + 1, SPLINE + 9)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -244,6 +244,8 @@ def _quick(program: list[Instruction]) -> list[Instruction]:
             made.append(Instruction(_BY_LEFT[instruction.op], value=made.pop(first).value))
         else:
             made.append(instruction)
+        if len(made) > 1 and made[-1].op == MUL_N and made[-2].op == TIME:
+            made[-2:] = [Instruction(TIME_N, value=made[-1].value)]
         if taken:
             del starts[-taken:]
         starts.append(first)

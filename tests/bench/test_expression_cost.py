@@ -201,4 +201,5 @@ def test_expressions_against_c(tmp_path):
         theirs = best(lambda address=address: in_c(address, context, system.y0, CALLS))
         ratios.append(ours / theirs)
         print(f"{name:24} {1e9 * ours:10.1f} {1e9 * theirs:9.1f} {ours / theirs:7.2f}")
-    assert max(ratios) < MOST
+    # the last law measures nothing: its ratio is that of the interpreter alone, and only shown
+    assert max(ratios[:-1]) < MOST
