@@ -12,6 +12,7 @@ from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.weight import add_weight
 from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
@@ -38,6 +39,15 @@ def _apply(context, t, y, dy):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
+
+
+def _weigh(context, t, y, dy):
+    """The same, and gravity over time."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    a, b = carray(y, (n,)), carray(dy, (n,))
+    code = add_applied(scene, t, a, b)
+    return code if code != 0 else add_weight(scene, t, a, b)
 
 
 def _wrench(context, t, y, f):
@@ -82,7 +92,9 @@ def open_expressions(scene: Scene) -> None:
     doors = scene.world.doors
     if len(scene.programs.start) > 1:
         doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
-    if len(scene.applied.kind) > 0:
+    if (scene.world.weight >= 0).any():
+        doors[APPLIED_DOOR] = jit.address(_weigh, _APPLY)
+    elif len(scene.applied.kind) > 0:
         doors[APPLIED_DOOR] = jit.address(_apply, _APPLY)
     kind = scene.applied.kind
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():

@@ -13,6 +13,7 @@ from mbsim.reader.overrides import apply_overrides
 from mbsim.reader.parse import MAX_BYTES, Node
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
+_NAMES["Motion_Marker"] = "MOTION"
 _XML_NAMES = {statement.name: statement.xml for statement in STATEMENTS if statement.xml}
 # what the checks of the whole model call attributes, in the words of this deck
 _ATTRIBUTES = {

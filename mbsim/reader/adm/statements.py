@@ -221,7 +221,7 @@ def _build_constraint(entry: Entry) -> None:
 
 
 _DIRECTIONS = {"ROTATION": "R", "TRANSLATION": "T"}
-_BETWEEN_MARKERS = ("X", "Y", "Z", "B3")
+_BETWEEN_MARKERS = ("X", "Y", "Z", "B1", "B2", "B3")
 
 
 def _motion_direction(entry: Entry) -> str:
