@@ -75,6 +75,7 @@ class Marker:
     pos: tuple[float, float, float] = (0.0, 0.0, 0.0)
     R: Array = field(default_factory=lambda: np.eye(3))
     source: Source = Source()
+    floating: bool = False  # of Adams: wherever I of its force is
 
 
 @dataclass(frozen=True)
