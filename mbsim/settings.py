@@ -149,13 +149,16 @@ def _refuse_verlet(model: Model) -> None:
         "Motion_Joint": model.motions,
         "Constraint_General": model.general_constraints,
     }
-    unknown: dict[str, Mapping[int, Any]] = {
+    expressed: dict[str, Mapping[int, Any]] = {
         "Force_Scalar_TwoBody": model.scalar_forces,
+        "Force_Vector_TwoBody": model.vector_forces,
+        "Force_Vector_OneBody": model.body_forces,
         "Control_Diff": model.differentials,
     }
-    for statement, elements in {**constraints, **unknown}.items():
+    for statement, elements in {**constraints, **expressed}.items():
         for element in elements.values():
-            name = element_name(model.file, statement, element.id)
+            xml = getattr(element, "statement", statement)
+            name = element_name(model.file, xml, element.id)
             why = "free bodies and this model has joints or other constraints"
             if statement not in constraints:
                 why = "forces of known stiffness, which an expression does not say"

@@ -343,7 +343,8 @@ class Runner:
         # the last change so far holds; a resumed run may have missed an earlier one
         for passed in self.settings.stages[: self.stage + 1]:
             if passed.simulation.gravity is not None:
-                scene.world.gravity[:] = passed.simulation.gravity.g
+                pull = self.system.pull(passed.simulation.gravity)
+                scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         budget = FIRST_BUDGET
         if fresh:
             if not self._begin_stage(stage):

@@ -15,6 +15,7 @@ from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.states import add_slopes
 from mbsim.dynamics.subroutines import failure_or
 from mbsim.dynamics.values import evaluate_program
+from mbsim.dynamics.weight import add_weight
 from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
@@ -38,29 +39,21 @@ _VALUES = types.int64(types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
 
 
-def _apply(context, t, y, dy):
-    """The forces of springs and expressions."""
+def _drive(context, t, y, dy):
+    """Gravity over time and the slopes of states; return 0 or a code."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    add_weight(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    return failure_or(scene, add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,))))
+
+
+def _act(context, t, y, dy):
+    """The forces between markers, and the same."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     scene.users.failed[0] = 0
-    return failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
-
-
-def _slope(context, t, y, dy):
-    """The slopes of states, where nothing is applied."""
-    scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    return add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,)))
-
-
-def _apply_and_slope(context, t, y, dy):
-    """The forces of springs and expressions, and the slopes of states."""
-    scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    code = add_applied(scene, t, carray(y, (n,)), carray(dy, (n,)))
-    if code != 0:
-        return code
-    return add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    code = failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
+    return code if code != 0 else _drive(context, t, y, dy)
 
 
 def _wrench(context, t, y, f):
@@ -119,10 +112,10 @@ def open_expressions(scene: Scene) -> None:
         doors[VALUE_DOOR] = jit.address(_evaluate, _VALUE)
     if (scene.equations.program >= 0).any():
         open_jets(scene)
-    applied, states = len(scene.applied.kind) > 0, len(scene.states.program) > 0
-    if applied or states:
-        acting = _apply if not states else _apply_and_slope if applied else _slope
-        doors[APPLIED_DOOR] = jit.address(acting, _APPLY)
+    if len(scene.applied.kind) > 0:
+        doors[APPLIED_DOOR] = jit.address(_act, _APPLY)
+    elif len(scene.states.program) > 0 or (scene.world.weight >= 0).any():
+        doors[APPLIED_DOOR] = jit.address(_drive, _APPLY)
     kind = scene.applied.kind
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
         doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)

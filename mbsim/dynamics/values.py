@@ -38,8 +38,8 @@ from mbsim.system.programs import (
     POW_N,
     SPLINE,
     SUB_N,
-    USER,
     TIME_N,
+    USER,
     VELOCITY,
 )
 

@@ -117,7 +117,15 @@ def _references(model: Model, known: Known) -> Iterator[Fault]:
         **mechanism_tables(model),
     }
     for source, element, name, id, target in _wanted(model):
-        if id is None or id in tables[target] or known.exists(target, id):
+        if id is None or known.exists(target, id):
+            continue
+        if id in tables[target]:
+            floats = target == "Reference_Marker" and model.markers[id].floating
+            if floats and name != "j_floating_marker_id":
+                message = (
+                    f'{name}="{id}": this marker floats: it has no place of its own, and only '
+                )
+                yield _fault(source, element, message + "j_floating_marker_id may be one")
             continue
         if target == "Post_Graphic" and id in known.display_graphics:
             type = known.display_graphics[id]

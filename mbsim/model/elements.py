@@ -75,6 +75,7 @@ class Marker:
     pos: tuple[float, float, float] = (0.0, 0.0, 0.0)
     R: Array = field(default_factory=lambda: np.eye(3))
     source: Source = Source()
+    floating: bool = False  # of Adams: wherever I of its force is
 
 
 @dataclass(frozen=True)
@@ -156,10 +157,12 @@ class Contact:
 
 @dataclass(frozen=True)
 class Gravity:
-    """Force_Gravity [L/T^2] in the global frame."""
+    """Force_Gravity [L/T^2] in the global frame; `exprs` of TIME stand in place of numbers."""
 
     g: tuple[float, float, float] = (0.0, 0.0, 0.0)
     source: Source = Source()
+    exprs: tuple[Expression | None, ...] = (None, None, None)
+    id: int = 1
 
 
 @dataclass(frozen=True)
@@ -233,10 +236,11 @@ class Coupler:
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion_Joint, Adams' MOTION: a displacement, velocity or acceleration is given.
+    """Motion_Joint, Motion_Marker, Adams' MOTION: a displacement, its first or second rate.
 
     `direction` is R (about J's z) or T (along it) on a joint; between two markers X, Y, Z (of I's
-    origin along J's axes) or B3 (about J's z). The markers are the joint's where there is one.
+    origin along J's axes) or B1, B2, B3 (AX, AY, AZ: about J's x, y, z). The markers are the
+    joint's where there is one.
     """
 
     id: int
@@ -250,6 +254,11 @@ class Motion:
     ic_disp: float | None = None  # what a V or A motion starts from; None: as the bodies stand
     ic_vel: float | None = None
     source: Source = Source()
+
+    @property
+    def statement(self) -> str:
+        """The XML's name of the statement."""
+        return "Motion_Marker" if self.joint_id is None else "Motion_Joint"
 
 
 @dataclass(frozen=True)

@@ -73,18 +73,23 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
     }
 
 
+def name_of(statement: str, element: Any) -> str:
+    """Return an element's name in messages; motions are of two statements."""
+    return f"{getattr(element, 'statement', statement)}[{element.id}]"
+
+
 def wanted(model: Model) -> Iterator[Wanted]:
     """Yield every reference: where, from which element and attribute, to which id and statement."""
     for statement, table in tables(model).items():
         for element in table.values():
-            name = f"{statement}[{element.id}]"
+            name = name_of(statement, element)
             # a motion of a joint has the joint's markers
             if getattr(element, "joint_id", None) is None:
                 for attribute in _MARKERS:
                     id = getattr(element, attribute, 0) or None
                     yield element.source, name, attribute, id, "Reference_Marker"
             else:
-                yield element.source, name, "joint_id", element.joint_id, "Constraint_Joint"
+                yield element.source, name, "joint_id", element.joint_id or None, "Constraint_Joint"
             for id in getattr(element, "joint_ids", ()):
                 yield element.source, name, "joint_ids", id, "Constraint_Joint"
     for request in model.requests.values():
@@ -103,7 +108,7 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
         for element in table.values():
             expression = getattr(element, "expr", None)
             if expression is not None:
-                yield element.source, f"{statement}[{element.id}]", "expr", expression
+                yield element.source, name_of(statement, element), "expr", expression
     for statement, forces in (
         ("Force_Vector_TwoBody", model.vector_forces),
         ("Force_Vector_OneBody", model.body_forces),
@@ -156,6 +161,7 @@ def check_mechanism(model: Model, exists: Exists) -> Iterator[Fault]:
     yield from _couplers(model)
     yield from _frictions(model)
     yield from _limits(model)
+    yield from _weights(model)
     yield from _circles(model)
     yield from _tables(model)
 
@@ -176,7 +182,7 @@ def _two_bodies(model: Model) -> Iterator[Fault]:
             if i is None or j is None:
                 continue
             both = f"markers {i.id} (I) and {j.id} (J)"
-            name = f"{statement}[{element.id}]"
+            name = name_of(statement, element)
             if i.body_id == j.body_id:
                 message = f"{both} are both on body {i.body_id}; must be on two bodies"
                 yield _fault(element.source, name, message)
@@ -199,7 +205,7 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
     for motion in model.motions.values():
         if exists("Motion_Joint", motion.id):
             continue
-        name = f"Motion_Joint[{motion.id}]"
+        name = name_of("Motion_Joint", motion)
         joint = model.joints.get(motion.joint_id or 0)
         if joint is not None and motion.direction not in JOINTS[joint.type].moves:
             given = f'motion_type="{motion.direction}"' if motion.direction else "motion_type"
@@ -216,6 +222,20 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
         if motion.expr is not None and (other := _not_of_time(motion.expr)):
             message = f'expr="{_short(motion.expr.text)}": uses {other}; in this release a motion '
             yield _fault(motion.source, name, message + "must be an expression of TIME alone")
+
+
+def _weights(model: Model) -> Iterator[Fault]:
+    """Yield gravity that depends on more than TIME."""
+    seen: list[Expression] = []
+    for gravity in (model.gravity, *(stage.gravity for stage in model.simulations)):
+        for axis, expression in zip("xyz", gravity.exprs if gravity else (), strict=False):
+            if expression is None or any(expression is other for other in seen):
+                continue
+            seen.append(expression)
+            if gravity is not None and (other := _not_of_time(expression)):
+                message = f'grav_{axis}="{_short(expression.text)}": uses {other}; must be '
+                message += "a number or an expression of TIME"
+                yield _fault(gravity.source, "Force_Gravity", message)
 
 
 def _not_of_time(expression: Expression) -> str:

@@ -10,6 +10,7 @@ ADAMS = {
     "Constraint_Jprim": "JPRIM",
     "Constraint_General": "GCON",
     "Motion_Joint": "MOTION",
+    "Motion_Marker": "MOTION",
     "Force_SpringDamper": "SPRINGDAMPER",
     "Force_Scalar_TwoBody": "SFORCE",
     "Force_Bushing": "BUSHING",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
+from mbsim.expressions import Expression
 from mbsim.model import elements as el
 from mbsim.reader.keywords import ANALYSIS_NOT_BUILT, ANALYSIS_TYPES
 from mbsim.reader.kinds import (
@@ -13,7 +14,7 @@ from mbsim.reader.kinds import (
     NOT_NEGATIVE,
     POSITIVE,
     REAL,
-    REAL_NO_EXPRESSION,
+    REAL_OR_EXPRESSION,
     TEXT,
     keyword,
 )
@@ -30,8 +31,15 @@ def _build_gravity(entry: Entry) -> None:
     # in <Command> the statement modifies: a component not given keeps its value
     before = (draft.command_gravity or draft.gravity) if in_command else None
     start = before.g if before else (0.0, 0.0, 0.0)
-    x, y, z = (entry.get(f"grav_{a}", start[k]) for k, a in enumerate("xyz"))
-    gravity = el.Gravity((x, y, z), entry.source)
+    old = before.exprs if before else (None, None, None)
+    g, exprs = list(start), list(old)
+    for k, axis in enumerate("xyz"):
+        given = entry.get(f"grav_{axis}")
+        if isinstance(given, Expression):
+            g[k], exprs[k] = 0.0, given
+        elif given is not None:
+            g[k], exprs[k] = given, None
+    gravity = el.Gravity((g[0], g[1], g[2]), entry.source, tuple(exprs), entry.get("id") or 1)
     if in_command:
         draft.command_gravity = gravity
     elif draft.gravity is not None:
@@ -224,7 +232,7 @@ FORCE_GRAVITY = Statement(
     {
         "id": Spec(ID),
         "label": Spec(TEXT),
-        **{f"grav_{axis}": Spec(REAL_NO_EXPRESSION) for axis in "xyz"},
+        **{f"grav_{axis}": Spec(REAL_OR_EXPRESSION) for axis in "xyz"},
     },
     _build_gravity,
     in_command=True,

@@ -1,4 +1,4 @@
-"""Constraint_Joint, _Jprim, _Coupler, _General and Motion_Joint."""
+"""Constraint_Joint, _Jprim, _Coupler, _General, Motion_Joint and Motion_Marker."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from mbsim.reader.keywords import (
     BY_EXPRESSION,
     BY_USERSUB,
     DIRECTIONS,
+    MARKER_DIRECTIONS,
     PRIMITIVES,
     VALUE_TYPES,
     spellings,
@@ -135,7 +136,8 @@ _GIVEN = {"D": "displacement", "V": "velocity", "A": "acceleration"}
 
 
 def _build_motion(entry: Entry) -> None:
-    """Add a motion of a joint; its markers, and a direction left open, come from the joint."""
+    """Add a motion; of a joint its markers, and a direction left open, come from the joint."""
+    of_joint = entry.statement.name == "Motion_Joint"
     val_type = entry.get("val_type")
     if val_type is None:
         return
@@ -143,8 +145,10 @@ def _build_motion(entry: Entry) -> None:
     motion = el.Motion(
         id=entry.get("id", 0),
         label=entry.get("label", ""),
-        joint_id=entry.get("joint_id"),
-        direction=entry.get("motion_type", ""),
+        joint_id=entry.get("joint_id", 0) if of_joint else None,
+        i_marker_id=entry.get("i_marker_id", 0),
+        j_marker_id=entry.get("j_marker_id", 0),
+        direction=entry.get("motion_type" if of_joint else "direction", ""),
         val_type=val_type,
         expr=entry.get("expr"),
         ic_disp=entry.get("ic_disp") if val_type != "D" else None,
@@ -154,11 +158,18 @@ def _build_motion(entry: Entry) -> None:
     by_expression = entry.get("type") is not None or not entry.given("type")
     if by_expression and not entry.given("expr"):
         entry.fault(f"expr: missing; must be {EXPRESSION.allowed} of TIME")
+    other = entry.draft.motions.get(motion.id)
+    if other is not None and other.statement != motion.statement:
+        first = f"{other.statement} on line {other.source.line}"
+        entry.fault(f"id already used by a {first}; motions share their ids", "id")
+        return
     entry.register(entry.draft.motions, motion)
 
 
 def complete_motions(draft: Draft) -> None:
     """Give the motions of joints the joint's markers, and the one direction that it has."""
+    # what refers to a motion need not say of which statement it is
+    draft.broken |= {("Motion_Joint", id) for name, id in draft.broken if name == "Motion_Marker"}
     for motion in draft.motions.values():
         joint = draft.joints.get(motion.joint_id or 0)
         if joint is None:
@@ -217,18 +228,31 @@ CONSTRAINT_GENERAL = Statement(
     },
     _build_general,
 )
+_GIVEN_MOTION: dict[str, Spec] = {
+    "val_type": Spec(keyword(VALUE_TYPES), required=True),
+    "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
+    "expr": Spec(EXPRESSION),
+    "ic_disp": Spec(REAL),
+    "ic_vel": Spec(REAL),
+    **USERSUB_REFUSED,
+}
 MOTION_JOINT = Statement(
     "Motion_Joint",
     {
         **_NAMED,
         "joint_id": Spec(ID, required=True),
         "motion_type": Spec(keyword(DIRECTIONS)),
-        "val_type": Spec(keyword(VALUE_TYPES), required=True),
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION),
-        "ic_disp": Spec(REAL),
-        "ic_vel": Spec(REAL),
-        **USERSUB_REFUSED,
+        **_GIVEN_MOTION,
+    },
+    _build_motion,
+)
+MOTION_MARKER = Statement(
+    "Motion_Marker",
+    {
+        **_NAMED,
+        **_MARKERS,
+        "direction": Spec(keyword(MARKER_DIRECTIONS), required=True),
+        **_GIVEN_MOTION,
     },
     _build_motion,
 )

@@ -73,6 +73,14 @@ def _parse_expression(text: str) -> float:
     return parse_real(text)
 
 
+def _parse_either(text: str) -> float | Expression:
+    """Return a number, or an expression where the text is none."""
+    if _REAL.fullmatch(text):
+        return parse_real(text)
+    made: Expression = _parse_tree(text)
+    return made
+
+
 def _parse_id(text: str) -> int:
     """Return a positive id that fits a 32-bit integer, as user subroutines take it."""
     value = parse_integer(text)
@@ -178,6 +186,7 @@ NOT_NEGATIVE = real("a number >= 0", least=0.0)
 UNIT = real("a number from 0 to 1", least=0.0, most=1.0)
 RATIO = real("a number > -1 and <= 0.5", above=-1.0, most=0.5)
 REAL_NO_EXPRESSION = Kind("a number", _parse_expression)
+REAL_OR_EXPRESSION = Kind("a number or an expression of TIME", _parse_either)
 INTEGER = Kind("a whole number", parse_integer)
 COUNT = Kind("a whole number > 0", _parse_count)
 ID = Kind(f"a positive integer up to {LARGEST_ID}", _parse_id)

@@ -10,6 +10,7 @@ from mbsim.reader.constraints import (
     CONSTRAINT_JOINT,
     CONSTRAINT_JPRIM,
     MOTION_JOINT,
+    MOTION_MARKER,
 )
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
@@ -54,6 +55,7 @@ STATEMENTS = (
     CONSTRAINT_COUPLER,
     CONSTRAINT_GENERAL,
     MOTION_JOINT,
+    MOTION_MARKER,
     FORCE_SPRINGDAMPER,
     FORCE_SCALAR_TWOBODY,
     FORCE_BUSHING,
@@ -83,7 +85,7 @@ NOT_BUILT = (
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
-    "Load_Command Load_Model Motion_Marker Param_Linear "
+    "Load_Command Load_Model Param_Linear "
     "Param_Simulation Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_String Save "

@@ -59,8 +59,9 @@ def elements_of(model: Model, statement: str) -> dict[int, Any]:
 
 def title(model: Model, statement: str, id: int) -> str:
     """Return an element's name and label: ``Constraint_Joint[1] crank``, ``JOINT/1`` of Adams."""
-    label = elements_of(model, statement)[id].label
-    return f"{element_name(model.file, GROUPS[statement].title, id)} {label}".rstrip()
+    element = elements_of(model, statement)[id]
+    xml = getattr(element, "statement", GROUPS[statement].title)
+    return f"{element_name(model.file, xml, id)} {element.label}".rstrip()
 
 
 def acting(system: System) -> list[tuple[str, int]]:

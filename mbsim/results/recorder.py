@@ -399,6 +399,8 @@ def _digests(system: System) -> dict[str, Value]:
     text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
     text += [repr(system.plans)]
     text += [f"{g.id} {shape_class(g)} {g.size}" for g in system.model.graphics.values()]
+    given = [system.model.gravity, *(stage.gravity for stage in system.model.simulations)]
+    text += [_said(gravity) for gravity in given if gravity is not None and any(gravity.exprs)]
     text += [_said(element) for element in _described(system.model)]
     arrays += [
         part for place in system.placement.markers.values() for part in (place.p_B, place.R_B)

@@ -331,7 +331,9 @@ class Connections(NamedTuple):
 class World(NamedTuple):
     """What belongs to no element."""
 
-    gravity: F1  # (3,)
+    gravity: F1  # (3,) what of it is constant
+    weight: I2  # (1 + .., 3) programs of components that are expressions, -1 for none: those in
+    # force, then those of every gravity of the model
     scale: F1  # (3,) length L, speed V and energy of the error norm
     doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate

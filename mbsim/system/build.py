@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.model.contact_radius import with_radii
-from mbsim.model.elements import Model
+from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
@@ -37,6 +37,7 @@ from mbsim.system.pairing import (
 from mbsim.system.programs import ProgramTable
 from mbsim.system.scratch import empty_log, empty_rows, scratch, start_state
 from mbsim.system.states import sensors_table, states_table
+from mbsim.system.weight import Pull, pulls
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -74,6 +75,7 @@ class System:
     values: list[tuple[int, int]]  # request id and F number 1..8 of each column of `Rows.value`
     equation_names: list[str]  # of each row of `Equations`, for messages
     subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
+    pulls: list[Pull] = field(default_factory=list)  # every gravity, that of the start first
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
@@ -81,10 +83,17 @@ class System:
         rows = {k: places[id].given for k, id in enumerate(self.body_ids)}
         return {k: given for k, given in rows.items() if len(given)}
 
+    def pull(self, gravity: Gravity) -> Pull:
+        """Return a gravity of the model as arrays."""
+        return next(pull for pull in self.pulls if pull.gravity is gravity)
+
     def connection_name(self, row: int) -> str:
         """Return the element of a row of `Connections` as its deck has it."""
         statement, id = self.connections[row]
-        return element_name(self.model.file, _STATEMENTS[statement], id)
+        xml = _STATEMENTS[statement]
+        if statement == "MOTION":
+            xml = self.model.motions[id].statement
+        return element_name(self.model.file, xml, id)
 
     def body_name(self, row: int) -> str:
         """Return the moving body of a row of `Bodies` as its deck has it."""
@@ -290,9 +299,11 @@ def build(
     states = states_table(model, programs)
     sensors = sensors_table(model, programs)
     reader = _state_reader(model, programs, subroutines)
-    values = _values(model, programs)
     nz = len(states.program)
-    ledger = _ledger(bool(model.motions), nf > 0, first_state + nz)
+    pulled = pulls(model, programs)
+    values = _values(model, programs)
+    damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
+    ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
     y0[states.place] = [state.ic for state in model.differentials.values()]
@@ -324,7 +335,8 @@ def build(
         equations=mechanism.equations,
         connections=mechanism.connections,
         world=a.World(
-            np.array(model.gravity.g, dtype=np.float64),
+            pulled[0].constant.copy(),
+            np.array([pulled[0].program, *(pull.program for pull in pulled)]),
             _scales(placement, speed),
             np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
@@ -356,4 +368,5 @@ def build(
         values,
         mechanism.names,
         subroutines,
+        pulled,
     )

@@ -43,6 +43,8 @@ _LEVELS = {"A": 0, "V": 1, "D": 2}
 #: What a motion's direction means.
 _DIRECTIONS = {
     "R": angle(),
+    "B1": angle(),  # of markers turned by `MarkerTable.turned`
+    "B2": angle(),
     "B3": angle(),
     "T": offset("z"),
     "X": offset("x"),
@@ -264,6 +266,9 @@ class _Builder:
             i, j = self.markers.row(motion.i_marker_id), self.markers.row(motion.j_marker_id)
         connection = self.connect("MOTION", motion.id, i, j)
         row = _DIRECTIONS[motion.direction]
+        if motion.direction in ("B1", "B2"):
+            axis = int(motion.direction == "B2")
+            i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
         self.add_term(row, i, j, 1.0)
         assert motion.expr is not None
         program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)

@@ -83,6 +83,7 @@ _STATEMENTS = {
     "ScalarForce": "Force_Scalar_TwoBody",
     "VectorForce": "Force_Vector_TwoBody",
     "BodyForce": "Force_Vector_OneBody",
+    "Gravity": "Force_Gravity",
     "Variable": "Reference_Variable",
     "Differential": "Control_Diff",
     "Sensor": "Sensor_Event",
@@ -160,7 +161,8 @@ class ProgramTable:
             if owner is None:
                 raise
             source, type_name = owner.source, type(owner).__name__
-            name = element_name(source.file, _STATEMENTS.get(type_name, type_name), owner.id)
+            statement = getattr(owner, "statement", _STATEMENTS.get(type_name, type_name))
+            name = element_name(source.file, statement, owner.id)
             where = Fault(source.file, source.line, name, f"in {expression.text!r}: {fault}")
             raise DeckError([where]) from None
         self.programs.append(made)

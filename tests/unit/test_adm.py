@@ -236,6 +236,38 @@ def test_overrides(tmp_path: Path) -> None:
         read(tmp_path, PENDULUM, ("PART[2].weight=3",))
 
 
+def test_bushings_and_vector_forces(tmp_path: Path) -> None:
+    text = "\n".join(
+        (
+            "MARKER/301, PART=2, FLOATING",
+            "BUSHING/1, I=102, J=202, K=1,2,3, C=4,5,6",
+            ", KT=7,8,9, TORQUE=0,0,-1",
+            "VFORCE/4, I=102, JFLOAT=301, RM=102, FX=1\\",
+            ", FZ=STEP(TIME,0,0,1,",
+            ", 1)+2",
+            "VTORQUE/5, I=102, JFLOAT=301, TY=WZ(102)",
+            "GFORCE/6, I=102, JFLOAT=301, FX=1\\FY=2\\TZ=3",
+        )
+    )
+    model = read(tmp_path, added(text))
+    bushing = model.bushings[1]
+    assert bushing.stiffness == (1.0, 2.0, 3.0, 7.0, 8.0, 9.0)
+    assert bushing.damping == (4.0, 5.0, 6.0, 0.0, 0.0, 0.0)
+    assert bushing.preload == (0.0,) * 5 + (-1.0,)
+    assert [force.type for force in model.vector_forces.values()] == [
+        "FORCEONLY",
+        "TORQUEONLY",
+        "FORCEANDTORQUE",
+    ]
+    first, second, third = model.vector_forces.values()
+    texts = [expr.text.replace(" ", "") if expr else None for expr in first.exprs]
+    assert texts == ["1", None, "STEP(TIME,0,0,1,1)+2", None, None, None]
+    assert (first.i_marker_id, first.j_floating_marker_id, first.ref_marker_id) == (102, 301, 102)
+    assert [expr is not None for expr in second.exprs] == [False] * 4 + [True, False]
+    assert [expr.text if expr else None for expr in third.exprs] == ["1", "2", *[None] * 3, "3"]
+    assert model.markers[301].floating
+
+
 FAULTS = {
     "no statement": ("123 foo", ("123 foo", "NAME/id")),
     "unknown statement": ("GRAHPICS/1, BOX", ("GRAHPICS[1]", "did you mean GRAPHICS?")),
@@ -243,7 +275,7 @@ FAULTS = {
         "MARKER/301, PART=2\nREULER = 180D, 90D, 180D",
         ("REULER", "no statement but an argument", "comma missing that continues the line before?"),
     ),
-    "not built": ("BUSHING/1, I=101", ("BUSHING[1]", "not built yet")),
+    "not built": ("BEAM/1, I=101", ("BEAM[1]", "not built yet")),
     "contact": ("CONTACT/1, IGEOM=1", ("CONTACT[1]", "not built yet")),
     "second units": ("UNITS/LENGTH=METER", ("UNITS", "a second UNITS")),
     "second gravity": ("ACCGRAV/IGRAV=1", ("ACCGRAV", "the first is on line 11")),
@@ -263,7 +295,15 @@ FAULTS = {
         ("give REULER or ZP and XP, not both",),
     ),
     "bad angle": ("MARKER/301, PART=2, REULER=90X,0,0", ('REULER="90X, 0, 0"', "3 angles")),
-    "floating": ("MARKER/301, PART=2, FLOATING", ("FLOATING", "not built yet")),
+    "floating": (
+        "MARKER/301, PART=2, FLOATING\nREQUEST/7, DISP, I=301",
+        ("REQUEST[7]", 'I="301"', "floats", "JFLOAT"),
+    ),
+    "vector without": ("GFORCE/1, I=102, JFLOAT=202", ("GFORCE[1]", "FX ... TZ: missing")),
+    "vector of the other kind": ("VFORCE/1, I=102, JFLOAT=202, TX=1", ("TX",)),
+    "vector user": ("VTORQUE/1, I=102, JFLOAT=202, FUNCTION=USER(1)", ("use TX ... TZ",)),
+    "bushing": ("BUSHING/1, I=102, J=202, K=1,2", ("BUSHING[1]", "3 numbers")),
+    "negative bushing": ("BUSHING/1, I=102, J=202, CT=1,2,-3", ("CT", "numbers >= 0")),
     "no part": ("MARKER/301", ("MARKER[301]", "PART: missing")),
     "unknown part": ("MARKER/301, PART=7", ('PART="7"', "no PART has this id; there are 1, 2")),
     "id twice": ("MARKER/101, PART=1", ("MARKER[101]", "id already used on line 6")),
@@ -294,7 +334,10 @@ FAULTS = {
         ("MOTION[1]", "joint 2 is SPHERICAL, which takes no motion"),
     ),
     "marker direction": ("MOTION/1, JOINT=1, X, FUNCTION=TIME", ("MOTION[1]", "X: must be ROTA")),
-    "B1": ("MOTION/1, I=102, J=202, B1, FUNCTION=TIME", ("B1: must be one of X, Y, Z, B3",)),
+    "direction": (
+        "MOTION/1, I=102, J=202, ROT, FUNCTION=TIME",
+        ("ROTATION: must be one of X, Y, Z, B1, B2, B3",),
+    ),
     "no direction": ("MOTION/1, I=102, J=202, FUNCTION=TIME", ("direction: missing",)),
     "no J": ("MOTION/1, I=102, X, FUNCTION=TIME", ("MOTION[1]", "J: missing")),
     "joint and marker": ("MOTION/1, JOINT=1, I=102, FUNCTION=TIME", ("give JOINT, or I and J",)),

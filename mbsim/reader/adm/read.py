@@ -13,12 +13,21 @@ from mbsim.reader.overrides import apply_overrides
 from mbsim.reader.parse import MAX_BYTES, Node
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
+_NAMES["Motion_Marker"] = "MOTION"
+_NAMES["Force_Vector_TwoBody"] = "GFORCE"
 _XML_NAMES = {statement.name: statement.xml for statement in STATEMENTS if statement.xml}
 # what the checks of the whole model call attributes, in the words of this deck
 _ATTRIBUTES = {
     **{"cg_id": "CM", "im_id": "IM", "vm_id": "VM", "wm_id": "WM", "body_id": "PART"},
-    **{"i_marker_id": "I", "j_marker_id": "J", "ref_marker_id": "RM", "joint_id": "JOINT"},
+    **{
+        "i_marker_id": "I",
+        "j_marker_id": "J",
+        "ref_marker_id": "RM",
+        "j_floating_marker_id": "JFLOAT",
+        "joint_id": "JOINT",
+    },
     **{"expr": "FUNCTION", "motion_type": "direction"},
+    **{f"{name}_expression": name.upper() for name in ("fx", "fy", "fz", "tx", "ty", "tz")},
     **{f"expr{k}": f"F{k}" for k in range(1, 9)},
     **{f"inertia_{axes}": f"IP {axes}" for axes in ("xx", "yy", "zz", "xy", "yz", "xz")},
 }

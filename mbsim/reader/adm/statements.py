@@ -163,6 +163,7 @@ def _build_marker(entry: Entry) -> None:
         pos=(float(p[0]), float(p[1]), float(p[2])),
         R=part.R @ frame.R,
         source=entry.source,
+        floating=entry.get("FLOATING", False),
     )
     entry.register(entry.draft.markers, marker)
 
@@ -233,7 +234,7 @@ def _build_constraint(entry: Entry) -> None:
 
 
 _DIRECTIONS = {"ROTATION": "R", "TRANSLATION": "T"}
-_BETWEEN_MARKERS = ("X", "Y", "Z", "B3")
+_BETWEEN_MARKERS = ("X", "Y", "Z", "B1", "B2", "B3")
 
 
 def _motion_direction(entry: Entry) -> str:
@@ -341,6 +342,55 @@ def _build_scalar(entry: Entry) -> None:
         source=entry.source,
     )
     entry.register(entry.draft.scalar_forces, force)
+
+
+def _six(entry: Entry, force: str, torque: str) -> tuple[float, ...]:
+    """Return three numbers along the axes of J, then three about them."""
+    none = (0.0, 0.0, 0.0)
+    return (*entry.get(force, none), *entry.get(torque, none))
+
+
+def _build_bushing(entry: Entry) -> None:
+    """Add a bushing."""
+    for name in ("K", "C", "KT", "CT"):
+        if any(value < 0.0 for value in entry.get(name, ())):
+            entry.fault("must be 3 numbers >= 0", name)
+    bushing = el.Bushing(
+        id=entry.get("id", 0),
+        i_marker_id=entry.get("I", 0),
+        j_marker_id=entry.get("J", 0),
+        stiffness=_six(entry, "K", "KT"),
+        damping=_six(entry, "C", "CT"),
+        preload=_six(entry, "FORCE", "TORQUE"),
+        source=entry.source,
+    )
+    entry.register(entry.draft.bushings, bushing)
+
+
+_VECTORS = {"VFORCE": "FORCEONLY", "VTORQUE": "TORQUEONLY", "GFORCE": "FORCEANDTORQUE"}
+
+
+def _build_vector(entry: Entry) -> None:
+    """Add a vector force, torque or both."""
+    names = [name for name in _COMPONENTS if name in entry.statement.attributes]
+    if not any(entry.given(name) for name in names):
+        entry.fault(f"{names[0]} ... {names[-1]}: missing; at least one must be given")
+    force = el.VectorForce(
+        id=entry.get("id", 0),
+        type=_VECTORS[entry.statement.name],
+        exprs=tuple(entry.get(name) for name in _COMPONENTS),
+        i_marker_id=entry.get("I", 0),
+        j_floating_marker_id=entry.get("JFLOAT", 0),
+        ref_marker_id=entry.get("RM"),
+        source=entry.source,
+    )
+    other = entry.draft.vector_forces.get(force.id)
+    if other is not None and other.type != force.type:
+        first = next(name for name, type in _VECTORS.items() if type == other.type)
+        where = f"the {first} on line {other.source.line}"
+        entry.fault(f"id already used by {where}; {', '.join(_VECTORS)} share their ids here", "id")
+        return
+    entry.register(entry.draft.vector_forces, force)
 
 
 def _build_variable(entry: Entry) -> None:
@@ -482,6 +532,26 @@ _VALUES = ("DISPLACEMENT", "VELOCITY", "ACCELERATION")
 _REQUESTS = (*_VALUES, "FORCE")
 _TRUE = Spec(FLAG)
 
+_COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+
+
+def _vector(name: str, components: tuple[str, ...]) -> AdmStatement:
+    """Return the statement of a vector force with these components."""
+    return AdmStatement(
+        name,
+        {
+            **_ID,
+            "I": Spec(ID, required=True),
+            "JFLOAT": Spec(ID, required=True),
+            "RM": Spec(ID),
+            **{component: Spec(EXPRESSION) for component in components},
+            "FUNCTION": Spec(refused=f"{_NOT_BUILT}; use {components[0]} ... {components[-1]}"),
+        },
+        _build_vector,
+        xml="Force_Vector_TwoBody",
+    )
+
+
 STATEMENTS = (
     AdmStatement(
         "UNITS",
@@ -529,7 +599,7 @@ STATEMENTS = (
             "ZP": Spec(numbers(3)),
             "XP": Spec(numbers(3)),
             "USEXP": _TRUE,
-            "FLOATING": Spec(refused=_NOT_BUILT),
+            "FLOATING": _TRUE,
             **{name: Spec(refused=_NOT_BUILT) for name in ("POINT_MASS", "FLEX_BODY", "NODE_ID")},
         },
         _build_marker,
@@ -618,6 +688,19 @@ STATEMENTS = (
         words=_TYPE_WORDS | {"ACTIONONLY": ("ACTIONONLY", "TRUE")},
         xml="Force_Scalar_TwoBody",
     ),
+    AdmStatement(
+        "BUSHING",
+        {
+            **_ID,
+            **_MARKERS,
+            **{name: Spec(numbers(3)) for name in ("K", "C", "KT", "CT", "FORCE", "TORQUE")},
+        },
+        _build_bushing,
+        xml="Force_Bushing",
+    ),
+    _vector("VFORCE", _COMPONENTS[:3]),
+    _vector("VTORQUE", _COMPONENTS[3:]),
+    _vector("GFORCE", _COMPONENTS),
     AdmStatement(
         "VARIABLE",
         {
@@ -733,7 +816,7 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
 # the others of the language, which would change the motion or what is known of it
 NOT_BUILT = (
-    "BEAM BUSHING CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
-    "GFORCE GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
-    "PTCV PTSF STRING SURFACE TFSISO TIRE UCON VFORCE VTORQUE"
+    "BEAM CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
+    "GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
+    "PTCV PTSF STRING SURFACE TFSISO TIRE UCON"
 ).split()
