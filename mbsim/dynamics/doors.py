@@ -6,6 +6,7 @@ from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import view
+from mbsim.core.jitable import jitable
 from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
 from mbsim.dynamics.expressions import fill_values
@@ -39,21 +40,29 @@ _VALUES = types.int64(types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
 
 
+@jitable
+def drive(scene, t, y, dy):
+    """Add gravity over time and fill the slopes of states; return 0 or a code."""
+    add_weight(scene, t, y, dy)
+    return failure_or(scene, add_slopes(scene, t, y, dy))
+
+
 def _drive(context, t, y, dy):
-    """Gravity over time and the slopes of states; return 0 or a code."""
+    """What acts where there are no forces between markers."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    add_weight(scene, t, carray(y, (n,)), carray(dy, (n,)))
-    return failure_or(scene, add_slopes(scene, t, carray(y, (n,)), carray(dy, (n,))))
+    scene.users.failed[0] = 0
+    return drive(scene, t, carray(y, (n,)), carray(dy, (n,)))
 
 
 def _act(context, t, y, dy):
     """The forces between markers, and the same."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
+    a, b = carray(y, (n,)), carray(dy, (n,))
     scene.users.failed[0] = 0
-    code = failure_or(scene, add_applied(scene, t, carray(y, (n,)), carray(dy, (n,))))
-    return code if code != 0 else _drive(context, t, y, dy)
+    code = failure_or(scene, add_applied(scene, t, a, b))
+    return code if code != 0 else drive(scene, t, a, b)
 
 
 def _wrench(context, t, y, f):

@@ -29,8 +29,6 @@ from mbsim.system.programs import ANGLE, Instruction, ProgramTable
 
 #: Angles that subroutines may follow over whole turns, beyond those that the deck names.
 SPARE_ANGLES = 32
-#: `dynamics.measures.AT_REST`: only the value is wanted.
-_AT_REST = -2
 
 #: What py_sysary gives: functions and how many of the ids each takes.
 ARRAYS = {
@@ -98,22 +96,20 @@ class StateReader:
     def open(self, scene: a.Scene) -> None:
         """Look at this scene from now on."""
         self.scene = scene
-        at = int(scene.programs.start[self.spare])
-        self.place = scene.programs.code[at].ctypes.data
-        self.words = scene.programs.code.shape[1]
-        self.first = memoryview(scene.programs.stack[0])
-        self.bytes = self.first.cast("B")
-        self.stack = memoryview(scene.programs.stack.reshape(-1)).cast("B")
+        at = int(scene.programs.quick_start[self.spare])
+        self.place = scene.programs.quick[at].ctypes.data
+        self.words = scene.programs.quick.shape[1]
+        self.values = memoryview(scene.programs.values)
         self.shown = b""
-        self.run: Callable[..., int] | None = None
+        self.run: Callable[..., float] | None = None
         host.sysfnc, host.sysary = self.sysfnc, self.sysary
 
-    def door(self) -> Callable[..., int]:
+    def door(self) -> Callable[..., float]:
         """Return the door of expressions, which opens after the scene is made."""
         if self.run is None:
-            number = ctypes.c_int64
-            kind = ctypes.CFUNCTYPE(number, number, ctypes.c_double, number, number, number, number)
-            self.run = kind(int(self.scene.world.doors[a.EXPRESSION_DOOR]))
+            number, real = ctypes.c_int64, ctypes.c_double
+            kind = ctypes.CFUNCTYPE(real, number, real, number, number)
+            self.run = kind(int(self.scene.world.doors[a.VALUE_DOOR]))
         return self.run
 
     def sysfnc(self, name: str, ids: Sequence[float]) -> list[Any]:
@@ -141,17 +137,14 @@ class StateReader:
         """Return the value of an instruction, or of the program of a variable."""
         assert host.state is not None
         scene, time, y = host.state
-        run = self.door()
         if isinstance(found, int):
             return self.variable(found)
         if found is not self.shown:
             ctypes.memmove(self.place, found, len(found))
             self.shown = found
-        kept = self.bytes.tobytes()
-        run(scene, time, y, self.spare, _AT_REST, 0)
-        value = self.first[0]
-        self.bytes[:] = kept
-        return value
+        scene, time, y = host.state
+        # one measure leaves the stack alone: its value is what is returned
+        return self.door()(scene, time, y, self.spare)
 
     def variable(self, program: int) -> float:
         """Return the value of the program of a variable."""
@@ -160,14 +153,13 @@ class StateReader:
             raise RecursionError("variables that need each other by py_sysfnc")
         scene, time, y = host.state
         # an expression that is half done may stand on the stack
-        kept = self.stack.tobytes()
+        kept = self.values.tobytes()
         self.open_programs.append(program)
         try:
-            self.door()(scene, time, y, program, _AT_REST, 0)
+            value = self.door()(scene, time, y, program)
         finally:
             self.open_programs.pop()
-        value = self.first[0]
-        self.stack[:] = kept
+        self.values.cast("B")[:] = kept
         if self.scene.users.failed[0] != 0:
             raise PassedOn
         return value
