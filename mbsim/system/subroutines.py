@@ -136,7 +136,6 @@ class StateReader:
     def value(self, found: bytes | int) -> float:
         """Return the value of an instruction, or of the program of a variable."""
         assert host.state is not None
-        scene, time, y = host.state
         if isinstance(found, int):
             return self.variable(found)
         if found is not self.shown:
