@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -484,3 +486,58 @@ def geneva_wheel(times, speed, a, pin, walls, inertia, damper, law):
         rhs, (times[0], times[-1]), [0.0, 0.0], method="DOP853", t_eval=times,
         rtol=1e-9, atol=1e-11, max_step=5e-4,
     ).y[0]  # fmt: skip
+
+
+def poisson(depth, rate, penalty, restitution, blend):
+    """Return the POISSON force at a depth and its rate."""
+    s = min(max((rate + blend) / (2 * blend), 0.0), 1.0)
+    soft = restitution**2 * penalty
+    return (soft + (penalty - soft) * s * s * (3.0 - 2.0 * s)) * depth
+
+
+def loose_slider(times, law, mu, slip, g=9.81):
+    """Return the angles of crank, rod and slider (Flores, Leine, Glocker 2010), and the slider.
+
+    Start: stretched, turning at 150, -75, 0 rad/s. `law` of a corner in the plane: penalty,
+    restitution, blend; friction `mu` is full from slip speed `slip` on, acting half the depth
+    above the corner.
+    """
+    l1, l2, a, b, room = 0.153, 0.306, 0.05, 0.025, 0.026
+    m1, m2, m3, J1, J2, J3 = 0.038, 0.038, 0.076, 7.4e-5, 5.9e-4, 2.7e-6
+    M11 = J1 + (m1 / 4 + m2 + m3) * l1**2
+    M22 = J2 + (m2 / 4 + m3) * l2**2
+    both = (m2 / 2 + m3) * l1 * l2
+
+    def rhs(t, y):
+        p, q, r, dp, dq, dr = y
+        cp, sp, cq, sq = math.cos(p), math.sin(p), math.cos(q), math.sin(q)
+        cr, sr = math.cos(r), math.sin(r)
+        height = l1 * sp + l2 * sq
+        vx, vy = -l1 * sp * dp - l2 * sq * dq, l1 * cp * dp + l2 * cq * dq
+        fx = fy = torque = 0.0
+        for along, up in ((a, b), (a, -b), (-a, b), (-a, -b)):
+            x, z = cr * along - sr * up, sr * along + cr * up
+            for side in (1.0, -1.0):  # upper and lower guide
+                depth = side * (height + z) - room
+                if depth <= 0.0:
+                    continue
+                push = poisson(depth, side * (vy + x * dr), *law)
+                arm = z - side * depth / 2
+                v = vx - arm * dr
+                u = min(abs(v) / slip, 1.0)
+                drag = -math.copysign(mu * push * u * (3.0 - u * u) / 2, v)
+                fx, fy = fx + drag, fy - side * push
+                torque += -x * side * push - arm * drag
+        # Lagrange's equations; the slider's own angle is coupled by forces alone
+        c, s = both * math.cos(p - q), both * math.sin(p - q)
+        Q1 = l1 * (-sp * fx + cp * fy) - s * dq**2 - g * (m1 / 2 + m2 + m3) * l1 * cp
+        Q2 = l2 * (-sq * fx + cq * fy) + s * dp**2 - g * (m2 / 2 + m3) * l2 * cq
+        det = M11 * M22 - c * c
+        return [dp, dq, dr, (M22 * Q1 - c * Q2) / det, (M11 * Q2 - c * Q1) / det, torque / J3]
+
+    p, q, r = solve_ivp(
+        rhs, (times[0], times[-1]), [0, 0, 0, 150.0, -75.0, 0], method="DOP853", t_eval=times,
+        rtol=1e-10, atol=1e-11, max_step=2e-5,
+    ).y[:3]  # fmt: skip
+    place = np.column_stack([l1 * np.cos(p) + l2 * np.cos(q), l1 * np.sin(p) + l2 * np.sin(q)])
+    return p, q, r, place

@@ -24,6 +24,7 @@ from models.reference import (
     four_bar_on_stop,
     geneva_wheel,
     hopping_follower,
+    loose_slider,
     slider_crank,
     top_attitude,
     wall_pendulum,
@@ -588,3 +589,36 @@ def test_geneva_as_the_law_has_it(tol, allowed):
         results["time"], 2 * np.pi, 0.1, (r, 0.005), walls, 5e-4, damper=0.1, law=law
     )
     assert np.abs(wheel_angle(results) - exact).max() < allowed
+
+
+def check_loose_slider(end, tol, allowed):
+    results = run_model("slider_crank_clearance.xml", tol=tol, end_time=end)
+    law = (1e7, 0.4, 0.01)
+    *angles, place = loose_slider(results["time"], law, mu=0.01, slip=0.05)
+    assert np.abs(results["bodies/4/position"][:, :2] - place).max() < allowed * 0.153
+    q = results["bodies/4/quaternion"]
+    assert np.abs(2 * np.arctan2(q[:, 3], q[:, 0]) - angles[2]).max() < 100 * allowed
+    q = results["bodies/2/quaternion"]
+    crank = np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))
+    assert np.abs(crank - angles[0]).max() < allowed
+    parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
+    total = sum(parts)
+    assert np.abs(total - total[0]).max() < 10 * allowed * total[0]
+    # it uses the clearance and no more than the depth beyond it
+    deepest = results["contacts/301/peak_penetration"]
+    assert 1e-3 < np.abs(results["bodies/4/position/y"]).max() < 1e-3 + deepest
+    first = results["events"]["time"][0]
+    height = np.interp(first, results["time"], np.abs(results["bodies/4/position/y"]))
+    assert height == pytest.approx(1e-3, rel=1e-2)
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 5e-9)])
+def test_slider_crank_clearance(tol, allowed):
+    check_loose_slider(0.04, tol, allowed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-6), (1e-9, 1e-8)])
+def test_slider_crank_clearance_for_five_turns(tol, allowed):
+    # no chaos until 0.2 s: 350 touches and leaves, and errors still fall with tol
+    check_loose_slider(0.2, tol, allowed)
