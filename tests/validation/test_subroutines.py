@@ -270,3 +270,39 @@ def test_exit_code_and_message(tmp_path):
     outcome = CliRunner().invoke(main, ["run", str(tmp_path / "deck.xml"), "-o", str(tmp_path)])
     assert outcome.exit_code == 4
     assert "IndexError" in outcome.output
+
+
+def test_a_resumed_run_goes_on_as_if_it_had_not_stopped(tmp_path):
+    flag = tmp_path / "flag"
+    check = f"    if time > 1.0 and not Path({str(flag)!r}).exists():\n        raise ValueError\n"
+    script = "from pathlib import Path\n" + SCRIPT.replace(
+        "    i, j = par\n", f"    i, j = par\n{check}"
+    )
+    with pytest.raises(PluginError, match="ValueError"):
+        run(tmp_path, USERS, script, output=tmp_path / "out")
+    flag.touch()
+    resumed = run(tmp_path, USERS, script, output=tmp_path / "out", resume=True)
+    whole = run(tmp_path, USERS, script)
+    assert resumed.status == "finished"
+    # shorter steps led up to the failure; a turn lost by AZ would tell by far more
+    for name in ("time", "energy/kinetic"):
+        np.testing.assert_allclose(resumed[name], whole[name], rtol=1e-6)
+
+
+def test_a_friction_subroutine_is_told_once_that_it_cannot_look(tmp_path):
+    script = (
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        '    value, wrong = py_sysfnc("DX", [20])\n'
+        "    return [0.0, 0.0, 0.0] if wrong else None\n"
+    )
+    elements = """<Post_Graphic id="100" type="Plane" rm_id="10"/>
+      <Post_Graphic id="200" type="Sphere" center_marker_id="40" radius="0.5"/>
+      <Body_Rigid id="4" cg_id="40" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+      <Reference_Marker id="40" body_id="4" pos_z="0.5"/>
+      <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+       j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="200"
+       dmax="1e-3" cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="sub.py"
+       cff_param_string="USER()"/>"""
+    run(tmp_path, elements, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
+    log = next((tmp_path / "out").glob("*.log")).read_text()
+    assert log.count("py_sysfnc is called where there is no state to look at") == 1
