@@ -512,7 +512,8 @@ def simulate(
     for user_subroutine in system.subroutines.values():
         statement, number = user_subroutine.element
         source = user_subroutine.source.name
-        tell(f"{statement}[{number}]: {user_subroutine.name} of {source}, interpreted")
+        said.append(f"{statement}[{number}]: {user_subroutine.name} of {source}, interpreted")
+        tell(said[-1])
     attributes: dict[str, str | float | int] = {
         "mbsim_version": __version__,
         "model_file": model.file,

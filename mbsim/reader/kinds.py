@@ -139,7 +139,9 @@ def _parse_tree(text: str) -> Expression:
     from mbsim.expressions.parse import ExpressionError, parse
 
     if re.match(r"USER\s*\(", text, re.IGNORECASE):
-        raise BadValueError("user subroutines for this are not built yet; give an expression")
+        raise BadValueError(
+            "USER(...) is no expression; where subroutines are built, give usrsub_param_string"
+        )
     try:
         return parse(text)
     except ExpressionError as error:

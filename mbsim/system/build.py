@@ -172,6 +172,7 @@ def _load_user_friction(
     from mbsim.plugins import failure, host, load_friction
 
     failure.clear()
+    host.forget()
     if log is not None:
         host.log = log
     return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
