@@ -19,7 +19,7 @@ from mbsim.errors import DeckError
 from mbsim.expressions.functions import CONSTANTS, FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError, parse
 from mbsim.expressions.tree import Call, Number, Time, references
-from mbsim.model.elements import Request, ScalarForce, Source, Variable
+from mbsim.model.elements import Differential, Request, ScalarForce, Source, Variable
 from mbsim.model.placement import place
 from mbsim.system.markers import MarkerTable
 from mbsim.system.programs import ProgramTable
@@ -247,6 +247,7 @@ def test_every_function_of_the_table_can_be_used():
         for count in {function.least, len(args)}:
             text = f"{function.name}({', '.join(args[:count])})"
             programs = table(variables)
+            programs.differentials, programs.sensors = {1: Differential(1, parse("TIME"))}, (1,)
             programs.add(parse(text), forces=True)
             assert len(programs.programs[0]) == 1
             if function.kind in (Kind.DISPLACEMENT, Kind.ELEMENTARY):

@@ -131,6 +131,4 @@ def test_adams_diff_is_the_same_state(tmp_path):
         "DIFF/1, IC=1.0, FUNCTION=-2*DIF(1)\nEND\n"
     )
     results = mbsim.simulate(mbsim.read_model(path), end_time=2.0, print_interval=0.1)
-    np.testing.assert_allclose(
-        results["diffs/1/value"], np.exp(-2.0 * results["time"]), atol=1e-7
-    )
+    np.testing.assert_allclose(results["diffs/1/value"], np.exp(-2.0 * results["time"]), atol=1e-7)
