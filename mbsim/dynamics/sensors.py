@@ -35,6 +35,15 @@ from mbsim.system.arrays import (
     Scene,
 )
 
+#: Stands for the side to which an expression left its value.
+LEAST = 1e-300
+
+
+@jitable
+def opposite(a, b):
+    """Return whether one is above 0 and the other below."""
+    return (a < 0.0 < b) or (b < 0.0 < a)
+
 
 @jitable
 def is_on(scene, k, excess):
@@ -48,7 +57,7 @@ def is_on(scene, k, excess):
         return excess > -width
     if compare == LESS:
         return excess < width
-    return abs(excess) <= width or excess * scene.state.sensed[k, EXCESS] < 0.0
+    return abs(excess) <= width or opposite(excess, scene.state.sensed[k, EXCESS])
 
 
 @jitable
@@ -56,7 +65,7 @@ def becomes_true(scene, k, excess):
     """Return whether sensor k acts where the expression exceeds the value by `excess`."""
     before = scene.state.sensed[k, EXCESS]
     if scene.sensors.compare[k] == EQUAL and scene.sensors.located[k] == 1:
-        return excess * before < 0.0 or (excess == 0.0 and before != 0.0)
+        return opposite(excess, before) or (excess == 0.0 and before != 0.0)
     return is_on(scene, k, excess) and scene.state.sensed[k, ON] == 0.0
 
 
@@ -70,6 +79,9 @@ def happens(scene, t, y):
             excess = value(scene, t, y, sensors.program[k]) - sensors.value[k]
             if becomes_true(scene, k, excess):
                 return 1.0
+            if scene.state.sensed[k, EXCESS] == 0.0 and excess != 0.0:
+                # it left the value to this side: without that a return within the step is not seen
+                scene.state.sensed[k, EXCESS] = LEAST if excess > 0.0 else -LEAST
     return 0.0
 
 

@@ -263,7 +263,11 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ("Constraint_Gear[1]", "not built yet"),
     ),
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
-    "sensor": (added('<SENSOR_EVENT id="4"/>'), END_OF_MODEL, ("Sensor_Event", "not built yet")),
+    "sensor": (
+        added('<Sensor_Proximity id="4"/>'),
+        END_OF_MODEL,
+        ("Sensor_Proximity", "not built yet"),
+    ),
     "save": (added('<Save model_file="a.xml"/>', "Command"), END_OF_COMMAND, ("Save",)),
     "VOLUME": (
         law('cnf_type="VOLUME" i_elastic_modulus="1e5"'),

@@ -21,6 +21,7 @@ from mbsim.expressions.parse import ExpressionError, parse
 from mbsim.expressions.tree import Call, Number, Time, references
 from mbsim.model.elements import (
     ArrayOfNumbers,
+    Differential,
     Request,
     ScalarForce,
     Source,
@@ -257,6 +258,7 @@ def test_every_function_of_the_table_can_be_used():
             text = f"{function.name}({', '.join(args[:count])})"
             programs = table(variables)
             programs.splines, programs.arrays_of_numbers = splines, arrays
+            programs.differentials, programs.sensors = {1: Differential(1, parse("TIME"))}, (1,)
             programs.add(parse(text), forces=True)
             # a spline stands behind its x and z
             assert len(programs.programs[0]) == (3 if function.name.endswith("SPL") else 1)
