@@ -325,8 +325,9 @@ def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
     for name, amount in zip(names, watch.last, strict=False):
         said = {"dissipated": "dissipated total"}.get(name, name.replace("_", " "))
         yield fact(said, number(float(amount)))
-    if any(stage.gravity is not None for stage in system.model.simulations[1:]):
-        return  # another gravity is another potential energy
+    stages = system.model.simulations
+    if any(s.gravity is not None for s in stages[1:]) or any(s.changes for s in stages):
+        return  # with another gravity or spring goes another potential energy
     what = "kinetic + potential + dissipated"
     if len(names) == len(watch.last):
         what += " - work of motions"

@@ -133,7 +133,7 @@ def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
     return y
 
 
-def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
+def request_programs(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
     """Make the programs of requests, the last of all; return request and F number of each."""
     made = []
     for request in model.requests.values():
@@ -226,7 +226,7 @@ def build(
     applied, applied_ids = applied_forces(model, table, programs)
     mechanism = constrain(model, table, programs)
     nj, nf = len(mechanism.elements), len(applied_ids)
-    values = _values(model, programs)
+    values = request_programs(model, programs)
     ledger = _ledger(bool(model.motions), nf > 0, a.BODY_SIZE * nb + 3 * len(carried))
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, 3 * len(carried) + kept)
