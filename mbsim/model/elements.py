@@ -425,7 +425,7 @@ class Model:
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""
-        tables: dict[str, dict[int, Any]] = {}
+        tables: dict[str, Any] = {}
         for change in changes:
             table = tables.setdefault(change.table, dict(getattr(self, change.table)))
             table[change.element.id] = change.element

@@ -253,3 +253,10 @@ def test_attributes_without_meaning_here_are_refused(tmp_path):
         run(tmp_path, model, '<Param_Static stability="1e-10"/>' + STATIC)
     with pytest.raises(DeckError, match="LINEAR"):
         run(tmp_path, model, '<Simulate analysis_type="Linear"/>')
+
+
+def test_box_on_a_slope_finds_no_rest(tmp_path):
+    """Slip laws bear nothing at rest; the error names the body."""
+    slope = f'<Force_Gravity grav_x="{0.3 * G}" grav_z="{-G}"/>'
+    with pytest.raises(SolverError, match=r"residual .*Body_Rigid\[2\]"):
+        run(tmp_path, GROUND + box(2, 0.1) + contact(1, 200, 100) + slope)
