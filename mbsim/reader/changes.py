@@ -62,9 +62,8 @@ def change(statement: Statement, node: Node, draft: Draft) -> None:
     kept = [a for a in before.attributes if fold(names.get(fold(a.name), a.name)) not in new]
     merged = replace(before, line=node.line, attributes=[*kept, *node.attributes])
     # warnings and notes of what did not change have been said
-    scratch = replace(
-        draft, **{table: {}}, in_command=False, broken=set(), warnings=[], note_lines={}
-    )
+    empty: dict[str, Any] = {table: {}}
+    scratch = replace(draft, **empty, in_command=False, broken=set(), warnings=[], note_lines={})
     statement.read(merged, scratch)
     complete_motions(scratch)
     elements: dict[int, Any] = getattr(scratch, table)
