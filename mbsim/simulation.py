@@ -27,6 +27,7 @@ from mbsim.settings import Settings, Stage, output_times, settle
 if TYPE_CHECKING:
     from mbsim.results.reading import Results
     from mbsim.system.build import System
+    from mbsim.system.changes import Parameters
 
 #: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
 #: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
@@ -50,7 +51,13 @@ class Runner:
     """One run: a system, its integrator, its recorder."""
 
     def __init__(
-        self, system: System, settings: Settings, recorder: Any, log: Any, tell: Notify
+        self,
+        system: System,
+        settings: Settings,
+        recorder: Any,
+        log: Any,
+        tell: Notify,
+        changes: list[Parameters] | None = None,
     ) -> None:
         from mbsim.core import jit
         from mbsim.core.problem import Problem
@@ -77,6 +84,7 @@ class Runner:
         self._hook = ctypes.CFUNCTYPE(
             ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
+        self.changes = changes or []  # parameters of every Simulate, where some differ
         self.stage = 0  # which Simulate
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
@@ -122,6 +130,28 @@ class Runner:
             self.log.line(line)
         for line in warnings:
             self.tell(line)
+
+    def _change(self) -> None:
+        """Let the elements be as the commands before this stage leave them, and say so once."""
+        if not self.changes:
+            return
+        from mbsim.system.changes import apply
+
+        apply(self.system.scene, self.changes[self.stage])
+        if self.system.reader is not None:
+            self.system.reader.open(self.system.scene)
+        before = self.settings.stages[self.stage - 1].simulation.changes if self.stage else ()
+        simulation = self.settings.stages[self.stage].simulation
+        for change in simulation.changes[len(before) :]:
+            self.log.line(f"from time {simulation.start_time:.9g} on {change.text}")
+
+    def _interrupts(self, stage: int) -> bool:
+        """Return whether motions may not go on as they were: after a rest, and when changed."""
+        if stage == 0:
+            return False
+        before, now = self.settings.stages[stage - 1], self.settings.stages[stage]
+        fresh = now.simulation.changes[len(before.simulation.changes) :]
+        return before.is_static or any(c.table in ("motions", "variables") for c in fresh)
 
     def _door(self, t: float) -> Any:
         """Return what asks the joints' door at time t, None where there are no joints."""
@@ -318,8 +348,7 @@ class Runner:
         if simulation.analysis_type == "STATIC":
             self.balance(stage)
             goes_on = False
-        elif self.stage and self.settings.stages[self.stage - 1].is_static:
-            # motions of velocity go on from rest
+        elif self._interrupts(self.stage):
             self.assemble_again(t)
         if (
             goes_on
@@ -345,8 +374,9 @@ class Runner:
             if passed.simulation.gravity is not None:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
+        self._change()
         budget = FIRST_BUDGET
-        if fresh:
+        if fresh or stage.is_static:
             if not self._begin_stage(stage):
                 return
         elif not self.system.model.sensors:
@@ -439,6 +469,18 @@ def _stoppable(runner: Runner) -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+def _parameters(system: System, settings: Settings) -> list[Parameters]:
+    """Return the parameters of every stage where commands change elements, else nothing."""
+    given = [stage.simulation.changes for stage in settings.stages]
+    if not any(given):
+        return []
+    from mbsim.system.changes import make_room, parameters
+
+    stages = [parameters(system, changes) for changes in given]
+    system.scene = make_room(system.scene, stages)
+    return stages
+
+
 def simulate(
     model: Model,
     *,
@@ -504,6 +546,7 @@ def simulate(
     files = [Path(file) for file in plugins]
     said: list[str] = []
     system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
+    changes = _parameters(system, settings)
     for note in settings.notes:
         tell(note)
     for number, user in system.user_friction.items():
@@ -534,7 +577,7 @@ def simulate(
 
         host.log = log.line
     status = "failed"
-    runner = Runner(system, settings, recorder, log, tell)
+    runner = Runner(system, settings, recorder, log, tell, changes)
     try:
         with _stoppable(runner):
             if resume:

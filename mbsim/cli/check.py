@@ -30,7 +30,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 
-    from mbsim.results.log import counts, pair_texts, units_text
+    from mbsim.results.log import counts, pair_texts, sequence, units_text
 
     warn(deck.warnings)
     numbers = ", ".join(f"{count} {name}" for name, count in counts(deck).items())
@@ -42,5 +42,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     if not deck.simulations:
         more = " and --print-interval" if is_adams(deck.file) else ""
         click.echo(f"  no Simulate: a run needs --end-time{more}")
+    for line in sequence(deck):
+        click.echo(f"  {line}")
     for note in (*deck.notes, *notes):
         click.echo(f"  note: {note}")

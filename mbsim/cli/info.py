@@ -88,7 +88,13 @@ def _about_model(model: Model) -> dict[str, Any]:
             for request in model.requests.values()
         },
         "simulations": [
-            {"start_time": s.start_time, "end_time": s.end_time, "print_interval": s.print_interval}
+            {
+                "analysis_type": s.analysis_type,
+                "start_time": s.start_time,
+                "end_time": s.end_time,
+                "print_interval": s.print_interval,
+                "changes": [change.text for change in s.changes],
+            }
             for s in model.simulations
         ],
     }

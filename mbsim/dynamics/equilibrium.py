@@ -107,7 +107,7 @@ class Search:
         self.evaluations += 1
         if self.hooks.rhs(y, self.f) != 0.0:
             return None
-        found = self.f[: BODY_SIZE * self.count].reshape(-1, BODY_SIZE)[:, 7:13].copy()
+        found: Array = self.f[: BODY_SIZE * self.count].reshape(-1, BODY_SIZE)[:, 7:13].copy()
         R = self.scene.work.R[: self.count]
         found[:, 3:] = np.einsum("bij,bj->bi", R, found[:, 3:])
         return found
@@ -129,7 +129,7 @@ class Search:
 
     def moved(self, y: Array, twist: Array) -> Array:
         """Return y with every body displaced by (translation, rotation), back on its joints."""
-        new = y.copy()
+        new: Array = y.copy()
         for b, (way, turn) in enumerate(zip(twist[:, :3], twist[:, 3:], strict=True)):
             at = BODY_SIZE * b
             if twist[b].any():
@@ -248,7 +248,8 @@ def _null(rows: Array) -> Array:
     size = np.linalg.norm(rows, axis=1)
     _, s, vt = np.linalg.svd(rows / np.where(size > 0.0, size, 1.0)[:, None])
     rank = int((s > _RANK * max(float(s.max(initial=0.0)), 1e-300)).sum())
-    return vt[rank:].T
+    free: Array = vt[rank:].T
+    return free
 
 
 @dataclass

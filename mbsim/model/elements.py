@@ -7,7 +7,8 @@ Nothing here is converted, placed or checked; see `placement` and `checks`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -187,6 +188,15 @@ class Static:
 
 
 @dataclass(frozen=True)
+class Change:
+    """An element as a statement of <Command> leaves it; `table` is the field of `Model`."""
+
+    table: str
+    element: Any
+    text: str  # for the log
+
+
+@dataclass(frozen=True)
 class Simulation:
     """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`.
 
@@ -200,6 +210,7 @@ class Simulation:
     transient: Transient | None = None  # a Param_Transient that stood before it in <Command>
     gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
     static: Static = Static()
+    changes: tuple[Change, ...] = ()  # all that stood before it in <Command>
     source: Source = Source()
 
 
@@ -550,3 +561,11 @@ class Model:
     compatibility: str = ""
     notes: tuple[str, ...] = ()  # statements accepted and not acted on, for the log
     warnings: tuple[str, ...] = ()
+
+    def changed(self, changes: tuple[Change, ...]) -> Model:
+        """Return the model with elements as the changes leave them, the last of each."""
+        tables: dict[str, Any] = {}
+        for change in changes:
+            table = tables.setdefault(change.table, dict(getattr(self, change.table)))
+            table[change.element.id] = change.element
+        return replace(self, **tables) if tables else self

@@ -125,6 +125,7 @@ def _build_timeless(entry: Entry) -> None:
         draft.command_transient,
         draft.command_gravity,
         draft.static,
+        draft.changes,
         entry.source,
     )
     draft.simulations.append(simulation)
@@ -168,6 +169,7 @@ def _build_simulate(entry: Entry) -> None:
         print_interval=interval,
         transient=draft.command_transient,
         gravity=draft.command_gravity,
+        changes=draft.changes,
         source=entry.source,
     )
     draft.simulations.append(simulation)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mbsim.errors import Fault
 from mbsim.model import elements as el
+from mbsim.reader.parse import Node
 
 
 @dataclass
@@ -54,6 +55,9 @@ class Draft:
     command_gravity: el.Gravity | None = None
     command_transient: el.Transient | None = None
     stop_line: int = 0
+    changes: tuple[el.Change, ...] = ()
+    # statements of <Model> that may be changed, by name and id as written, as last changed
+    nodes: dict[tuple[str, str], Node] = field(default_factory=dict)
 
     faults: list[Fault] = field(default_factory=list)
     broken: set[tuple[str, int]] = field(default_factory=set)

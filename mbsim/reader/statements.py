@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
+from mbsim.reader.changes import CHANGEABLE, change
 from mbsim.reader.command import FORCE_GRAVITY, PARAM_STATIC, PARAM_TRANSIENT, SIMULATE, STOP
 from mbsim.reader.constraints import (
     CONSTRAINT_COUPLER,
@@ -91,6 +92,7 @@ NOT_BUILT = (
     "Reference_ParamSurface Reference_String Save "
     "Sensor_Proximity UserProgramControl"
 ).split()
+_NOT_AFTER_STOP = (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 
 
@@ -126,17 +128,16 @@ def _read_statement(section: Node, node: Node, draft: Draft) -> None:
             known = [statement.name for statement in STATEMENTS] + NOT_BUILT
             message = f"unknown statement <{node.tag}>{nearest(node.tag, known)}"
         draft.fault(node.line, label, message)
+    elif draft.stop_line and (statement in _NOT_AFTER_STOP or statement.name in CHANGEABLE):
+        draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
+    elif draft.in_command and statement.name in CHANGEABLE:
+        change(statement, node, draft)
     elif not (statement.in_command if draft.in_command else statement.in_model):
         where = "<Model>" if draft.in_command else "<Command>"
-        also = "; changing an element between simulations is not built yet"
+        also = f"; elements that can change between simulations: {', '.join(CHANGEABLE)}"
         what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
         draft.fault(node.line, label, what)
     else:
-        if draft.stop_line and statement in (
-            SIMULATE,
-            PARAM_TRANSIENT,
-            PARAM_STATIC,
-            FORCE_GRAVITY,
-        ):
-            draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
         statement.read(node, draft)
+        if statement.name in CHANGEABLE and id:
+            draft.nodes.setdefault((statement.name, id.value.strip()), node)

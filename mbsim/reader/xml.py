@@ -64,6 +64,10 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
     faults, warnings = check_model(model, known)
+    for simulation in model.simulations:
+        if simulation.changes:
+            later, _ = check_model(model.changed(simulation.changes), known)
+            faults = [*faults, *(fault for fault in later if fault not in faults)]
     if draft.faults or faults:
         raise DeckError([*draft.faults, *map(said_so, faults)])
     draft.warnings.extend(warnings)

@@ -335,11 +335,28 @@ def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
     for name, amount in zip(names, watch.last, strict=False):
         said = {"dissipated": "dissipated total"}.get(name, name.replace("_", " "))
         yield fact(said, number(float(amount)))
-    if any(stage.gravity is not None for stage in system.model.simulations[1:]):
-        return  # another gravity is another potential energy
+    stages = system.model.simulations
+    if any(s.gravity is not None for s in stages[1:]) or any(s.changes for s in stages):
+        return  # with another gravity or spring goes another potential energy
     what = "kinetic + potential + dissipated"
     if len(names) == len(watch.last):
         what += " - work of motions"
     first, last = (float(e[:3].sum() - e[3]) for e in (watch.first, watch.last))
     yield fact("balance, change since the start", number(last - first))
     yield fact("  of", what)
+
+
+def sequence(model: Model) -> Iterator[str]:
+    """Yield what a deck's commands do, where that is more than one transient."""
+    if [s.analysis_type for s in model.simulations] in ([], ["TRANSIENT"]) and not any(
+        s.changes for s in model.simulations
+    ):
+        return
+    said = 0
+    for simulation in model.simulations:
+        for change in simulation.changes[said:]:
+            yield f"change {change.text}"
+        said = len(simulation.changes)
+        until = f" to {number(simulation.end_time)}"
+        times = until if simulation.end_time > simulation.start_time else ""
+        yield f"simulate {simulation.analysis_type} at {number(simulation.start_time)}{times}"

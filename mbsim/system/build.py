@@ -28,7 +28,7 @@ from mbsim.system.contacts import (
     pairs_table,
 )
 from mbsim.system.markers import MarkerTable
-from mbsim.system.mechanism import constrain, sweep
+from mbsim.system.mechanism import Mechanism, constrain, sweep
 from mbsim.system.pairing import (
     Plans,
     plan_pairs,
@@ -76,6 +76,7 @@ class System:
     equation_names: list[str]  # of each row of `Equations`, for messages
     subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
     pulls: list[Pull] = field(default_factory=list)  # every gravity, that of the start first
+    reader: StateReader | None = None  # what py_sysfnc looks at
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
@@ -220,6 +221,52 @@ def _users(users: dict[tuple[str, int], UserSubroutine]) -> a.Users:
     )
 
 
+@dataclass
+class Acting:
+    """What acts and what is asked for, as rows and programs, which are made in one order."""
+
+    programs: ProgramTable
+    applied: a.Applied
+    applied_ids: list[tuple[str, int]]
+    mechanism: Mechanism
+    states: a.States
+    sensors: a.Sensors
+    reader: StateReader | None
+    pulls: list[Pull]
+    values: list[tuple[int, int]]
+
+
+def acting(
+    model: Model,
+    table: MarkerTable,
+    first_state: int,
+    subroutines: dict[tuple[str, int], UserSubroutine],
+) -> Acting:
+    """Return forces, constraints, states, sensors and requests; `first_state`: place in y."""
+    programs = ProgramTable(
+        table,
+        model.variables,
+        model.differentials,
+        first_state,
+        tuple(model.sensors),
+        model.splines,
+        model.arrays,
+    )
+    programs.users = {element: k for k, element in enumerate(subroutines)}
+    applied, applied_ids = applied_forces(model, table, programs)
+    return Acting(
+        programs,
+        applied,
+        applied_ids,
+        constrain(model, table, programs),
+        states_table(model, programs),
+        sensors_table(model, programs),
+        _state_reader(model, programs, subroutines),
+        pulls(model, programs),
+        _values(model, programs),  # the last of all
+    )
+
+
 def build(
     model: Model,
     end_time: float,
@@ -284,32 +331,16 @@ def build(
 
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + 3 * len(carried)
-    programs = ProgramTable(
-        table,
-        model.variables,
-        model.differentials,
-        first_state,
-        tuple(model.sensors),
-        model.splines,
-        model.arrays,
-    )
-    programs.users = {element: k for k, element in enumerate(subroutines)}
-    applied, applied_ids = applied_forces(model, table, programs)
-    mechanism = constrain(model, table, programs)
-    nj, nf = len(mechanism.elements), len(applied_ids)
-    states = states_table(model, programs)
-    sensors = sensors_table(model, programs)
-    reader = _state_reader(model, programs, subroutines)
-    nz = len(states.program)
-    pulled = pulls(model, programs)
-    values = _values(model, programs)
+    rows = acting(model, table, first_state, subroutines)
+    mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
+    nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
     ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
     y0[states.place] = [state.ic for state in model.differentials.values()]
     markers, angles = table.arrays()
-    instructions = programs.arrays(mechanism.elements, applied_ids, contact_ids)
+    instructions = rows.programs.arrays(mechanism.elements, rows.applied_ids, contact_ids)
     if any(s.analysis_type == "STATIC" for s in model.simulations):
         # the last number is TIME where it stands still
         instructions = instructions._replace(number=np.append(instructions.number, 0.0))
@@ -329,9 +360,9 @@ def build(
         angles=angles,
         programs=instructions,
         states=states,
-        sensors=sensors,
+        sensors=rows.sensors,
         users=_users(subroutines),
-        applied=applied,
+        applied=rows.applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
         connections=mechanism.connections,
@@ -343,14 +374,16 @@ def build(
             np.zeros(1, dtype=np.int64),
             ledger,
         ),
-        state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(sensors.id)),
+        state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(rows.sensors.id)),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
         sweep=sweep(mechanism),
-        rows=empty_rows(len(y0), nb, len(contact_ids), ns, nj, nf, len(values), len(sensors.id)),
+        rows=empty_rows(
+            len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
+        ),
     )
-    if reader is not None:
-        reader.open(scene)
+    if rows.reader is not None:
+        rows.reader.open(scene)
     needs_fcl = any(not kind.closed_form for kind in kinds)
     return System(
         model,
@@ -364,10 +397,11 @@ def build(
         user,
         needs_fcl,
         mechanism.elements,
-        applied_ids,
+        rows.applied_ids,
         table.rows,
-        values,
+        rows.values,
         mechanism.names,
         subroutines,
         pulled,
+        rows.reader,
     )

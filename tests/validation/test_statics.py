@@ -149,3 +149,114 @@ def test_static_then_transient_stays(tmp_path):
     assert len(z) == 11
     assert np.abs(z - z[0]).max() < 1e-9
     assert 0.1 - z[0] == pytest.approx((G / 1e6) ** (1 / 1.5), rel=1e-9)
+
+
+def _bar(body, mass, start, end, first):
+    """Return statements of a bar with its cg in the middle, and markers at both ends."""
+    (x0, y0), (x1, y1) = start, end
+    return f"""
+<Body_Rigid id="{body}" cg_id="{first}" mass="{mass}" inertia_xx="0.1" inertia_yy="0.1"
+  inertia_zz="0.1"/>
+<Reference_Marker id="{first}" body_id="{body}" pos_x="{(x0 + x1) / 2}" pos_y="{(y0 + y1) / 2}"/>
+<Reference_Marker id="{first + 1}" body_id="{body}" pos_x="{x0}" pos_y="{y0}"/>
+<Reference_Marker id="{first + 2}" body_id="{body}" pos_x="{x1}" pos_y="{y1}"/>
+"""
+
+
+_A, _B, _C, _D, _S = (0.0, 0.0), (0.3, 0.6), (1.8, 1.2), (2.0, 0.0), (3.0, 1.5)
+_FOUR_BAR = (
+    EARTH
+    + f'<Reference_Marker id="11" body_id="1" pos_x="{_D[0]}"/>'
+    + f'<Reference_Marker id="12" body_id="1" pos_x="{_S[0]}" pos_y="{_S[1]}"/>'
+    + _bar(2, 1.0, _A, _B, 20)
+    + _bar(3, 2.0, _B, _C, 30)
+    + _bar(4, 1.5, _D, _C, 40)
+    + "".join(
+        f'<Constraint_Joint id="{k}" type="REVOLUTE" i_marker_id="{i}" j_marker_id="{j}"/>'
+        for k, (i, j) in enumerate(((21, 10), (31, 22), (32, 42), (41, 11)), 1)
+    )
+    + f'<Force_Gravity grav_y="{-G}"/>'
+)
+
+
+def _loop(angle):
+    """Return B and C of the four-bar for the crank's angle, by two circles."""
+    length = {k: math.dist(*ends) for k, ends in enumerate(((_A, _B), (_B, _C), (_D, _C)))}
+    b = length[0] * np.array([math.cos(angle), math.sin(angle)])
+    d = np.array(_D) - b
+    far = float(np.linalg.norm(d))
+    x = (far**2 + length[1] ** 2 - length[2] ** 2) / (2.0 * far)
+    e = d / far
+    return b, b + x * e + math.sqrt(length[1] ** 2 - x * x) * np.array([-e[1], e[0]])
+
+
+def test_four_bar_with_a_spring_is_where_its_energy_is_least(tmp_path):
+    """Against scipy's minimiser over the crank's angle."""
+    from scipy.optimize import minimize_scalar
+
+    def energy(angle):
+        b, c = _loop(angle)
+        heights = 1.0 * b[1] / 2 + 2.0 * (b[1] + c[1]) / 2 + 1.5 * c[1] / 2
+        return G * heights + 0.5 * 150.0 * (math.dist(c, _S) - 0.4) ** 2
+
+    start = math.atan2(_B[1], _B[0])
+    found = minimize_scalar(energy, bracket=(start, start - 0.1), options={"xtol": 1e-13})
+    spring = (
+        '<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="42" j_marker_id="12" '
+        'stiffness="150" length="0.4"/>'
+    )
+    results = run(tmp_path, _FOUR_BAR + spring)
+    b, c = _loop(found.x)
+    # an energy is flat at its least: 1e-8 of it is all that a minimiser can see
+    assert results["bodies/2/position"][-1, :2] == pytest.approx(b / 2, abs=3e-7)
+    assert results["bodies/3/position"][-1, :2] == pytest.approx((b + c) / 2, abs=3e-7)
+
+    def slope(angle, h=1e-4):
+        return (
+            8 * (energy(angle + h) - energy(angle - h))
+            - energy(angle + 2 * h)
+            + energy(angle - 2 * h)
+        ) / (12 * h)
+
+    crank = results["bodies/2/position"][-1]
+    assert abs(slope(math.atan2(crank[1], crank[0]))) < 1e-8 * G
+
+
+def test_motions_hold_their_displacement_and_run_on_afterwards(tmp_path):
+    """A crank that is driven stays at the angle of its time; then it turns at its rate."""
+    motion = (
+        '<Motion_Joint id="1" joint_id="1" motion_type="R" val_type="D" expr="0.4 + 0.5*TIME"/>'
+    )
+    pendulum = PENDULUM.replace(f"{EARTH}", EARTH) + GRAVITY + motion
+    command = STATIC + '<Simulate analysis_type="Transient" end_time="1" print_interval="0.5"/>'
+    results = run(tmp_path, pendulum, command)
+    for k, t in enumerate((0.0, 0.5, 1.0)):
+        angle = 0.4 + 0.5 * t
+        x, _, z = results["bodies/2/position"][k]
+        assert abs(math.atan2(z, x)) == pytest.approx(angle, abs=1e-9)
+    assert np.abs(results["bodies/2/angular_velocity"][:, 1]) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_bound_on_iterations_ends_the_search(tmp_path):
+    """The error says how far it came."""
+    model = GROUND + sphere(1.0) + contact(1, 200, 100) + GRAVITY
+    with pytest.raises(SolverError, match=r"in 3 iterations: residual 9\.81"):
+        run(tmp_path, model, '<Param_Static max_num_iter="3"/>' + STATIC)
+
+
+def test_attributes_without_meaning_here_are_refused(tmp_path):
+    """By name, with the line."""
+    from mbsim.errors import DeckError
+
+    model = GROUND + sphere(1.0) + contact(1, 200, 100) + GRAVITY
+    with pytest.raises(DeckError, match='Param_Static: stability="1e-10": is not honoured'):
+        run(tmp_path, model, '<Param_Static stability="1e-10"/>' + STATIC)
+    with pytest.raises(DeckError, match="LINEAR"):
+        run(tmp_path, model, '<Simulate analysis_type="Linear"/>')
+
+
+def test_box_on_a_slope_finds_no_rest(tmp_path):
+    """Slip laws bear nothing at rest; the error names the body."""
+    slope = f'<Force_Gravity grav_x="{0.3 * G}" grav_z="{-G}"/>'
+    with pytest.raises(SolverError, match=r"residual .*Body_Rigid\[2\]"):
+        run(tmp_path, GROUND + box(2, 0.1) + contact(1, 200, 100) + slope)
