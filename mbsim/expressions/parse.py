@@ -1,24 +1,23 @@
-"""Text of the deck's language to a tree: recursive descent, bounded in length and depth.
-
-    sum      : product (("+" | "-") product)*
-    product  : unary (("*" | "/") unary)*
-    unary    : ("+" | "-") unary | power
-    power    : primary ("**" unary)?
-    primary  : NUMBER | NAME | NAME "(" sum (("," | ":") sum)* ")" | "(" sum ")"
+"""Text of the deck's language to a tree, by an LALR grammar; bounded in length and depth.
 
 So -2**2 is -4 and 2**3**2 is 2**9. A number that ends in D is an angle in degrees; ":" stands
-only after the first argument of IF.
+only after the first argument of IF. The parser keeps its own stack and the tree is made from its
+leaves up, so that no text can bring about a recursion error.
 """
 
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import re
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mbsim.expressions.functions import CHOICES, CONSTANTS, FUNCTIONS, Function
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time
+
+if TYPE_CHECKING:
+    from lark import Lark, Token
 
 LONGEST = 20_000
 #: Parentheses and functions within each other.
@@ -27,13 +26,38 @@ DEEPEST = 50
 LONGEST_CHAIN = 400
 
 _VALUES = {"PI": math.pi, "RTOD": 180.0 / math.pi, "DTOR": math.pi / 180.0}
-_TOKEN = re.compile(
-    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<unit>[a-zA-Z_]\w*|\.\d*)?"
-    r"|(?P<name>[a-zA-Z_]\w*)|(?P<sign>\*\*|[-+*/(),:])",
-    re.ASCII,
-)
-_OPERATORS = {"+": "ADD", "-": "SUB", "*": "MUL", "/": "DIV"}
+_SIGNS = {"PLUS": "ADD", "MINUS": "SUB", "TIMES": "MUL", "OVER": "DIV"}
 _ORDINALS = ("first", "second", "third", "fourth")
+
+GRAMMAR = r"""
+?sum: product
+    | sum PLUS product    -> operation
+    | sum MINUS product   -> operation
+?product: unary
+    | product TIMES unary -> operation
+    | product OVER unary  -> operation
+?unary: power
+    | PLUS unary          -> plus
+    | MINUS unary         -> minus
+?power: primary
+    | primary POWER unary -> power
+?primary: NUMBER          -> number
+    | NAME                -> constant
+    | FUNCTION "(" sum (SEPARATOR sum)* ")" -> call
+    | "(" sum ")"         -> group
+
+NUMBER: /([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?([a-zA-Z_][a-zA-Z_0-9]*|\.[0-9]*)?/
+NAME: /[a-zA-Z_][a-zA-Z_0-9]*/
+POWER: "**"
+TIMES: "*"
+OVER: "/"
+PLUS: "+"
+MINUS: "-"
+SEPARATOR: "," | ":"
+%declare FUNCTION
+%ignore /\s+/
+"""
+_NUMBER = re.compile(r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<unit>.*)", re.ASCII)
 
 
 class ExpressionError(ValueError):
@@ -44,167 +68,157 @@ class ExpressionError(ValueError):
         self.message, self.column = message, column
 
 
-class _Token(NamedTuple):
-    """A number, a name in upper case, a sign, or the end."""
+class _Part(NamedTuple):
+    """A part of the tree, with the levels of nesting and of operations in it."""
 
-    kind: str
-    text: str
-    column: int
-    value: float = 0.0
-
-
-def _tokens(text: str) -> list[_Token]:
-    """Cut the text into tokens, the last one being the end."""
-    found, at = [], 0
-    while True:
-        while at < len(text) and text[at].isspace():
-            at += 1
-        if at >= len(text):
-            return [*found, _Token("end", "the end", at + 1)]
-        match = _TOKEN.match(text, at)
-        if match is None:
-            raise ExpressionError(f"{text[at]!r} means nothing here", at + 1)
-        if match["number"]:
-            found.append(_number(match, at + 1))
-        elif match["name"]:
-            found.append(_Token("name", match["name"].upper(), at + 1))
-        else:
-            found.append(_Token("sign", match["sign"], at + 1))
-        at = match.end()
+    node: Node
+    levels: int = 0
+    chain: int = 1
 
 
-def _number(match: re.Match[str], column: int) -> _Token:
-    """Return a number, in radians where it ends in D."""
-    value, unit = float(match["number"]), match["unit"] or ""
-    if not math.isfinite(value):
-        raise ExpressionError(f"{match[0]} is too large for a number", column)
-    if unit.upper() == "D":
-        value *= math.pi / 180.0
-    elif re.fullmatch(r"[dD]\d+", unit):
+def _number(token: Token) -> Token:
+    """Refuse what only looks like a number; this and `_name` are called as the text is cut."""
+    match = _NUMBER.fullmatch(token)
+    assert match is not None
+    column, unit = _column(token), match["unit"]
+    if not math.isfinite(float(match["number"])):
+        raise ExpressionError(f"{token} is too large for a number", column)
+    if re.fullmatch(r"[dD]\d+", unit):
         raise ExpressionError(
-            f"{match[0]} is not clear: write E for a power of ten, D alone for degrees", column
+            f"{token} is not clear: write E for a power of ten, D alone for degrees", column
         )
-    elif unit:
-        raise ExpressionError(f"{match[0]} is not a number", column)
-    return _Token("number", match[0], column, value)
+    if unit and unit.upper() != "D":
+        raise ExpressionError(f"{token} is not a number", column)
+    return token
 
 
-class _Parser:
-    """One pass over the tokens of one text."""
+def _name(token: Token) -> Token:
+    """Mark functions and refuse what is no name."""
+    name = token.upper()
+    if name in FUNCTIONS:
+        token.type = "FUNCTION"
+    elif name not in _VALUES and name != "TIME":
+        raise ExpressionError(f"there is no function {name}{_like(name)}", _column(token))
+    return token
 
-    def __init__(self, text: str) -> None:
-        self.tokens = _tokens(text)
-        self.at = 0
-        self.depth = 0
 
-    @property
-    def next(self) -> _Token:
-        return self.tokens[self.at]
+def _column(token: Token) -> int:
+    return (token.start_pos or 0) + 1
 
-    def take(self, *signs: str) -> _Token | None:
-        """Return the next token and go on, if it is one of the signs."""
-        token = self.next
-        if token.kind != "sign" or token.text not in signs:
-            return None
-        self.at += 1
-        return token
 
-    def expect(self, sign: str, after: str) -> None:
-        """Go over a sign that has to be here."""
-        if self.take(sign) is None:
-            raise ExpressionError(
-                f"{_shown(self.next)} stands where {sign!r} {after} should be", self.next.column
-            )
+class _Builder:
+    """What the parser calls for each rule, with its parts from left to right."""
 
-    def nest(self, change: int) -> None:
-        """Go one level of nesting in or out."""
-        self.depth += change
-        if self.depth > DEEPEST:
-            raise ExpressionError(f"more than {DEEPEST} levels of nesting", self.next.column)
+    def number(self, given: list[Token]) -> _Part:
+        match = _NUMBER.fullmatch(given[0])
+        assert match is not None
+        return _Part(Number(float(match["number"]) * (_VALUES["DTOR"] if match["unit"] else 1.0)))
 
-    def sum(self) -> Node:
-        node = self.product()
-        while sign := self.take("+", "-"):
-            node = Call(_OPERATORS[sign.text], (node, self.product()), sign.column)
-        return node
+    def constant(self, given: list[Token]) -> _Part:
+        name = given[0].upper()
+        return _Part(Time() if name == "TIME" else Number(_VALUES[name]))
 
-    def product(self) -> Node:
-        node = self.unary()
-        while sign := self.take("*", "/"):
-            node = Call(_OPERATORS[sign.text], (node, self.unary()), sign.column)
-        return node
+    def group(self, given: list[Any]) -> _Part:
+        part = given[0]
+        return _nested(part, part, 1)
 
-    def unary(self) -> Node:
-        sign = self.take("+", "-")
-        if sign is None:
-            return self.power()
-        self.nest(1)
-        node = self.unary()
-        self.nest(-1)
-        if sign.text == "+":
-            return node
-        return (
-            Number(-node.value) if isinstance(node, Number) else Call("NEG", (node,), sign.column)
+    def plus(self, given: list[Any]) -> _Part:
+        return _nested(given[1], given[1], _column(given[0]))
+
+    def minus(self, given: list[Any]) -> _Part:
+        sign, part = given
+        if isinstance(part.node, Number):
+            return _nested(_Part(Number(-part.node.value)), part, _column(sign))
+        return _nested(_call("NEG", [part], _column(sign)), part, _column(sign))
+
+    def operation(self, given: list[Any]) -> _Part:
+        left, sign, right = given
+        return _call(_SIGNS[sign.type], [left, right], _column(sign))
+
+    def power(self, given: list[Any]) -> _Part:
+        base, sign, exponent = given
+        made = _call("POW", [base, exponent], _column(sign))
+        deeper = _nested(made, exponent, _column(sign))
+        return deeper._replace(levels=max(deeper.levels, base.levels))
+
+    def call(self, given: list[Any]) -> _Part:
+        name, column = given[0].upper(), _column(given[0])
+        for place, sign in enumerate(given[2::2]):
+            if sign == ":" and (name != "IF" or place > 0):
+                raise ExpressionError(
+                    "':' stands only after the first argument of IF", _column(sign)
+                )
+        parts = given[1::2]
+        _check_arguments(FUNCTIONS[name], [part.node for part in parts], column)
+        made = _call(name, parts, column)
+        return _nested(made, made, column)
+
+
+def _call(name: str, parts: list[_Part], column: int) -> _Part:
+    """Return a function of parts; refuse a tree that is too deep for those who walk it."""
+    chain = 1 + max(part.chain for part in parts)
+    if chain > LONGEST_CHAIN + 1:
+        raise ExpressionError(
+            f"more than {LONGEST_CHAIN} operations in a row: use variables for parts of it", column
         )
-
-    def power(self) -> Node:
-        base = self.primary()
-        sign = self.take("**")
-        if sign is None:
-            return base
-        self.nest(1)
-        node = Call("POW", (base, self.unary()), sign.column)
-        self.nest(-1)
-        return node
-
-    def primary(self) -> Node:
-        token = self.next
-        if self.take("("):
-            self.nest(1)
-            node = self.sum()
-            self.nest(-1)
-            self.expect(")", f"for the '(' of column {token.column}")
-            return node
-        if token.kind not in ("number", "name"):
-            raise ExpressionError(
-                f"{_shown(token)} stands where a number, a name or '(' should be", token.column
-            )
-        self.at += 1
-        if token.kind == "number":
-            return Number(token.value)
-        return self.named(token)
-
-    def named(self, token: _Token) -> Node:
-        """Return what a name means."""
-        name = token.text
-        if name == "TIME":
-            return Time()
-        if name in _VALUES:
-            return Number(_VALUES[name])
-        function = FUNCTIONS.get(name)
-        if function is None:
-            raise ExpressionError(f"there is no function {name}{_like(name)}", token.column)
-        self.expect("(", f"after {name}")
-        self.nest(1)
-        args = self.arguments(name)
-        self.nest(-1)
-        _check_arguments(function, args, token.column)
-        return Call(name, tuple(args), token.column)
-
-    def arguments(self, name: str) -> list[Node]:
-        """Return what stands between a function's parentheses."""
-        args = [self.sum()]
-        while sign := self.take(",", ":"):
-            if sign.text == ":" and (name != "IF" or len(args) != 1):
-                raise ExpressionError("':' stands only after the first argument of IF", sign.column)
-            args.append(self.sum())
-        self.expect(")", f"or ',' after an argument of {name}")
-        return args
+    node = Call(name, tuple(part.node for part in parts), column)
+    return _Part(node, max(part.levels for part in parts), chain)
 
 
-def _shown(token: _Token) -> str:
-    """Return a token as a message shows it."""
-    return token.text if token.kind == "end" else repr(token.text)
+def _nested(part: _Part, inner: _Part, column: int) -> _Part:
+    """Return a part one level above an inner one."""
+    if inner.levels >= DEEPEST:
+        raise ExpressionError(f"more than {DEEPEST} levels of nesting", column)
+    return part._replace(levels=inner.levels + 1)
+
+
+@functools.cache
+def _parser() -> Lark:
+    """Return the parser; only decks with expressions import what it needs."""
+    from lark import Lark
+
+    return Lark(
+        GRAMMAR,
+        start="sum",
+        parser="lalr",
+        lexer="basic",
+        transformer=_Builder(),
+        lexer_callbacks={"NUMBER": _number, "NAME": _name},
+    )
+
+
+def _unexpected(text: str, token: Token, accepted: set[str]) -> ExpressionError:
+    """Return what is wrong about a token that cannot stand where it does."""
+    at_end = token.type == "$END"
+    column = len(text) + 1 if at_end else _column(token)
+    shown = "the end" if at_end else repr(token.upper() if token.type in _NAMES else str(token))
+    if "NUMBER" in accepted:
+        wanted = "a number, a name or '('"
+    elif "PLUS" not in accepted:
+        name = re.split(r"\W+", text[: column - 1].rstrip(), flags=re.ASCII)[-1]
+        wanted = f"'(' after {name.upper()}"
+    else:
+        wanted = _closing(text[: column - 1])
+    return ExpressionError(f"{shown} stands where {wanted} should be", column)
+
+
+_NAMES = ("FUNCTION", "NAME")
+
+
+def _closing(before: str) -> str:
+    """Return what could follow a complete operand: it depends on the parenthesis around it."""
+    opened: list[int] = []
+    for at, sign in enumerate(before):
+        if sign == "(":
+            opened.append(at)
+        elif sign == ")" and opened:
+            opened.pop()
+    if not opened:
+        return "an operator or the end"
+    name = re.search(r"[a-zA-Z_]\w*\s*\Z", before[: opened[-1]], re.ASCII)
+    if name is None:
+        return f"')' for the '(' of column {opened[-1] + 1}"
+    return f"')' or ',' after an argument of {name[0].strip().upper()}"
 
 
 def _like(name: str) -> str:
@@ -236,20 +250,6 @@ def _check_arguments(function: Function, args: list[Node], column: int) -> None:
             raise ExpressionError(f"{which} must be the id of {what}, a whole number", column)
 
 
-def _check_chains(root: Node) -> None:
-    """Refuse a tree that is too deep for those who walk it."""
-    waiting = [(root, 1)]
-    while waiting:
-        node, depth = waiting.pop()
-        if isinstance(node, Call):
-            if depth > LONGEST_CHAIN:
-                raise ExpressionError(
-                    f"more than {LONGEST_CHAIN} operations in a row: use variables for parts of it",
-                    node.column,
-                )
-            waiting.extend((arg, depth + 1) for arg in node.args)
-
-
 def parse(text: str) -> Expression:
     """Return the tree of an expression.
 
@@ -265,14 +265,16 @@ def parse(text: str) -> Expression:
     """
     if len(text) > LONGEST:
         raise ExpressionError(f"an expression of more than {LONGEST} characters", LONGEST + 1)
-    parser = _Parser(text)
-    if parser.next.kind == "end":
+    if not text.strip():
         raise ExpressionError("the expression is empty", 1)
-    root = parser.sum()
-    if parser.next.kind != "end":
-        raise ExpressionError(
-            f"{_shown(parser.next)} stands where an operator or the end should be",
-            parser.next.column,
-        )
-    _check_chains(root)
-    return Expression(text, root)
+    parser = _parser()
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+    try:
+        made: Any = parser.parse(text)
+    except UnexpectedCharacters as fault:
+        at = fault.pos_in_stream or 0
+        raise ExpressionError(f"{text[at]!r} means nothing here", at + 1) from None
+    except UnexpectedToken as fault:
+        raise _unexpected(text, fault.token, set(fault.accepts or fault.expected)) from None
+    return Expression(text, made.node)

@@ -290,7 +290,7 @@ class _Compiler:
         while waiting:
             node, complete = waiting.pop()
             operands = self.operands(node)
-            if operands:
+            if operands and isinstance(node, Call):
                 if complete:
                     self.combine(node, made, starts)
                 else:

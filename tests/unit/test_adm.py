@@ -409,11 +409,11 @@ def test_any_text_is_read_or_refused(tmp_path: Path, pieces: list[str]) -> None:
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:
-    text = added("SPLINE/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
+    text = added("BEAM/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
     with pytest.raises(DeckError) as caught:
         read(tmp_path, text)
     assert [fault.line for fault in caught.value.faults[:2]] == [13, 14]
-    assert {fault.element for fault in caught.value.faults} == {"SPLINE[1]", "JOINT[2]", "PART[3]"}
+    assert {fault.element for fault in caught.value.faults} == {"BEAM[1]", "JOINT[2]", "PART[3]"}
 
 
 def test_warnings(tmp_path: Path) -> None:
