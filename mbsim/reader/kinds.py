@@ -140,7 +140,8 @@ def _parse_tree(text: str) -> Expression:
 
     if re.match(r"USER\s*\(", text, re.IGNORECASE):
         raise BadValueError(
-            "USER(...) is no expression; where subroutines are built, give usrsub_param_string"
+            "USER(...) is no expression; forces and variables of an XML deck take "
+            "subroutines by usrsub_param_string and usrsub_fnc_name"
         )
     try:
         return parse(text)

@@ -342,7 +342,10 @@ FAULTS = {
     "no J": ("MOTION/1, I=102, X, FUNCTION=TIME", ("MOTION[1]", "J: missing")),
     "joint and marker": ("MOTION/1, JOINT=1, I=102, FUNCTION=TIME", ("give JOINT, or I and J",)),
     "no joint": ("MOTION/1, JOINT=9, FUNCTION=TIME", ('JOINT="9"', "no JOINT has this id")),
-    "user": ("MOTION/1, JOINT=1, FUNCTION=USER(1,2)", ("USER(1,2)", "not built yet")),
+    "user": (
+        "MOTION/1, JOINT=1, FUNCTION=USER(1,2)",
+        ("USER(1,2)", "is no expression", "of an XML deck"),
+    ),
     "no kind of force": ("SFORCE/1, I=102, J=202, FUNCTION=1", ("type: missing", "ROTATIONAL")),
     "wrong stiffness": ("SPRINGDAMPER/1, ROT, I=102, J=202, K=3", ('K="3"', "other type")),
     "circle": ("VARIABLE/1, FUNCTION=2*VARVAL(1)", ("VARIABLE[1]", "leads back", "1 -> 1")),

@@ -299,10 +299,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         GRAVITY_LINE,
         ("Force_Gravity", 'grav_z="-9.81*DZ(20)"', "uses DZ", "an expression of TIME"),
     ),
-    "static analysis": (
-        deck(('"Transient"', '"Static"')),
+    "linear analysis": (
+        deck(('"Transient"', '"Linear"')),
         SIMULATE_LINE,
-        ("Simulate", 'analysis_type="Static"', "TRANSIENT"),
+        ("Simulate", 'analysis_type="Linear"', "TRANSIENT"),
     ),
     "print_increment": (
         deck(('print_interval="0.01"', 'print_increment="5"')),
