@@ -18,7 +18,7 @@ from mbsim import simulation
 from mbsim.dynamics import crowd
 from mbsim.dynamics.kinematics import place_bodies, place_graphics
 from mbsim.errors import Interrupted, ModelError, SolverError
-from mbsim.system import build, pairing
+from mbsim.system import build, contacts, pairing
 from mbsim.system.arrays import FREE, LISTINGS, LIVE, WANTED
 
 LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
@@ -182,7 +182,7 @@ def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
     system = listed(tmp_path, model)
     many, skin = len(listed_pairs(system)), float(system.scene.crowds.size[0])
     monkeypatch.setattr(
-        build, "_crowd_places", lambda plans: (many - 3, plans.crowds[0].kinds and 1)
+        contacts, "_crowd_places", lambda plans: (many - 3, plans.crowds[0].kinds and 1)
     )
     tight = listed(tmp_path, model)
     assert tight.scene.pairs.count[WANTED] == 0
@@ -190,7 +190,7 @@ def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
     wanted = [(301, i, j) for k, i in enumerate(ids) for j in ids[k + 1 :]]
     check_against_brute_force(tight, random, wanted)
     # what touches cannot be left out
-    monkeypatch.setattr(build, "_crowd_places", lambda plans: (2, 1))
+    monkeypatch.setattr(contacts, "_crowd_places", lambda plans: (2, 1))
     assert listed(tmp_path, model).scene.pairs.count[WANTED] > 0
     with pytest.raises(SolverError, match="more pairs of graphics are near each other"):
         run_deck(tmp_path, model, end_time=0.1, allow_overlap=True)
