@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """An independent solver of small mechanisms, for tests: bodies, constraints, multipliers.
 
 A quantity that moves with the bodies is a `Jet`: its value, its rate, and its second

@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """One description of a mechanism, two readings: a deck for mbsim and `mechanics.Mechanism`."""
 
 from __future__ import annotations

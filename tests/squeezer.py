@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """Andrews' squeezing mechanism as bodies and revolute joints; constants of the IVP Test Set.
 
 Points: crank O-P, link P-E, triangle B-E-D (spring C-D), links E-H and H-A, E-G and G-A.

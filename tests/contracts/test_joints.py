@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """What every registered joint must do: the motion that it leaves, and what it does not do.
 
 The equations are evaluated here from the catalogue's own words, in plain numpy, and their

@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """Joints and reactions against Adams' own output: curves of 15 models over 5 s.
 
 The curves (`../shared/data/adams`, from Project Chrono's tests) carry 6 or 7 digits. Frames, as

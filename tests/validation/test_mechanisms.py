@@ -1,4 +1,3 @@
-# ruff: noqa: E741  (I and J are the markers of a joint)
 """Mechanisms against published values, closed forms and an independent solver (`mechanics`)."""
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ TOLS = pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 3e-4), (1e-10, 1e-8)]
 def along(force):
     """Return a law of `mechanics`: `force(r, rate)` pushes I and J apart."""
 
-    def law(I, J, t):  # noqa: E741
+    def law(I, J, t):
         d = I.p.v - J.p.v
         r = np.sqrt(d @ d)
         return force(r, (I.p.d - J.p.d) @ d / r) * d / r, np.zeros(3)
@@ -42,7 +42,7 @@ def along(force):
 def about(torque):
     """Return a law of `mechanics`: `torque(angle, rate)` turns I about J's z."""
 
-    def law(I, J, t):  # noqa: E741
+    def law(I, J, t):
         rate = (I.w.d - J.w.d) @ J.z.v
         return np.zeros(3), torque(mech.relative_angle(I, J).v, rate) * J.z.v
 
@@ -94,7 +94,7 @@ def test_torsion_spring_that_stiffens_with_the_angle(tol, allowed, tmp_path):
 
     law = about(lambda a, w: -(50 + 10 * abs(a)) * a - damper(a) * w)
     bar = mech.Body(1.0, BAR, (2, 0, 0), DOWN, (0, 0, 0))
-    I, J = mech.Marker(1, (0, 0, 0), DOWN), mech.Marker(0, (0, 0, 0), DOWN)  # noqa: E741
+    I, J = mech.Marker(1, (0, 0, 0), DOWN), mech.Marker(0, (0, 0, 0), DOWN)
     exact = mech.Mechanism(
         [bar], [mech.Constraint(I, J, mech.revolute)], [mech.Force(I, J, law)], G
     )
