@@ -260,26 +260,26 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     the state there is no interpolated one; where that ends before the event after all, it is
     tried a little longer.
     """
-    code, part, asked = attempt(p, m, steps, t, h, times)
-    if p.happens == 0:
-        return code, part, asked, h
     near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
-    shortened = False
-    for _ in range(MOST_RETAKES):
-        if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0:
+    shortened, retakes = False, 0
+    # `attempt` is named once: each place where it is called is compiled anew
+    while True:
+        code, part, asked = attempt(p, m, steps, t, h, times)
+        failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
+        if p.happens == 0 or failed:
             return code, part, asked, h
         cut = first_event(p, m, t, h, times)
-        if cut > h:
-            if not shortened or nudge > near:
-                break
+        before = cut > h
+        good = (not shortened or nudge > near) if before else (h - cut <= near or h <= floor)
+        if good or retakes == MOST_RETAKES:
+            break
+        retakes += 1
+        if before:
             h += nudge
             nudge *= 2.0
-        elif h - cut <= near or h <= floor:
-            break
         else:
             h = max(cut, floor)
             shortened = True
-        code, part, asked = attempt(p, m, steps, t, h, times)
     # the problem's hooks expect its last evaluation at the trial point
     happens_at(p, m, t, h, 1.0)
     return code, part, asked, h
