@@ -22,6 +22,7 @@ from mbsim.dynamics.measures import (
     relative_spin_up,
     relative_velocity,
 )
+from mbsim.dynamics.slopes import slope
 from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, get, put
 from mbsim.system.arrays import SHOWN
 from mbsim.system.programs import (
@@ -115,6 +116,7 @@ def interpret(scene, t, y, program, body, way):
             x, z = get(stack, top - 1), get(stack, top)
             put(stack, top - 1, spline(programs, code[1], code[2], code[3], x, z))
         else:
-            put(stack, top, constant(rate_or_force(scene, y, code)))
+            rise = slope(scene, y, code, body, way)
+            put(stack, top, (rate_or_force(scene, y, code), rise, 0.0))
             top += 1
     return 0
