@@ -53,6 +53,11 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
+    linearise: int = 0  # this and the rest only for implicit methods
+    factor: int = 0
+    solve: int = 0
+    factor_pair: int = 0
+    solve_pair: int = 0
 
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.

@@ -56,8 +56,10 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
     FRICTION_DOOR,
     WRENCH_DOOR,
     VALUE_DOOR,
-) = range(10)
-DOORS = 10
+    TANGENT_DOOR,  # the packed arrays of `system.tangent`, where a method is implicit
+    SLOPES_DOOR,
+) = range(12)
+DOORS = 12
 
 # entries of `Applied.kind`
 (

@@ -1,0 +1,111 @@
+"""The hooks of implicit methods, and the door to the joint's and forces' derivatives.
+
+The linearised mechanism stands behind a door of the scene, so its arrays are made only where a
+method asks for them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import carray, types
+
+from mbsim.core import jit
+from mbsim.core.address import pack, view
+from mbsim.core.problem import HOOK, Problem
+from mbsim.dynamics.doors import open_jets
+from mbsim.dynamics.linearise import linearise
+from mbsim.dynamics.newton_matrix import factor, solve
+from mbsim.dynamics.stiffness import add_applied_slopes, fill_state_slopes
+from mbsim.system.arrays import SLOPES_DOOR, TANGENT_DOOR, Scene
+from mbsim.system.depends import find_depends
+from mbsim.system.tangent import Tangent, make_tangent
+
+_VALUES = types.int64(types.int64, types.float64, types.CPointer(types.float64))
+
+
+def _linearise(context, t, h, a, b):
+    """f(t, y), and the linearised mechanism."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    n = scene.rows.y.shape[1]
+    return float(linearise(scene, T, t, h, carray(a, (n,)), carray(b, (n,))))
+
+
+def _factor(context, t, h, a, b):
+    """The matrix of real coefficients."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    for k in range(4):
+        T.real.c[0, k] = a[k]
+    return float(factor(scene, T, T.real, h))
+
+
+def _solve(context, t, h, a, b):
+    """The correction of a residual."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    n = scene.rows.y.shape[1]
+    return float(solve(scene, T, T.real, carray(a, (n,)), carray(b, (n,))))
+
+
+def _factor_pair(context, t, h, a, b):
+    """The matrix of complex coefficients."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    for k in range(3):
+        T.pair.c[0, k] = complex(a[2 * k], a[2 * k + 1])
+    T.pair.c[0, 3] = a[6]
+    return float(factor(scene, T, T.pair, h))
+
+
+def _solve_pair(context, t, h, a, b):
+    """The correction of a complex residual: real parts, then imaginary ones."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    n = scene.rows.y.shape[1]
+    given, found = T.pair.r[0], T.pair.r[1]
+    for k in range(n):
+        given[k] = complex(a[k], a[n + k])
+    code = solve(scene, T, T.pair, given, found)
+    for k in range(n):
+        b[k] = found[k].real
+        b[n + k] = found[k].imag
+    return float(code)
+
+
+def _slopes(context, t, y):
+    """The derivatives of forces between markers and of states' slopes."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    a = carray(y, (scene.rows.y.shape[1],))
+    code = add_applied_slopes(scene, T, t, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def open_slopes(scene: Scene) -> None:
+    """Open the door of derivatives of forces where there are some."""
+    if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
+        return
+    scene.world.doors[SLOPES_DOOR] = jit.address(_slopes, _VALUES)
+    if len(scene.programs.start) > 1:
+        open_jets(scene)
+
+
+def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
+    """Return the problem with the hooks of an implicit method, and what must live with it.
+
+    `pair`: the method solves with complex coefficients as well.
+    """
+    tangent = make_tangent(scene, find_depends(scene), pair)
+    table = pack(tangent)
+    scene.world.doors[TANGENT_DOOR] = int(table.ctypes.data)
+    open_slopes(scene)
+    hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
+    if pair:
+        hooks |= {"factor_pair": _factor_pair, "solve_pair": _solve_pair}
+    return (
+        problem._replace(**{name: jit.address(hook, HOOK) for name, hook in hooks.items()}),
+        (tangent, table),
+    )

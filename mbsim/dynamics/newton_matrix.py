@@ -1,0 +1,402 @@
+"""The linear systems of implicit methods, for a step's coefficients c1, c2, c3.
+
+Sought is d = (dx, dq, dv, dw, dz) with, for residuals r,
+
+    dv = c1 dx - r_x,   dw = B theta - rho,   da = c2 dx - r_a,   d(alpha) = c2/c1 B theta - r_alpha,
+    c3 dz - d(z') = r_z,
+
+da and d(alpha) the accelerations that the linearised mechanism gives; theta is the turn in body
+axes. The quaternion of a first-order method (form 0) is a row of four numbers, q + dq with
+dq = q (sigma, theta/2), so that with r_q = q (rho_0, rho'/2)
+
+    B = c1 + [w]x/2 + w w'/(4 c1),   rho = rho' + rho_0 w/c1,   sigma = (rho_0 - theta.w/4)/c1,
+
+and r_a = c1 r_x + r_v, r_alpha = c1 rho + r_w. A second-order method (form 1) turns by the
+exponential, B = c1 (1 + [h w]x/2), and gives r_a itself.
+
+xi = guess + zeta: the guess is what the residuals ask for where no force changes, c2 dx = r_a. It
+need not fit the joints, whose accelerations alone f keeps; zeta does, and follows from what
+the guess does to the forces. With K and D, A = M(c2) - K - D E, eta = E xi - e the rates.
+"""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, rotate, unrotate, vector
+from mbsim.dynamics.blocks import (
+    BLOCKS,
+    COUPLINGS,
+    STALE,
+    eliminate,
+    factor_border,
+    factor_small,
+    find_order,
+    solve_bodies,
+    solve_border,
+    solve_small,
+)
+from mbsim.dynamics.equations import active_count
+from mbsim.system.arrays import BODY_SIZE
+
+#: Code of a matrix without an inverse.
+SINGULAR = 12
+
+
+@jitable
+def fill_turns(T, M, h):
+    """Fill B of every body and its inverse."""
+    L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
+    for b in range(len(L.w)):
+        w, B, inverse = L.w[b], M.B[b], M.work[3]
+        for i in range(3):
+            for j in range(3):
+                B[i, j] = c1 if i == j else 0.0
+                if form == 0.0:
+                    B[i, j] += w[i] * w[j] / (4.0 * c1)
+        half = 0.5 if form == 0.0 else 0.5 * h * c1
+        B[0, 1] -= half * w[2]
+        B[0, 2] += half * w[1]
+        B[1, 0] += half * w[2]
+        B[1, 2] -= half * w[0]
+        B[2, 0] -= half * w[1]
+        B[2, 1] += half * w[0]
+        for i in range(3):
+            for j in range(3):
+                inverse[i, j] = B[i, j]
+        factor_small(inverse, M.swap[b], 3)
+        for j in range(3):
+            x = M.work[2, 0]
+            for i in range(3):
+                x[i] = 1.0 if i == j else 0.0
+            solve_small(inverse, M.swap[b], 3, x)
+            for i in range(3):
+                M.B_inverse[b, i, j] = x[i]
+
+
+@jitable
+def times_rate(L, M, b, out):
+    """Write E of body b, 6 x 6: rates of spin and of the point at O by xi.
+
+    spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
+    """
+    R, B, c1, w, r = L.R[b], M.B[b], M.c[0, 0], L.spin[b], L.r[b]
+    for j in range(3):
+        column = (R[j, 0], R[j, 1], R[j, 2])
+        # R B R' e_j
+        u0 = B[0, 0] * column[0] + B[0, 1] * column[1] + B[0, 2] * column[2]
+        u1 = B[1, 0] * column[0] + B[1, 1] * column[1] + B[1, 2] * column[2]
+        u2 = B[2, 0] * column[0] + B[2, 1] * column[1] + B[2, 2] * column[2]
+        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        around = cross(e, (w[0], w[1], w[2]))
+        s0 = R[0, 0] * u0 + R[0, 1] * u1 + R[0, 2] * u2 + around[0]
+        s1 = R[1, 0] * u0 + R[1, 1] * u1 + R[1, 2] * u2 + around[1]
+        s2 = R[2, 0] * u0 + R[2, 1] * u1 + R[2, 2] * u2 + around[2]
+        arm = cross(e, (r[0], r[1], r[2]))
+        out[0, j], out[1, j], out[2, j] = s0, s1, s2
+        out[3, j] = c1 * arm[0] - (s1 * r[2] - s2 * r[1])
+        out[4, j] = c1 * arm[1] - (s2 * r[0] - s0 * r[2])
+        out[5, j] = c1 * arm[2] - (s0 * r[1] - s1 * r[0])
+        for i in range(3):
+            out[i, 3 + j] = 0.0
+            out[3 + i, 3 + j] = c1 if i == j else 0.0
+
+
+@jitable
+def gyration(scene, L, b, u):
+    """Return how J alpha + w x J w changes with a change u of w, in body axes."""
+    J, w = scene.bodies.inertia[b], vector(L.w[b])
+    first = cross(u, rotate(J, w))
+    second = cross(w, rotate(J, u))
+    return (first[0] + second[0], first[1] + second[1], first[2] + second[2])
+
+
+@jitable
+def add_inertia(scene, L, M, b, A):
+    """Add inertia and the wrench that joints and equations exert on body b, by xi, to A."""
+    m, c1, c2 = scene.bodies.mass[b], M.c[0, 0], M.c[0, 1]
+    R, B, J = L.R[b], M.B[b], scene.bodies.inertia[b]
+    r, f, N = vector(L.r[b]), vector(L.force[b]), vector(L.torque[b])
+    for j in range(3):
+        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        # a turn about O
+        own = (R[j, 0], R[j, 1], R[j, 2])
+        u = (
+            B[0, 0] * own[0] + B[0, 1] * own[1] + B[0, 2] * own[2],
+            B[1, 0] * own[0] + B[1, 1] * own[1] + B[1, 2] * own[2],
+            B[2, 0] * own[0] + B[2, 1] * own[1] + B[2, 2] * own[2],
+        )
+        spun, gyro = rotate(J, u), gyration(scene, L, b, u)
+        ratio = c2 / c1
+        local = (
+            ratio * spun[0] + gyro[0],
+            ratio * spun[1] + gyro[1],
+            ratio * spun[2] + gyro[2],
+        )
+        torque, turned, arm = rotate(R, local), cross(e, N), cross(e, r)
+        force = (m * c2 * arm[0], m * c2 * arm[1], m * c2 * arm[2])
+        moment, bend = cross(r, force), cross(arm, f)
+        for i in range(3):
+            A[i, j] += torque[i] + turned[i] + moment[i] + bend[i]
+            A[3 + i, j] += force[i]
+        # a displacement
+        push = (m * c2 * e[0], m * c2 * e[1], m * c2 * e[2])
+        moment, bend = cross(r, push), cross(e, f)
+        for i in range(3):
+            A[i, 3 + j] += moment[i] + bend[i]
+            A[3 + i, 3 + j] += push[i]
+
+
+@jitable
+def fill_matrix(scene, T, M):
+    """Fill A."""
+    P, L = T.pattern, T.linear
+    for k in range(P.count[COUPLINGS], P.count[BLOCKS]):
+        for i in range(6):
+            for j in range(6):
+                M.A[k, i, j] = 0.0
+    E = M.work[2]
+    last = -1
+    for b in range(len(P.order)):
+        times_rate(L, M, b, E)
+        for a in range(len(P.order)):
+            k = P.place[a, b]
+            if k < 0 or k >= P.count[COUPLINGS]:
+                continue
+            K, D, A = L.K[k], L.D[k], M.A[k]
+            for i in range(6):
+                for j in range(6):
+                    A[i, j] = -K[i, j]
+                for q in range(6):
+                    part = D[i, q]
+                    if part != 0.0:
+                        for j in range(6):
+                            A[i, j] -= part * E[q, j]
+        last = b
+    for b in range(last + 1):
+        add_inertia(scene, L, M, b, M.A[P.place[b, b]])
+
+
+@jitable
+def factor(scene, T, M, h):
+    """Factor the matrix for the coefficients in M.c; return 0 or a code."""
+    P, L, free = T.pattern, T.linear, scene.tree.free
+    if P.count[STALE] == 1 and not find_order(P):
+        return SINGULAR
+    fill_turns(T, M, h)
+    fill_matrix(scene, T, M)
+    if not eliminate(P, M, L, free):
+        return SINGULAR
+    return factor_rest(scene, T, M)
+
+
+@jitable
+def bordered(scene, k):
+    """Return the row of `Linear.column` of the k-th unknown of the border."""
+    n = active_count(scene)
+    return k if k < n else len(scene.equations.program) + k - n
+
+
+@jitable
+def border_count(scene):
+    """Return the number of unknowns of the border: equations in use, then states."""
+    return active_count(scene) + len(scene.states.program)
+
+
+@jitable
+def along_row(L, M, row, slope, x):
+    """Return a row of the border times displacements; of a state's slope with their rates."""
+    total = 0.0 * x[0, 0]
+    for b in range(len(L.w)):
+        for i in range(6):
+            if L.row[row, b, i] != 0.0:
+                total += L.row[row, b, i] * x[b, i]
+    if slope == 0:
+        return total
+    E = M.work[2]
+    for b in range(len(L.w)):
+        used = False
+        for i in range(6):
+            used = used or L.row_rate[row, b, i] != 0.0
+        if used:
+            times_rate(L, M, b, E)
+            for i in range(6):
+                for j in range(6):
+                    total += L.row_rate[row, b, i] * E[i, j] * x[b, j]
+    return total
+
+
+@jitable
+def factor_rest(scene, T, M):
+    """Factor the border: what equations and states ask of the bodies."""
+    P, L = T.pattern, T.linear
+    held, size = active_count(scene), border_count(scene)
+    for k in range(size):
+        row, y = bordered(scene, k), M.answer[k]
+        for b in range(len(P.order)):
+            for i in range(6):
+                y[b, i] = L.column[row, b, i]
+        solve_bodies(P, M, L, scene.tree.free, y)
+    for k in range(size):
+        row, slope = bordered(scene, k), 1 if k >= held else 0
+        for other in range(size):
+            along = along_row(L, M, row, slope, M.answer[other])
+            if slope == 0:
+                M.border[k, other] = along
+                continue
+            M.border[k, other] = -along
+            if other >= held:
+                M.border[k, other] -= L.slopes[k - held, other - held]
+            if other == k:
+                M.border[k, other] += M.c[0, 2]
+    factor_border(M.border, M.border_swap, size)
+    return 0
+
+
+@jitable
+def inner_turn(q, r):
+    """Return conj(q) r, scalar first: r in the tangent space of q (which is of unit length)."""
+    return (
+        q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3],
+        q[0] * r[1] - q[1] * r[0] - q[2] * r[3] + q[3] * r[2],
+        q[0] * r[2] + q[1] * r[3] - q[2] * r[0] - q[3] * r[1],
+        q[0] * r[3] - q[1] * r[2] + q[2] * r[1] - q[3] * r[0],
+    )
+
+
+@jitable
+def turn_residual(L, M, b, r):
+    """Return rho_0 and rho of body b."""
+    at = BODY_SIZE * b + 3
+    s = inner_turn(L.q[b], (r[at], r[at + 1], r[at + 2], r[at + 3]))
+    w, c1 = L.w[b], M.c[0, 0]
+    more = s[0] / c1
+    rho = (2.0 * s[1] + more * w[0], 2.0 * s[2] + more * w[1], 2.0 * s[3] + more * w[2])
+    return s[0], rho
+
+
+@jitable
+def fill_guess(L, M, b, r):
+    """Fill what the residuals of body b ask for where no force changes, about O, and its rate."""
+    at, c1, c2, form = BODY_SIZE * b, M.c[0, 0], M.c[0, 1], M.c[0, 3].real
+    R, inverse, arm, spin = L.R[b], M.B_inverse[b], L.r[b], L.spin[b]
+    _, rho = turn_residual(L, M, b, r)
+    first = c1 if form == 0.0 else 0.0 * c1
+    ask = (
+        (first * rho[0] + r[at + 10]) * c1 / c2,
+        (first * rho[1] + r[at + 11]) * c1 / c2,
+        (first * rho[2] + r[at + 12]) * c1 / c2,
+    )
+    turn = (
+        inverse[0, 0] * ask[0] + inverse[0, 1] * ask[1] + inverse[0, 2] * ask[2],
+        inverse[1, 0] * ask[0] + inverse[1, 1] * ask[1] + inverse[1, 2] * ask[2],
+        inverse[2, 0] * ask[0] + inverse[2, 1] * ask[1] + inverse[2, 2] * ask[2],
+    )
+    way = (
+        (first * r[at] + r[at + 7]) / c2,
+        (first * r[at + 1] + r[at + 8]) / c2,
+        (first * r[at + 2] + r[at + 9]) / c2,
+    )
+    theta = rotate(R, turn)
+    r_O = (arm[0], arm[1], arm[2])
+    swing = cross(theta, r_O)
+    # rates: of spin R (B turn - rho) + theta x w, of O's point v - spin x r
+    slower = (ask[0] - rho[0], ask[1] - rho[1], ask[2] - rho[2])
+    turned = rotate(R, slower)
+    around = cross(theta, (spin[0], spin[1], spin[2]))
+    faster = (turned[0] + around[0], turned[1] + around[1], turned[2] + around[2])
+    carried = cross(faster, r_O)
+    for i in range(3):
+        M.guess[b, i] = theta[i]
+        M.guess[b, 3 + i] = way[i] - swing[i]
+        M.rate[b, i] = faster[i]
+        M.rate[b, 3 + i] = c1 * way[i] - r[at + i] - carried[i]
+    # what inertia makes of it beside c2 M: on the right side
+    return slower, theta, way
+
+
+@jitable
+def fill_right_side(scene, T, M, r):
+    """Fill g: what forces, spin and joints make of the guess."""
+    P, L = T.pattern, T.linear
+    nb = len(P.order)
+    for b in range(nb):
+        slower, theta, way = fill_guess(L, M, b, r)
+        gyro = rotate(L.R[b], gyration(scene, L, b, slower))
+        turned = cross(theta, vector(L.torque[b]))
+        bend = cross(way, vector(L.force[b]))
+        for i in range(3):
+            M.g[b, i] = -gyro[i] - turned[i] - bend[i]
+            M.g[b, 3 + i] = 0.0 * M.guess[b, i]
+    for k in range(P.count[COUPLINGS]):
+        a, b = P.pair[k, 0], P.pair[k, 1]
+        K, D = L.K[k], L.D[k]
+        for i in range(6):
+            for j in range(6):
+                M.g[a, i] += K[i, j] * M.guess[b, j] + D[i, j] * M.rate[b, j]
+
+
+@jitable
+def solve_border_part(scene, T, M, r):
+    """Solve for multipliers and states, and add what they do to g, which holds displacements."""
+    P, L = T.pattern, T.linear
+    held, size = active_count(scene), border_count(scene)
+    x = M.extra[1]
+    for k in range(size):
+        row = bordered(scene, k)
+        if k < held:
+            x[k] = -along_row(L, M, row, 0, M.g)
+            continue
+        place = scene.states.place[k - held]
+        x[k] = r[place] + along_row(L, M, row, 1, M.g)
+        for b in range(len(P.order)):
+            for i in range(6):
+                x[k] += L.row[row, b, i] * M.guess[b, i] + L.row_rate[row, b, i] * M.rate[b, i]
+    solve_border(M.border, M.border_swap, size, x)
+    for k in range(size):
+        for b in range(len(P.order)):
+            for i in range(6):
+                M.g[b, i] += M.answer[k, b, i] * x[k]
+
+
+@jitable
+def write_answer(scene, T, M, r, d):
+    """Write the displacements of bodies in the layout of y."""
+    L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
+    for b in range(len(L.w)):
+        at, R, B, arm, q, w = BODY_SIZE * b, L.R[b], M.B[b], L.r[b], L.q[b], L.w[b]
+        theta = (
+            M.guess[b, 0] + M.g[b, 0],
+            M.guess[b, 1] + M.g[b, 1],
+            M.guess[b, 2] + M.g[b, 2],
+        )
+        swing = cross(theta, (arm[0], arm[1], arm[2]))
+        s0, rho = turn_residual(L, M, b, r)
+        turn = unrotate(R, theta)
+        for i in range(3):
+            d[at + i] = M.guess[b, 3 + i] + M.g[b, 3 + i] + swing[i]
+            d[at + 7 + i] = c1 * d[at + i] - r[at + i]
+            d[at + 10 + i] = B[i, 0] * turn[0] + B[i, 1] * turn[1] + B[i, 2] * turn[2] - rho[i]
+        sigma = 0.0 * c1
+        if form == 0.0:
+            sigma = (s0 - 0.25 * (turn[0] * w[0] + turn[1] * w[1] + turn[2] * w[2])) / c1
+        e = (0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])
+        d[at + 3] = q[0] * sigma - q[1] * e[0] - q[2] * e[1] - q[3] * e[2]
+        d[at + 4] = q[1] * sigma + q[0] * e[0] + q[2] * e[2] - q[3] * e[1]
+        d[at + 5] = q[2] * sigma + q[0] * e[1] + q[3] * e[0] - q[1] * e[2]
+        d[at + 6] = q[3] * sigma + q[0] * e[2] + q[1] * e[1] - q[2] * e[0]
+
+
+@jitable
+def solve(scene, T, M, r, d):
+    """Solve for the residual r; r and d (n,) in the layout of y."""
+    fill_right_side(scene, T, M, r)
+    solve_bodies(T.pattern, M, T.linear, scene.tree.free, M.g)
+    solve_border_part(scene, T, M, r)
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
+        # X, work and losses are sums of what bodies do
+        d[k] = r[k] / M.c[0, 2]
+    write_answer(scene, T, M, r, d)
+    held = active_count(scene)
+    for z in range(len(scene.states.program)):
+        d[scene.states.place[z]] = M.extra[1, held + z]
+    return 0

@@ -1,0 +1,470 @@
+"""How forces change with displacements and velocities of bodies: the blocks K and D.
+
+A force F along the rows u of two bodies (wrench on I; less that of J) has
+
+    d F = F_x (u_i . xi_i - u_j . xi_j) + F_v (u_i . eta_i - u_j . eta_j)
+
+with xi the displacement and eta the change of velocity of a body, both about its O. Incidents
+are frozen: contact point, normal and tangents stay where they are on the bodies, and X and memory
+as they are. Laws are asked at neighbouring arguments, expressions give exact derivatives.
+Bushings count as for small angles.
+"""
+
+from __future__ import annotations
+
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
+from mbsim.dynamics.blocks import couple
+from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
+from mbsim.dynamics.expressions import run, value
+from mbsim.dynamics.kinematics import place_body, position
+from mbsim.dynamics.markers import marker_axis, marker_point
+from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.system.arrays import (
+    AXIS_FORCE,
+    AXIS_TORQUE,
+    BODY_SIZE,
+    BUSHING,
+    LINE_FORCE,
+    SLIDE_LIMIT,
+    TURN_LIMIT,
+    VECTOR_FORCE,
+)
+
+#: Differences of the laws' arguments, as parts of them and of the model's speed.
+_PART, _PART_OF_SPEED = 1e-6, 1e-8
+#: Differences of the state for user subroutines, as parts of length or speed, and radians.
+_PUSH = 1e-7
+
+
+@jitable
+def lever(scene, linear, y, b, p, force, torque, row):
+    """Write the wrench of a unit: force at p and torque, about O of body b; nothing for ground."""
+    if b == len(scene.bodies.mass):
+        for k in range(6):
+            row[k] = 0.0
+        return
+    arm = add(sub(p, position(scene, y, b)), vector(linear.r[b]))
+    moment = add(cross(arm, force), torque)
+    for k in range(3):
+        row[k] = moment[k]
+        row[3 + k] = force[k]
+
+
+@jitable
+def add_product(target, factor, u, v):
+    """Add factor u v' to a block."""
+    for i in range(6):
+        part = factor * u[i]
+        if part != 0.0:
+            for j in range(6):
+                target[i, j] += part * v[j]
+
+
+@jitable
+def add_two_sided(P, blocks, nb, i, j, factor, u, v):
+    """Add factor u v' of a force between bodies i and j; rows 0 of u and v are of i, 1 of j."""
+    if i < nb:
+        add_product(blocks[P.place[i, i]], factor, u[0], v[0])
+    if j < nb:
+        add_product(blocks[P.place[j, j]], factor, u[1], v[1])
+    if i < nb and j < nb and i != j:
+        add_product(blocks[P.place[i, j]], -factor, u[0], v[1])
+        add_product(blocks[P.place[j, i]], -factor, u[1], v[0])
+    elif i < nb and i == j:
+        add_product(blocks[P.place[i, i]], -factor, u[0], v[1])
+        add_product(blocks[P.place[i, i]], -factor, u[1], v[0])
+
+
+@jitable
+def contact_bodies(scene, s):
+    """Return the bodies of a slot."""
+    gi, gj = sides(scene, s)
+    return scene.graphics.body[gi], scene.graphics.body[gj]
+
+
+@jitable
+def couple_contacts(scene, P):
+    """Couple the bodies that touch; return whether there is room."""
+    nb, hit = len(scene.bodies.mass), scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        i, j = contact_bodies(scene, hit[k])
+        if i < nb and j < nb and i != j and not couple(P, i, j):
+            return False
+    return True
+
+
+@jitable
+def ask_friction(scene, t, h, y, s, c, around, given):
+    """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
+    loci, locj = around
+    slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
+    return friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
+
+
+@jitable
+def friction_slopes(scene, t, h, y, s, c, around, given, table):
+    """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
+    out, least = scene.work.law_out, _PART_OF_SPEED * scene.world.scale[1]
+    base, code = table[:, 6:11], 0
+    for column in range(6):
+        size = _PART * abs(given[column])
+        if column < 5:
+            size += least if column < 2 else least / scene.world.scale[0]
+        elif size == 0.0:
+            size = _PART
+        kept = given[column]
+        for side in range(2):
+            given[column] = kept + (size if side == 0 else -size)
+            code = ask_friction(scene, t, h, y, s, c, around, given)
+            if code != 0:
+                return code
+            for r in range(5):
+                if side == 0:
+                    base[column, r] = out[r]
+                else:
+                    table[r, column] = (base[column, r] - out[r]) / (2.0 * size)
+        given[column] = kept
+    return 0
+
+
+@jitable
+def add_contact_slopes(scene, T, t, h, y, s):
+    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
+    P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
+    nb, c = len(scene.bodies.mass), contact_of(scene, s)
+    gi, gj = sides(scene, s)
+    i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+    point = work.points[s]
+    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    share, out, none = point[7], work.law_out, (0.0, 0.0, 0.0)
+    rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
+
+    # the normal law by depth and rate
+    step = _PART * depth
+    call = (depth + step, rate, contacts.normal_par[c], out)
+    code = call_int(contacts.normal_law[c], call)
+    upper = out[0]
+    code += call_int(contacts.normal_law[c], (depth - step, rate, contacts.normal_par[c], out))
+    by_depth = share * (upper - out[0]) / (2.0 * step)
+    step = _PART * abs(rate) + _PART_OF_SPEED * scene.world.scale[1]
+    code += call_int(contacts.normal_law[c], (depth, rate + step, contacts.normal_par[c], out))
+    upper = out[0]
+    code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
+    by_rate = share * (upper - out[0]) / (2.0 * step)
+    if code != 0:
+        return code
+
+    # depth and its rate are -n . of displacement and velocity
+    normal = L.basis
+    for side in range(2):
+        lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
+    u, v = normal[:, 0], normal[:, 0]
+    add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
+    add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
+    if contacts.friction_law[c] == 0:
+        return 0
+
+    tx = vector(work.t[s])
+    ty = cross(n, tx)
+    v_rel = sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p))
+    w_rel = sub(vector(work.w[i]), vector(work.w[j]))
+    given = L.rise[0:6]
+    given[0], given[1] = dot(v_rel, tx), dot(v_rel, ty)
+    given[2], given[3], given[4] = dot(w_rel, tx), dot(w_rel, ty), dot(w_rel, n)
+    given[5] = work.slot[s, 2]
+    around = (none, none)
+    if contacts.framed[c] == 1:
+        half = scale(0.5 * depth, n)
+        around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
+    code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
+    if code != 0:
+        return code
+    for side in range(2):
+        b = i if side == 0 else j
+        rows = L.basis[side]
+        lever(scene, L, y, b, p, tx, none, rows[1])
+        lever(scene, L, y, b, p, ty, none, rows[2])
+        lever(scene, L, y, b, p, none, tx, rows[3])
+        lever(scene, L, y, b, p, none, ty, rows[4])
+        lever(scene, L, y, b, p, none, n, rows[5])
+    for r in range(5):
+        u = L.basis[:, 1 + r]
+        for column in range(5):
+            if L.law[r, column] != 0.0:
+                add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, 1 + column])
+        by_normal = L.law[r, 5]
+        if by_normal != 0.0:
+            add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
+            add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
+    return 0
+
+
+@jitable
+def add_contacts_slopes(scene, T, t, h, y):
+    """Add what all incidents do; return a code."""
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        code = add_contact_slopes(scene, T, t, h, y, hit[k])
+        if code != 0:
+            return code
+    return 0
+
+
+@jitable
+def sides_of(scene, f):
+    """Return the bodies that applied force f acts on; ground for what acts on I alone."""
+    i, j = scene.markers.body[scene.applied.i[f]], scene.markers.body[scene.applied.j[f]]
+    return i, (len(scene.bodies.mass) if scene.applied.alone[f] == 1 else j)
+
+
+@jitable
+def depends_on(scene, T, f, k):
+    """Return program k (0 to 6) of applied force f, -1 for none."""
+    return scene.applied.program[f] if k == 6 else scene.applied.components[f, k]
+
+
+@jitable
+def couple_applied(scene, P, T):
+    """Couple the bodies between which forces act, and those that they look at."""
+    nb = len(scene.bodies.mass)
+    for f in range(len(scene.applied.kind)):
+        i, j = sides_of(scene, f)
+        if i < nb and j < nb and i != j and not couple(P, i, j):
+            return False
+        for k in range(7):
+            program = depends_on(scene, T, f, k)
+            if program < 0:
+                continue
+            for at in range(T.depends.body_start[program], T.depends.body_start[program + 1]):
+                b = T.depends.body[at]
+                for a in (i, j):
+                    if a < nb and a != b and not couple(P, a, b):
+                        return False
+    return True
+
+
+@jitable
+def pushed(scene, y, body, way, size):
+    """Change one number of pose or velocity of a body in y, where `way` is as in slopes."""
+    at = BODY_SIZE * body
+    axis = way % 3
+    if way < 3:
+        y[at + axis] += size
+    elif way < POSES:
+        # half a turn of the quaternion, global: q + (0, e) q size/2
+        w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        half = 0.5 * size
+        if axis == 0:
+            rise = (-x, w, -z, yy)
+        elif axis == 1:
+            rise = (-yy, z, w, -x)
+        else:
+            rise = (-z, -yy, x, w)
+        for k in range(4):
+            y[at + 3 + k] += half * rise[k]
+    elif way < 9:
+        y[at + 7 + axis] += size
+    else:
+        R = scene.work.R[body]
+        for k in range(3):
+            y[at + 10 + k] += size * R[axis, k]
+    place_body(scene, y, body)
+
+
+@jitable
+def program_rise(scene, T, t, y, program, body, row):
+    """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
+
+    Both as spatial vectors about O of the body: angular, linear.
+    """
+    at = BODY_SIZE * body
+    for way in range(WAYS):
+        if T.depends.user[program] == 1:
+            size = _PUSH * (1.0 if way % POSES >= 3 else scene.world.scale[0])
+            if way >= POSES:
+                size *= scene.world.scale[1] / scene.world.scale[0]
+            before = value(scene, t, y, program)
+            kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
+            speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
+            pushed(scene, y, body, way, size)
+            rise = (value(scene, t, y, program) - before) / size
+            for k in range(7):
+                y[at + k] = kept[k]
+            for k in range(6):
+                y[at + 7 + k] = speed[k]
+            place_body(scene, y, body)
+        else:
+            run(scene, t, y, program, body, way)
+            rise = scene.programs.stack[0, 1]
+        # (linear, angular) to (angular, linear)
+        row[(way // POSES) * POSES + (way % POSES + 3) % POSES] = rise
+    r = vector(T.linear.r[body])
+    for part in range(2):
+        first = part * POSES
+        linear = (row[first + 3], row[first + 4], row[first + 5])
+        moment = cross(r, linear)
+        for k in range(3):
+            row[first + k] += moment[k]
+
+
+@jitable
+def add_program_slopes(scene, T, t, y, f, program, u):
+    """Add d(value)/d(bodies and states) times the wrench u of its unit on the bodies of force f."""
+    P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    i, j = sides_of(scene, f)
+    for at in range(T.depends.body_start[program], T.depends.body_start[program + 1]):
+        b = T.depends.body[at]
+        program_rise(scene, T, t, y, program, b, L.rise)
+        for side in range(2):
+            a = i if side == 0 else j
+            if a < nb:
+                sign = 1.0 if side == 0 else -1.0
+                add_product(L.K[P.place[a, b]], sign, u[side], L.rise[0:6])
+                add_product(L.D[P.place[a, b]], sign, u[side], L.rise[6:12])
+    first = len(scene.equations.program)
+    for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
+        z = T.depends.state[at]
+        rise = state_rise(scene, T, t, y, program, z)
+        for side in range(2):
+            a = i if side == 0 else j
+            if a < nb:
+                for k in range(6):
+                    L.column[first + z, a, k] += (rise if side == 0 else -rise) * u[side, k]
+
+
+@jitable
+def state_rise(scene, T, t, y, program, z):
+    """Return the derivative of a program by state z."""
+    place = scene.states.place[z]
+    if T.depends.user[program] == 0:
+        run(scene, t, y, program, A_STATE, place)
+        return scene.programs.stack[0, 1]
+    before, kept = value(scene, t, y, program), y[place]
+    size = _PUSH * max(abs(kept), scene.states.scale[z])
+    y[place] = kept + size
+    rise = (value(scene, t, y, program) - before) / size
+    y[place] = kept
+    return rise
+
+
+@jitable
+def fill_unit(scene, T, y, f, force, torque, at_j):
+    """Fill the wrenches of a unit force and torque: on I at its origin, on J at its own or I's."""
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    bi, bj = sides_of(scene, f)
+    u = T.linear.basis[:, 0]
+    lever(scene, T.linear, y, bi, marker_point(scene, y, i), force, torque, u[0])
+    p = marker_point(scene, y, j if at_j == 1 else i)
+    lever(scene, T.linear, y, bj, p, force, torque, u[1])
+    return u
+
+
+@jitable
+def add_bushing_slopes(scene, T, y, f):
+    """Add a bushing: stiffness and damping along and about J's axes, as for small angles."""
+    P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    bi, bj = sides_of(scene, f)
+    none = (0.0, 0.0, 0.0)
+    for k in range(6):
+        e = marker_axis(scene, scene.applied.j[f], k % 3)
+        u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
+        par = scene.applied.par[f]
+        add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
+        add_two_sided(P, L.D, nb, bi, bj, -par[6 + k], u, u)
+
+
+@jitable
+def add_vector_slopes(scene, T, t, y, f):
+    """Add a vector force by expressions."""
+    none = (0.0, 0.0, 0.0)
+    for k in range(6):
+        program = scene.applied.components[f, k]
+        if program < 0:
+            continue
+        e = marker_axis(scene, scene.applied.axes[f], k % 3)
+        u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
+        add_program_slopes(scene, T, t, y, f, program, u)
+
+
+@jitable
+def limit_slopes(scene, f, x, rate):
+    """Return dF/dx and dF/dx' of a limit."""
+    step = _PUSH * max(abs(x), 1e-3 * scene.world.scale[0])
+    fast = _PART_OF_SPEED * scene.world.scale[1] + _PART * abs(rate)
+    by_x = at_limit(scene, f, x + step, rate)[0] - at_limit(scene, f, x - step, rate)[0]
+    by_rate = at_limit(scene, f, x, rate + fast)[0] - at_limit(scene, f, x, rate - fast)[0]
+    return by_x / (2.0 * step), by_rate / (2.0 * fast)
+
+
+@jitable
+def add_scalar_slopes(scene, T, t, y, f):
+    """Add a force along a line, along an axis or about one."""
+    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
+    bi, bj = sides_of(scene, f)
+    none, x, rate = (0.0, 0.0, 0.0), 0.0, 0.0
+    if kind == LINE_FORCE:
+        n, x, rate = along_line(scene, y, f)
+    elif kind == AXIS_FORCE:
+        n = marker_axis(scene, scene.applied.j[f], 2)
+    elif kind == SLIDE_LIMIT:
+        n, x, rate = along_slide(scene, y, f)
+    else:
+        n, x, rate = along_axis(scene, f)
+    turns = kind == AXIS_TORQUE or kind == TURN_LIMIT
+    u = fill_unit(scene, T, y, f, none if turns else n, n if turns else none, 1)
+    if kind == SLIDE_LIMIT or kind == TURN_LIMIT:
+        by_x, by_rate = limit_slopes(scene, f, x, rate)
+    elif scene.applied.program[f] >= 0:
+        add_program_slopes(scene, T, t, y, f, scene.applied.program[f], u)
+        by_x, by_rate = 0.0, 0.0
+    else:
+        by_x, by_rate = -scene.applied.par[f, 0], -scene.applied.par[f, 1]
+    if by_x != 0.0:
+        add_two_sided(P, L.K, nb, bi, bj, by_x, u, u)
+    if by_rate != 0.0:
+        add_two_sided(P, L.D, nb, bi, bj, by_rate, u, u)
+    if kind == LINE_FORCE and x > 0.0:
+        # the line turns: F/d across it
+        tension = dot(vector(scene.work.applied[f]), n) / x
+        a = cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))
+        a = scale(1.0 / norm(a), a)
+        for e in (a, cross(n, a)):
+            u = fill_unit(scene, T, y, f, e, none, 1)
+            add_two_sided(P, L.K, nb, bi, bj, tension, u, u)
+
+
+@jitable
+def add_applied_slopes(scene, T, t, y):
+    """Add what forces between markers do."""
+    for f in range(len(scene.applied.kind)):
+        kind = scene.applied.kind[f]
+        if kind == BUSHING:
+            add_bushing_slopes(scene, T, y, f)
+        elif kind == VECTOR_FORCE:
+            add_vector_slopes(scene, T, t, y, f)
+        elif kind <= TURN_LIMIT:
+            add_scalar_slopes(scene, T, t, y, f)
+    return 0
+
+
+@jitable
+def fill_state_slopes(scene, T, t, y):
+    """Fill how the slopes of the user's own states change with bodies and with each other."""
+    L, first = T.linear, len(scene.equations.program)
+    for z in range(len(scene.states.program)):
+        program = scene.states.program[z]
+        for other in range(len(scene.states.program)):
+            L.slopes[z, other] = 0.0
+        for at in range(T.depends.body_start[program], T.depends.body_start[program + 1]):
+            b = T.depends.body[at]
+            program_rise(scene, T, t, y, program, b, L.rise)
+            for k in range(6):
+                L.row[first + z, b, k] = L.rise[k]
+                L.row_rate[first + z, b, k] = L.rise[6 + k]
+        for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
+            other = T.depends.state[at]
+            L.slopes[z, other] = state_rise(scene, T, t, y, program, other)
+

@@ -1,0 +1,198 @@
+"""Arrays of the linearised mechanism, made only for implicit methods.
+
+Unknown are displacements xi of bodies, spatial vectors (angular, linear) about O: the cg of the
+root of a body's tree, or the body's own cg. Blocks are 6 x 6, rows and columns by body. A body
+that hangs on a joint is not an unknown of its own: xi = xi of its parent + S' dq.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbsim.core.arrays import C2, C3, F1, F2, F3, I1, I2
+from mbsim.system.arrays import TURN_ROOT, Scene
+
+#: Blocks that are made room for beside those of a model whose bodies are all coupled.
+_ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
+#: Bodies of the largest model that implicit methods take: a table of their pairs is kept.
+MOST_BODIES = 4000
+
+
+class Pattern(NamedTuple):
+    """Which bodies are coupled, and in what order they are eliminated."""
+
+    place: I2  # (nb, nb) block of a pair, -1 for none
+    pair: I2  # (couplings, 2) bodies of the blocks that forces fill
+    order: I1  # (nb,) bodies
+    start: I1  # (nb + 1,) first neighbour of each step
+    neighbour: I1  # (blocks,) bodies that are eliminated later
+    count: I1  # (3,) couplings, blocks, 1 where the order is to be found anew
+    joint: I1  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
+    parent: I1  # (nb,) body row, -1 for ground
+    children: I1  # (nb,) that hang on it
+    waiting: I1  # (nb,) scratch: children not yet eliminated, -1 when done itself
+    degree: I1  # (nb,) scratch
+
+
+class Linear(NamedTuple):
+    """The mechanism linearised at one state: what does not depend on the step."""
+
+    R: F3  # (nb, 3, 3)
+    q: F2  # (nb, 4)
+    w: F2  # (nb, 3) angular velocity, body axes
+    r: F2  # (nb, 3) cg from O
+    spin: F2  # (nb, 3) angular velocity, global
+    torque: F2  # (nb, 3) of inertia about the cg, global: J alpha + w x J w
+    force: F2  # (nb, 3) of joints and equations
+    S: F3  # (nt, 6, 6) free directions of joints by rows
+    U: F3  # (nt, 12, 6) how S'f changes with xi of the child and of the parent, f the joint's force
+    f: F2  # (nt, 6) joint forces about O
+    K: F3  # (couplings, 6, 6) of forces by xi
+    D: F3  # (couplings, 6, 6) of forces by their rates
+    column: F3  # (border, nb, 6) force of a unit multiplier, or of a unit of a state
+    row: F3  # (border, nb, 6) gradient of an equation, or of a state's slope by xi
+    row_rate: F3  # (border, nb, 6) of a state's slope by the rates
+    slopes: F2  # (states, states) of states by states
+    basis: F3  # (2, 6, 6) scratch
+    law: F2  # (6, 12) scratch
+    rise: F1  # (13,) scratch
+
+
+class Real(NamedTuple):
+    """A factorisation with real coefficients."""
+
+    A: F3  # (blocks, 6, 6)
+    pivot: F3  # (nb, 6, 6)
+    swap: I2  # (nb, 6)
+    B: F3  # (nb, 3, 3) d(spin)/d(turn), body axes
+    B_inverse: F3  # (nb, 3, 3)
+    answer: F3  # (border, nb, 6)
+    border: F2  # (border, border)
+    border_swap: I1  # (border,)
+    g: F2  # (nb + 1, 6) right side, then solution; scratch
+    guess: F2  # (nb, 6) displacement that residuals alone ask for
+    rate: F2  # (nb, 6) its rate
+    extra: F2  # (2, border) right side and solution
+    work: F3  # (4, 6, 6) scratch
+    c: F2  # (1, 4) coefficients c1, c2, c3, form
+    r: F2  # (2, n) residual and answer in the layout of y
+
+
+class Pair(NamedTuple):
+    """The same with complex coefficients."""
+
+    A: C3
+    pivot: C3
+    swap: I2
+    B: C3
+    B_inverse: C3
+    answer: C3
+    border: C2
+    border_swap: I1
+    g: C2
+    guess: C2
+    rate: C2
+    extra: C2
+    work: C3
+    c: C2
+    r: C2
+
+
+class Depends(NamedTuple):
+    """What programs depend on."""
+
+    body_start: I1  # (programs + 1,)
+    body: I1
+    state_start: I1  # (programs + 1,)
+    state: I1  # rows of states
+    user: I1  # (programs,) 1 where a subroutine is called
+
+
+class Tangent(NamedTuple):
+    """All of it; `Pair` is of length zero where no method asks for it."""
+
+    pattern: Pattern
+    linear: Linear
+    depends: Depends
+    real: Real
+    pair: Pair
+
+
+def border_size(scene: Scene) -> int:
+    """Return the number of equations and states."""
+    return len(scene.equations.program) + len(scene.states.program)
+
+
+def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
+    """Return empty arrays for a scene; `pair`: for complex coefficients as well."""
+    nb, nt, m = len(scene.bodies.mass), len(scene.tree.body), border_size(scene)
+    nz, n = len(scene.states.program), scene.rows.y.shape[1]
+    blocks = nb * nb if nb <= _ALL_COUPLED else min(nb * nb, _BLOCKS_A_BODY * nb)
+    joint, parent = np.full(nb, -1, dtype=np.int64), np.full(nb, -1, dtype=np.int64)
+    children = np.zeros(nb, dtype=np.int64)
+    for k in range(nt):
+        if scene.tree.turn[k] != TURN_ROOT:
+            joint[scene.tree.body[k]] = k
+            if scene.tree.parent[k] >= 0:
+                parent[scene.tree.body[k]] = scene.tree.body[scene.tree.parent[k]]
+                children[parent[scene.tree.body[k]]] += 1
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    pattern = Pattern(
+        np.full((nb, nb), -1, dtype=np.int64),
+        whole(blocks, 2),
+        whole(nb),
+        whole(nb + 1),
+        whole(blocks),
+        np.array([0, 0, 1], dtype=np.int64),
+        joint,
+        parent,
+        children,
+        whole(nb),
+        whole(nb),
+    )
+    linear = Linear(
+        np.zeros((nb, 3, 3)),
+        np.zeros((nb, 4)),
+        *(np.zeros((nb, 3)) for _ in range(5)),
+        np.zeros((nt, 6, 6)),
+        np.zeros((nt, 12, 6)),
+        np.zeros((nt, 6)),
+        np.zeros((blocks, 6, 6)),
+        np.zeros((blocks, 6, 6)),
+        *(np.zeros((m, nb, 6)) for _ in range(3)),
+        np.zeros((nz, nz)),
+        np.zeros((2, 6, 6)),
+        np.zeros((6, 12)),
+        np.zeros(13),
+    )
+    real = Real(*_factor_arrays(nb, m, n, blocks, np.float64))
+    complex_blocks = (nb, m, n, blocks) if pair else (0, 0, 0, 0)
+    return Tangent(
+        pattern, linear, depends, real, Pair(*_factor_arrays(*complex_blocks, np.complex128))
+    )
+
+
+def _factor_arrays(nb: int, m: int, n: int, blocks: int, kind: type) -> tuple[np.ndarray, ...]:
+    """Return the arrays of a factorisation."""
+    return (
+        np.zeros((blocks, 6, 6), dtype=kind),
+        np.zeros((nb, 6, 6), dtype=kind),
+        np.zeros((nb, 6), dtype=np.int64),
+        np.zeros((nb, 3, 3), dtype=kind),
+        np.zeros((nb, 3, 3), dtype=kind),
+        np.zeros((m, nb, 6), dtype=kind),
+        np.zeros((m, m), dtype=kind),
+        np.zeros(m, dtype=np.int64),
+        np.zeros((nb + 1, 6), dtype=kind),
+        np.zeros((nb, 6), dtype=kind),
+        np.zeros((nb, 6), dtype=kind),
+        np.zeros((2, m), dtype=kind),
+        np.zeros((4, 6, 6), dtype=kind),
+        np.zeros((1, 4), dtype=kind),
+        np.zeros((2, n), dtype=kind),
+    )
