@@ -6,17 +6,15 @@ Sought is d = (dx, dq, dv, dw, dz) with, for residuals r,
     c3 dz - d(z') = r_z,
 
 da and d(alpha) the accelerations that the linearised mechanism gives; theta is the turn in body
-axes. The quaternion of a first-order method (form 0) is a row of four numbers, q + dq with
-dq = q (sigma, theta/2), so that with r_q = q (rho_0, rho'/2)
+axes, dq = q (0, theta/2), r_q = q (., rho/2). A first-order method (form 0) linearises q' = q (0,
+w)/2, so that B = c1 + [w]x/2, r_a = c1 r_x + r_v and r_alpha = c1 rho + r_w. A second-order method
+(form 1) turns by the exponential, B = c1 (1 + h [w]x/2), and gives r_a and r_alpha itself.
 
-    B = c1 + [w]x/2 + w w'/(4 c1),   rho = rho' + rho_0 w/c1,   sigma = (rho_0 - theta.w/4)/c1,
+Displacements xi keep to joints and equations: what a residual asks for across them (M-orthogonal)
+is left to the projection of the states, which takes the part of the multipliers of a stabilised
+formulation of index 2. With K and D of forces and eta = E xi - e the change of velocities,
 
-and r_a = c1 r_x + r_v, r_alpha = c1 rho + r_w. A second-order method (form 1) turns by the
-exponential, B = c1 (1 + [h w]x/2), and gives r_a itself.
-
-xi = guess + zeta: the guess is what the residuals ask for where no force changes, c2 dx = r_a. It
-need not fit the joints, whose accelerations alone f keeps; zeta does, and follows from what
-the guess does to the forces. With K and D, A = M(c2) - K - D E, eta = E xi - e the rates.
+    (M(c2) - K - D E) xi = M r_a - D e + what joints and equations exert.
 """
 
 from __future__ import annotations
@@ -29,11 +27,9 @@ from mbsim.dynamics.blocks import (
     STALE,
     eliminate,
     factor_border,
-    factor_small,
     find_order,
     solve_bodies,
     solve_border,
-    solve_small,
 )
 from mbsim.dynamics.equations import active_count
 from mbsim.system.arrays import BODY_SIZE
@@ -44,15 +40,13 @@ SINGULAR = 12
 
 @jitable
 def fill_turns(T, M, h):
-    """Fill B of every body and its inverse."""
+    """Fill B of every body."""
     L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
     for b in range(len(L.w)):
-        w, B, inverse = L.w[b], M.B[b], M.work[3]
+        w, B = L.w[b], M.B[b]
         for i in range(3):
             for j in range(3):
                 B[i, j] = c1 if i == j else 0.0
-                if form == 0.0:
-                    B[i, j] += w[i] * w[j] / (4.0 * c1)
         half = 0.5 if form == 0.0 else 0.5 * h * c1
         B[0, 1] -= half * w[2]
         B[0, 2] += half * w[1]
@@ -60,17 +54,6 @@ def fill_turns(T, M, h):
         B[1, 2] -= half * w[0]
         B[2, 0] -= half * w[1]
         B[2, 1] += half * w[0]
-        for i in range(3):
-            for j in range(3):
-                inverse[i, j] = B[i, j]
-        factor_small(inverse, M.swap[b], 3)
-        for j in range(3):
-            x = M.work[2, 0]
-            for i in range(3):
-                x[i] = 1.0 if i == j else 0.0
-            solve_small(inverse, M.swap[b], 3, x)
-            for i in range(3):
-                M.B_inverse[b, i, j] = x[i]
 
 
 @jitable
@@ -253,86 +236,56 @@ def factor_rest(scene, T, M):
 
 
 @jitable
-def inner_turn(q, r):
-    """Return conj(q) r, scalar first: r in the tangent space of q (which is of unit length)."""
+def turn_residual(L, b, r):
+    """Return rho of body b: twice the vector part of conj(q) r_q, q being of unit length."""
+    q, at = L.q[b], BODY_SIZE * b + 3
+    s0, s1, s2, s3 = r[at], r[at + 1], r[at + 2], r[at + 3]
     return (
-        q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3],
-        q[0] * r[1] - q[1] * r[0] - q[2] * r[3] + q[3] * r[2],
-        q[0] * r[2] + q[1] * r[3] - q[2] * r[0] - q[3] * r[1],
-        q[0] * r[3] - q[1] * r[2] + q[2] * r[1] - q[3] * r[0],
+        2.0 * (q[0] * s1 - q[1] * s0 - q[2] * s3 + q[3] * s2),
+        2.0 * (q[0] * s2 + q[1] * s3 - q[2] * s0 - q[3] * s1),
+        2.0 * (q[0] * s3 - q[1] * s2 + q[2] * s1 - q[3] * s0),
     )
 
 
 @jitable
-def turn_residual(L, M, b, r):
-    """Return rho_0 and rho of body b."""
-    at = BODY_SIZE * b + 3
-    s = inner_turn(L.q[b], (r[at], r[at + 1], r[at + 2], r[at + 3]))
-    w, c1 = L.w[b], M.c[0, 0]
-    more = s[0] / c1
-    rho = (2.0 * s[1] + more * w[0], 2.0 * s[2] + more * w[1], 2.0 * s[3] + more * w[2])
-    return s[0], rho
-
-
-@jitable
-def fill_guess(L, M, b, r):
-    """Fill what the residuals of body b ask for where no force changes, about O, and its rate."""
-    at, c1, c2, form = BODY_SIZE * b, M.c[0, 0], M.c[0, 1], M.c[0, 3].real
-    R, inverse, arm, spin = L.R[b], M.B_inverse[b], L.r[b], L.spin[b]
-    _, rho = turn_residual(L, M, b, r)
-    first = c1 if form == 0.0 else 0.0 * c1
+def ask_body(scene, L, M, b, r):
+    """Fill g of body b with what its residuals ask of inertia, and its rate with -e."""
+    at, m, form = BODY_SIZE * b, scene.bodies.mass[b], M.c[0, 3].real
+    R, arm = L.R[b], vector(L.r[b])
+    first = M.c[0, 0] if form == 0.0 else 0.0 * M.c[0, 0]
+    rho = turn_residual(L, b, r)
     ask = (
-        (first * rho[0] + r[at + 10]) * c1 / c2,
-        (first * rho[1] + r[at + 11]) * c1 / c2,
-        (first * rho[2] + r[at + 12]) * c1 / c2,
+        first * rho[0] + r[at + 10],
+        first * rho[1] + r[at + 11],
+        first * rho[2] + r[at + 12],
     )
-    turn = (
-        inverse[0, 0] * ask[0] + inverse[0, 1] * ask[1] + inverse[0, 2] * ask[2],
-        inverse[1, 0] * ask[0] + inverse[1, 1] * ask[1] + inverse[1, 2] * ask[2],
-        inverse[2, 0] * ask[0] + inverse[2, 1] * ask[1] + inverse[2, 2] * ask[2],
+    spun, gyro = rotate(scene.bodies.inertia[b], ask), gyration(scene, L, b, rho)
+    torque = rotate(R, (spun[0] + gyro[0], spun[1] + gyro[1], spun[2] + gyro[2]))
+    force = (
+        m * (first * r[at] + r[at + 7]),
+        m * (first * r[at + 1] + r[at + 8]),
+        m * (first * r[at + 2] + r[at + 9]),
     )
-    way = (
-        (first * r[at] + r[at + 7]) / c2,
-        (first * r[at + 1] + r[at + 8]) / c2,
-        (first * r[at + 2] + r[at + 9]) / c2,
-    )
-    theta = rotate(R, turn)
-    r_O = (arm[0], arm[1], arm[2])
-    swing = cross(theta, r_O)
-    # rates: of spin R (B turn - rho) + theta x w, of O's point v - spin x r
-    slower = (ask[0] - rho[0], ask[1] - rho[1], ask[2] - rho[2])
-    turned = rotate(R, slower)
-    around = cross(theta, (spin[0], spin[1], spin[2]))
-    faster = (turned[0] + around[0], turned[1] + around[1], turned[2] + around[2])
-    carried = cross(faster, r_O)
+    moment, slower = cross(arm, force), rotate(R, rho)
+    carried = cross(slower, arm)
     for i in range(3):
-        M.guess[b, i] = theta[i]
-        M.guess[b, 3 + i] = way[i] - swing[i]
-        M.rate[b, i] = faster[i]
-        M.rate[b, 3 + i] = c1 * way[i] - r[at + i] - carried[i]
-    # what inertia makes of it beside c2 M: on the right side
-    return slower, theta, way
+        M.g[b, i] = torque[i] + moment[i]
+        M.g[b, 3 + i] = force[i]
+        M.rate[b, i] = -slower[i]
+        M.rate[b, 3 + i] = carried[i] - r[at + i]
 
 
 @jitable
 def fill_right_side(scene, T, M, r):
-    """Fill g: what forces, spin and joints make of the guess."""
+    """Fill g: what residuals ask of inertia and of forces by velocities."""
     P, L = T.pattern, T.linear
-    nb = len(P.order)
-    for b in range(nb):
-        slower, theta, way = fill_guess(L, M, b, r)
-        gyro = rotate(L.R[b], gyration(scene, L, b, slower))
-        turned = cross(theta, vector(L.torque[b]))
-        bend = cross(way, vector(L.force[b]))
-        for i in range(3):
-            M.g[b, i] = -gyro[i] - turned[i] - bend[i]
-            M.g[b, 3 + i] = 0.0 * M.guess[b, i]
+    for b in range(len(P.order)):
+        ask_body(scene, L, M, b, r)
     for k in range(P.count[COUPLINGS]):
-        a, b = P.pair[k, 0], P.pair[k, 1]
-        K, D = L.K[k], L.D[k]
+        a, b, D = P.pair[k, 0], P.pair[k, 1], L.D[k]
         for i in range(6):
             for j in range(6):
-                M.g[a, i] += K[i, j] * M.guess[b, j] + D[i, j] * M.rate[b, j]
+                M.g[a, i] += D[i, j] * M.rate[b, j]
 
 
 @jitable
@@ -350,7 +303,7 @@ def solve_border_part(scene, T, M, r):
         x[k] = r[place] + along_row(L, M, row, 1, M.g)
         for b in range(len(P.order)):
             for i in range(6):
-                x[k] += L.row[row, b, i] * M.guess[b, i] + L.row_rate[row, b, i] * M.rate[b, i]
+                x[k] += L.row_rate[row, b, i] * M.rate[b, i]
     solve_border(M.border, M.border_swap, size, x)
     for k in range(size):
         for b in range(len(P.order)):
@@ -361,29 +314,21 @@ def solve_border_part(scene, T, M, r):
 @jitable
 def write_answer(scene, T, M, r, d):
     """Write the displacements of bodies in the layout of y."""
-    L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
+    L, c1 = T.linear, M.c[0, 0]
     for b in range(len(L.w)):
-        at, R, B, arm, q, w = BODY_SIZE * b, L.R[b], M.B[b], L.r[b], L.q[b], L.w[b]
-        theta = (
-            M.guess[b, 0] + M.g[b, 0],
-            M.guess[b, 1] + M.g[b, 1],
-            M.guess[b, 2] + M.g[b, 2],
-        )
-        swing = cross(theta, (arm[0], arm[1], arm[2]))
-        s0, rho = turn_residual(L, M, b, r)
-        turn = unrotate(R, theta)
+        at, B, q = BODY_SIZE * b, M.B[b], L.q[b]
+        theta = (M.g[b, 0], M.g[b, 1], M.g[b, 2])
+        swing, rho = cross(theta, vector(L.r[b])), turn_residual(L, b, r)
+        turn = unrotate(L.R[b], theta)
         for i in range(3):
-            d[at + i] = M.guess[b, 3 + i] + M.g[b, 3 + i] + swing[i]
+            d[at + i] = M.g[b, 3 + i] + swing[i]
             d[at + 7 + i] = c1 * d[at + i] - r[at + i]
             d[at + 10 + i] = B[i, 0] * turn[0] + B[i, 1] * turn[1] + B[i, 2] * turn[2] - rho[i]
-        sigma = 0.0 * c1
-        if form == 0.0:
-            sigma = (s0 - 0.25 * (turn[0] * w[0] + turn[1] * w[1] + turn[2] * w[2])) / c1
         e = (0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])
-        d[at + 3] = q[0] * sigma - q[1] * e[0] - q[2] * e[1] - q[3] * e[2]
-        d[at + 4] = q[1] * sigma + q[0] * e[0] + q[2] * e[2] - q[3] * e[1]
-        d[at + 5] = q[2] * sigma + q[0] * e[1] + q[3] * e[0] - q[1] * e[2]
-        d[at + 6] = q[3] * sigma + q[0] * e[2] + q[1] * e[1] - q[2] * e[0]
+        d[at + 3] = -q[1] * e[0] - q[2] * e[1] - q[3] * e[2]
+        d[at + 4] = q[0] * e[0] + q[2] * e[2] - q[3] * e[1]
+        d[at + 5] = q[0] * e[1] + q[3] * e[0] - q[1] * e[2]
+        d[at + 6] = q[0] * e[2] + q[1] * e[1] - q[2] * e[0]
 
 
 @jitable

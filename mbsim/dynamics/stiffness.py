@@ -20,7 +20,8 @@ from mbsim.dynamics.blocks import couple
 from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
 from mbsim.dynamics.expressions import run, value
 from mbsim.dynamics.kinematics import place_body, position
-from mbsim.dynamics.markers import marker_axis, marker_point
+from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
 from mbsim.system.arrays import (
     AXIS_FORCE,
@@ -363,6 +364,124 @@ def fill_unit(scene, T, y, f, force, torque, at_j):
 
 
 @jitable
+def from_origin(scene, L, y, b, p):
+    """Return point p from O of body b."""
+    return add(sub(p, position(scene, y, b)), vector(L.r[b]))
+
+
+@jitable
+def add_turn(scene, T, y, b, by, p, force, torque, sign):
+    """Add that force at p and torque on body b turn with body `by`."""
+    nb = len(scene.bodies.mass)
+    if b == nb or by == nb:
+        return
+    block, at = T.linear.K[T.pattern.place[b, by]], from_origin(scene, T.linear, y, b, p)
+    for k in range(3):
+        turned = cross(unit(k), force)
+        moment = add(cross(at, turned), cross(unit(k), torque))
+        for i in range(3):
+            block[i, k] += sign * moment[i]
+            block[3 + i, k] += sign * turned[i]
+
+
+@jitable
+def add_lever(scene, T, y, b, by, p, force, sign):
+    """Add that the point p of a force on body b moves with body `by`."""
+    nb = len(scene.bodies.mass)
+    if b == nb or by == nb:
+        return
+    block, at = T.linear.K[T.pattern.place[b, by]], from_origin(scene, T.linear, y, by, p)
+    for k in range(3):
+        moment, slide = cross(cross(unit(k), at), force), cross(unit(k), force)
+        for i in range(3):
+            block[i, k] += sign * moment[i]
+            block[i, 3 + k] += sign * slide[i]
+
+
+@jitable
+def add_geometry(scene, T, y, f, axes, at_j):
+    """Add that force f turns with a marker's body (none if negative), and its points with theirs.
+
+    `at_j`: what acts on J does so at J's origin, not at I's.
+    """
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    bi, bj = sides_of(scene, f)
+    row = scene.work.applied[f]
+    force, torque = vector(row), (row[3], row[4], row[5])
+    p = marker_point(scene, y, i)
+    q, follows = (marker_point(scene, y, j), bj) if at_j == 1 else (p, bi)
+    add_lever(scene, T, y, bi, bi, p, force, 1.0)
+    add_lever(scene, T, y, bj, follows, q, force, -1.0)
+    if axes >= 0:
+        by = scene.markers.body[axes]
+        add_turn(scene, T, y, bi, by, p, force, torque, 1.0)
+        add_turn(scene, T, y, bj, by, q, force, torque, -1.0)
+
+
+@jitable
+def add_rate_by_pose(scene, T, f, u, by_rate, n):
+    """Add how the rate n . (v_I - v_J) of a damper along n changes as the arms of points turn.
+
+    theta . (arm x (n x w)); what the turning of n adds is left to its own.
+    """
+    P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    markers, both = (scene.applied.i[f], scene.applied.j[f]), sides_of(scene, f)
+    for side in range(2):
+        b = both[side]
+        if b == nb:
+            continue
+        w = vector(scene.work.w[b])
+        rise = cross(marker_arm(scene, markers[side]), cross(n, w))
+        for k in range(3):
+            L.rise[k] = rise[k]
+            L.rise[3 + k] = 0.0
+        add_one_sided(P, L, nb, both, b, by_rate if side == 0 else -by_rate, u)
+
+
+@jitable
+def add_one_sided(P, L, nb, both, b, factor, u):
+    """Add factor times the row in `L.rise`, of displacements of body b, to both bodies."""
+    for other in range(2):
+        a = both[other]
+        if a < nb:
+            add_product(L.K[P.place[a, b]], factor if other == 0 else -factor, u[other], L.rise)
+
+
+@jitable
+def add_turning_rate(scene, T, y, f, by_rate, n, d, u):
+    """Add how the rate changes as the line turns: (v across)/d . (dP_I - dP_J)."""
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    bi, bj = sides_of(scene, f)
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    across = scale(1.0 / d, sub(v, scale(dot(v, n), n)))
+    rows = T.linear.basis[:, 1]
+    none = (0.0, 0.0, 0.0)
+    lever(scene, T.linear, y, bi, marker_point(scene, y, i), across, none, rows[0])
+    lever(scene, T.linear, y, bj, marker_point(scene, y, j), across, none, rows[1])
+    nb = len(scene.bodies.mass)
+    add_two_sided(T.pattern, T.linear.K, nb, bi, bj, by_rate, u, rows)
+
+
+@jitable
+def add_axis_rate(scene, T, f, by_rate, n, u, turns):
+    """Add how the rate along J's axis n changes as that turns: theta_J . (n x v)."""
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    b, nb, both = scene.markers.body[j], len(scene.bodies.mass), sides_of(scene, f)
+    if b == nb:
+        return
+    if turns:
+        w = scene.work.w
+        v = sub(vector(w[both[0]]), vector(w[both[1]]))
+    else:
+        v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    rise = cross(n, v)
+    for k in range(3):
+        T.linear.rise[k] = rise[k]
+        T.linear.rise[3 + k] = 0.0
+    add_one_sided(T.pattern, T.linear, nb, both, b, by_rate, u)
+
+
+@jitable
 def add_bushing_slopes(scene, T, y, f):
     """Add a bushing: stiffness and damping along and about J's axes, as for small angles."""
     P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
@@ -374,6 +493,7 @@ def add_bushing_slopes(scene, T, y, f):
         par = scene.applied.par[f]
         add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
         add_two_sided(P, L.D, nb, bi, bj, -par[6 + k], u, u)
+    add_geometry(scene, T, y, f, scene.applied.j[f], 0)
 
 
 @jitable
@@ -387,6 +507,7 @@ def add_vector_slopes(scene, T, t, y, f):
         e = marker_axis(scene, scene.applied.axes[f], k % 3)
         u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
         add_program_slopes(scene, T, t, y, f, program, u)
+    add_geometry(scene, T, y, f, scene.applied.axes[f], 0)
 
 
 @jitable
@@ -424,9 +545,17 @@ def add_scalar_slopes(scene, T, t, y, f):
         by_x, by_rate = -scene.applied.par[f, 0], -scene.applied.par[f, 1]
     if by_x != 0.0:
         add_two_sided(P, L.K, nb, bi, bj, by_x, u, u)
+    line = kind == LINE_FORCE
     if by_rate != 0.0:
         add_two_sided(P, L.D, nb, bi, bj, by_rate, u, u)
-    if kind == LINE_FORCE and x > 0.0:
+        if not turns:
+            add_rate_by_pose(scene, T, f, u, by_rate, n)
+        if not line:
+            add_axis_rate(scene, T, f, by_rate, n, u, turns)
+        elif x > 0.0:
+            add_turning_rate(scene, T, y, f, by_rate, n, x, u)
+    add_geometry(scene, T, y, f, -1 if line else scene.applied.j[f], 1)
+    if line and x > 0.0:
         # the line turns: F/d across it
         tension = dot(vector(scene.work.applied[f]), n) / x
         a = cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))

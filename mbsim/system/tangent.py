@@ -67,13 +67,11 @@ class Real(NamedTuple):
     pivot: F3  # (nb, 6, 6)
     swap: I2  # (nb, 6)
     B: F3  # (nb, 3, 3) d(spin)/d(turn), body axes
-    B_inverse: F3  # (nb, 3, 3)
     answer: F3  # (border, nb, 6)
     border: F2  # (border, border)
     border_swap: I1  # (border,)
     g: F2  # (nb + 1, 6) right side, then solution; scratch
-    guess: F2  # (nb, 6) displacement that residuals alone ask for
-    rate: F2  # (nb, 6) its rate
+    rate: F2  # (nb, 6) change of velocities that residuals alone ask for
     extra: F2  # (2, border) right side and solution
     work: F3  # (4, 6, 6) scratch
     c: F2  # (1, 4) coefficients c1, c2, c3, form
@@ -87,12 +85,10 @@ class Pair(NamedTuple):
     pivot: C3
     swap: I2
     B: C3
-    B_inverse: C3
     answer: C3
     border: C2
     border_swap: I1
     g: C2
-    guess: C2
     rate: C2
     extra: C2
     work: C3
@@ -184,12 +180,10 @@ def _factor_arrays(nb: int, m: int, n: int, blocks: int, kind: type) -> tuple[np
         np.zeros((nb, 6, 6), dtype=kind),
         np.zeros((nb, 6), dtype=np.int64),
         np.zeros((nb, 3, 3), dtype=kind),
-        np.zeros((nb, 3, 3), dtype=kind),
         np.zeros((m, nb, 6), dtype=kind),
         np.zeros((m, m), dtype=kind),
         np.zeros(m, dtype=np.int64),
         np.zeros((nb + 1, 6), dtype=kind),
-        np.zeros((nb, 6), dtype=kind),
         np.zeros((nb, 6), dtype=kind),
         np.zeros((2, m), dtype=kind),
         np.zeros((4, 6, 6), dtype=kind),
