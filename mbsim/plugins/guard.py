@@ -226,7 +226,7 @@ def state_callback(
     function : callable
         Of (id, time, par, npar, dflag, iflag); it returns a number, or `count` of them.
     element : (str, int)
-        Its statement and id.
+        How messages name it, and its id.
     place : (str, str)
         Name of the function, and its file.
     par : sequence of float
@@ -244,7 +244,7 @@ def state_callback(
     from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
 
     results_at = _Views(count)
-    title, id = f"{element[0]}[{element[1]}]", element[1]
+    title, id = element
     name, source = place
     values, npar = [float(value) for value in par], len(par)
     started = False

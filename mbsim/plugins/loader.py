@@ -217,10 +217,11 @@ def find_script(
 ) -> Script:
     """Return the script that defines function `name` of an element; see `find_subroutine`.
 
-    `element` is how messages name it, `prefix` (cff, usrsub) what its attributes begin with.
+    `element` is how messages name it, `prefix` (cff, usrsub) what its attributes begin with,
+    or ROUTINE of an Adams deck.
     """
     scripts = {} if scripts is None else scripts
-    attribute = f"{prefix}_fnc_name"
+    attribute = prefix if prefix == "ROUTINE" else f"{prefix}_fnc_name"
     if user.interpreter and user.interpreter.upper() != "PYTHON":
         raise ModelError(
             f'{element}: interpreter="{user.interpreter}" is not built yet, use Python'
@@ -238,6 +239,7 @@ def find_script(
                 "name a Python twin with --plugin FILE.py"
             )
         said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
+        said = f"no FILE.py::{name}" if prefix == "ROUTINE" else said
         raise ModelError(
             f'{element}: {attribute}="{name}" names no file ({said}); '
             "name one with --plugin FILE.py"

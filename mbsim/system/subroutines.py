@@ -66,7 +66,7 @@ def load(
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Return the subroutines of forces and variables by (statement, id), in order of their rows."""
     return {
-        (statement, id): load_subroutine(user, (xml, id), count, plugins, scripts)
+        (statement, id): load_subroutine(user, (xml, id), count, plugins, scripts, model.file)
         for statement, xml, id, user, count in wanted(model)
     }
 
