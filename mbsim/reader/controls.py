@@ -93,7 +93,10 @@ def _build_sensor(entry: Entry) -> None:
     add_sensor(entry, sensor)
 
 
-_NO_IDS = "what it refers to is not documented; give the expression itself as evaluate"
+_NO_IDS = (
+    "names a Sensor_Evaluate, whose value several sensors may set; that is not built: give the "
+    "expression itself as evaluate, SENVAL(id) is then of this sensor"
+)
 
 SENSOR_EVENT = Statement(
     "Sensor_Event",
