@@ -6,7 +6,6 @@ They stay interpreted: what they ask by `py_sysfnc` is looked up in Python.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -72,8 +71,7 @@ def load_subroutine(
     function = user_function(script, user.fnc_name, title, ARGUMENTS)
     place = user.fnc_name, str(script.path)
     address, keep = guard.state_callback(function, (title, element[1]), place, user.par, count)
-    looks = script.text is None or bool(re.search("py_sysfnc|py_sysary", script.text))
-    return UserSubroutine(address, count, script.path, user.fnc_name, element, looks, keep)
+    return UserSubroutine(address, count, script.path, user.fnc_name, element, script.looks, keep)
 
 
 def begin_run(log: Callable[[str], None] | None) -> None:

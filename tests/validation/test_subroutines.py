@@ -359,20 +359,68 @@ def test_a_resumed_run_goes_on_as_if_it_had_not_stopped(tmp_path):
         np.testing.assert_allclose(resumed[name], whole[name], rtol=1e-6)
 
 
-def test_a_friction_subroutine_is_told_once_that_it_cannot_look(tmp_path):
+SLIDER = """<Post_Graphic id="100" type="Plane" rm_id="10"/>
+  <Post_Graphic id="200" type="Sphere" center_marker_id="40" radius="0.5"/>
+  <Body_Rigid id="4" cg_id="40" mass="1" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"
+    v_ic_x="2" v_ic_x_flag="TRUE"/>
+  <Reference_Marker id="40" body_id="4" pos_z="0.5" pos_x="0.3"/>
+  <Reference_Variable id="8" expr="3*DX(40)+TIME"/>
+  <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+   j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="200"
+   dmax="1e-3" cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="sub.py"
+   cff_param_string="USER(40)"/>"""
+CFFSUB = "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+
+
+def test_a_friction_subroutine_looks_at_the_state_of_its_call(tmp_path):
+    # a sphere on a plane: the point on the plane is below the centre, half the depth under
+    # the point at which the slip is taken
     script = (
-        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
-        '    value, wrong = py_sysfnc("DX", [20])\n'
-        "    return [0.0, 0.0, 0.0] if wrong else None\n"
+        CFFSUB
+        + """    p, no_p = py_sysary("TDISP", par)
+    v, no_v = py_sysary("VEL", par)
+    of_variable, no_variable = py_sysfnc("VARVAL", [8])
+    py_errmes(no_p or no_v or no_variable, "asked", id, "STOP")
+    slip = v[0] + v[4] * (0.5 * (p[2] - 0.5) - p[2])
+    known = [(p[0], locj[0]), (abs(slip), hypot(xdot[0], xdot[1])), (of_variable, 3*p[0] + time)]
+    for seen, given in known:
+        if abs(seen - given) > 1e-12:
+            raise ValueError((time, known))
+    return [-0.1 * nforce * tanh(20.0 * xdot[0]), -0.1 * nforce * tanh(20.0 * xdot[1]), 0.0]
+"""
     )
-    elements = """<Post_Graphic id="100" type="Plane" rm_id="10"/>
-      <Post_Graphic id="200" type="Sphere" center_marker_id="40" radius="0.5"/>
-      <Body_Rigid id="4" cg_id="40" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
-      <Reference_Marker id="40" body_id="4" pos_z="0.5"/>
-      <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
-       j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="200"
-       dmax="1e-3" cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="sub.py"
-       cff_param_string="USER()"/>"""
-    run(tmp_path, elements, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
+    results = run(tmp_path, SLIDER, script, end_time=0.5)
+    assert results.stats["python_calls"] > 100
+    position = results["bodies/4/position"]
+    assert 0.5 < position[-1, 0] - position[0, 0] < 0.99  # friction has slowed it down
+
+
+def test_what_a_variable_raises_for_a_friction_subroutine_ends_the_run(tmp_path):
+    script = (
+        CFFSUB
+        + "    return [py_sysfnc('VARVAL', [7])[0], 0.0, 0.0]\n"
+        + "def VARSUB(id, time, par, npar, dflag, iflag):\n"
+        + "    return 0.0 if time < 0.2 else [][3]\n"
+    )
+    variable = f'<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>'
+    with pytest.raises(PluginError, match=r"Reference_Variable\[7\]: VARSUB failed at time 0.2.*"):
+        run(tmp_path, SLIDER + variable, script)
+
+
+def test_a_subroutine_is_told_once_that_forces_are_not_known(tmp_path):
+    script = CFFSUB + (
+        "    wrong = [py_sysfnc(name, [40])[1] for name in ('FX', 'ACCX', 'NONE')]\n"
+        "    return [0.0, 0.0, 0.0] if wrong == [1, 1, 1] else None\n"
+    )
+    run(tmp_path, SLIDER, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
+    log = next((tmp_path / "out").glob("*.log")).read_text()
+    assert log.count("py_sysfnc FX: forces follow from what subroutines give") == 1
+    assert log.count("py_sysfnc ACCX: accelerations follow") == 1
+
+
+def test_a_call_while_the_script_is_loaded_is_told_that_there_is_no_state(tmp_path):
+    script, element = scalar("    return 0.0\n")
+    script = 'asked = py_sysfnc("DX", [20])\nassert asked == [0.0, 1]\n' + script
+    run(tmp_path, element, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
     log = next((tmp_path / "out").glob("*.log")).read_text()
     assert log.count("py_sysfnc is called where there is no state to look at") == 1
