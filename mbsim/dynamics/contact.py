@@ -140,6 +140,9 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     given[12] = 0.0
     scene.log.counters[FRICTION_CALLS] += 1
     scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
+    if contacts.interpreted[c] == 1:
+        for k in range(len(scene.users.seen)):
+            scene.users.seen[k] = y[k]
     return call_int(
         contacts.friction_law[c],
         (contacts.id[c], given, contacts.friction_par[c], work.law_out),

@@ -149,29 +149,34 @@ def add_touching(scene, y, s, out):
 
 
 @jitable
-def add_bushing(scene, f):
+def add_bushing(scene, y, f):
     """Add the largest stiffness and damping of bushing f, along every axis and about it.
 
-    A turn moves I's origin along by its arm, and by a stretched spring's moment too: that
-    is within what the arm of the largest stiffness gives twice.
+    Both bodies are pushed at I's origin P, so arms go there. A turn of body b moves P by its
+    arm, and turns the axes along which a force that the bushing already bears acts: arm times
+    force, as much again where J's axes turn with b.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
     i, j, par = applied.i[f], applied.j[f], applied.par[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
     k, c = max(par[0], max(par[1], par[2])), max(par[6], max(par[7], par[8]))
     turn_k, turn_c = max(par[3], max(par[4], par[5])), max(par[9], max(par[10], par[11]))
+    at = marker_point(scene, y, i)
+    stretch = norm(sub(at, marker_point(scene, y, j)))
+    force = k * stretch + norm((par[12], par[13], par[14]))
     for side in range(2):
         m = i if side == 0 else j
         b = markers.body[m]
         if b == ground:
             continue
-        block, inverse, arm = scene.work.block[b], scene.bodies.inverse[b], marker_arm(scene, m)
-        square = 2.0 * dot(arm, arm)
+        block, inverse = scene.work.block[b], scene.bodies.inverse[b]
+        arm = sub(at, position(scene, y, b))
+        square, bent = dot(arm, arm), 2.0 * norm(arm) * force
         most = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
         for r in range(3):
             block[4 * r] += both * k
             block[10 + 4 * r] += both * c
-        block[9] += both * (k * square + turn_k) * most
+        block[9] += both * (k * square + turn_k + bent) * most
         block[19] += both * (c * square + turn_c) * most
 
 
@@ -184,7 +189,7 @@ def add_spring(scene, y, f):
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
     if applied.kind[f] == BUSHING:
-        add_bushing(scene, f)
+        add_bushing(scene, y, f)
         return
     i, j, par = applied.i[f], applied.j[f], applied.par[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0

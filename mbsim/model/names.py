@@ -19,6 +19,8 @@ ADAMS = {
     "Reference_Spline": "SPLINE",
     "Reference_Array": "ARRAY",
     "Post_Request": "REQUEST",
+    "Control_Diff": "DIFF",
+    "Sensor_Event": "SENSOR",
 }
 
 

@@ -175,10 +175,12 @@ def callback(
     inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
 
     def guarded(element: int, inputs: int, par: int, out: int) -> int:
-        time = 0.0
+        time, outer = 0.0, host.state
         try:
             given = inputs_at[inputs].tolist()
             host.time = time = given[0]
+            if host.seen is not None:
+                host.state = (host.seen[0], time, host.seen[1])
             result = function(
                 element,
                 time,
@@ -204,9 +206,13 @@ def callback(
                 force[0], force[1], force[4] = three_numbers(result)
             force[2] = force[3] = 0.0
             return 0
+        except PassedOn:
+            return RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, f"Force_Contact[{element}]", time, name, source)
             return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+        finally:
+            host.state = outer
 
     entry = C_FUNCTION(guarded)
     return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
@@ -226,7 +232,7 @@ def state_callback(
     function : callable
         Of (id, time, par, npar, dflag, iflag); it returns a number, or `count` of them.
     element : (str, int)
-        Its statement and id.
+        How messages name it, and its id.
     place : (str, str)
         Name of the function, and its file.
     par : sequence of float
@@ -244,7 +250,7 @@ def state_callback(
     from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
 
     results_at = _Views(count)
-    title, id = f"{element[0]}[{element[1]}]", element[1]
+    title, id = element
     name, source = place
     values, npar = [float(value) for value in par], len(par)
     started = False

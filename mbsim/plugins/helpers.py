@@ -34,6 +34,8 @@ class Host:
         self.log: Callable[[str], None] = _to_stderr
         #: While a subroutine that may look at it runs: scene, time, and where y lies.
         self.state: tuple[int, float, int] | None = None
+        #: Scene and y of friction subroutines that may look, where there are some.
+        self.seen: tuple[int, int] | None = None
         #: What looks at it: (name, ids) -> [value, errflg] and -> [values, errflg].
         self.sysfnc: Look = _nothing
         self.sysary: Look = _nothing
@@ -42,6 +44,7 @@ class Host:
     def forget(self) -> None:
         """Look at nothing, before a new run."""
         self.state, self.sysfnc, self.sysary = None, _nothing, _nothing
+        self.seen = None
         self.warned.clear()
 
 
@@ -87,7 +90,7 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
     """Return [value, errflg] of a function of the language, DX for example, at the trial state.
 
     errflg is 1 and the value 0 where the function or a marker is not known, forces and
-    accelerations among them, and outside subroutines of forces and variables.
+    accelerations among them, and outside subroutines.
     """
     if host.state is None:
         _no_state("py_sysfnc")

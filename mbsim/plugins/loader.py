@@ -8,6 +8,7 @@ import inspect
 import itertools
 import linecache
 import marshal
+import re
 import sys
 import traceback
 import types
@@ -37,6 +38,11 @@ class Script:
     path: Path
     text: str | None
     values: dict[str, Any]
+
+    @property
+    def looks(self) -> bool:
+        """Return whether it may ask for functions of the language; of a .pyc nobody knows."""
+        return self.text is None or bool(re.search("py_sysfnc|py_sysary", self.text))
 
 
 Scripts = dict[Path, Script]
@@ -68,6 +74,8 @@ class UserFriction:
         The Force_Contact.
     function : callable
         The user's own function object.
+    looks : bool
+        Whether it is interpreted and its script may ask for the state by `py_sysfnc`.
     """
 
     address: int
@@ -80,6 +88,7 @@ class UserFriction:
     element: int
     function: Callable[..., Any] = field(repr=False)
     keep: object = field(default=None, repr=False)
+    looks: bool = False
 
     def call(
         self, time: float, par: Any, loci: Any, locj: Any, x: Any, xdot: Any, nforce: float
@@ -149,6 +158,7 @@ def load_friction(
             element=contact.id,
             function=function,
             keep=keep,
+            looks=bool(reason) and script.looks,
         )
 
     address, reason = 0, "--interpret-plugins"
@@ -217,10 +227,11 @@ def find_script(
 ) -> Script:
     """Return the script that defines function `name` of an element; see `find_subroutine`.
 
-    `element` is how messages name it, `prefix` (cff, usrsub) what its attributes begin with.
+    `element` is how messages name it, `prefix` (cff, usrsub) what its attributes begin with,
+    or ROUTINE of an Adams deck.
     """
     scripts = {} if scripts is None else scripts
-    attribute = f"{prefix}_fnc_name"
+    attribute = prefix if prefix == "ROUTINE" else f"{prefix}_fnc_name"
     if user.interpreter and user.interpreter.upper() != "PYTHON":
         raise ModelError(
             f'{element}: interpreter="{user.interpreter}" is not built yet, use Python'
@@ -238,6 +249,7 @@ def find_script(
                 "name a Python twin with --plugin FILE.py"
             )
         said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
+        said = f"no FILE.py::{name}" if prefix == "ROUTINE" else said
         raise ModelError(
             f'{element}: {attribute}="{name}" names no file ({said}); '
             "name one with --plugin FILE.py"

@@ -6,12 +6,12 @@ They stay interpreted: what they ask by `py_sysfnc` is looked up in Python.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from mbsim.model.elements import Subroutine
+from mbsim.model.names import element_name, is_adams
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 from mbsim.plugins.loader import Scripts, find_script, user_function
@@ -54,21 +54,24 @@ def load_subroutine(
     count: int,
     plugin_files: Sequence[Path],
     scripts: Scripts,
+    deck: str = "",
 ) -> UserSubroutine:
     """Return the subroutine of an element (its statement and id) that gives `count` numbers.
+
+    Messages name the element as the file `deck` does.
 
     Raises
     ------
     ModelError
         If the file or the function cannot be used; the message says what to change.
     """
-    title = f"{element[0]}[{element[1]}]"
-    script = find_script(user, user.fnc_name, title, "usrsub", plugin_files, scripts)
+    title = element_name(deck, *element)
+    prefix = "ROUTINE" if is_adams(deck) else "usrsub"
+    script = find_script(user, user.fnc_name, title, prefix, plugin_files, scripts)
     function = user_function(script, user.fnc_name, title, ARGUMENTS)
     place = user.fnc_name, str(script.path)
-    address, keep = guard.state_callback(function, element, place, user.par, count)
-    looks = script.text is None or bool(re.search("py_sysfnc|py_sysary", script.text))
-    return UserSubroutine(address, count, script.path, user.fnc_name, element, looks, keep)
+    address, keep = guard.state_callback(function, (title, element[1]), place, user.par, count)
+    return UserSubroutine(address, count, script.path, user.fnc_name, element, script.looks, keep)
 
 
 def begin_run(log: Callable[[str], None] | None) -> None:

@@ -24,11 +24,10 @@ from mbsim.reader.kinds import (
     POSITIVE,
     REAL,
     REALS,
-    TEXT,
     WORDS,
     keyword,
 )
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _NOT_BUILT = "is documented but not built yet"
 #: What only some joints have; DISTANCE may have a length, the others must have theirs.
@@ -188,12 +187,11 @@ def complete_motions(draft: Draft) -> None:
 
 _JOINT_TYPES = spellings(**{name: "" for name in JOINTS})
 _MARKERS = {"i_marker_id": Spec(ID, required=True), "j_marker_id": Spec(ID, required=True)}
-_NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
 
 CONSTRAINT_JOINT = Statement(
     "Constraint_Joint",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(keyword(_JOINT_TYPES), required=True),
         **_MARKERS,
         "pitch": Spec(REAL),
@@ -205,13 +203,13 @@ CONSTRAINT_JOINT = Statement(
 )
 CONSTRAINT_JPRIM = Statement(
     "Constraint_Jprim",
-    {**_NAMED, "type": Spec(keyword(PRIMITIVES), required=True), **_MARKERS},
+    {**NAMED, "type": Spec(keyword(PRIMITIVES), required=True), **_MARKERS},
     _build_primitive,
 )
 CONSTRAINT_COUPLER = Statement(
     "Constraint_Coupler",
     {
-        **_NAMED,
+        **NAMED,
         "joint_ids": Spec(IDS, required=True),
         "motion_types": Spec(WORDS, required=True),
         "scales": Spec(REALS, required=True),
@@ -221,7 +219,7 @@ CONSTRAINT_COUPLER = Statement(
 CONSTRAINT_GENERAL = Statement(
     "Constraint_General",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
         "expr": Spec(EXPRESSION, required=True),
         **USERSUB_REFUSED,
@@ -239,7 +237,7 @@ _GIVEN_MOTION: dict[str, Spec] = {
 MOTION_JOINT = Statement(
     "Motion_Joint",
     {
-        **_NAMED,
+        **NAMED,
         "joint_id": Spec(ID, required=True),
         "motion_type": Spec(keyword(DIRECTIONS)),
         **_GIVEN_MOTION,
@@ -249,7 +247,7 @@ MOTION_JOINT = Statement(
 MOTION_MARKER = Statement(
     "Motion_Marker",
     {
-        **_NAMED,
+        **NAMED,
         **_MARKERS,
         "direction": Spec(keyword(MARKER_DIRECTIONS), required=True),
         **_GIVEN_MOTION,

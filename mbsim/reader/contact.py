@@ -25,7 +25,7 @@ from mbsim.reader.kinds import (
     keyword,
 )
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
@@ -122,9 +122,7 @@ _POST = "contact post-processing subroutines are not called"
 FORCE_CONTACT = Statement(
     "Force_Contact",
     {
-        "id": Spec(ID, required=True),
-        "label": Spec(TEXT),
-        "full_label": Spec(TEXT),
+        **NAMED,
         "num_i_graphics": Spec(COUNT),
         "i_graphics_id": Spec(IDS, required=True),
         "num_j_graphics": Spec(COUNT),

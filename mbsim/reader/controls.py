@@ -8,14 +8,13 @@ from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB
 from mbsim.reader.kinds import (
     EXPRESSION,
     FLAG,
-    ID,
     NOT_NEGATIVE,
     POSITIVE,
     REAL,
     TEXT,
     keyword,
 )
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _IMPLICIT = "an implicit equation 0 = f(z, z') is not built; solve it for z' and leave it out"
 _NO_SLOPE = "z' at the start is what expr gives; only an implicit equation has it given"
@@ -39,9 +38,7 @@ def _build_differential(entry: Entry) -> None:
 CONTROL_DIFF = Statement(
     "Control_Diff",
     {
-        "id": Spec(ID, required=True),
-        "label": Spec(TEXT),
-        "full_label": Spec(TEXT),
+        **NAMED,
         "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
         "expr": Spec(EXPRESSION, required=True),
         "ic": Spec(REAL),
@@ -93,14 +90,15 @@ def _build_sensor(entry: Entry) -> None:
     add_sensor(entry, sensor)
 
 
-_NO_IDS = "what it refers to is not documented; give the expression itself as evaluate"
+_NO_IDS = (
+    "names a Sensor_Evaluate, whose value several sensors may set; that is not built: give the "
+    "expression itself as evaluate, SENVAL(id) is then of this sensor"
+)
 
 SENSOR_EVENT = Statement(
     "Sensor_Event",
     {
-        "id": Spec(ID, required=True),
-        "label": Spec(TEXT),
-        "full_label": Spec(TEXT),
+        **NAMED,
         "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
         "expr": Spec(EXPRESSION, required=True),
         "compare": Spec(keyword(_COMPARE)),

@@ -7,8 +7,8 @@ from typing import Any
 from mbsim.model import elements as el
 from mbsim.model.mechanism_checks import COMPONENTS
 from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES, VECTOR_TYPES
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, TEXT, keyword
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, keyword
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
 
 
@@ -155,12 +155,11 @@ def _build_variable(entry: Entry) -> None:
 
 
 _MARKERS = {"i_marker_id": Spec(ID, required=True), "j_marker_id": Spec(ID, required=True)}
-_NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
 
 FORCE_SPRINGDAMPER = Statement(
     "Force_SpringDamper",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(keyword(SPRING_TYPES), required=True),
         **_MARKERS,
         "stiffness": Spec(NOT_NEGATIVE),
@@ -173,7 +172,7 @@ FORCE_SPRINGDAMPER = Statement(
 FORCE_SCALAR_TWOBODY = Statement(
     "Force_Scalar_TwoBody",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(keyword(SCALAR_TYPES), required=True),
         **_MARKERS,
         "expr": Spec(EXPRESSION),
@@ -185,7 +184,7 @@ FORCE_SCALAR_TWOBODY = Statement(
 FORCE_BUSHING = Statement(
     "Force_Bushing",
     {
-        **_NAMED,
+        **NAMED,
         **_MARKERS,
         **{f"{prefix}{axis}": Spec(NOT_NEGATIVE) for prefix in "kc" for axis in _AXES},
         **{f"preload_{axis}": Spec(REAL) for axis in _AXES},
@@ -201,7 +200,7 @@ _VECTOR: dict[str, Spec] = {
 FORCE_VECTOR_TWOBODY = Statement(
     "Force_Vector_TwoBody",
     {
-        **_NAMED,
+        **NAMED,
         "i_marker_id": Spec(ID, required=True),
         "j_floating_marker_id": Spec(ID, required=True),
         **_VECTOR,
@@ -210,13 +209,13 @@ FORCE_VECTOR_TWOBODY = Statement(
 )
 FORCE_VECTOR_ONEBODY = Statement(
     "Force_Vector_OneBody",
-    {**_NAMED, "i_marker_id": Spec(ID, required=True), **_VECTOR},
+    {**NAMED, "i_marker_id": Spec(ID, required=True), **_VECTOR},
     _build_body_force,
 )
 REFERENCE_VARIABLE = Statement(
     "Reference_Variable",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(BY_EITHER),
         "expr": Spec(EXPRESSION),
         **USERSUB,

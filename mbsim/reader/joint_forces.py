@@ -5,9 +5,9 @@ from __future__ import annotations
 from mbsim.model import elements as el
 from mbsim.reader.contact import CFF_ALL, CFF_USES, FORCE_CONTACT, check_coulomb
 from mbsim.reader.keywords import CFF_OF_JOINTS, CNF_OF_LIMITS, DIRECTIONS
-from mbsim.reader.kinds import ID, NOT_NEGATIVE, POSITIVE, REAL, TEXT, keyword
+from mbsim.reader.kinds import ID, NOT_NEGATIVE, POSITIVE, REAL, keyword
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 #: Attributes of laws that stand here as they do in Force_Contact.
 _COULOMB = ("mu_static", "mu_dynamic", "stiction_trans_vel", "friction_trans_vel")
@@ -89,17 +89,15 @@ def _build_limit(entry: Entry) -> None:
     entry.register(entry.draft.joint_limits, limit)
 
 
-_NAMED = {
-    "id": Spec(ID, required=True),
-    "label": Spec(TEXT),
-    "full_label": Spec(TEXT),
+_ON_JOINT = {
+    **NAMED,
     "joint_id": Spec(ID, required=True),
 }
 
 FORCE_JOINTFRICTION = Statement(
     "Force_JointFriction",
     {
-        **_NAMED,
+        **_ON_JOINT,
         "cff_type": Spec(keyword(CFF_OF_JOINTS), required=True),
         **_of_contact(_COULOMB),
         "pin_radius": Spec(POSITIVE),
@@ -113,7 +111,7 @@ FORCE_JOINTFRICTION = Statement(
 FORCE_JOINTLIMIT = Statement(
     "Force_JointLimit",
     {
-        **_NAMED,
+        **_ON_JOINT,
         "motion_type": Spec(keyword(DIRECTIONS), required=True),
         "lower": Spec(REAL),
         "upper": Spec(REAL),

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from mbsim.model.elements import Source
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold, nearest
-from mbsim.reader.kinds import TEXT, BadValueError, Kind
+from mbsim.reader.kinds import ID, TEXT, BadValueError, Kind
 from mbsim.reader.parse import Attribute, Node
 
 Element = TypeVar("Element")
@@ -33,6 +33,10 @@ class Spec:
     harmless: str = ""
     alias: str = ""
     repeats: bool = False
+
+
+#: What an element with an id has in every deck.
+NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
 
 
 def _needs_no_names(node: Node) -> bool:

@@ -90,7 +90,7 @@ NOT_BUILT = (
     "Param_Simulation Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_String Save "
-    "Sensor_Proximity UserProgramControl"
+    "Sensor_Evaluate Sensor_Proximity UserProgramControl"
 ).split()
 _NOT_AFTER_STOP = (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 
 from mbsim.model import elements as el
-from mbsim.reader.kinds import FLAG, ID, REALS, TEXT, BadValueError, keyword, parse_real
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.kinds import FLAG, REALS, TEXT, BadValueError, keyword, parse_real
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 Numbers = tuple[float, ...]
 
@@ -113,12 +113,10 @@ def _build_array(entry: Entry) -> None:
     entry.register(entry.draft.arrays, array)
 
 
-_NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
-
 REFERENCE_SPLINE = Statement(
     "Reference_Spline",
     {
-        **_NAMED,
+        **NAMED,
         "x": Spec(REALS),
         "y": Spec(REALS),
         "z": Spec(REALS),
@@ -132,7 +130,7 @@ REFERENCE_SPLINE = Statement(
 REFERENCE_ARRAY = Statement(
     "Reference_Array",
     {
-        **_NAMED,
+        **NAMED,
         "type": Spec(keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"})),
         "values": Spec(REALS, required=True),
     },

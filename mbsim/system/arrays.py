@@ -254,6 +254,7 @@ class Users(NamedTuple):
     address: I1  # (nu,) of their guarded C functions
     result: F2  # (nu, most) what each returned last
     failed: I1  # (1,) code of the first that failed in this evaluation, or 0
+    seen: F1  # (ny,) y when a friction subroutine that looks at it is called; else (0,)
 
 
 class Applied(NamedTuple):

@@ -201,23 +201,22 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
-def _state_reader(
-    model: Model, programs: ProgramTable, users: dict[tuple[str, int], UserSubroutine]
-) -> StateReader | None:
+def _state_reader(model: Model, programs: ProgramTable, looks: bool) -> StateReader | None:
     """Return what serves py_sysfnc where a script has it."""
-    if not any(user.looks for user in users.values()):
+    if not looks:
         return None
     from mbsim.system.subroutines import StateReader
 
     return StateReader(model, programs)
 
 
-def _users(users: dict[tuple[str, int], UserSubroutine]) -> a.Users:
-    """Return the rows of user subroutines."""
+def _users(users: dict[tuple[str, int], UserSubroutine], seen: int) -> a.Users:
+    """Return the rows of user subroutines; `seen`: how much of y friction subroutines look at."""
     return a.Users(
         np.array([user.address for user in users.values()], dtype=np.int64),
         np.zeros((len(users), max((user.count for user in users.values()), default=1))),
         np.zeros(1, dtype=np.int64),
+        np.zeros(seen),
     )
 
 
@@ -241,8 +240,12 @@ def acting(
     table: MarkerTable,
     first_state: int,
     subroutines: dict[tuple[str, int], UserSubroutine],
+    looks: bool,
 ) -> Acting:
-    """Return forces, constraints, states, sensors and requests; `first_state`: place in y."""
+    """Return forces, constraints, states, sensors and requests.
+
+    `first_state` is the place in y, `looks` whether a script has py_sysfnc.
+    """
     programs = ProgramTable(
         table,
         model.variables,
@@ -261,7 +264,7 @@ def acting(
         constrain(model, table, programs),
         states_table(model, programs),
         sensors_table(model, programs),
-        _state_reader(model, programs, subroutines),
+        _state_reader(model, programs, looks),
         pulls(model, programs),
         _values(model, programs),  # the last of all
     )
@@ -331,7 +334,9 @@ def build(
 
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + 3 * len(carried)
-    rows = acting(model, table, first_state, subroutines)
+    rubs = any(friction.looks for friction in user.values())
+    looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
+    rows = acting(model, table, first_state, subroutines, looks)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
@@ -361,7 +366,7 @@ def build(
         programs=instructions,
         states=states,
         sensors=rows.sensors,
-        users=_users(subroutines),
+        users=_users(subroutines, len(y0) if rubs else 0),
         applied=rows.applied,
         tree=mechanism.tree,
         equations=mechanism.equations,

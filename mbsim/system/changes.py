@@ -55,7 +55,8 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     bodies.update({id: k for k, id in enumerate(system.body_ids)})
     table = MarkerTable(system.placement, bodies)
     places = scene.states.place
-    rows = acting(model, table, int(places[0]) if len(places) else 0, system.subroutines)
+    first_state = int(places[0]) if len(places) else 0
+    rows = acting(model, table, first_state, system.subroutines, system.reader is not None)
     applied = rows.applied
     markers, angles = table.arrays()
     listed = [with_radii(contact, model.graphics) for contact in model.contacts.values()]

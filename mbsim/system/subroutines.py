@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.core.address import pack
 from mbsim.errors import DeckError
 from mbsim.expressions.elementary import TIME
 from mbsim.expressions.functions import FUNCTIONS, Kind
@@ -66,7 +67,7 @@ def load(
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Return the subroutines of forces and variables by (statement, id), in order of their rows."""
     return {
-        (statement, id): load_subroutine(user, (xml, id), count, plugins, scripts)
+        (statement, id): load_subroutine(user, (xml, id), count, plugins, scripts, model.file)
         for statement, xml, id, user, count in wanted(model)
     }
 
@@ -103,6 +104,9 @@ class StateReader:
         self.shown = b""
         self.run: Callable[..., float] | None = None
         host.sysfnc, host.sysary = self.sysfnc, self.sysary
+        if len(scene.users.seen) > 0:
+            self.table = pack(scene)
+            host.seen = (self.table.ctypes.data, scene.users.seen.ctypes.data)
 
     def door(self) -> Callable[..., float]:
         """Return the door of expressions, which opens after the scene is made."""
@@ -151,6 +155,9 @@ class StateReader:
         if program in self.open_programs:
             raise RecursionError("variables that need each other by py_sysfnc")
         scene, time, y = host.state
+        if host.seen is not None and y == host.seen[1]:
+            # contacts come first in an evaluation, before what forgets failures
+            self.scene.users.failed[0] = 0
         # an expression that is half done may stand on the stack
         kept = self.values.tobytes()
         self.open_programs.append(program)
@@ -171,6 +178,11 @@ class StateReader:
         if name == "VARVAL":
             return self.variables.get(int(ids[0])) if len(ids) == 1 else None
         function = FUNCTIONS.get(name)
+        if function is not None and function.kind in (Kind.FORCE, Kind.ACCELERATION):
+            host.log(
+                f"warning: py_sysfnc {name}: {function.kind.value} follow from what subroutines "
+                "give, so they are not known yet: errflg is 1"
+            )
         if function is None or function.kind not in (Kind.DISPLACEMENT, Kind.VELOCITY):
             return None
         if not function.least <= len(ids) <= len(function.args):

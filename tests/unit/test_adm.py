@@ -301,7 +301,29 @@ FAULTS = {
     ),
     "vector without": ("GFORCE/1, I=102, JFLOAT=202", ("GFORCE[1]", "FX ... TZ: missing")),
     "vector of the other kind": ("VFORCE/1, I=102, JFLOAT=202, TX=1", ("TX",)),
-    "vector user": ("VTORQUE/1, I=102, JFLOAT=202, FUNCTION=USER(1)", ("use TX ... TZ",)),
+    "vector function": (
+        "VTORQUE/1, I=102, JFLOAT=202, FUNCTION=TIME",
+        ('FUNCTION="TIME"', "must be USER(number"),
+    ),
+    "vector both": (
+        "VTORQUE/1, I=102, JFLOAT=202, TX=1, FUNCTION=USER(1)",
+        ('TX="1"', "give FUNCTION or components"),
+    ),
+    "routine alone": (
+        "SFORCE/1, ROT, I=102, J=202, FUNCTION=1, ROUTINE=F",
+        ('ROUTINE="F"', "belongs to FUNCTION=USER(...)"),
+    ),
+    "library": (
+        "VARIABLE/1, FUNCTION=USER(1)\\ROUTINE=my::F",
+        ('ROUTINE="my::F"', "shared libraries", "FILE.py::NAME"),
+    ),
+    "no name": ("VARIABLE/1, FUNCTION=USER(1)\\ROUTINE=a.py::", ("FILE.py::NAME",)),
+    "no script": (
+        "VARIABLE/1, FUNCTION=USER(1)\\ROUTINE=a.py::F",
+        ('ROUTINE="a.py::F"', "no such file"),
+    ),
+    "user value": ("VARIABLE/1, FUNCTION=USER(1,a)", ("'a'", "is no number")),
+    "user differential": ("DIFF/1, FUNCTION=USER(1)", ("is no expression", "variables take")),
     "bushing": ("BUSHING/1, I=102, J=202, K=1,2", ("BUSHING[1]", "3 numbers")),
     "negative bushing": ("BUSHING/1, I=102, J=202, CT=1,2,-3", ("CT", "numbers >= 0")),
     "no part": ("MARKER/301", ("MARKER[301]", "PART: missing")),
@@ -344,7 +366,7 @@ FAULTS = {
     "no joint": ("MOTION/1, JOINT=9, FUNCTION=TIME", ('JOINT="9"', "no JOINT has this id")),
     "user": (
         "MOTION/1, JOINT=1, FUNCTION=USER(1,2)",
-        ("USER(1,2)", "is no expression", "of an XML deck"),
+        ("USER(1,2)", "is no expression", "only forces and variables"),
     ),
     "no kind of force": ("SFORCE/1, I=102, J=202, FUNCTION=1", ("type: missing", "ROTATIONAL")),
     "wrong stiffness": ("SPRINGDAMPER/1, ROT, I=102, J=202, K=3", ('K="3"', "other type")),

@@ -83,6 +83,12 @@ def faked(monkeypatch: Any) -> Any:
     return fake_simulate
 
 
+def test_python_m_mbsim_is_the_command_line(tmp_path: Path) -> None:
+    done = process("-m", "mbsim", "check", "no.xml", cwd=ROOT)
+    assert done.returncode == 2
+    assert done.stderr == "mbsim: error: no.xml: cannot be read: No such file or directory\n"
+
+
 # --- run -------------------------------------------------------------------------------------
 
 

@@ -194,7 +194,8 @@ def test_touch_and_leave_stand_at_their_own_times(tmp_path):
     [
         (sensor(1, "DZ(77)"), "77"),
         (sensor(1, "TIME", "NE"), 'compare="NE".*GE, LE, GT, LT, EQ'),
-        (sensor(1, "TIME", evaluate_id=3), "evaluate_id.*not documented"),
+        (sensor(1, "TIME", evaluate_id=3), "evaluate_id.*Sensor_Evaluate.*not built.*evaluate"),
+        ('<Sensor_Evaluate id="3" expr="TIME"/>', r"Sensor_Evaluate\[3\].*not built"),
         (sensor(1, "TIME", dt=-1), 'dt="-1".*> 0'),
         ('<Post_Request id="1" type="EXPRESSION" expr2="SENVAL(4)"/>', "4"),
     ],
@@ -214,3 +215,14 @@ def test_adams_sensor(tmp_path):
     results = mbsim.simulate(mbsim.read_model(path), end_time=2.0, print_interval=0.01)
     assert results.stats["halted_by_sensor"] == 1
     assert 0.499 <= results["time"][-1] == times(results, 1)[0]
+
+
+def test_an_adams_sensor_with_bisection_is_located(tmp_path):
+    path = tmp_path / "deck.adm"
+    path.write_text(
+        "a deck\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND\nPART/1, GROUND\n"
+        "DIFF/1, IC=1.0, FUNCTION=-DIF(1)\n"
+        "SENSOR/1, FUNCTION=DIF(1), VALUE=0.5, LE, ERROR=0.1, HALT, BISECTION\nEND\n"
+    )
+    results = mbsim.simulate(mbsim.read_model(path), end_time=2.0, print_interval=0.01, tol=1e-12)
+    np.testing.assert_allclose(times(results, 1), [math.log(2.0)], rtol=0, atol=1e-9)

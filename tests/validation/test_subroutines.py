@@ -45,7 +45,7 @@ def VTOSUB(id, time, par, npar, dflag, iflag):
 BODIES = """<MotionSolve><Model>
   <Body_Rigid id="1" isground="TRUE"/>
   <Body_Rigid id="2" cg_id="20" mass="1.5" inertia_xx="1" inertia_yy="0.7" inertia_zz="0.4"
-    v_ic_x="0.3" w_ic_z="9"/>
+    v_ic_x="0.3" v_ic_x_flag="TRUE" w_ic_z="9" w_ic_z_flag="TRUE"/>
   <Body_Rigid id="3" cg_id="30" mass="0.8" inertia_xx="0.2" inertia_yy="0.3" inertia_zz="0.4"/>
   <Reference_Marker id="10" body_id="1"/>
   <Reference_Marker id="20" body_id="2" pos_z="-1.2"/>
@@ -115,6 +115,76 @@ def test_subroutines_do_what_the_same_expressions_do(tmp_path):
     for name in names:
         if "stats" not in name:
             np.testing.assert_allclose(user[name], twin[name], rtol=1e-11, atol=1e-11, err_msg=name)
+
+
+ADM = """the same as EXPRESSIONS; forces on one body have ground on the other side
+UNITS/FORCE=NEWTON, MASS=KILOGRAM, LENGTH=METER, TIME=SECOND
+PART/1, GROUND
+PART/2, MASS=1.5, CM=20, IP=1, 0.7, 0.4, VX=0.3, WZ=9
+PART/3, MASS=0.8, CM=30, IP=0.2, 0.3, 0.4
+MARKER/10, PART=1
+MARKER/11, PART=1, FLOATING
+MARKER/20, PART=2, QP=0, 0, -1.2
+MARKER/21, PART=2, QP=0.1, 0, -1.2
+MARKER/30, PART=3, QP=0.5, 0.2, 0
+MARKER/31, PART=3, QP=0.4, 0, 0
+MARKER/32, PART=3, FLOATING
+ACCGRAV/KGRAV=-9.81
+SFORCE/2, ROTATIONAL, I=21, J=10, FUNCTION=0.1*VARVAL(7)
+REQUEST/1, F2=VARVAL(7)\\F3=2*DZ(20)+TIME
+{elements}
+END
+"""
+ADM_USERS = """SFORCE/1, TRANSLATIONAL, I=20, J=10, FUNCTION=USER(20, 10,
+, 100, 2)\\ROUTINE=sub.py::SFOSUB
+VARIABLE/7, FUNCTION=USER(20)\\ROUTINE=sub.py::VARSUB
+GFORCE/3, I=21, JFLOAT=32, RM=31, FUNCTION=USER(21, 31)\\ROUTINE=sub.py::GFOSUB
+VFORCE/4, I=31, JFLOAT=11, RM=10, FUNCTION=USER(31)\\ROUTINE=sub.py::VFOSUB
+VTORQUE/5, I=30, JFLOAT=11, RM=10, FUNCTION=USER(30)\\ROUTINE=sub.py::VTOSUB"""
+ADM_EXPRESSIONS = """SFORCE/1, TRANSLATIONAL, I=20, J=10, FUNCTION=-100*(DM(20,10)-1)-2*VR(20,10)
+VARIABLE/7, FUNCTION=2*DZ(20)+TIME
+GFORCE/3, I=21, JFLOAT=32, RM=31
+, FX=-3*DX(21,31,31)-0.2*VX(21,31,31,31)
+, FY=-3*DY(21,31,31)-0.2*VY(21,31,31,31)
+, FZ=-3*DZ(21,31,31)-0.2*VZ(21,31,31,31)
+, TX=-0.1*WX(21,31,31), TY=-0.1*WY(21,31,31)
+, TZ=-0.5*AZ(21,31)+0.01*VARVAL(7)
+VFORCE/4, I=31, JFLOAT=11, RM=10, FX=-0.3*VX(31), FY=-0.3*VY(31), FZ=-0.3*VZ(31)
+VTORQUE/5, I=30, JFLOAT=11, RM=10, TX=PSI(30), TZ=TIME"""
+
+
+def run_adm(folder, elements, script=SCRIPT, **options):
+    (folder / "sub.py").write_text(script)
+    deck = folder / "deck.adm"
+    deck.write_text(ADM.format(elements=elements))
+    options = {"end_time": 1.5, "print_interval": 0.1} | options
+    return mbsim.simulate(mbsim.read_model(deck), **options)
+
+
+def test_subroutines_of_an_adams_deck_do_what_the_same_expressions_do(tmp_path):
+    user, twin = run_adm(tmp_path, ADM_USERS), run_adm(tmp_path, ADM_EXPRESSIONS)
+    assert user.stats["steps"] == twin.stats["steps"]
+    assert user.stats["python_calls"] > 4 * user.stats["rhs_evaluations"]
+    for name in ("bodies/2/position", "bodies/3/quaternion", "vector_forces/3/torque"):
+        np.testing.assert_allclose(user[name], twin[name], rtol=1e-11, atol=1e-11, err_msg=name)
+    # PSI jumps at the start, where body 3 stands upright, so both must take the same steps
+    adm = run_adm(tmp_path, ADM_USERS, tol=1e-8)
+    xml = run(tmp_path, EXPRESSIONS, tol=1e-8)
+    assert adm.stats["steps"] == xml.stats["steps"]
+    np.testing.assert_allclose(adm["bodies/3/position"], xml["bodies/3/position"], rtol=1e-9)
+
+
+def test_messages_about_subroutines_of_an_adams_deck_have_its_words(tmp_path):
+    script = "def SFOSUB(id, time, par, npar, dflag, iflag):\n    return par[7]\n"
+    elements = "VARIABLE/7, FUNCTION=0\nSFORCE/1, TRANSLATIONAL, I=20, J=10, FUNCTION=USER()"
+    with pytest.raises(ModelError, match=r'SFORCE/1: ROUTINE="SFOSUB" names no file.*--plugin'):
+        run_adm(tmp_path, elements, script)
+    plugins = [tmp_path / "sub.py"]
+    with pytest.raises(PluginError, match=r"SFORCE/1: SFOSUB failed at time 0: IndexError"):
+        run_adm(tmp_path, elements, script, plugins=plugins)
+    named = elements + "\\ROUTINE=sub.py::MISSING"
+    with pytest.raises(ModelError, match=r'SFORCE/1: .* does not define ROUTINE="MISSING"'):
+        run_adm(tmp_path, named, script)
 
 
 def scalar(body, name="SFOSUB", par="20"):
@@ -289,20 +359,68 @@ def test_a_resumed_run_goes_on_as_if_it_had_not_stopped(tmp_path):
         np.testing.assert_allclose(resumed[name], whole[name], rtol=1e-6)
 
 
-def test_a_friction_subroutine_is_told_once_that_it_cannot_look(tmp_path):
+SLIDER = """<Post_Graphic id="100" type="Plane" rm_id="10"/>
+  <Post_Graphic id="200" type="Sphere" center_marker_id="40" radius="0.5"/>
+  <Body_Rigid id="4" cg_id="40" mass="1" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"
+    v_ic_x="2" v_ic_x_flag="TRUE"/>
+  <Reference_Marker id="40" body_id="4" pos_z="0.5" pos_x="0.3"/>
+  <Reference_Variable id="8" expr="3*DX(40)+TIME"/>
+  <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+   j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="200"
+   dmax="1e-3" cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="sub.py"
+   cff_param_string="USER(40)"/>"""
+CFFSUB = "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+
+
+def test_a_friction_subroutine_looks_at_the_state_of_its_call(tmp_path):
+    # a sphere on a plane: the point on the plane is below the centre, half the depth under
+    # the point at which the slip is taken
     script = (
-        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
-        '    value, wrong = py_sysfnc("DX", [20])\n'
-        "    return [0.0, 0.0, 0.0] if wrong else None\n"
+        CFFSUB
+        + """    p, no_p = py_sysary("TDISP", par)
+    v, no_v = py_sysary("VEL", par)
+    of_variable, no_variable = py_sysfnc("VARVAL", [8])
+    py_errmes(no_p or no_v or no_variable, "asked", id, "STOP")
+    slip = v[0] + v[4] * (0.5 * (p[2] - 0.5) - p[2])
+    known = [(p[0], locj[0]), (abs(slip), hypot(xdot[0], xdot[1])), (of_variable, 3*p[0] + time)]
+    for seen, given in known:
+        if abs(seen - given) > 1e-12:
+            raise ValueError((time, known))
+    return [-0.1 * nforce * tanh(20.0 * xdot[0]), -0.1 * nforce * tanh(20.0 * xdot[1]), 0.0]
+"""
     )
-    elements = """<Post_Graphic id="100" type="Plane" rm_id="10"/>
-      <Post_Graphic id="200" type="Sphere" center_marker_id="40" radius="0.5"/>
-      <Body_Rigid id="4" cg_id="40" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
-      <Reference_Marker id="40" body_id="4" pos_z="0.5"/>
-      <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
-       j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="200"
-       dmax="1e-3" cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="sub.py"
-       cff_param_string="USER()"/>"""
-    run(tmp_path, elements, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
+    results = run(tmp_path, SLIDER, script, end_time=0.5)
+    assert results.stats["python_calls"] > 100
+    position = results["bodies/4/position"]
+    assert 0.5 < position[-1, 0] - position[0, 0] < 0.99  # friction has slowed it down
+
+
+def test_what_a_variable_raises_for_a_friction_subroutine_ends_the_run(tmp_path):
+    script = (
+        CFFSUB
+        + "    return [py_sysfnc('VARVAL', [7])[0], 0.0, 0.0]\n"
+        + "def VARSUB(id, time, par, npar, dflag, iflag):\n"
+        + "    return 0.0 if time < 0.2 else [][3]\n"
+    )
+    variable = f'<Reference_Variable id="7" type="USERSUB" {by("VARSUB")}/>'
+    with pytest.raises(PluginError, match=r"Reference_Variable\[7\]: VARSUB failed at time 0.2.*"):
+        run(tmp_path, SLIDER + variable, script)
+
+
+def test_a_subroutine_is_told_once_that_forces_are_not_known(tmp_path):
+    script = CFFSUB + (
+        "    wrong = [py_sysfnc(name, [40])[1] for name in ('FX', 'ACCX', 'NONE')]\n"
+        "    return [0.0, 0.0, 0.0] if wrong == [1, 1, 1] else None\n"
+    )
+    run(tmp_path, SLIDER, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
+    log = next((tmp_path / "out").glob("*.log")).read_text()
+    assert log.count("py_sysfnc FX: forces follow from what subroutines give") == 1
+    assert log.count("py_sysfnc ACCX: accelerations follow") == 1
+
+
+def test_a_call_while_the_script_is_loaded_is_told_that_there_is_no_state(tmp_path):
+    script, element = scalar("    return 0.0\n")
+    script = 'asked = py_sysfnc("DX", [20])\nassert asked == [0.0, 1]\n' + script
+    run(tmp_path, element, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
     log = next((tmp_path / "out").glob("*.log")).read_text()
     assert log.count("py_sysfnc is called where there is no state to look at") == 1

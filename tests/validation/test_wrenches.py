@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import free_bodies as free
 
 from mbsim.dynamics.wrenches import turning_torque
-from mbsim.errors import SolverError
+from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import BodyForce, Bushing, Marker, Request, VectorForce
 
@@ -175,3 +176,43 @@ def test_a_vector_force_that_is_no_number_stops_the_run():
     force = BodyForce(1, "FORCEONLY", (parse("1/(TIME-TIME)"), *[None] * 5), "", 20)
     with pytest.raises(SolverError):
         free.run(free.model(free.body(2), body_forces=[force]))
+
+
+def hung(damping, preload=0.0):
+    """Return two free bodies that a stiff bushing joins away from both cgs, shaken."""
+    K = (4e3, 6e3, 5e3, 30.0, 20.0, 25.0)
+    C = tuple(damping * k for k in K)
+    model = two_bodies(bushings=[Bushing(1, "", 21, 31, K, C, (preload, 0, 0, 0, 0, 0))])
+    place = {"pos": (0.5, 0.1, 0.4), "R": TILTED}
+    markers = {id: replace(model.markers[id], **place) for id in (21, 31)}
+    return replace(model, markers=model.markers | markers)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01])
+@pytest.mark.parametrize("preload", [0.0, 200.0])
+def test_the_method_without_error_estimate_follows_a_bushing(damping, preload):
+    model = hung(damping, preload)
+    rows, _ = free.run(model, tol=1e-7, integrator="VERLET")
+    exact, _ = free.run(model, tol=1e-11, integrator="DOP853")
+    half = exact["time"] <= 0.2
+    off = np.abs(rows["y"] - exact["y"])[half]
+    assert off[:, [0, 1, 2, 13, 14, 15]].max() < 2e-4
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01, 0.1])
+def test_its_largest_steps_are_stable_with_a_bushing(damping):
+    rows, _ = free.run(hung(damping), tol=0.1, integrator="VERLET")
+    total = rows["energy"][:, :2].sum(axis=1)
+    # stable steps of 0.9 of the limit see 1/(1 - 0.81) of the energy; others double it for ever
+    assert total.max() < 6.0 * total[0]
+
+
+@pytest.mark.parametrize("kind", ["vector_forces", "body_forces"])
+def test_the_method_without_error_estimate_refuses_vector_forces(kind):
+    exprs = (parse("1"), *(None,) * 5)
+    if kind == "vector_forces":
+        force = VectorForce(7, "FORCEANDTORQUE", exprs, "", 20, 10)
+    else:
+        force = BodyForce(7, "FORCEANDTORQUE", exprs, "", 20)
+    with pytest.raises(ModelError, match=r"Force_Vector_.*\[7\]: integrator VERLET is for forces"):
+        free.run(free.model(free.body(2), **{kind: [force]}), integrator="VERLET")

@@ -7,8 +7,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from mbsim.reader.kinds import EXPRESSION, TEXT, BadValueError, Kind, parse_real
+from mbsim.reader.kinds import EXPRESSION, TEXT, USER, BadValueError, Kind, parse_real
 from mbsim.reader.statement import Statement
 
 _DEGREES = re.compile(r"(.*\d\.?)[dD]")
@@ -40,7 +41,7 @@ class AdmStatement(Statement):
         spec = self.attributes.get(name)
         if spec is None:
             return Value.LIST
-        if spec.kind is EXPRESSION:
+        if spec.kind in (EXPRESSION, EXPRESSION_OR_USER):
             return Value.FUNCTION
         if spec.kind is TEXT:
             return Value.TEXT
@@ -83,6 +84,22 @@ def angles(count: int) -> Kind:
     return Kind(allowed, lambda text: _parse_items(text, True, (count,)))
 
 
+def _parse_either(text: str) -> Any:
+    return (USER if re.match(r"USER\s*\(", text, re.IGNORECASE) else EXPRESSION).parse(text)
+
+
+def _parse_routine(text: str) -> str:
+    """Return `name`, or `file.py::name`."""
+    file, _, name = text.rpartition("::")
+    if not name.isidentifier():
+        raise BadValueError
+    if file and not file.lower().endswith((".py", ".pyc")):
+        raise BadValueError("shared libraries are not built yet; must be " + ROUTINE.allowed)
+    return text
+
+
+EXPRESSION_OR_USER = Kind("an expression, or USER(number, number, ...)", _parse_either)
+ROUTINE = Kind("a function's name, or FILE.py::NAME", _parse_routine)
 ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
 ANY = Kind(f"items {LIST}", str)
 NUMBERS = Kind(f"numbers {LIST}", _parse_numbers)

@@ -9,7 +9,18 @@ import numpy as np
 from mbsim.model import elements as el
 from mbsim.model.frames import GLOBAL, Frame, rotation_313
 from mbsim.reader import units
-from mbsim.reader.adm.declare import ANGLE, ANY, NUMBERS, ROWS, AdmStatement, angles, numbers
+from mbsim.reader.adm.declare import (
+    ANGLE,
+    ANY,
+    EXPRESSION_OR_USER,
+    NUMBERS,
+    ROUTINE,
+    ROWS,
+    AdmStatement,
+    angles,
+    numbers,
+)
+from mbsim.reader.adm.subroutine import function_or_user, routine
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.controls import add_sensor
 from mbsim.reader.draft import Draft
@@ -23,10 +34,12 @@ from mbsim.reader.kinds import (
     POSITIVE,
     REAL,
     TEXT,
+    USER,
     keyword,
 )
 from mbsim.reader.parse import Node
 from mbsim.reader.statement import Entry, Spec
+from mbsim.reader.subroutine import result
 from mbsim.reader.tables import add_spline
 
 
@@ -330,12 +343,14 @@ def _build_spring(entry: Entry) -> None:
 def _build_scalar(entry: Entry) -> None:
     """Add a scalar force."""
     type = _type_of(entry)
-    if entry.get("FUNCTION") is None:
+    expr, user = function_or_user(entry, "SFORCE", "SFOSUB")
+    if expr is None:
         return
     force = el.ScalarForce(
         id=entry.get("id", 0),
         type=type,
-        expr=entry.get("FUNCTION"),
+        expr=expr,
+        user=user,
         i_marker_id=entry.get("I", 0),
         j_marker_id=entry.get("J", 0),
         action_only=entry.get("ACTIONONLY", False),
@@ -368,17 +383,29 @@ def _build_bushing(entry: Entry) -> None:
 
 
 _VECTORS = {"VFORCE": "FORCEONLY", "VTORQUE": "TORQUEONLY", "GFORCE": "FORCEANDTORQUE"}
+_VECTOR_SUBROUTINES = {"VFORCE": "VFOSUB", "VTORQUE": "VTOSUB", "GFORCE": "GFOSUB"}
 
 
 def _build_vector(entry: Entry) -> None:
     """Add a vector force, torque or both."""
     names = [name for name in _COMPONENTS if name in entry.statement.attributes]
-    if not any(entry.given(name) for name in names):
+    given = [name for name in names if entry.given(name)]
+    exprs = tuple(entry.get(name) for name in _COMPONENTS)
+    user = routine(entry, _VECTOR_SUBROUTINES[entry.statement.name])
+    for name in given if entry.given("FUNCTION") else ():
+        entry.fault("give FUNCTION or components, not both", name)
+    if user is not None:
+        exprs = tuple(
+            result(entry, "VECTORFORCE", user, names.index(name)) if name in names else None
+            for name in _COMPONENTS
+        )
+    elif not given and not entry.given("FUNCTION"):
         entry.fault(f"{names[0]} ... {names[-1]}: missing; at least one must be given")
     force = el.VectorForce(
         id=entry.get("id", 0),
         type=_VECTORS[entry.statement.name],
-        exprs=tuple(entry.get(name) for name in _COMPONENTS),
+        exprs=exprs,
+        user=user,
         i_marker_id=entry.get("I", 0),
         j_floating_marker_id=entry.get("JFLOAT", 0),
         ref_marker_id=entry.get("RM"),
@@ -395,8 +422,9 @@ def _build_vector(entry: Entry) -> None:
 
 def _build_variable(entry: Entry) -> None:
     """Add a variable."""
-    if entry.get("FUNCTION") is not None:
-        variable = el.Variable(entry.get("id", 0), entry.get("FUNCTION"), source=entry.source)
+    expr, user = function_or_user(entry, "VARIABLE", "VARSUB")
+    if expr is not None:
+        variable = el.Variable(entry.get("id", 0), expr, user=user, source=entry.source)
         entry.register(entry.draft.variables, variable)
 
 
@@ -441,6 +469,7 @@ def _build_sensor(entry: Entry) -> None:
         compare=entry.get("COMPARE", "EQ"),
         value=entry.get("VALUE", 0.0),
         error_tol=entry.get("ERROR", 1e-3),
+        zero_crossing=entry.get("BISECTION", False),
         evaluate=entry.get("EVALUATE"),
         halt=entry.get("HALT", False),
         stops=entry.get("RETURN", False),
@@ -545,7 +574,8 @@ def _vector(name: str, components: tuple[str, ...]) -> AdmStatement:
             "JFLOAT": Spec(ID, required=True),
             "RM": Spec(ID),
             **{component: Spec(EXPRESSION) for component in components},
-            "FUNCTION": Spec(refused=f"{_NOT_BUILT}; use {components[0]} ... {components[-1]}"),
+            "FUNCTION": Spec(USER),
+            "ROUTINE": Spec(ROUTINE),
         },
         _build_vector,
         xml="Force_Vector_TwoBody",
@@ -682,7 +712,8 @@ STATEMENTS = (
             "TYPE": _choice(*_TYPES),
             **_MARKERS,
             "ACTIONONLY": _TRUE,
-            "FUNCTION": Spec(EXPRESSION, required=True),
+            "FUNCTION": Spec(EXPRESSION_OR_USER, required=True),
+            "ROUTINE": Spec(ROUTINE),
         },
         _build_scalar,
         words=_TYPE_WORDS | {"ACTIONONLY": ("ACTIONONLY", "TRUE")},
@@ -705,7 +736,8 @@ STATEMENTS = (
         "VARIABLE",
         {
             **_ID,
-            "FUNCTION": Spec(EXPRESSION, required=True),
+            "FUNCTION": Spec(EXPRESSION_OR_USER, required=True),
+            "ROUTINE": Spec(ROUTINE),
             "IC": Spec(REAL, note="has no effect: the value follows from the function"),
         },
         _build_variable,
@@ -764,7 +796,7 @@ STATEMENTS = (
             "DT": Spec(POSITIVE),
             "STEPSIZE": Spec(POSITIVE),
             **{name: Spec(FLAG) for name in _SENSOR_FLAGS},
-            "BISECTION": Spec(FLAG, refused=f"{_NOT_BUILT}; of XML decks zero_crossing locates"),
+            "BISECTION": Spec(FLAG),
             "CODGEN": Spec(FLAG, note=_HARMLESS),
             "YYDUMP": Spec(FLAG, note=_HARMLESS),
             "RESTART": Spec(FLAG, note=_HARMLESS),

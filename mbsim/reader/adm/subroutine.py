@@ -1,0 +1,43 @@
+r"""``FUNCTION=USER(1, 2.5)\ROUTINE=file.py::name``: user subroutines of an Adams deck."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mbsim.expressions.tree import Expression
+from mbsim.model import elements as el
+from mbsim.reader.statement import Entry
+from mbsim.reader.subroutine import result
+
+
+def routine(entry: Entry, default: str) -> el.Subroutine | None:
+    """Return the subroutine of a statement, None where its FUNCTION is none or is faulty.
+
+    `default` is the name of the function where ROUTINE is not given.
+    """
+    par = entry.get("FUNCTION")
+    if not isinstance(par, tuple):
+        if entry.given("ROUTINE") and (par is not None or not entry.given("FUNCTION")):
+            entry.fault("belongs to FUNCTION=USER(...), which is not given", "ROUTINE")
+        return None
+    file, _, name = entry.get("ROUTINE", "").rpartition("::")
+    if not entry.given("ROUTINE"):
+        entry.note(f"not given; taken as {default}", "ROUTINE")
+    script = ""
+    if file:
+        path = Path(file)
+        path = path if path.is_absolute() else entry.draft.directory / path
+        script = str(path.resolve())
+        if not path.is_file():
+            entry.fault("no such file (the path is relative to the deck)", "ROUTINE")
+    return el.Subroutine(par, name or default, script_name=script, interpreter="PYTHON")
+
+
+def function_or_user(
+    entry: Entry, statement: str, default: str
+) -> tuple[Expression | None, el.Subroutine | None]:
+    """Return what FUNCTION is as an expression, and the subroutine where that gives it."""
+    user = routine(entry, default)
+    if user is not None:
+        return result(entry, statement, user), user
+    return entry.get("FUNCTION"), None
