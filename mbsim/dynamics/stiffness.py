@@ -386,11 +386,21 @@ def add_turn(scene, T, y, b, by, p, force, torque, sign):
 
 @jitable
 def add_lever(scene, T, y, b, by, p, force, sign):
-    """Add that the point p of a force on body b moves with body `by`."""
-    nb = len(scene.bodies.mass)
-    if b == nb or by == nb:
+    """Add that the point p of a force on body b moves with body `by`, less that b's cg moves.
+
+    The balance of inertia takes all forces along with the cg.
+    """
+    if b == len(scene.bodies.mass):
         return
-    block, at = T.linear.K[T.pattern.place[b, by]], from_origin(scene, T.linear, y, by, p)
+    if by < len(scene.bodies.mass):
+        carry(scene, T, b, by, from_origin(scene, T.linear, y, by, p), force, sign)
+    carry(scene, T, b, b, vector(T.linear.r[b]), force, -sign)
+
+
+@jitable
+def carry(scene, T, b, by, at, force, sign):
+    """Add the moment on body b of a force whose point, at from O, moves with body `by`."""
+    block = T.linear.K[T.pattern.place[b, by]]
     for k in range(3):
         moment, slide = cross(cross(unit(k), at), force), cross(unit(k), force)
         for i in range(3):
