@@ -55,7 +55,8 @@ DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEA
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
 STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
-#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x; TIME n, x + TIME n.
+#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x.
+#: TIME n; x + TIME n.
 ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
 TIME_N, ADD_TIME_N = range(SPLINE + 8, SPLINE + 10)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
