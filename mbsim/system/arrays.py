@@ -220,6 +220,7 @@ class Programs(NamedTuple):
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
     quick_start: I1  # (programs + 1,) the same for values alone
     quick: I2  # (instructions, 6) with operations by a number in one, see system.programs
+    operand: F1  # (instructions,) the number that each of `quick` takes, if it takes one
     values: F1  # (deepest + 1,) scratch: values alone
     level: F1  # (curves,) z of a curve of a spline
     curve: I1  # (curves + 1,) first piece of each
