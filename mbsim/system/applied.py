@@ -57,6 +57,7 @@ def applied_forces(
         law_par=np.zeros((n, max([1, *(len(values) for _, values in laws)]))),
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
+        late=np.zeros((0, 3), dtype=np.int64),
     )
     for k, (statement, element) in enumerate(given):
         made.law[k], values = laws[k]
@@ -105,7 +106,7 @@ def _add_scalar(
 ) -> None:
     """Fill row k with a scalar force by an expression."""
     made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
-    made.program[k] = programs.add(force.expr, force)
+    made.program[k] = programs.add(force.expr, force, forces=True)
     made.alone[k] = int(force.action_only)
     along = a.AXIS_FORCE if force.action_only else a.LINE_FORCE
     made.kind[k] = a.AXIS_TORQUE if force.type == "ROTATIONAL" else along
@@ -140,7 +141,7 @@ def _add_vector(
     made.axes[k] = markers.row(force.ref_marker_id)
     for c, expression in enumerate(force.exprs):
         if expression is not None:
-            made.components[k, c] = programs.add(expression, force)
+            made.components[k, c] = programs.add(expression, force, forces=True)
 
 
 def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:

@@ -27,6 +27,7 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
+from mbsim.system.dependence import in_order
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import Mechanism, constrain, sweep
 from mbsim.system.pairing import (
@@ -154,7 +155,7 @@ def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs):
             if expression is not None:
-                programs.add(expression, request, forces=True)
+                programs.add(expression, request, forces=True, accelerations=True)
                 made.append((request.id, k + 1))
     return made
 
@@ -254,11 +255,15 @@ def acting(
     )
     programs.users = {element: k for k, element in enumerate(subroutines)}
     applied, applied_ids = applied_forces(model, table, programs)
+    mechanism = constrain(model, table, programs)
+    applied, applied_ids = in_order(
+        model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
+    )
     return Acting(
         programs,
         applied,
         applied_ids,
-        constrain(model, table, programs),
+        mechanism,
         states_table(model, programs),
         sensors_table(model, programs),
         _state_reader(model, programs, subroutines),
@@ -334,6 +339,7 @@ def build(
     rows = acting(model, table, first_state, subroutines)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
+    nu = len(rows.applied.late)
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
     ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
@@ -376,7 +382,9 @@ def build(
         ),
         state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(rows.sensors.id)),
         log=empty_log(len(contact_ids)),
-        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
+        work=scratch(
+            nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, len(rows.applied.late)
+        ),
         sweep=sweep(mechanism),
         rows=empty_rows(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
