@@ -382,9 +382,7 @@ def build(
         ),
         state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(rows.sensors.id)),
         log=empty_log(len(contact_ids)),
-        work=scratch(
-            nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, len(rows.applied.late)
-        ),
+        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu),
         sweep=sweep(mechanism),
         rows=empty_rows(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
