@@ -151,12 +151,15 @@ class Runner:
         return len(rest) == 1 or all(rest)
 
     def _interrupts(self, stage: int) -> bool:
-        """Return whether motions may not go on as they were: after a rest, and when changed."""
-        if stage == 0:
-            return False
-        before, now = self.settings.stages[stage - 1], self.settings.stages[stage]
-        fresh = now.simulation.changes[len(before.simulation.changes) :]
-        return before.is_static or any(c.table in ("motions", "variables") for c in fresh)
+        """Return whether motions may not go on as they were: after a rest, and when changed.
+
+        A model is assembled as it is written, before what changes it ahead of its first Simulate.
+        """
+        before = self.settings.stages[max(0, stage - 1) : stage]
+        known = sum(len(one.simulation.changes) for one in before)
+        fresh = self.settings.stages[stage].simulation.changes[known:]
+        rested = any(one.is_static for one in before)
+        return rested or any(c.table in ("motions", "variables") for c in fresh)
 
     def _door(self, t: float) -> Any:
         """Return what asks the joints' door at time t, None where there are no joints."""

@@ -114,7 +114,8 @@ def settle_states(scene: Scene, y: Array, hooks: Hooks, most: int) -> Rest:
     Bodies that are not yet at rest are left to `equilibrium.balance`.
     """
     states, iterations = _States(scene, y, hooks), 0
-    for iterations in range(most):
+    while iterations < most:
+        iterations += 1
         local = states.look()
         # on as long as it becomes better: the last steps are free
         if local is None or not states.advance(local):
