@@ -27,7 +27,7 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
-from mbsim.system.dependence import in_order
+from mbsim.system.dependence import check_states, in_order
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import Mechanism, constrain, sweep
 from mbsim.system.pairing import (
@@ -259,12 +259,15 @@ def acting(
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )
+    states = states_table(model, programs)
+    held = (mechanism.connections, mechanism.elements, programs)
+    check_states(model, states, applied, applied_ids, *held)
     return Acting(
         programs,
         applied,
         applied_ids,
         mechanism,
-        states_table(model, programs),
+        states,
         sensors_table(model, programs),
         _state_reader(model, programs, subroutines),
         pulls(model, programs),

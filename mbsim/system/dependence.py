@@ -79,39 +79,86 @@ def _needs(
     programs: ProgramTable,
 ) -> _Needs:
     """Return what each applied force needs."""
-    rows = {element: k for k, element in enumerate(elements)}
-    held = set(connection_ids)
-    found = _Needs([set() for _ in elements], [False for _ in elements])
+    found = _Needs([], [])
     for row in range(len(elements)):
-        for program in _programs(applied, row):
-            for op, given, _, element in programs.programs[program]:
-                if op == ELEMENT and element in rows:
-                    found.rows[row].add(rows[element])
-                elif op == ELEMENT and element in held:
-                    found.reaction[row] = True
-                elif op == NET:
-                    _add_net(found, row, given[0], given[1], applied, connections)
-    for row in range(len(elements)):
-        # friction in joints is pressed by reactions
-        if any(applied.connection[k] >= 0 for k in found.rows[row]):
-            found.reaction[row] = True
-        found.rows[row] = {k for k in found.rows[row] if applied.connection[k] < 0}
+        rows, reaction = _needed(
+            _programs(applied, row), applied, elements, connections, connection_ids, programs
+        )
+        found.rows.append(rows)
+        found.reaction.append(reaction)
     return found
 
 
-def _add_net(
-    found: _Needs, row: int, i: int, j: int, applied: a.Applied, connections: a.Connections
-) -> None:
-    """Add all that acts between two markers to what a force needs."""
-    ends = {(i, j), (j, i)}
-    if any(pair in ends for pair in zip(connections.i, connections.j, strict=True)):
-        found.reaction[row] = True
+def _needed(
+    wanted: list[int],
+    applied: a.Applied,
+    elements: list[tuple[str, int]],
+    connections: a.Connections,
+    connection_ids: Sequence[tuple[str, int]],
+    programs: ProgramTable,
+) -> tuple[set[int], bool]:
+    """Return the rows of forces that programs need, and whether they need a reaction."""
+    place = {element: k for k, element in enumerate(elements)}
+    held = set(connection_ids)
+    rows: set[int] = set()
+    reaction = False
+    for program in wanted:
+        for op, given, _, element in programs.programs[program]:
+            if op == ELEMENT and element in place:
+                rows.add(place[element])
+            elif op == ELEMENT:
+                reaction |= element in held
+            elif op == NET:
+                ends = {(given[0], given[1]), (given[1], given[0])}
+                pairs = zip(connections.i, connections.j, strict=True)
+                reaction |= any(pair in ends for pair in pairs)
+                rows |= _between(given[0], given[1], applied)
+    # friction in joints is pressed by reactions
+    rubbing = {k for k in rows if applied.connection[k] >= 0}
+    return rows - rubbing, reaction or bool(rubbing)
+
+
+def _between(i: int, j: int, applied: a.Applied) -> set[int]:
+    """Return the rows of what acts between two markers, and of what acts on i alone without j."""
+    found = set()
     for k in range(len(applied.kind)):
-        alone = applied.alone[k] == 1
-        if (alone and applied.i[k] == i and j == 0) or (
-            not alone and (applied.i[k], applied.j[k]) in ends
-        ):
-            found.rows[row].add(k)
+        if applied.alone[k] == 1:
+            counts = applied.i[k] == i and j == 0
+        else:
+            counts = (applied.i[k], applied.j[k]) in ((i, j), (j, i))
+        if counts:
+            found.add(k)
+    return found
+
+
+def check_states(
+    model: Model,
+    states: a.States,
+    applied: a.Applied,
+    elements: list[tuple[str, int]],
+    connections: a.Connections,
+    connection_ids: Sequence[tuple[str, int]],
+    programs: ProgramTable,
+) -> None:
+    """Refuse slopes that need a reaction: they are evaluated with the forces, before those.
+
+    Raises
+    ------
+    DeckError
+        Naming the state.
+    """
+    for state, program in zip(model.differentials.values(), states.program, strict=True):
+        rows, reaction = _needed(
+            [int(program)], applied, elements, connections, connection_ids, programs
+        )
+        if reaction or any(applied.kind[k] >= a.LATE for k in rows):
+            source = state.source
+            name = element_name(source.file, "Control_Diff", state.id)
+            why = (
+                f"in {state.expr.text!r}: needs reactions of joints or motions, which are not "
+                "known yet when slopes are; forces that need none, and contacts, can be used"
+            )
+            raise DeckError([Fault(source.file, source.line, name, why)])
 
 
 def _order(model: Model, elements: list[tuple[str, int]], needs: _Needs) -> list[int]:

@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import mechanism_decks as decks
+from decks_io import GROUND, run_deck
+from decks_io import sphere as free_sphere
 from mechanics import Body
 
 from mbsim.errors import DeckError, SolverError
@@ -186,6 +188,39 @@ def test_brake_torque_by_the_pin_force_of_a_pendulum(tmp_path):
     np.testing.assert_allclose(p[:, 0], length * np.sin(own.y[0]), atol=1e-8)
     np.testing.assert_allclose(p[:, 2], -length * np.cos(own.y[0]), atol=1e-8)
     assert imbalance(run) < 1e-8
+
+
+def test_a_force_follows_a_contact_and_a_state_follows_the_force(tmp_path):
+    """A sphere rests on a plane; another is lifted by twice what it presses with.
+
+    z' is that force: its integral is the impulse.
+    """
+    ball = free_sphere(0.1 - (2.0 * G / 1e5) ** (1 / 1.5), mass=2.0)
+    other = free_sphere(3.0, mass=1.0, body=3, x=1.0)
+    touch = (
+        '<Force_Contact id="1" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1" '
+        'j_graphics_id="100" cnf_type="Impact" stiffness="1e5" exponent="1.5" damping="50" '
+        'dmax="1e-3"/>'
+    )
+    lift = scalar(1, "2*CONTACT(1, 0, 4, 0)", i=30, j=10)
+    state = '<Control_Diff id="5" expr="SFORCE(1, 0, 4, 0)" ic="0"/>'
+    seen = '<Post_Request id="1" type="EXPRESSION" expr1="DIF(5)"/>'
+    gravity = f'<Force_Gravity grav_z="{-G}"/>'
+    run = run_deck(
+        tmp_path, GROUND + ball + other + touch + lift + state + seen + gravity, 0.5, 0.1, tol=1e-9
+    )
+    t = run["time"]
+    force = 2 * 2.0 * G
+    np.testing.assert_allclose(
+        run["bodies/3/position"][:, 2], 3.0 + 0.5 * (force - G) * t**2, atol=1e-8
+    )
+    np.testing.assert_allclose(run["requests/1"][:, 0], force * t, atol=1e-7)
+
+
+def test_a_state_of_a_reaction_is_refused_by_name(tmp_path):
+    state = '<Control_Diff id="5" expr="JOINT(1, 0, 4, 0)" ic="0"/>'
+    with pytest.raises(DeckError, match=r"Control_Diff\[5\].*needs reactions"):
+        slider(state).run(tmp_path, 0.1, 0.05)
 
 
 def test_reactions_that_no_force_agrees_with_end_the_run_by_name(tmp_path):
