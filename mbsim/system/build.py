@@ -7,7 +7,7 @@ without friction no friction law, a law that does not look at X no X.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -203,10 +203,10 @@ def _load_subroutines(
 
 
 def _state_reader(
-    model: Model, programs: ProgramTable, users: dict[tuple[str, int], UserSubroutine]
+    model: Model, programs: ProgramTable, users: Mapping[tuple[str, int], UserSubroutine | None]
 ) -> StateReader | None:
     """Return what serves py_sysfnc where a script has it."""
-    if not any(user.looks for user in users.values()):
+    if not any(user is not None and user.looks for user in users.values()):
         return None
     from mbsim.system.subroutines import StateReader
 
@@ -241,9 +241,13 @@ def acting(
     model: Model,
     table: MarkerTable,
     first_state: int,
-    subroutines: dict[tuple[str, int], UserSubroutine],
+    subroutines: Mapping[tuple[str, int], UserSubroutine | None],
+    runs: bool = True,
 ) -> Acting:
-    """Return forces, constraints, states, sensors and requests; `first_state`: place in y."""
+    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
+
+    What only a run needs, laws and what subroutines look at, is left out unless it `runs`.
+    """
     programs = ProgramTable(
         table,
         model.variables,
@@ -254,7 +258,7 @@ def acting(
         model.arrays,
     )
     programs.users = {element: k for k, element in enumerate(subroutines)}
-    applied, applied_ids = applied_forces(model, table, programs)
+    applied, applied_ids = applied_forces(model, table, programs, laws=runs)
     mechanism = constrain(model, table, programs)
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
@@ -269,10 +273,21 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
-        _state_reader(model, programs, subroutines),
+        _state_reader(model, programs, subroutines) if runs else None,
         pulls(model, programs),
         _values(model, programs),  # the last of all
     )
+
+
+def check_expressions(model: Model) -> None:
+    """Raise what is wrong with expressions where they stand, as `build` would."""
+    from mbsim.system.subroutines import wanted
+
+    placement = place(model)
+    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
+    rows.update({id: k for k, id in enumerate(placement.bodies)})
+    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
+    acting(model, MarkerTable(placement, rows), 0, users, runs=False)
 
 
 def build(

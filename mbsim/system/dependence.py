@@ -189,7 +189,7 @@ def _sorted(needs: _Needs, row: int) -> list[int]:
 
 def _circle(model: Model, ring: list[tuple[str, int]]) -> DeckError:
     """Return the fault of forces that need each other."""
-    names = [f"{_TABLES[statement][0]}[{id}]" for statement, id in ring]
+    names = [element_name(model.file, _TABLES[statement][0], id) for statement, id in ring]
     statement, id = ring[0]
     source = getattr(model, _TABLES[statement][1])[id].source
     what = "a force that needs itself" if len(ring) == 2 else "forces that need each other"

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import mechanism_decks as decks
-from decks_io import GROUND, run_deck
+from decks_io import GROUND, run_deck, write_deck
 from decks_io import sphere as free_sphere
 from mechanics import Body
 
@@ -251,3 +251,17 @@ def test_forces_in_a_circle_are_refused_by_name(tmp_path, first, second, said):
 def test_accelerations_stay_refused_in_forces(tmp_path):
     with pytest.raises(DeckError, match="ACCX looks at accelerations, which cannot be used here"):
         slider(scalar(1, "ACCX(1000)")).run(tmp_path, 0.1, 0.05)
+
+
+def test_check_finds_the_circle_without_a_run(tmp_path):
+    from click.testing import CliRunner
+
+    from mbsim.cli.main import main
+
+    good = slider(scalar(1, "JOINT(1, 0, 4, 0)") + scalar(2, "SFORCE(1, 0, 2, 0)"))
+    circle = slider(scalar(1, "SFORCE(2, 0, 2, 0)") + scalar(2, "SFORCE(1, 0, 2, 0)"))
+    for scene, code, said in ((good, 0, "ok"), (circle, 2, "forces that need each other")):
+        path = write_deck(tmp_path, scene.xml())
+        shown = CliRunner().invoke(main, ["check", str(path)])
+        assert shown.exit_code == code
+        assert said in shown.output
