@@ -98,7 +98,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
 
     if code == UNSETTLED:
         raise SolverError(_unsettled(system, contact, t))
-    element = system.contact_ids[contact] if 0 <= contact else 0
+    element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
     if code in (RAISED_COMPILED, USER_NOT_FINITE):
         from mbsim.plugins import reproduce
 

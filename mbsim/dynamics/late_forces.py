@@ -251,7 +251,8 @@ def settle(scene, t, y, stresses):
         fill_rows(scene)
         broken, largest, reaction = measure_misses(scene, t, y)
         if broken >= 0:
-            work.trouble[1] = late[broken, 0]
+            # the row of `Work.applied` tells which it is, and no contact is at fault
+            work.trouble[1] = -1
             return NOT_FINITE
         if k == 0:
             bound = TOO_LARGE * max(largest, reaction)

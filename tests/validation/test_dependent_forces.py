@@ -16,6 +16,7 @@ from decks_io import GROUND, run_deck, write_deck
 from decks_io import sphere as free_sphere
 from mechanics import Body
 
+import mbsim
 from mbsim.errors import DeckError, SolverError
 
 G = 9.81
@@ -229,6 +230,34 @@ def test_reactions_that_no_force_agrees_with_end_the_run_by_name(tmp_path):
     scene = slider(axes + scalar(4, "JOINT(1, 0, 4, 0)", j=1002))
     with pytest.raises(SolverError, match=r"Force_Scalar_TwoBody\[4\].* does not settle at time 0"):
         scene.run(tmp_path, 0.1, 0.05)
+
+
+def test_a_force_that_is_no_number_is_named(tmp_path):
+    scene = slider(scalar(4, "SQRT(-JOINT(1, 0, 4, 0))"))
+    with pytest.raises(SolverError, match=r"Force_Scalar_TwoBody\[4\] is not finite at time 0"):
+        scene.run(tmp_path, 0.1, 0.05)
+
+
+def test_two_rails_press_as_one(tmp_path):
+    """Redundant: each takes half of the weight, and their frictions are those of one."""
+    mu = 0.3
+    size = "(ABS(JOINT(1, 0, 4, 0)) + ABS(JOINT(2, 0, 4, 0)))"
+    rail = decks.Joint("TRANSLATIONAL", 1, 0, (0, 0, 0), ALONG_X)
+    run = slider(scalar(1, f"-{mu}*{size}"), v=2.0, joints=[rail]).run(tmp_path, 0.3, 0.1)
+    t = run["time"]
+    np.testing.assert_allclose(x_of(run), 2 * t - 0.5 * mu * G * t**2, atol=1e-8)
+    np.testing.assert_allclose(run["joints/2/force"][:, 2], 0.5 * M * G, rtol=1e-11)
+
+
+def test_equilibrium_with_a_share_of_a_reaction(tmp_path):
+    """k x = 0.5 N, N = m g."""
+    path = write_deck(tmp_path, slider(scalar(1, "-100*DX(1000) + 0.5*JOINT(1, 0, 4, 0)")).xml())
+    text = path.read_text(encoding="utf-8")
+    at = text.index("<Simulate")
+    end = text.index("/>", at)
+    path.write_text(text[:at] + '<Simulate analysis_type="Static"' + text[end:], encoding="utf-8")
+    run = mbsim.simulate(mbsim.read_model(path))
+    np.testing.assert_allclose(x_of(run), [0.5 * M * G / 100], atol=1e-13)
 
 
 @pytest.mark.parametrize(
