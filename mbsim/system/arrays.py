@@ -73,6 +73,10 @@ DOORS = 10
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
 ) = range(11)
+LATE = 16  # is added to the kind of forces that need reactions, see dynamics.late_forces
+
+# second column of `Applied.late`: components 0 to 5 of a vector force, then
+SCALAR, RUBBING = 6, 7
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
@@ -274,6 +278,7 @@ class Applied(NamedTuple):
     law_par: F2  # (nf, widest)
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
+    late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
 
 
 class Tree(NamedTuple):
@@ -393,6 +398,8 @@ class Work(NamedTuple):
     law_out: F1  # (5,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
     rub: F2  # (nf, 9) of friction: see dynamics.joint_friction
+    late: F2  # (nu, 5) of what is settled with the reactions, see dynamics.late_forces
+    secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
 

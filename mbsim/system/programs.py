@@ -129,6 +129,7 @@ class ProgramTable:
         differentiable: bool = False,
         of_time: bool = False,
         forces: bool = False,
+        accelerations: bool = False,
     ) -> int:
         """Return the row of a new program.
 
@@ -142,8 +143,9 @@ class ProgramTable:
         of_time : bool
             Only TIME.
         forces : bool
-            Forces and accelerations too: these are known when an output row is written, not while
-            forces are summed.
+            Forces too: for what is evaluated behind them, see `system.dependence`.
+        accelerations : bool
+            Accelerations too, which are known when an output row is written.
 
         Raises
         ------
@@ -156,7 +158,9 @@ class ProgramTable:
             if not differentiable:
                 allowed |= {Kind.VELOCITY, Kind.STATE}
                 if forces:
-                    allowed |= {Kind.FORCE, Kind.ACCELERATION}
+                    allowed.add(Kind.FORCE)
+                if accelerations:
+                    allowed.add(Kind.ACCELERATION)
         try:
             made = _Compiler(self, frozenset(allowed)).compile(expression.root)
         except ExpressionError as fault:

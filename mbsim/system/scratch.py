@@ -52,7 +52,9 @@ def empty_log(nc: int) -> a.Log:
     )
 
 
-def scratch(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int) -> a.Work:
+def scratch(
+    nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int, nu: int
+) -> a.Work:
     """Return scratch, with the ground's rows as they stay."""
     ng = len(graphics.body)
     fixed = graphics.body == nb
@@ -88,6 +90,8 @@ def scratch(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, 
         law_out=np.zeros(5),
         applied=np.zeros((nf, 8)),
         rub=np.zeros((nf, 9)),
+        late=np.zeros((nu, 5)),
+        secant=np.zeros((nu, nu)),
         reaction=np.zeros(6 * nj),
         trouble=np.full(2, -1, dtype=np.int64),
     )
