@@ -46,10 +46,10 @@ class Pace:
             long_ago = t - LATELY * passed
             before = next((v for _, when, v in reversed(self.seen) if when <= long_ago), 0.0)
             if speed > max(FAST * system.scene.world.scale[1], GROWTH * before):
-                _give_up(system, y, t, pace)
+                _give_up(system, y, t, pace, "the motion leaves all bounds")
         pace = self._pace(STALLED)
         if pace is not None and pace < SLIVER * passed:
-            _give_up(system, y, t, pace)
+            _give_up(system, y, t, pace, "the run would not end")
 
     def _is_old(self, seen: tuple[int, float, float], steps: int, t: float) -> bool:
         return seen[0] <= steps - STALLED and seen[1] <= t - LATELY * (t - self.start)
@@ -77,10 +77,10 @@ def _fastest(system: System, y: Any) -> float:
     return float(_speeds(system, y).max(initial=0.0))
 
 
-def _give_up(system: System, y: Any, t: float, pace: float) -> NoReturn:
+def _give_up(system: System, y: Any, t: float, pace: float, why: str) -> NoReturn:
     raise SolverError(
-        f"no progress at time {t:.9g}: steps are {pace:.3g} on average and the motion leaves all "
-        f"bounds; {_culprit(system, y, t)}. Results up to there are kept."
+        f"no progress at time {t:.9g}: steps are {pace:.3g} on average and {why}; "
+        f"{_culprit(system, y, t)}. Results up to there are kept."
     )
 
 

@@ -393,9 +393,6 @@ def test_sdnd101(tol, allowed):
 @STOP_TOLS
 @pytest.mark.parametrize("kind", STOPS)
 def test_each_stop_of_sdnd101_alone(kind, tol, allowed, tmp_path):
-    # steps end where a contact begins; at the others a step runs into the stop and is cut
-    if kind != "contact":
-        allowed = max(allowed, 8e-4 if tol == 1e-5 else 0.0)
     head, *stops = re.split(r"(?=\n    <!-- )", (MODELS / "sdnd101.xml").read_text("utf-8"))
     tail = stops[-1][stops[-1].index("  </Model>") :]
     body = list(STOPS).index(kind)
