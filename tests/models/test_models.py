@@ -25,6 +25,7 @@ from models.reference import (
     geneva_wheel,
     hopping_follower,
     loose_slider,
+    roller_follower,
     slider_crank,
     top_attitude,
     wall_pendulum,
@@ -447,6 +448,36 @@ def test_cam(tol, allowed):
     assert np.abs(lift - cam).max() < 1.5e-5
     rigid = m * e * w**2 * np.cos(w * t) + k * cam + preload + m * 9.81
     assert np.abs(force - rigid).max() < 1e-3 * rigid.max()
+    assert all(event["kind"] == "touch" for event in results["events"])  # never leaves
+    assert cam_balance(results) < allowed
+
+
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-6)])
+def test_cam_roller(tol, allowed):
+    results = run_model("cam_roller.xml", tol=tol)
+    t, w, e, S = results["time"], 20 * np.pi, 0.01, 0.04
+    law, rub = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    height, spin, forces = roller_follower(
+        t, w, e, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23), law, rub, 0.0299757
+    )
+    z, turning = results["bodies/4/position/z"], results["bodies/4/angular_velocity/y"]
+    assert np.abs(z - height).max() < allowed * 2.5e-5  # of the depth
+    assert np.abs(turning - spin).max() < allowed * np.abs(spin).max()
+    largest = forces[:, 0].max()
+    for axis, column in (("x", 1), ("z", 2)):
+        force = results[f"contacts/301/force/{axis}"]
+        assert np.abs(force - forces[:, column]).max() < allowed * largest
+    # rigid: the centre S from that of the cam; it rolls once friction has taken it along
+    x0, z0 = -e * np.sin(w * t), -e * np.cos(w * t)
+    rigid = z0 + np.sqrt(S**2 - x0**2)
+    assert np.abs(z - rigid).max() < results["contacts/301/peak_penetration"] + 2e-6
+    n = np.column_stack([-x0, rigid - z0]) / S
+    rate = e * w * np.sin(w * t) - e**2 * w * np.sin(w * t) * np.cos(w * t) / np.sqrt(S**2 - x0**2)
+    touch = np.column_stack([x0, z0]) + 0.03 * n
+    along = n[:, 1] * w * touch[:, 1] + n[:, 0] * (w * touch[:, 0] + rate)
+    rolls = t > 0.02
+    assert np.abs(-0.01 * turning - along)[rolls].max() < 0.01
+    assert np.abs(0.01 * turning)[:10].min() < 0.1
     assert all(event["kind"] == "touch" for event in results["events"])  # never leaves
     assert cam_balance(results) < allowed
 
