@@ -43,6 +43,14 @@ def test_every_deck_has_a_test_here():
         assert f'"{deck.name}"' in text, deck.name
 
 
+def test_every_deck_is_in_the_readme():
+    text = (MODELS.parent / "README.md").read_text("utf-8")
+    tables = text[text.index("## Decks in `models/`") : text.index("## Joints, motions, forces")]
+    rows = [line for line in tables.splitlines() if line.startswith("| `")]
+    listed = {name for row in rows for name in re.findall(r"`(\w+\.xml)`", row.split("|")[1])}
+    assert listed == {deck.name for deck in MODELS.glob("*.xml")}
+
+
 @BOTH
 def test_seed_contact(detector):
     # sphere on a box: FCL's depth of this pair is exact to rounding
