@@ -608,12 +608,31 @@ def test_geneva_indexes_by_a_quarter_a_turn():
     assert off[engaged].max() < 5e-5 + results["contacts/1/peak_penetration"] + 1e-6
     # a quarter a turn, kept while the pin is out, without adding up
     for turn in range(4):
-        resting = angle[(t > turn + 0.42) & (t < turn + 1.1)]
+        free = (t < 2.45) | (t > 3.125)  # of the load
+        resting = angle[(t > turn + 0.42) & (t < turn + 1.1) & free]
         assert np.abs(resting - (turn + 1) * np.pi / 2).max() < 2e-4
         assert np.ptp(resting) < 1e-5
     parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
     total = sum(parts) - results["energy/work_of_motions"]
     assert np.abs(total - total[0]).max() < 1e-3 * parts[2][-1]
+
+
+def test_geneva_locks_its_wheel_against_a_load():
+    results = run_model("geneva.xml")
+    t, angle = results["time"], wheel_angle(results) - 1.5 * np.pi
+    loaded = (t > 2.5) & (t < 3.03)
+    arm = 0.1 * np.sin(np.radians(15))
+    # the disc is flat by as much between its corners; where its halves meet both push
+    depth, flat = (0.1 / arm / 1e8) ** (2 / 3), 0.045 * (1 - np.cos(np.radians(0.45)))
+    least, most = (3e-5 + depth) / arm, (3e-5 + depth + flat) / arm
+    assert least < angle[loaded].mean() < most
+    assert np.abs(angle[loaded] - least).max() < 0.1 * least
+    force = np.hypot(results["contacts/2/force/x"], results["contacts/2/force/y"])
+    # rows, 2 ms apart, meet the facets, 2.5 ms each, at five places only
+    assert force[loaded].mean() == pytest.approx(0.1 / arm, rel=0.05)
+    # the disc never touches the ends while the wheel turns, nor before the load
+    assert (force[(t < 2.45) | (t > 3.06)] == 0).all()
+    assert angle[t > 3.42][0] - np.pi / 2 == pytest.approx(angle[(t > 2.42)][0], abs=1e-6)
 
 
 @pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-6), (1e-9, 1e-9)])
