@@ -22,6 +22,7 @@ from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError
 from mbsim.failures import fail, give_up
 from mbsim.model.elements import Model
+from mbsim.runaway import Pace
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
@@ -382,7 +383,7 @@ class Runner:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         self._change()
-        budget = FIRST_BUDGET
+        budget, pace = FIRST_BUDGET, Pace(simulation.start_time, simulation.end_time)
         if fresh or stage.is_static:
             if not self._begin_stage(stage):
                 return
@@ -418,6 +419,8 @@ class Runner:
                     int(method.counts[scheme.CODE]),
                     method.memory[scheme.TIME],
                 )
+            now, steps = float(method.memory[scheme.TIME]), int(method.counts[scheme.STEPS])
+            pace.watch(self.system, method.y, now, steps)
             if outcome == problem.STEP_TOO_SMALL:
                 give_up(self.system, self.settings, self.method)
             if self.interrupted:

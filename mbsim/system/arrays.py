@@ -105,6 +105,9 @@ NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
 # what SENVAL shows, what it will show, whether it became true and Python has not yet acted
 EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
 
+# columns of `State.sides`: see dynamics.kinks
+SIDE, HEAT = range(2)
+
 
 class Bodies(NamedTuple):
     """Moving bodies."""
@@ -251,6 +254,13 @@ class Sensors(NamedTuple):
     located: I1  # (n,) 1 where a step ends at the crossing
 
 
+class Kinks(NamedTuple):
+    """What may change its branch within a step, which then ends there; see system.kinks."""
+
+    program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
+    limit: I1  # (n,) row of `Applied`, -1 for an expression
+
+
 class Users(NamedTuple):
     """User subroutines of forces and variables, see dynamics.subroutines."""
 
@@ -362,6 +372,7 @@ class State(NamedTuple):
     normal: F1  # (ns,) normal force
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
+    sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
 
 
 class Log(NamedTuple):
@@ -472,6 +483,7 @@ class Scene(NamedTuple):
     programs: Programs
     states: States
     sensors: Sensors
+    kinks: Kinks
     users: Users
     applied: Applied
     tree: Tree

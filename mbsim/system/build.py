@@ -28,6 +28,7 @@ from mbsim.system.contacts import (
     pairs_table,
 )
 from mbsim.system.dependence import check_states, in_order
+from mbsim.system.kinks import kinks_table
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import Mechanism, constrain, sweep
 from mbsim.system.pairing import (
@@ -231,6 +232,7 @@ class Acting:
     mechanism: Mechanism
     states: a.States
     sensors: a.Sensors
+    kinks: a.Kinks
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
@@ -274,6 +276,7 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
+        kinks_table(model, programs, applied),
         _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
         _values(model, programs),  # the last of all
@@ -388,6 +391,7 @@ def build(
         programs=instructions,
         states=states,
         sensors=rows.sensors,
+        kinks=rows.kinks,
         users=_users(subroutines, len(y0) if rubs else 0),
         applied=rows.applied,
         tree=mechanism.tree,
@@ -401,7 +405,14 @@ def build(
             np.zeros(1, dtype=np.int64),
             ledger,
         ),
-        state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(rows.sensors.id)),
+        state=start_state(
+            nb,
+            len(graphic_ids),
+            ns,
+            table.start_angles(),
+            len(rows.sensors.id),
+            len(rows.kinks.program),
+        ),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu),
         sweep=sweep(mechanism),

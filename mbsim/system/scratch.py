@@ -16,7 +16,7 @@ INCIDENTS = 100_000
 
 
 def start_state(
-    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0
+    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0, kinks: int = 0
 ) -> a.State:
     """Return the incident table before anything touched."""
     sensed = np.zeros((sensors, 5))
@@ -36,6 +36,7 @@ def start_state(
         normal=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
+        sides=np.zeros((kinks, 2)),
     )
 
 
