@@ -94,7 +94,11 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
 
     if code == JAMMED:
         raise SolverError(_jammed(system, contact, t))
-    element = system.contact_ids[contact] if 0 <= contact else 0
+    from mbsim.dynamics.late_forces import UNSETTLED
+
+    if code == UNSETTLED:
+        raise SolverError(_unsettled(system, contact, t))
+    element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
     if code in (RAISED_COMPILED, USER_NOT_FINITE):
         from mbsim.plugins import reproduce
 
@@ -120,4 +124,16 @@ def _jammed(system: System, row: int, t: float) -> str:
         f"Force_JointFriction[{id}]: Constraint_Joint[{joint}] jams at time {t:.9g}: friction "
         "and the reaction that it causes raise each other without end; results up to there "
         "are kept"
+    )
+
+
+def _unsettled(system: System, row: int, t: float) -> str:
+    """Return what is said of a force that no reactions agree with."""
+    from mbsim.results.elements import GROUPS
+
+    statement, id = system.applied[row]
+    name = element_name(system.model.file, GROUPS[statement].title, id)
+    return (
+        f"{name} does not settle at time {t:.9g}: it follows from reactions that follow from it, "
+        "and no value was found that agrees with both; results up to there are kept"
     )

@@ -22,6 +22,7 @@ from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError
 from mbsim.failures import fail, give_up
 from mbsim.model.elements import Model
+from mbsim.runaway import Pace
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
@@ -145,13 +146,21 @@ class Runner:
         for change in simulation.changes[len(before) :]:
             self.log.line(f"from time {simulation.start_time:.9g} on {change.text}")
 
+    def _keeps_end(self) -> bool:
+        """Return whether the row at the end is this stage's: the last's, or one rest of several."""
+        rest = [stage.is_static for stage in self.settings.stages[self.stage : self.stage + 2]]
+        return len(rest) == 1 or all(rest)
+
     def _interrupts(self, stage: int) -> bool:
-        """Return whether motions may not go on as they were: after a rest, and when changed."""
-        if stage == 0:
-            return False
-        before, now = self.settings.stages[stage - 1], self.settings.stages[stage]
-        fresh = now.simulation.changes[len(before.simulation.changes) :]
-        return before.is_static or any(c.table in ("motions", "variables") for c in fresh)
+        """Return whether motions may not go on as they were: after a rest, and when changed.
+
+        A model is assembled as it is written, before what changes it ahead of its first Simulate.
+        """
+        before = self.settings.stages[max(0, stage - 1) : stage]
+        known = sum(len(one.simulation.changes) for one in before)
+        fresh = self.settings.stages[stage].simulation.changes[known:]
+        rested = any(one.is_static for one in before)
+        return rested or any(c.table in ("motions", "variables") for c in fresh)
 
     def _door(self, t: float) -> Any:
         """Return what asks the joints' door at time t, None where there are no joints."""
@@ -336,8 +345,7 @@ class Runner:
             # a sensor may have ended the one before early
             now = float(method.memory[scheme.TIME])
             simulation = replace(simulation, start_time=now)
-        last = self.stage == len(self.settings.stages) - 1
-        self.sensing.begin(output_times(simulation, last), stage.h_max)
+        self.sensing.begin(output_times(simulation, self._keeps_end()), stage.h_max)
         # the statement may have changed what acts: f and the step begin anew
         method.memory[scheme.HAVE_F] = 0.0
         method.memory[scheme.STEP] = 0.0
@@ -375,7 +383,7 @@ class Runner:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         self._change()
-        budget = FIRST_BUDGET
+        budget, pace = FIRST_BUDGET, Pace(simulation.start_time, simulation.end_time)
         if fresh or stage.is_static:
             if not self._begin_stage(stage):
                 return
@@ -411,6 +419,8 @@ class Runner:
                     int(method.counts[scheme.CODE]),
                     method.memory[scheme.TIME],
                 )
+            now, steps = float(method.memory[scheme.TIME]), int(method.counts[scheme.STEPS])
+            pace.watch(self.system, method.y, now, steps)
             if outcome == problem.STEP_TOO_SMALL:
                 give_up(self.system, self.settings, self.method)
             if self.interrupted:

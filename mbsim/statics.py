@@ -10,9 +10,11 @@ import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balance, Hooks, balance
+from mbsim.dynamics.equilibrium_states import Rest, settle_states
 from mbsim.errors import SolverError
 from mbsim.expressions.elementary import NUMBER, TIME
 from mbsim.model.elements import Static
+from mbsim.model.names import element_name
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -51,21 +53,29 @@ def find(
     given: Static,
     tell: Callable[[str], None],
 ) -> None:
-    """Put the bodies of `y` into an equilibrium at time t, with velocities 0.
+    """Put the bodies of `y` into an equilibrium at time t, with velocities 0, and states with them.
 
     Raises
     ------
     SolverError
         If there is none, or none is found; `y` stays as it was.
     """
+    most = given.max_num_iter or MOST_ITERATIONS
     with standing_still(system, t):
-        found, where = balance(
-            system.scene, y, hooks, given.max_num_iter or MOST_ITERATIONS, given.imbalance
-        )
+        found, where = balance(system.scene, y, hooks, most, given.imbalance)
+        if len(system.scene.states.program):
+            # bodies that rest while states stand still are a start, or else what was given
+            start = where if found.balanced else y
+            rest = settle_states(system.scene, start, hooks, most)
+            if rest.state >= 0:
+                raise SolverError(_unsettled(system, rest, t))
+            found, where = balance(system.scene, rest.y, hooks, most, given.imbalance)
     if not found.balanced:
         raise SolverError(_failure(system, found, t))
     for line in _report(system, found, y, where, t):
         tell(line)
+    if len(system.scene.states.program):
+        tell(f"static: states at rest after {rest.iterations} iterations")
     y[...] = where
 
 
@@ -90,6 +100,16 @@ def _report(system: System, found: Balance, before: Array, y: Array, t: float) -
     if found.unstable:
         lines.append("static: without friction this equilibrium is unstable")
     return lines
+
+
+def _unsettled(system: System, rest: Rest, t: float) -> str:
+    """Return which state has no equilibrium."""
+    id = list(system.model.differentials)[rest.state]
+    name = element_name(system.model.file, "Control_Diff", id)
+    return (
+        f"no static equilibrium found at time {t:.9g}: the rate of {name} stays "
+        f"{rest.rate:.6g} after {rest.iterations} iterations, which is not 0"
+    )
 
 
 def _failure(system: System, found: Balance, t: float) -> str:

@@ -23,10 +23,12 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     from mbsim.model.names import is_adams
     from mbsim.reader.xml import read_model
     from mbsim.settings import settle
+    from mbsim.system.build import check_expressions
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)
     plans = plan_pairs(deck)
+    check_expressions(deck)
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 

@@ -85,6 +85,11 @@ def source_digest(files: list[Path]) -> str:
     return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
 
 
+def _is_known(file: Path) -> bool:
+    """Return whether all that a file can reach is seen by the digest of the cache."""
+    return PACKAGE in file.parents or cache_root().resolve() in file.parents
+
+
 class _ContentLocator(_CacheLocator):
     """Numba's cache for functions of this project, in a folder named by content."""
 
@@ -104,7 +109,7 @@ class _ContentLocator(_CacheLocator):
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ContentLocator | None:
         root = cache_root()
         file = Path(py_file).resolve()
-        if PACKAGE not in file.parents and root.resolve() not in file.parents:
+        if not _is_known(file):
             return None
         # an adapter closes over the law it adapts: that law's file counts as well
         cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
@@ -155,9 +160,14 @@ event.register("numba:run_pass", _Watch())
 
 @functools.cache
 def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `py_func` compiled at its first call (or loaded from the cache), once a process."""
+    """Return `py_func` compiled at its first call (or loaded from the cache), once a process.
+
+    What stands elsewhere is not cached: Numba would keep it while the arrays that it looks at
+    change.
+    """
     _register()
-    return numba.njit(cache=True, error_model="numpy")(py_func)
+    known = _is_known(Path(py_func.__code__.co_filename).resolve())
+    return numba.njit(cache=known, error_model="numpy")(py_func)
 
 
 _kept: list[Any] = []

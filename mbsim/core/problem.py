@@ -21,6 +21,8 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 |        |                             | between the committed point and this one, else 0     |
 | arrive | y committed, scratch        | 1 if something happened by this committed point that  |
 |        |                             | the caller of `advance` must act on, else 0           |
+| kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
+|        |                             | point, else 0                                         |
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
@@ -53,6 +55,7 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
+    kinks: int = 0  # only for problems whose forces change their branch
     linearise: int = 0  # this and the rest only for implicit methods
     factor: int = 0
     solve: int = 0
@@ -70,6 +73,9 @@ AT_ONCE = 100
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED = range(6)
+
+# what `kinks` is asked: whether sides differ, to keep them too, and that a step was taken
+ASK, SETTLE, PASS = 0.0, 1.0, 2.0
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE = range(3)

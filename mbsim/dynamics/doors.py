@@ -12,6 +12,7 @@ from mbsim.dynamics.applied import add_applied
 from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
+from mbsim.dynamics.late_forces import add_late
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.states import add_slopes
 from mbsim.dynamics.subroutines import failure_or
@@ -78,6 +79,13 @@ def _rub(context, t, y, dy):
     return add_friction(scene, t, carray(y, (n,)), carray(dy, (n,)))
 
 
+def _settle(context, t, y, dy):
+    """Forces that need reactions, with friction in joints, and the accelerations with them."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return add_late(scene, t, carray(y, (n,)), carray(dy, (n,)))
+
+
 def _express(context, t, y, program, body, way):
     """The jet of an expression."""
     scene = view(context, Scene)
@@ -128,7 +136,10 @@ def open_expressions(scene: Scene) -> None:
     kind = scene.applied.kind
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
         doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
-    if (scene.applied.connection >= 0).any():
+    if len(scene.applied.late) > 0:
+        # only then: it is compiled with all that it needs
+        doors[FRICTION_DOOR] = jit.address(_settle, _APPLY)
+    elif (scene.applied.connection >= 0).any():
         doors[FRICTION_DOOR] = jit.address(_rub, _APPLY)
     if scene.rows.value.shape[1] > 0:
         doors[VALUES_DOOR] = jit.address(_evaluate_requests, _VALUES)

@@ -184,4 +184,8 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         # where none is located, steps need not be looked into
         happens = jit.address(happens_hook, HOOK) if scene.sensors.located.any() else 0
         problem = problem._replace(happens=happens, arrive=arrive)
+    if len(scene.kinks.program) > 0 and not fixed_step:
+        from mbsim.dynamics.kinks import kinks_hook
+
+        problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
     return problem, table

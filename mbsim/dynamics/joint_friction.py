@@ -162,6 +162,9 @@ def settle_friction(scene, t, y, stresses):
         worst, largest, row, factor = compare(scene, t)
         scene.work.trouble[1] = row
         if not math.isfinite(worst):
+            # this tells which it is, and no contact is at fault
+            scene.work.applied[row, 0] = worst
+            scene.work.trouble[1] = -1
             return NOT_FINITE
         enough = SETTLED if k < MOST_ROUNDS - 1 else GOOD_ENOUGH
         if worst <= enough * largest:

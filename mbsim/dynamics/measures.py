@@ -16,7 +16,7 @@ from mbsim.dynamics.contact import FORCE, TORQUE, contact_of, sides
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
-from mbsim.system.arrays import VECTOR_FORCE
+from mbsim.system.arrays import LATE, VECTOR_FORCE
 
 AT_REST, AS_THEY_ARE = -2, -1
 
@@ -286,7 +286,7 @@ def on_i(scene, applied, row):
 @jitable
 def floats(scene, applied, row):
     """Return whether a row's J marker is a floating one, which is wherever I is."""
-    return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
+    return applied == 1 and scene.applied.kind[row] % LATE == VECTOR_FORCE
 
 
 @jitable

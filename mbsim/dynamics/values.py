@@ -27,6 +27,7 @@ from mbsim.expressions.elementary import (
 from mbsim.expressions.values import apply_value, power_value
 from mbsim.system.programs import (
     ADD_N,
+    ADD_TIME_N,
     ANGLE,
     DISTANCE,
     DIV_N,
@@ -72,7 +73,7 @@ def evaluate_program(scene, t, y, program):
     The topmost value is `x`; those below it stand in `values` from row 1 on.
     """
     programs = scene.programs
-    s, number = programs.values, programs.number
+    s, operand = programs.values, programs.operand
     top, x = 0, 0.0
     for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
         code = programs.quick[at]
@@ -81,7 +82,7 @@ def evaluate_program(scene, t, y, program):
         if op == NUMBER:
             s[top] = x
             top += 1
-            x = number[code[1]]
+            x = operand[at]
         elif op == TIME:
             s[top] = x
             top += 1
@@ -89,7 +90,7 @@ def evaluate_program(scene, t, y, program):
         elif op == TIME_N:
             s[top] = x
             top += 1
-            x = t * number[code[1]]
+            x = t * operand[at]
         elif op == ADD:
             top -= 1
             x = s[top] + x
@@ -103,19 +104,21 @@ def evaluate_program(scene, t, y, program):
             top -= 1
             x = s[top] / x
         elif op == ADD_N:
-            x = x + number[code[1]]
+            x = x + operand[at]
         elif op == SUB_N:
-            x = x - number[code[1]]
+            x = x - operand[at]
         elif op == MUL_N:
-            x = x * number[code[1]]
+            x = x * operand[at]
         elif op == DIV_N:
-            x = x / number[code[1]]
+            x = x / operand[at]
         elif op == N_SUB:
-            x = number[code[1]] - x
+            x = operand[at] - x
         elif op == N_DIV:
-            x = number[code[1]] / x
+            x = operand[at] / x
         elif op == POW_N:
-            x = power_value(x, number[code[1]])
+            x = power_value(x, operand[at])
+        elif op == ADD_TIME_N:
+            x = x + t * operand[at]
         elif op == SIN:
             x = math.sin(x)
         elif op == COS:

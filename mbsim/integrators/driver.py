@@ -11,6 +11,7 @@ import math
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
+    ASK,
     AT_ONCE,
     BY_CHECK,
     BY_ERROR,
@@ -19,8 +20,10 @@ from mbsim.core.problem import (
     FAILED,
     HAPPENED,
     NOT_FINITE,
+    PASS,
     PAUSED,
     ROWS_FULL,
+    SETTLE,
     STABLE_EVERY,
     STEP_TOO_SMALL,
 )
@@ -58,6 +61,12 @@ LOCATED = 1e-11
 LOOKS, MOST_LOOKS = 4, 64
 #: So often at most a step is taken again to end at its first event.
 MOST_RETAKES = 40
+
+#: Kinks so near to an end of a step, as a part of it, are as good as at the end: what a kink makes
+#: wrong grows with the square of what is left of the step behind it, a jump's with that itself.
+NEAR_KINK = 1e-4
+#: So often at most a step is taken again to end at a kink.
+MOST_CUTS = 3
 
 #: A hook that fails is tried again at a tenth of the step, so many times.
 MOST_FAILURES = 8
@@ -117,6 +126,8 @@ def begin(p, m, steps, t, t_end, h_max):
         if code != 0.0:
             return code
         m.memory[HAVE_F] = 1.0
+        if p.kinks != 0:
+            call_float(p.kinks, (p.context, t, SETTLE, m.y, m.error))
     if m.memory[STEP] == 0.0:
         if steps.order == 0.0:
             m.memory[STEP] = stable(p, m, t, h_max)
@@ -209,6 +220,33 @@ def first_event(p, m, t, h, times):
 
 
 @jitable
+def side_at(p, m, t, h, s, what):
+    """Return whether a force is on another branch at the part s of the fitted step."""
+    interpolate(m, s, m.error)
+    return call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error)) > 0.0
+
+
+@jitable
+def first_kink(p, m, t, h):
+    """Return the length of the fitted step up to its first kink that matters, h for none.
+
+    The problem is left evaluated at the trial point.
+    """
+    low, high = NEAR_KINK, 1.0
+    side_at(p, m, t, h, low, SETTLE)
+    if call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0:
+        while high - low > 0.1 * NEAR_KINK:
+            middle = 0.5 * (low + high)
+            if side_at(p, m, t, h, middle, ASK):
+                high = middle
+            else:
+                low = middle
+    call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    # a little more, so that the step after it begins on the other side
+    return h if high > 1.0 - NEAR_KINK else (high + 0.5 * NEAR_KINK) * h
+
+
+@jitable
 def outputs(p, m, steps, times):
     """Write a row for every output time within the last step; return 0 or what stopped it."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
@@ -234,38 +272,49 @@ def outputs(p, m, steps, times):
 def attempt(p, m, steps, t, h, times):
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
+    And whether it ends on another branch of a force.
+
     A step that fails is not checked. The dense output of one that will be taken is fitted
     before the problem is committed, while its hooks still know the step's begin. Single impacts
     are not guarded, nor their peaks looked for, by a method whose step is the problem's bound.
     """
     code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
     if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code, 1.0, -1.0
-    asked = -1.0
+        return code, 1.0, -1.0, False
+    asked, kinked = -1.0, False
     if steps.order > 0.0:
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
         if part < 1.0:
-            return 0.0, part, -1.0
+            return 0.0, part, -1.0, False
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-    if asked >= 0.0 or p.happens != 0 or output_within(m, times, t + h):
+    if p.kinks != 0:
+        kinked = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0
+    if asked >= 0.0 or kinked or p.happens != 0 or output_within(m, times, t + h):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
-    return code, 1.0, asked
+    return code, 1.0, asked, kinked
 
 
 @jitable
 def attempt_to_event(p, m, steps, t, h, times, floor):
     """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
 
+    A step with a kink ends just behind it, so that none has one in its midst.
     A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
     the state there is no interpolated one; where that ends before the event after all, it is
     tried a little longer.
     """
     near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
-    shortened, retakes = False, 0
+    shortened, retakes, cuts = False, 0, 0
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
-        code, part, asked = attempt(p, m, steps, t, h, times)
+        code, part, asked, kinked = attempt(p, m, steps, t, h, times)
         failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
+        if kinked and not failed and cuts < MOST_CUTS and not shortened:
+            cuts += 1
+            cut = first_kink(p, m, t, h)
+            if floor < cut < h:
+                h = cut
+                continue
         if p.happens == 0 or failed:
             return code, part, asked, h
         cut = first_event(p, m, t, h, times)
@@ -304,6 +353,8 @@ def look_inside(p, m, asked):
 def accept(p, m, steps, t, h, asked):
     """Take the trial point; return the problem's word on it, or a negative code."""
     word = call_float(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
+    if p.kinks != 0:
+        call_float(p.kinks, (p.context, t + h, PASS, m.trial, m.error))
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]

@@ -66,7 +66,7 @@ class Method(NamedTuple):
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (14,) the fields of `Problem`
+    problem: I1  # (15,) the fields of `Problem`
     method: Method
 
 
@@ -118,7 +118,7 @@ def on_bench(context):
     bench = view(context, Bench)
     w = bench.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
-    problem = Problem(*first, w[7], w[8], w[9], w[10], w[11], w[12], w[13])
+    problem = Problem(*first, w[7], w[8], w[9], w[10], w[11], w[12], w[13], w[14])
     return problem, bench.method
 
 

@@ -10,7 +10,9 @@ from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Attribute, Node
 from mbsim.reader.statements import known_attributes
 
-_FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)
+_FORM = re.compile(
+    r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?(?:\[\s*([1-9]\d*)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL
+)
 _MOST_LISTED = 12
 
 
@@ -29,7 +31,8 @@ def apply_overrides(
     overrides : sequence of str
         ``Element[id].attribute=value``, names matched without case and `_`. A statement
         without ids is named by its place among those of its name, ``Simulate[2]``, or by
-        its name alone where there is one.
+        its name alone where there is one. ``Element[id][2].attribute=value`` is the first
+        change of that element in <Command>, [3] the next.
     known : callable, optional
         Returns the attributes that a statement may have, None where that is open.
 
@@ -43,9 +46,9 @@ def apply_overrides(
         match = _FORM.fullmatch(text)
         if match is None:
             raise ModelError(f"--set {text}: must be Element[id].attribute=value")
-        element, index, attribute, value = match.groups()
+        element, index, turn, attribute, value = match.groups()
         try:
-            node = _find(sections, element, index)
+            node = _find(sections, element, index, int(turn or 1))
             _set(node, attribute, value.strip(), f"--set {text}", known(node))
         except LookupError as error:
             raise ModelError(f"--set {text}: {error.args[0]}") from None
@@ -57,8 +60,12 @@ def _statements(sections: Sequence[Node]) -> Iterator[Node]:
         yield from section.children
 
 
-def _find(sections: Sequence[Node], element: str, index: str | None) -> Node:
-    """Return the one statement that a selector names, LookupError otherwise."""
+def _find(sections: Sequence[Node], element: str, index: str | None, turn: int) -> Node:
+    """Return the one statement that a selector names, LookupError otherwise.
+
+    Of statements with one id, which is the element and its changes in <Command>, it is the
+    `turn`-th.
+    """
     named = [node for node in _statements(sections) if node.key == fold(element)]
     if not named:
         tags = sorted({node.tag for node in _statements(sections)})
@@ -69,10 +76,15 @@ def _find(sections: Sequence[Node], element: str, index: str | None) -> Node:
         if len(named) == 1:
             return named[0]
         raise LookupError(f"{len(named)} of {tag}; name one of {_choices(named)}")
+    found = []
     for place, node in enumerate(named, start=1):
         id = node.find("id")
         if index == (id.value.strip() if id else str(place)):
-            return node
+            found.append(node)
+    if len(found) >= turn:
+        return found[turn - 1]
+    if found:
+        raise LookupError(f"no {tag}[{index}][{turn}] in the deck; it has {len(found)} of them")
     raise LookupError(f"no {tag}[{index}] in the deck; it has {_choices(named)}")
 
 

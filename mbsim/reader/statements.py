@@ -86,12 +86,19 @@ NOT_BUILT = (
     "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
-    "Load_Command Load_Model Param_Linear "
+    "Param_Linear "
     "Param_Simulation Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
-    "Reference_ParamSurface Reference_String Save "
+    "Reference_ParamSurface Reference_String "
     "Sensor_Evaluate Sensor_Proximity UserProgramControl"
 ).split()
+#: Documented statements that mbsim has another way for.
+REFUSED = {
+    "Load_Command": "a run's commands are those of its deck; write them into this <Command>",
+    "Load_Model": "a run is one deck; give the other file to a mbsim run of its own",
+    "Save": "the result file keeps the state; a run cut short goes on with mbsim run --resume",
+}
+_REFUSED = {fold(name): f"{name} is not taken: {why}" for name, why in REFUSED.items()}
 _NOT_AFTER_STOP = (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 
@@ -124,8 +131,10 @@ def _read_statement(section: Node, node: Node, draft: Draft) -> None:
     if statement is None:
         if node.key in _NOT_BUILT:
             message = f"{_NOT_BUILT[node.key]} is documented but not built yet"
+        elif node.key in _REFUSED:
+            message = _REFUSED[node.key]
         else:
-            known = [statement.name for statement in STATEMENTS] + NOT_BUILT
+            known = [*(statement.name for statement in STATEMENTS), *NOT_BUILT, *REFUSED]
             message = f"unknown statement <{node.tag}>{nearest(node.tag, known)}"
         draft.fault(node.line, label, message)
     elif draft.stop_line and (statement in _NOT_AFTER_STOP or statement.name in CHANGEABLE):

@@ -32,16 +32,19 @@ _FRICTIONS = {
 
 
 def applied_forces(
-    model: Model, markers: MarkerTable, programs: ProgramTable
+    model: Model, markers: MarkerTable, programs: ProgramTable, laws: bool = True
 ) -> tuple[a.Applied, list[tuple[str, int]]]:
-    """Return the forces between markers, and for each row its element: (statement, id)."""
+    """Return the forces between markers, and for each row its element: (statement, id).
+
+    Without `laws` those of friction and limits are left out, which would be compiled.
+    """
     given = [
         (statement, element)
         for statement, table in _tables(model).items()
         for element in table.values()
     ]
     n = len(given)
-    laws = [_law(element) for _, element in given]
+    found = [_law(element) if laws else (0, np.zeros(0)) for _, element in given]
     made = a.Applied(
         kind=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
@@ -54,12 +57,13 @@ def applied_forces(
         alone=np.zeros(n, dtype=np.int64),
         bounds=np.zeros((n, 2)),
         law=np.zeros(n, dtype=np.int64),
-        law_par=np.zeros((n, max([1, *(len(values) for _, values in laws)]))),
+        law_par=np.zeros((n, max([1, *(len(values) for _, values in found)]))),
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
+        late=np.zeros((0, 3), dtype=np.int64),
     )
     for k, (statement, element) in enumerate(given):
-        made.law[k], values = laws[k]
+        made.law[k], values = found[k]
         made.law_par[k, : len(values)] = values
         _FILL[statement](model, markers, programs, made, k, element)
     return made, [(statement, element.id) for statement, element in given]
@@ -105,7 +109,7 @@ def _add_scalar(
 ) -> None:
     """Fill row k with a scalar force by an expression."""
     made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
-    made.program[k] = programs.add(force.expr, force)
+    made.program[k] = programs.add(force.expr, force, forces=True)
     made.alone[k] = int(force.action_only)
     along = a.AXIS_FORCE if force.action_only else a.LINE_FORCE
     made.kind[k] = a.AXIS_TORQUE if force.type == "ROTATIONAL" else along
@@ -140,7 +144,7 @@ def _add_vector(
     made.axes[k] = markers.row(force.ref_marker_id)
     for c, expression in enumerate(force.exprs):
         if expression is not None:
-            made.components[k, c] = programs.add(expression, force)
+            made.components[k, c] = programs.add(expression, force, forces=True)
 
 
 def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:

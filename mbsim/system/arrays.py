@@ -75,6 +75,10 @@ DOORS = 12
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
 ) = range(11)
+LATE = 16  # is added to the kind of forces that need reactions, see dynamics.late_forces
+
+# second column of `Applied.late`: components 0 to 5 of a vector force, then
+SCALAR, RUBBING = 6, 7
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
@@ -102,6 +106,9 @@ NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
 # columns of `State.sensed`: expression less value at the committed state, whether it was true,
 # what SENVAL shows, what it will show, whether it became true and Python has not yet acted
 EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
+
+# columns of `State.sides`: see dynamics.kinks
+SIDE, HEAT = range(2)
 
 
 class Bodies(NamedTuple):
@@ -222,6 +229,7 @@ class Programs(NamedTuple):
     stack: F2  # (deepest, 3) scratch: value, first and second derivative
     quick_start: I1  # (programs + 1,) the same for values alone
     quick: I2  # (instructions, 6) with operations by a number in one, see system.programs
+    operand: F1  # (instructions,) the number that each of `quick` takes, if it takes one
     values: F1  # (deepest + 1,) scratch: values alone
     level: F1  # (curves,) z of a curve of a spline
     curve: I1  # (curves + 1,) first piece of each
@@ -246,6 +254,13 @@ class Sensors(NamedTuple):
     value: F1  # (n,)
     width: F1  # (n,) how far from the value counts as there
     located: I1  # (n,) 1 where a step ends at the crossing
+
+
+class Kinks(NamedTuple):
+    """What may change its branch within a step, which then ends there; see system.kinks."""
+
+    program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
+    limit: I1  # (n,) row of `Applied`, -1 for an expression
 
 
 class Users(NamedTuple):
@@ -275,6 +290,7 @@ class Applied(NamedTuple):
     law_par: F2  # (nf, widest)
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
+    late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
 
 
 class Tree(NamedTuple):
@@ -358,6 +374,7 @@ class State(NamedTuple):
     normal: F1  # (ns,) normal force
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
+    sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
 
 
 class Log(NamedTuple):
@@ -394,6 +411,8 @@ class Work(NamedTuple):
     law_out: F1  # (5,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
     rub: F2  # (nf, 9) of friction: see dynamics.joint_friction
+    late: F2  # (nu, 5) of what is settled with the reactions, see dynamics.late_forces
+    secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
 
@@ -466,6 +485,7 @@ class Scene(NamedTuple):
     programs: Programs
     states: States
     sensors: Sensors
+    kinks: Kinks
     users: Users
     applied: Applied
     tree: Tree

@@ -7,7 +7,7 @@ without friction no friction law, a law that does not look at X no X.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,8 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
+from mbsim.system.dependence import check_states, in_order
+from mbsim.system.kinks import kinks_table
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import Mechanism, constrain, sweep
 from mbsim.system.pairing import (
@@ -154,7 +156,7 @@ def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs):
             if expression is not None:
-                programs.add(expression, request, forces=True)
+                programs.add(expression, request, forces=True, accelerations=True)
                 made.append((request.id, k + 1))
     return made
 
@@ -230,6 +232,7 @@ class Acting:
     mechanism: Mechanism
     states: a.States
     sensors: a.Sensors
+    kinks: a.Kinks
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
@@ -239,12 +242,14 @@ def acting(
     model: Model,
     table: MarkerTable,
     first_state: int,
-    subroutines: dict[tuple[str, int], UserSubroutine],
+    subroutines: Mapping[tuple[str, int], UserSubroutine | None],
     looks: bool,
+    runs: bool = True,
 ) -> Acting:
-    """Return forces, constraints, states, sensors and requests.
+    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
 
-    `first_state` is the place in y, `looks` whether a script has py_sysfnc.
+    `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
+    look at, is left out unless it `runs`.
     """
     programs = ProgramTable(
         table,
@@ -256,18 +261,37 @@ def acting(
         model.arrays,
     )
     programs.users = {element: k for k, element in enumerate(subroutines)}
-    applied, applied_ids = applied_forces(model, table, programs)
+    applied, applied_ids = applied_forces(model, table, programs, laws=runs)
+    mechanism = constrain(model, table, programs)
+    applied, applied_ids = in_order(
+        model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
+    )
+    states = states_table(model, programs)
+    held = (mechanism.connections, mechanism.elements, programs)
+    check_states(model, states, applied, applied_ids, *held)
     return Acting(
         programs,
         applied,
         applied_ids,
-        constrain(model, table, programs),
-        states_table(model, programs),
+        mechanism,
+        states,
         sensors_table(model, programs),
-        _state_reader(model, programs, looks),
+        kinks_table(model, programs, applied),
+        _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
         _values(model, programs),  # the last of all
     )
+
+
+def check_expressions(model: Model) -> None:
+    """Raise what is wrong with expressions where they stand, as `build` would."""
+    from mbsim.system.subroutines import wanted
+
+    placement = place(model)
+    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
+    rows.update({id: k for k, id in enumerate(placement.bodies)})
+    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
+    acting(model, MarkerTable(placement, rows), 0, users, looks=False, runs=False)
 
 
 def build(
@@ -339,6 +363,7 @@ def build(
     rows = acting(model, table, first_state, subroutines, looks)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
+    nu = len(rows.applied.late)
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
     ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
@@ -366,6 +391,7 @@ def build(
         programs=instructions,
         states=states,
         sensors=rows.sensors,
+        kinks=rows.kinks,
         users=_users(subroutines, len(y0) if rubs else 0),
         applied=rows.applied,
         tree=mechanism.tree,
@@ -379,9 +405,16 @@ def build(
             np.zeros(1, dtype=np.int64),
             ledger,
         ),
-        state=start_state(nb, len(graphic_ids), ns, table.start_angles(), len(rows.sensors.id)),
+        state=start_state(
+            nb,
+            len(graphic_ids),
+            ns,
+            table.start_angles(),
+            len(rows.sensors.id),
+            len(rows.kinks.program),
+        ),
         log=empty_log(len(contact_ids)),
-        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj),
+        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu),
         sweep=sweep(mechanism),
         rows=empty_rows(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)

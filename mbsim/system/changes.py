@@ -71,6 +71,10 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
         scene.applied, applied, _OF_APPLIED
     ):
         raise _refused(system, changes, "asks for another law than before: not built yet")
+    if rows.applied_ids != system.applied or not all(
+        np.array_equal(getattr(applied, n), getattr(scene.applied, n)) for n in ("kind", "late")
+    ):
+        raise _refused(system, changes, "follows from other forces than before: not built yet")
     programs = rows.programs.arrays(rows.mechanism.elements, rows.applied_ids, system.contact_ids)
     return Parameters(contacts, applied, programs)
 

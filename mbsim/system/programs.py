@@ -55,8 +55,10 @@ DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEA
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
 STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
-#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x; TIME n.
-ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV, TIME_N = range(SPLINE + 1, SPLINE + 9)
+#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x.
+#: TIME n; x + TIME n.
+ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
+TIME_N, ADD_TIME_N = range(SPLINE + 8, SPLINE + 10)
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -127,6 +129,7 @@ class ProgramTable:
         differentiable: bool = False,
         of_time: bool = False,
         forces: bool = False,
+        accelerations: bool = False,
     ) -> int:
         """Return the row of a new program.
 
@@ -140,8 +143,9 @@ class ProgramTable:
         of_time : bool
             Only TIME.
         forces : bool
-            Forces and accelerations too: these are known when an output row is written, not while
-            forces are summed.
+            Forces too: for what is evaluated behind them, see `system.dependence`.
+        accelerations : bool
+            Accelerations too, which are known when an output row is written.
 
         Raises
         ------
@@ -154,7 +158,9 @@ class ProgramTable:
             if not differentiable:
                 allowed |= {Kind.VELOCITY, Kind.STATE}
                 if forces:
-                    allowed |= {Kind.FORCE, Kind.ACCELERATION}
+                    allowed.add(Kind.FORCE)
+                if accelerations:
+                    allowed.add(Kind.ACCELERATION)
         try:
             made = _Compiler(self, frozenset(allowed)).compile(expression.root)
         except ExpressionError as fault:
@@ -198,7 +204,8 @@ class ProgramTable:
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         numbers: dict[float, int] = {}
         start, code = _table(self.programs, rows, numbers)
-        quick_start, quick = _table([_quick(program) for program in self.programs], rows, numbers)
+        shortened = [_quick(program) for program in self.programs]
+        quick_start, quick = _table(shortened, rows, numbers)
         deepest = max(map(_deepest, self.programs), default=0)
         return a.Programs(
             start,
@@ -207,6 +214,8 @@ class ProgramTable:
             np.zeros((deepest, 3)),
             quick_start,
             quick,
+            # beside the instruction: one load less than by its row of `number`
+            np.array([instruction.value for program in shortened for instruction in program]),
             np.zeros(deepest + 1),
             *self.curves.arrays(),
         )
@@ -220,7 +229,7 @@ def _table(
     at = 0
     for program in programs:
         for op, given, value, element in program:
-            if op == NUMBER or op >= ADD_N:
+            if op == NUMBER:
                 # the sign of a zero counts, but neither gives another result than the other
                 given = (numbers.setdefault(value, len(numbers)),)
             elif element is not None:
@@ -248,6 +257,8 @@ def _quick(program: list[Instruction]) -> list[Instruction]:
             made.append(instruction)
         if len(made) > 1 and made[-1].op == MUL_N and made[-2].op == TIME:
             made[-2:] = [Instruction(TIME_N, value=made[-1].value)]
+        if len(made) > 1 and made[-1].op == elementary.ADD and made[-2].op == TIME_N:
+            made[-2:] = [Instruction(ADD_TIME_N, value=made[-2].value)]
         if taken:
             del starts[-taken:]
         starts.append(first)

@@ -16,7 +16,7 @@ INCIDENTS = 100_000
 
 
 def start_state(
-    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0
+    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0, kinks: int = 0
 ) -> a.State:
     """Return the incident table before anything touched."""
     sensed = np.zeros((sensors, 5))
@@ -36,6 +36,7 @@ def start_state(
         normal=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
+        sides=np.zeros((kinks, 2)),
     )
 
 
@@ -52,7 +53,9 @@ def empty_log(nc: int) -> a.Log:
     )
 
 
-def scratch(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int) -> a.Work:
+def scratch(
+    nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int, nu: int
+) -> a.Work:
     """Return scratch, with the ground's rows as they stay."""
     ng = len(graphics.body)
     fixed = graphics.body == nb
@@ -88,6 +91,8 @@ def scratch(nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, 
         law_out=np.zeros(5),
         applied=np.zeros((nf, 8)),
         rub=np.zeros((nf, 9)),
+        late=np.zeros((nu, 5)),
+        secant=np.zeros((nu, nu)),
         reaction=np.zeros(6 * nj),
         trouble=np.full(2, -1, dtype=np.int64),
     )

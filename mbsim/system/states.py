@@ -13,7 +13,9 @@ def states_table(model: Model, programs: ProgramTable) -> a.States:
     """Return the states, whose slopes become programs."""
     states = model.differentials.values()
     return a.States(
-        np.array([programs.add(state.expr, state) for state in states], dtype=np.int64),
+        np.array(
+            [programs.add(state.expr, state, forces=True) for state in states], dtype=np.int64
+        ),
         programs.first_state + np.arange(len(states), dtype=np.int64),
         np.array([state.scale for state in states], dtype=np.float64),
     )

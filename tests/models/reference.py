@@ -451,6 +451,47 @@ class Governor:
         return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2
 
 
+def roller_follower(
+    times, speed, e, R, roller, mass, inertia, spring, preload, law, rub, z0, g=9.81
+):
+    """Return height and spin (about y) of a follower's roller above an eccentric cam, and forces.
+
+    The cam's centre is at -e (sin, cos)(w t) in x and z. `law` is that of IMPACT, `rub` friction
+    coefficient and the slip at which it is full; forces act half the depth below both surfaces.
+    Forces are the normal force, along x and along z.
+    """
+    mu, full = rub
+
+    def push(t, z, dz, spin):
+        x0, z0 = -e * math.sin(speed * t), -e * math.cos(speed * t)
+        far = math.hypot(x0, z - z0)
+        n = (-x0 / far, (z - z0) / far)
+        depth = R + roller - far
+        cam = (x0 + (R - depth / 2) * n[0], z0 + (R - depth / 2) * n[1])
+        arm = roller - depth / 2
+        # a turn w about y moves (x, z) by w (z, -x)
+        vx = -spin * arm * n[1] - speed * cam[1]
+        vz = dz + spin * arm * n[0] + speed * cam[0]
+        normal = impact(depth, -(n[0] * vx + n[1] * vz), *law)
+        slip = n[1] * vx - n[0] * vz
+        u = min(abs(slip) / full, 1.0)
+        drag = -math.copysign(mu * normal * u * (3.0 - u * u) / 2, slip)
+        return normal, normal * n[0] + drag * n[1], normal * n[1] - drag * n[0], -arm * drag
+
+    low = R + roller - e
+
+    def rhs(t, y):
+        _, _, up, torque = push(t, *y)
+        return [y[1], (up - preload - spring * (y[0] - low)) / mass - g, torque / inertia]
+
+    z, dz, spin = solve_ivp(
+        rhs, (times[0], times[-1]), [z0, 0.0, 0.0], method="DOP853", t_eval=times,
+        rtol=1e-10, atol=1e-13, max_step=2e-5,
+    ).y  # fmt: skip
+    forces = np.array([push(*row)[:3] for row in zip(times, z, dz, spin, strict=True)])
+    return z, spin, forces
+
+
 def geneva_wheel(times, speed, a, pin, walls, inertia, damper, law):
     """Return the angle of a Geneva wheel at (0, 0), its crank at (a, 0) turning from -90 deg.
 

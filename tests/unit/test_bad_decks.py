@@ -268,7 +268,17 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         END_OF_MODEL,
         ("Sensor_Proximity", "not built yet"),
     ),
-    "save": (added('<Save model_file="a.xml"/>', "Command"), END_OF_COMMAND, ("Save",)),
+    "save": (added('<Save model_file="a.xml"/>', "Command"), END_OF_COMMAND, ("Save", "--resume")),
+    "load model": (
+        added('<Load_Model file="b.xml"/>'),
+        END_OF_MODEL,
+        ("Load_Model is not taken: a run is one deck",),
+    ),
+    "load command": (
+        added('<Load_Command file="b.xml"/>', "Command"),
+        END_OF_COMMAND,
+        ("Load_Command is not taken", "<Command>"),
+    ),
     "VOLUME": (
         law('cnf_type="VOLUME" i_elastic_modulus="1e5"'),
         CONTACT_LINE + 1,

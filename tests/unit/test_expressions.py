@@ -259,7 +259,7 @@ def test_every_function_of_the_table_can_be_used():
             programs = table(variables)
             programs.splines, programs.arrays_of_numbers = splines, arrays
             programs.differentials, programs.sensors = {1: Differential(1, parse("TIME"))}, (1,)
-            programs.add(parse(text), forces=True)
+            programs.add(parse(text), forces=True, accelerations=True)
             # a spline stands behind its x and z
             assert len(programs.programs[0]) == (3 if function.name.endswith("SPL") else 1)
             if function.kind in (Kind.DISPLACEMENT, Kind.ELEMENTARY, Kind.TABLE):

@@ -261,3 +261,67 @@ def test_box_on_a_slope_finds_no_rest(tmp_path):
     slope = f'<Force_Gravity grav_x="{0.3 * G}" grav_z="{-G}"/>'
     with pytest.raises(SolverError, match=r"residual .*Body_Rigid\[2\]"):
         run(tmp_path, GROUND + box(2, 0.1) + contact(1, 200, 100) + slope)
+
+
+def held(expr, states):
+    """Return a sphere of 2 kg that a force along z of ground holds, with states."""
+    return f"""{EARTH}{sphere(-0.9, mass=2.0)}{GRAVITY}{states}
+<Force_Scalar_TwoBody id="1" type="Force" i_marker_id="20" j_marker_id="10"
+  expr="{expr}" action_only="TRUE"/>"""
+
+
+def state(id, expr, ic=0.0):
+    return f'<Control_Diff id="{id}" expr="{expr}" ic="{ic}"/>'
+
+
+def test_a_state_comes_to_rest_with_the_body_that_it_pushes(tmp_path):
+    """z' = (x - z)/0.1 lags behind a cubic spring that stretches with it: 0 = x - z."""
+    model = held("-300*(DIF(5)**3 + DIF(5)) + 4*DZ(20)", state(5, "(DZ(20) - DIF(5))/0.1"))
+    model += '<Post_Request id="1" type="EXPRESSION" expr1="DIF(5)" expr2="DIF1(5)"/>'
+    results = run(tmp_path, model)
+    z = results["bodies/2/position"][-1, 2]
+    assert -300 * (z**3 + z) + 4 * z == pytest.approx(2 * G, abs=1e-9)
+    assert results["requests/1"][-1, 0] == pytest.approx(z, abs=1e-12)
+    assert results["requests/1"][-1, 1] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_the_integral_part_of_a_controller_holds_the_weight(tmp_path):
+    """z' = x + 0.5 has its equilibrium by the body alone; for the body alone nothing holds it."""
+    integral = state(5, "DZ(20) + 0.5")
+    results = run(tmp_path, held("-40*(DZ(20) + 0.5) - 9*VZ(20) - 60*DIF(5)", integral))
+    assert results["bodies/2/position"][-1, 2] == pytest.approx(-0.5, abs=1e-11)
+
+
+def test_states_at_rest_stay_there(tmp_path):
+    """A transient from the equilibrium moves nothing; two states, one of them not linear."""
+    states = state(5, "2 - EXP(DIF(5)) + 0.3*DIF(6)", ic=3.0)
+    states += state(6, "DZ(20) - DIF(6)*(1 + DIF(6)**2)", ic=1.0)
+    after = '<Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/>'
+    results = run(tmp_path, held("-200*DZ(20) + 9*DIF(5)", states), STATIC + after, tol=1e-9)
+    z = results["bodies/2/position"][:, 2]
+    assert z == pytest.approx(np.full(len(z), z[0]), abs=1e-9)
+    six = z[0]
+    for _ in range(60):
+        six -= (six + six**3 - z[0]) / (1 + 3 * six**2)
+    assert 200 * z[0] == pytest.approx(9 * math.log(2 + 0.3 * six) - 2 * G, abs=1e-8)
+
+
+@pytest.mark.parametrize("slope", ["1", "DIF(6)**2 + 1", "1 + TIME"])
+def test_a_state_without_equilibrium_is_named(tmp_path, slope):
+    states = state(5, "-DIF(5)") + state(6, slope, ic=0.7)
+    with pytest.raises(SolverError, match=r"the rate of Control_Diff\[6\].* stays 1 after"):
+        run(tmp_path, held("-200*DZ(20) + 9*DIF(5)", states))
+
+
+def test_two_rests_in_a_row_keep_a_row_each(tmp_path):
+    """The spring changes between them; the rows stand at one time, in their order."""
+    model = f"""{EARTH}{sphere(-0.9, mass=3.0)}{GRAVITY}
+<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"
+  stiffness="500" damping="3" length="0.5"/>"""
+    change = '<Force_SpringDamper id="1" stiffness="250"/>'
+    after = '<Simulate analysis_type="Transient" end_time="0.2" print_interval="0.1"/>'
+    results = run(tmp_path, model, STATIC + change + STATIC + after)
+    assert results["time"].tolist() == pytest.approx([0.0, 0.0, 0.1, 0.2])
+    z = results["bodies/2/position"][:, 2]
+    assert z[0] == pytest.approx(-(0.5 + 3.0 * G / 500.0), abs=1e-12)
+    assert z[1:] == pytest.approx(np.full(3, -(0.5 + 3.0 * G / 250.0)), abs=1e-9)

@@ -1,0 +1,68 @@
+"""Where the step under trial leaves the branch that a force was on: see `system.kinks`.
+
+What an expression or a limit is on is a number, its side. The driver ends a step where a side
+becomes another than it was at the committed state.
+"""
+
+from __future__ import annotations
+
+from numba import carray
+
+from mbsim.core.address import view
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK, PASS
+from mbsim.dynamics.applied import along_axis, along_slide, at_limit
+from mbsim.dynamics.expressions import value
+from mbsim.dynamics.kinematics import place_bodies
+from mbsim.system.arrays import HEAT, SIDE, SLIDE_LIMIT, Scene
+
+#: Each change of side heats by 1, each step takes a tenth of the heat. What is hotter than this
+#: changes at nearly every step, as the sign of what is at rest does: then steps are not cut.
+HOT = 4.0
+COOLING = 0.9
+
+
+@jitable
+def side_of_limit(scene, y, f):
+    """Return 0 between the bounds, 1 below, 2 above, and 2 more where the limit pushes."""
+    if scene.applied.kind[f] == SLIDE_LIMIT:
+        _, x, rate = along_slide(scene, y, f)
+    else:
+        _, x, rate = along_axis(scene, f)
+    lower, upper = scene.applied.bounds[f, 0], scene.applied.bounds[f, 1]
+    if lower <= x <= upper:
+        return 0.0
+    size, _, _ = at_limit(scene, f, x, rate)
+    return (1.0 if x < lower else 2.0) + (2.0 if size != 0.0 else 0.0)
+
+
+@jitable
+def side(scene, t, y, k):
+    """Return on which side row k of `Kinks` is; the bodies have been placed."""
+    program = scene.kinks.program[k]
+    if program >= 0:
+        return value(scene, t, y, program)
+    return side_of_limit(scene, y, scene.kinks.limit[k])
+
+
+@jitable
+def watch(scene, t, y, what):
+    """Return 1 if a side differs from that kept, else 0; unless it is only asked, keep them."""
+    place_bodies(scene, y)
+    sides, differs = scene.state.sides, 0.0
+    for k in range(len(scene.kinks.program)):
+        now = side(scene, t, y, k)
+        other = now != sides[k, SIDE]
+        if other and sides[k, HEAT] <= HOT:
+            differs = 1.0
+        if what == PASS:
+            sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
+        if what != ASK:
+            sides[k, SIDE] = now
+    return differs
+
+
+def kinks_hook(context, t, h, a, b):
+    """Whether a force is on another branch; h says whether that is to be kept."""
+    scene = view(context, Scene)
+    return watch(scene, t, carray(a, (scene.rows.y.shape[1],)), h)
