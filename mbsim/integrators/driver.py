@@ -26,7 +26,13 @@ from mbsim.core.problem import (
     STABLE_EVERY,
     STEP_TOO_SMALL,
 )
-from mbsim.integrators.control import foretold_factor, next_factor, quantised, smallest_step, starting_step
+from mbsim.integrators.control import (
+    foretold_factor,
+    next_factor,
+    quantised,
+    smallest_step,
+    starting_step,
+)
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
     CODE,

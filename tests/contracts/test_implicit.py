@@ -317,12 +317,13 @@ def test_a_fast_part_at_the_start_is_followed_then_left_behind():
 
 
 def test_van_der_pol():
-    # reference solution of the stiff problem at t = 2, eps = 1e-6 (Hairer and Wanner, IV.10)
-    run = Run(VAN_DER_POL, (2.0, -0.66), given=1e3, scale=1e-3)
-    assert run(2.0, 1e-7) == DONE
-    assert run.state.y[0] == pytest.approx(1.706167732170469, rel=1e-6)
-    assert run.state.y[1] == pytest.approx(-0.8928097010248125, rel=1e-6)
-    assert run.count(scheme.EVALUATIONS) < 5000
+    # the solution at t = 2 for eps = 1e-6 of F. Mazzia, C. Magherini, Test Set for IVP Solvers
+    run = Run(VAN_DER_POL, (2.0, 0.0), given=1e3, scale=1e-3)
+    assert run(2.0, 1e-5) == DONE
+    assert run.state.y[0] == pytest.approx(1.706167732170483, rel=1e-6)
+    assert run.state.y[1] == pytest.approx(-0.8928097010247975, rel=1e-6)
+    # Radau of scipy 1.14 takes as many
+    assert run.count(scheme.EVALUATIONS) < 5500
     assert run.count(scheme.JACOBIANS) < 0.6 * run.count(scheme.STEPS)
     assert run.count(scheme.FACTORIZATIONS) < run.count(scheme.STEPS) + run.count(scheme.REJECTED)
 
