@@ -26,6 +26,8 @@ from mbsim.integrators.scheme import (
 GO_ON, SOLVED, HOPELESS = range(3)
 #: What is left unsolved of a step's equations may be this part of its error, or less.
 LEFT = 0.03
+#: No correction need be smaller than this.
+ROUNDING = 1e-14
 #: Hope for the first correction ends here: what was linear a step ago may press on something now.
 LEAST_REST = 0.05
 #: The step after one whose equations were not solved, where nothing is known of what would be.
@@ -35,7 +37,7 @@ HALF, QUARTER = 0.5, 0.25
 @jitable
 def target(tol):
     """Return how large what is left may be, in the norm of the error."""
-    return max(10.0 * 2.2e-16, tol * min(LEFT, math.sqrt(tol)))
+    return max(ROUNDING, tol * min(LEFT, math.sqrt(tol)))
 
 
 @jitable
@@ -64,7 +66,8 @@ def judge(m, iteration, most, size, before, rate_before):
 
     Of a rate r = size / before what is left after this correction is r / (1 - r) of it. A method
     that would not be done after `most` corrections ends at once, and says in RETRY what part of
-    the step would have been.
+    the step would have been. One that does not get smaller any more, and is small enough for the
+    step's error, is rounding.
     """
     goal = target(m.memory[TOL])
     if not size < math.inf:
@@ -74,9 +77,11 @@ def judge(m, iteration, most, size, before, rate_before):
     if iteration > 1:
         quotient = size / before
         # the geometric mean of two: one alone may be good or bad by chance
-        rate = quotient if iteration == 2 else math.sqrt(quotient * rate_before)
+        rate = quotient if rate_before == 0.0 else math.sqrt(quotient * rate_before)
         if size > goal:
             if not rate < 0.99:
+                if size <= LEFT * m.memory[TOL]:
+                    return SOLVED, rate_before
                 m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
                 return HOPELESS, rate
             ahead = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration) / goal

@@ -18,14 +18,21 @@ from mbsim.core.problem import DONE, FAILED, HOOK, PAUSED, SINGULAR, STEP_TOO_SM
 from mbsim.integrators import catalog, driver, radau5, scheme
 
 RELAX, VAN_DER_POL, ROBERTSON, OSCILLATOR, DECAY, BLOWS_UP, HALF_LINE = range(7)
+#: A body of mass 1 on a spring and a damper, driven, with a state z that follows it; a top whose
+#: point is held, and that springs and dampers hold; a sphere that falls on a stiff floor.
+BODY, TOP, FLOOR = range(7, 10)
+INERTIA = (1.0, 1.2, 0.5)
 
 
 class Box(NamedTuple):
     """What the hooks below know: an equation, its linearisation, inverses, rows written."""
 
-    numbers: I1  # kind, rows used, 1: no step is rejected, 1: no system can be solved
+    numbers: I1  # kind, rows used, 1: no step is rejected, 1: no system can be solved, bodies
     given: F1  # parameters of the equation
     scale: F1
+    at: F1  # where it is linearised
+    spread: F2  # y's change for one of positions, turns and states
+    small: F2  # the inverse for these
     jacobian: F2
     real: F2
     pair: Annotated[npt.NDArray[np.complex128], "complex128", 2]
@@ -54,7 +61,40 @@ def rates(kind, given, t, y, f):
     elif kind == HALF_LINE:
         f[0] = 0.6 - y[0]
         return 7.0 if y[0] < 0.5 else 0.0
+    elif kind >= BODY:
+        body_rates(kind, given, t, y, f)
     return 0.0
+
+
+@jitable
+def body_rates(kind, given, t, y, f):
+    """Write f(t, y) of a body of 13 numbers, and of a state behind it."""
+    q, w = y[3:7], y[10:13]
+    for i in range(3):
+        f[i] = y[7 + i]
+    f[3] = 0.5 * (-q[1] * w[0] - q[2] * w[1] - q[3] * w[2])
+    f[4] = 0.5 * (q[0] * w[0] + q[2] * w[2] - q[3] * w[1])
+    f[5] = 0.5 * (q[0] * w[1] + q[3] * w[0] - q[1] * w[2])
+    f[6] = 0.5 * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0])
+    a, b, c = INERTIA
+    for i in range(6):
+        f[7 + i] = 0.0
+    f[10] = (b - c) * w[1] * w[2] / a
+    f[11] = (c - a) * w[2] * w[0] / b
+    f[12] = (a - b) * w[0] * w[1] / c
+    if kind == TOP:
+        # weight 3 down along z, at 1 along its own z axis
+        f[10] += 3.0 * 2.0 * (q[2] * q[3] + q[0] * q[1]) / a
+        f[11] -= 3.0 * 2.0 * (q[1] * q[3] - q[0] * q[2]) / b
+    elif kind == BODY:
+        f[7] = -given[0] * y[0] - 0.1 * y[7] + math.sin(2.0 * t)
+        f[8] = -y[1] - y[1] ** 3 + 0.2 * y[13]
+        f[13] = y[1] - 2.0 * y[13]
+    elif kind == FLOOR:
+        depth = -y[2]
+        f[9] = -9.81
+        if depth > 0.0:
+            f[9] += max(0.0, given[0] * depth - 0.02 * math.sqrt(given[0]) * y[9])
 
 
 @jitable
@@ -110,6 +150,7 @@ def _linearise(context, t, h, a, b):
     n = len(box.scale)
     y, f = carray(a, (n,)), carray(b, (n,))
     code = rates(box.numbers[0], box.given, t, y, f)
+    box.at[:] = y
     near, there = y.copy(), f.copy()
     for j in range(n):
         step = 1e-7 * max(abs(y[j]), box.scale[j])
@@ -121,8 +162,51 @@ def _linearise(context, t, h, a, b):
     return code
 
 
+@jitable
+def spread_out(box, c):
+    """Write how y changes with positions, turns in body axes and states, by the first rows."""
+    q, w, s = box.at[3:7], box.at[10:13], box.spread
+    s[:] = 0.0
+    for i in range(3):
+        s[i, i] = 1.0
+        s[7 + i, i] = c
+        # dq = q (0, dtheta) / 2, and c dq - d(q (0, w) / 2) = 0
+        j, k = (i + 1) % 3, (i + 2) % 3
+        s[3, 3 + i] = -0.5 * q[1 + i]
+        s[4 + i, 3 + i] = 0.5 * q[0]
+        s[4 + j, 3 + i] = 0.5 * q[1 + k]
+        s[4 + k, 3 + i] = -0.5 * q[1 + j]
+        s[10 + i, 3 + i] = c
+        s[10 + j, 3 + i] = 0.5 * w[k]
+        s[10 + k, 3 + i] = -0.5 * w[j]
+    for i in range(13, len(box.at)):
+        s[i, i - 7] = 1.0
+
+
 def _factor(context, t, h, a, b):
     box, c = view(context, Box), carray(a, (4,))
+    if c[3] == 1.0:
+        # of second order: positions, turns and states are solved for
+        bodies = box.numbers[4]
+        if bodies == 1:
+            spread_out(box, c[0])
+        else:
+            box.spread[:] = np.eye(len(box.at))
+        first = 7 * bodies
+        small = np.zeros(box.small.shape)
+        for i in range(len(small)):
+            small[i, i] = c[1] if i < 6 * bodies else c[2]
+            for j in range(len(small)):
+                for k in range(len(box.at)):
+                    small[i, j] -= box.jacobian[first + i, k] * box.spread[k, j]
+        box.real[:] = 0.0
+        if not invert(small, box.small) or box.numbers[3] == 1:
+            return SINGULAR
+        for i in range(len(box.at)):
+            for j in range(len(small)):
+                for k in range(len(small)):
+                    box.real[i, first + j] += box.spread[i, k] * box.small[k, j]
+        return 0.0
     work = -box.jacobian
     for i in range(len(work)):
         work[i, i] += c[0]
@@ -163,6 +247,15 @@ def _solve_pair(context, t, h, a, b):
     return 0.0
 
 
+def _unit(context, t, h, a, b):
+    # quaternions back to unit length
+    y = carray(a, (7,))
+    length = math.sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
+    for i in range(3, 7):
+        y[i] /= length
+    return 0.0
+
+
 def _keep(context, t, h, a, b):
     box = view(context, Box)
     n = len(box.scale)
@@ -195,26 +288,34 @@ LINEAR = ("linearise", "factor", "solve", "factor_pair", "solve_pair")
 
 
 class Run:
-    """RADAU5 on one of the equations above."""
+    """A method on one of the equations above."""
 
-    def __init__(self, kind, y0, given=0.0, scale=1.0, step=0.0, fixed=False, rows=0):
-        n = len(y0)
+    def __init__(
+        self, kind, y0, given=0.0, scale=1.0, step=0.0, fixed=False, rows=0, name="RADAU5"
+    ):
+        n, bodies = len(y0), int(kind >= BODY)
+        freedoms = n - 7 * bodies
         self.box = Box(
-            np.array([kind, 0, fixed, 0]),
+            np.array([kind, 0, fixed, 0, bodies]),
             np.array([given]),
             np.full(n, 1.0) * scale,
+            np.zeros(n),
+            np.zeros((n, freedoms)),
+            np.zeros((freedoms, freedoms)),
             np.zeros((n, n)),
             np.zeros((n, n)),
             np.zeros((n, n), dtype=complex),
             np.zeros((rows, n + 1)),
         )
         self._table = pack(self.box)
-        plain = [jit.address(hook, HOOK) for hook in HOOKS]
+        named = list(HOOKS)
+        named[1] = _unit if bodies else _zero
+        plain = [jit.address(hook, HOOK) for hook in named]
         hooks = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
         linear = dict(zip(LINEAR, (jit.address(f, HOOK) for f in hooks), strict=True))
         self.problem = Problem(int(self._table.ctypes.data), *plain, **linear)
-        method = catalog.load("RADAU5")
-        self.state = scheme.make(method, np.array(y0), 0.0)
+        method = catalog.load(name)
+        self.state = scheme.make(method, np.array(y0), 0.0, bodies)
         self.state.memory[scheme.STEP] = step
         self.steps, self._kept = scheme.bind(method, self.problem, self.state)
 
