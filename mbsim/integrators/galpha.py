@@ -66,8 +66,9 @@ CURVE = 0.5 * (1.0 - AF) - (1.0 - AM) * (0.5 + SHIFT)
 ERROR_X = BETA + 0.5 * SHIFT - 1.0 / 6.0
 ERROR_V = CURVE + GAMMA * (0.5 + SHIFT) - 1.0 / 6.0
 
-#: Corrections in one step at most, and with a linearisation and a line search for each.
-MOST, MOST_DAMPED = 6, 20
+#: Corrections in one step at most: with an old linearisation, which another may better, with one
+#: of this step, and with a linearisation and a line search for each.
+MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
 #: The least part of a correction that a line search takes.
 LEAST_PART = 1.0 / 128.0
 #: A linearisation is kept for another step where the iteration converged so fast with it.
@@ -215,11 +216,22 @@ def allowed(p, m, t, h, d):
 
 @jitable
 def take(m, h, part, d):
-    """Add a part of the correction d of y to a."""
+    """Add a part of the correction d of y to a.
+
+    The unknown is a, in turns as in shifts: with c1 dtheta - dtheta x w / 2 = dw of the linear
+    system, a changes by dtheta / (beta h^2), not by dw / (gamma h).
+    """
     end = BODY_SIZE * m.bodies[0]
+    step = part / (GAMMA * h)
     for i in range(len(m.y)):
         if is_rate(i, end):
-            m.k[A1, i] += part * d[i] / (GAMMA * h)
+            m.k[A1, i] += step * d[i]
+    half = 0.5 * BETA * h / GAMMA * step
+    for at in range(10, end, BODY_SIZE):
+        wx, wy, wz = m.trial[at], m.trial[at + 1], m.trial[at + 2]
+        m.k[A1, at] += half * (d[at + 1] * wz - d[at + 2] * wy)
+        m.k[A1, at + 1] += half * (d[at + 2] * wx - d[at] * wz)
+        m.k[A1, at + 2] += half * (d[at] * wy - d[at + 1] * wx)
 
 
 @jitable
@@ -227,6 +239,7 @@ def iterate(p, m, t, h, anew):
     """Solve for a by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
     foretell(m, h)
+    most = MOST_NEW if anew else MOST_OLD
     before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -239,8 +252,8 @@ def iterate(p, m, t, h, anew):
         part = allowed(p, m, t, h, m.k[D])
         take(m, h, part, m.k[D])
         if part == 1.0:
-            word, rate = judge(m, iteration, MOST, size, before, rate)
-        elif iteration == MOST:
+            word, rate = judge(m, iteration, most, size, before, rate)
+        elif iteration == most:
             word = HOPELESS
         before = size
     m.memory[RATE] = rate
