@@ -28,6 +28,7 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
         problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
         problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
         problem.BY_NOT_FINITE: "a force or acceleration is not finite",
+        problem.BY_NEWTON: "Newton's iteration does not converge",
     }[int(counts[scheme.LAST_REASON])]
     body, contact = int(trouble[0]), int(trouble[1])
     where = []

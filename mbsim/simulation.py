@@ -79,6 +79,8 @@ class Runner:
         self.detector = self._open_fcl_door()
         self.problem: Problem
         self.problem, self._table = mechanism(system.scene, method.order == 0.0)
+        if method.implicit and self.problem.linearise == 0:
+            raise ModelError(f"integrator={settings.integrator}: this model has no linearisation")
         self._steps, self._bench = scheme.bind(method, self.problem, self.method)
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
@@ -291,6 +293,10 @@ class Runner:
 
     def checkpoint(self) -> dict[str, Any]:
         """Return everything a run needs to go on: state, log, method, and where it is."""
+        from mbsim.integrators import scheme
+
+        # what an implicit method linearised is not saved: this run does without it as well
+        self.method.memory[scheme.HAVE_JACOBIAN] = 0.0
         groups = self._saved()
         arrays = {
             f"{name}/{field}": np.array(array)
@@ -444,8 +450,8 @@ class Runner:
             "rejected": int(counts[scheme.REJECTED]),
             "rhs_evaluations": int(counts[scheme.EVALUATIONS]),
             "output_evaluations": int(counts[scheme.OUTPUTS]),
-            "jacobians": 0,
-            "factorizations": 0,
+            "jacobians": int(counts[scheme.JACOBIANS]),
+            "factorizations": int(counts[scheme.FACTORIZATIONS]),
             "narrowphase_pairs": int(counters[a.NARROWPHASE]),
             "skipped_pairs": int(counters[a.SKIPPED]),
             "pair_listings": int(counters[a.LISTINGS]),

@@ -10,7 +10,8 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 |--------|-----------------------------|------------------------------------------------------|
 | rhs    | y, f (out)                  | code; f = f(t, y), h after the last committed point   |
 | project| y (in and out), -           | code; y back onto its manifold                        |
-| norm   | local error, y              | largest error over its scale, dimensionless           |
+| norm   | local error, y              | largest error over its scale, dimensionless; h = 0:   |
+|        |                             | of a difference of two states that is no step's error |
 | check  | y new, -                    | 1, or the part of the step to take instead            |
 | commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
 |        |                             | rows are full; 4 `stable` must be asked again         |
@@ -26,6 +27,33 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
+
+Implicit methods need the linearisation of f as well, in y's layout and with the bodies' part in
+second-order form. With d = (dx, dq, dv, dw, dz) for bodies at x with quaternion q, velocity v
+and angular velocity w, and states z of first order, and real or complex c1, c2, c3, it solves
+
+    c1 dx - dv = r_x        c1 dq - d(q') = r_q, q' = q (0, w) / 2
+    c2 dx - da = r_a        (turns likewise in body axes)
+    c3 dz - d(z') = r_z
+
+da being the linearised acceleration under joints and equations. `form` says what r holds:
+0: method of first order, c3 = c1, c2 = c1^2, and r is the residual of (c1 I - J) d = r: the
+   problem makes r_a of it;
+1: method of second order, r_x = r_q = 0 and the slots of v and w hold r_a.
+
+| hook       | a, b                                    | returns                               |
+|------------|-----------------------------------------|---------------------------------------|
+| linearise  | y, f (out)                              | code; as rhs, and keeps the           |
+|            |                                         | linearisation there                   |
+| factor     | c1, c2, c3, form; -                     | 0 or SINGULAR; of the linearisation   |
+|            |                                         | kept                                  |
+| solve      | r, d (out)                              | code; by the last `factor`            |
+| factor_pair| re c1, im c1, re c2, .. im c3, form; -  | 0 or SINGULAR; does not disturb the   |
+|            |                                         | factors of `factor`                   |
+| solve_pair | r, d (out), real parts, then imaginary  | code; by the last `factor_pair`       |
+| step_fraction | y, d                                 | largest part (0..1) of a correction d |
+|            |                                         | of y that lets no friction jump over  |
+|            |                                         | zero slip (may be left out)           |
 """
 
 from __future__ import annotations
@@ -56,11 +84,12 @@ class Problem(NamedTuple):
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
     kinks: int = 0  # only for problems whose forces change their branch
-    linearise: int = 0  # this and the rest only for implicit methods
+    linearise: int = 0  # this and the next four only for implicit methods
     factor: int = 0
     solve: int = 0
     factor_pair: int = 0
     solve_pair: int = 0
+    step_fraction: int = 0  # optional
 
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
@@ -68,6 +97,10 @@ STABLE_EVERY = 16
 
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3
+#: Of an implicit method: its equations of a step are not solved; a shorter one is tried.
+NOT_CONVERGED = 50
+#: Of `factor`: there is no solution, or too many.
+SINGULAR = 51
 #: Codes from here on end the run without another try.
 AT_ONCE = 100
 
@@ -78,4 +111,4 @@ DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED = range(6)
 ASK, SETTLE, PASS = 0.0, 1.0, 2.0
 
 # reasons given to `reject`
-BY_ERROR, BY_CHECK, BY_NOT_FINITE = range(3)
+BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON = range(4)

@@ -150,7 +150,8 @@ def scaled_error(scene, h, e, y):
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
-    step can do to a velocity is not chased. The worst body is left in `trouble[0]`.
+    step can do to a velocity is not chased. With h = 0, `e` is no step's error. The worst body
+    is left in `trouble[0]`.
     """
     length, speed = scene.world.scale[0], scene.world.scale[1]
     largest, worst = 0.0, -1
@@ -185,8 +186,9 @@ def scaled_error(scene, h, e, y):
     for k in range(len(states.place)):
         at = states.place[k]
         largest = max(largest, (e[at] / max(abs(y[at]), states.scale[k])) ** 2)
-    # what was not integrated but put right, as after a motion that jumps
-    largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
+    if h > 0.0:
+        # what was not integrated but put right, as after a motion that jumps
+        largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

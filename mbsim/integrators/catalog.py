@@ -13,6 +13,8 @@ METHODS = {
     "DOPRI5": "explicit, order 5",
     "DOP853": "explicit, order 8",
     "VERLET": "explicit, order 2, one evaluation a step within its stability bound",
+    "GALPHA": "implicit, order 2, for stiff contact and mechanisms",
+    "RADAU5": "implicit, order 5, for stiff equations and accuracy",
 }
 
 

@@ -9,6 +9,7 @@ from mbsim.core.jitable import jitable
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 3.0
+HOLD = 1.2
 
 
 @jitable
@@ -28,6 +29,23 @@ def next_factor(error, before, order, memory, rejected):
     growth = error ** (-(1.0 - 0.75 * memory) / order)
     factor = SAFETY * growth * max(before, 1e-4) ** (memory / order)
     return min(GROW, max(SHRINK, factor))
+
+
+@jitable
+def foretold_factor(error, before, order, ratio):
+    """Return the factor from this step of an implicit method to the next.
+
+    The error is foretold from this and the last one, `ratio` being this step over the last, 0 if
+    there was none. A step that would grow by less than HOLD is kept: its factors are.
+    Source: K. Gustafsson, ACM Trans. Math. Softw. 20 (1994) 496; E. Hairer, G. Wanner, Solving
+    ODEs II (1996), section IV.8.
+    """
+    error = max(error, 1e-10)
+    factor = SAFETY * error ** (-1.0 / order)
+    if ratio > 0.0:
+        factor *= min(1.0, ratio * (max(before, 1e-2) / error) ** (1.0 / order))
+    factor = min(GROW, max(SHRINK, factor))
+    return 1.0 if 1.0 <= factor <= HOLD else factor
 
 
 @jitable

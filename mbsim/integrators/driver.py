@@ -1,4 +1,4 @@
-"""The driver of the explicit one-step methods: steps, control, guards, outputs, returns to Python.
+"""The driver of the one-step methods: steps, control, guards, outputs, returns to Python.
 
 A method (`scheme.py`) tries a step; the driver decides about it, the problem's hooks have their
 say, and a step is taken. After E. Hairer, S. P. Norsett, G. Wanner, Solving ODEs I (1993), II.4.
@@ -15,10 +15,12 @@ from mbsim.core.problem import (
     AT_ONCE,
     BY_CHECK,
     BY_ERROR,
+    BY_NEWTON,
     BY_NOT_FINITE,
     DONE,
     FAILED,
     HAPPENED,
+    NOT_CONVERGED,
     NOT_FINITE,
     PASS,
     PAUSED,
@@ -27,7 +29,13 @@ from mbsim.core.problem import (
     STABLE_EVERY,
     STEP_TOO_SMALL,
 )
-from mbsim.integrators.control import next_factor, quantised, smallest_step, starting_step
+from mbsim.integrators.control import (
+    foretold_factor,
+    next_factor,
+    quantised,
+    smallest_step,
+    starting_step,
+)
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
     CODE,
@@ -36,9 +44,11 @@ from mbsim.integrators.scheme import (
     EVENT_DUE,
     FAILURES,
     FIRST_MAX,
+    FRESH,
     H_LARGEST,
     H_SMALLEST,
     HAVE_F,
+    HAVE_JACOBIAN,
     LAST_ERROR,
     LAST_REASON,
     LAST_STEP,
@@ -46,6 +56,7 @@ from mbsim.integrators.scheme import (
     NEXT_OUTPUT,
     OUTPUTS,
     REJECTED,
+    RETRY,
     STALE,
     STEP,
     STEPS,
@@ -128,6 +139,8 @@ def begin(p, m, steps, t, t_end, h_max):
         m.memory[HAVE_F] = 1.0
         if p.kinks != 0:
             call_float(p.kinks, (p.context, t, SETTLE, m.y, m.error))
+        m.memory[FRESH] = 1.0
+        m.memory[HAVE_JACOBIAN] = 0.0
     if m.memory[STEP] == 0.0:
         if steps.order == 0.0:
             m.memory[STEP] = stable(p, m, t, h_max)
@@ -164,7 +177,7 @@ def gives_up(m, code, h, floor):
     # a trial far ahead may be where no law was meant for: come nearer before giving up
     m.counts[FAILURES] += 1
     tried = m.counts[FAILURES] > MOST_FAILURES or h <= floor
-    return code != NOT_FINITE and (tried or code >= AT_ONCE)
+    return code != NOT_FINITE and code != NOT_CONVERGED and (tried or code >= AT_ONCE)
 
 
 @jitable
@@ -358,6 +371,10 @@ def accept(p, m, steps, t, h, asked):
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
+    for j in range(len(m.kept)):
+        for i in range(len(m.y)):
+            m.kept[j, i] = m.ahead[j, i]
+    m.memory[FRESH] = 0.0
     if word >= 4.0:
         word -= 4.0
         m.memory[STALE] = 1.0
@@ -380,7 +397,11 @@ def choose_next(m, steps, h, h_max):
         m.memory[STEP] = h
         return
     error = m.memory[LAST_ERROR]
-    factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, steps.memory, False)
+    if steps.implicit:
+        ratio = 0.0 if m.memory[FRESH] == 1.0 else h / m.memory[LAST_STEP]
+        factor = foretold_factor(error, m.memory[ERROR_BEFORE], steps.order, ratio)
+    else:
+        factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, steps.memory, False)
     m.memory[STEP] = h * (min(factor, 1.0) if m.memory[AFTER_REJECTION] == 1.0 else factor)
     m.memory[ERROR_BEFORE] = max(error, 1e-4)
     m.memory[AFTER_REJECTION] = 0.0
@@ -425,7 +446,9 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             if gives_up(m, code, h, floor):
                 m.counts[CODE] = int(code)
                 return FAILED
-            reject(p, m, t, max(0.1 * h, floor), BY_NOT_FINITE)
+            unsolved = code == NOT_CONVERGED
+            shrink, reason = (m.memory[RETRY], BY_NEWTON) if unsolved else (0.1, BY_NOT_FINITE)
+            reject(p, m, t, max(shrink * h, floor), reason)
             m.memory[AFTER_REJECTION] = 1.0
             if h <= floor:
                 return STEP_TOO_SMALL

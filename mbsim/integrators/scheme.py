@@ -1,4 +1,4 @@
-"""What the driver asks of an explicit method, and what a method keeps.
+"""What the driver asks of a method, and what a method keeps.
 
 A method is one file with two functions on arrays. Both are C functions behind addresses, as the
 problem's hooks are, so the driver is compiled once for all methods and a run compiles the one it
@@ -16,6 +16,12 @@ uses. With p the problem, m the `Method` and k the stages, k[0] = f at the commi
 `order` is the power of h that the error of a step has; 0 stands for a method without an error
 estimate: the step is what the problem's hook `stable` says, at most h_max, and holds for
 STABLE_EVERY steps; the guards of single impacts are left out.
+
+An implicit method solves with the problem's linearisation (`core.problem`) and says so:
+the driver then foretells steps as it does for such methods, and keeps one that is good as it is.
+What a method needs of the step before is in `kept`, where the driver puts what `attempt` left in
+`ahead` once the step is taken; memory[FRESH] says that there is none, as at the start and
+after an event.
 """
 
 from __future__ import annotations
@@ -34,8 +40,16 @@ from mbsim.core.problem import HOOK, Problem
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
 LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(7, 14)
+# of implicit methods: whether the problem keeps a linearisation, and where it was taken;
+# the step that it was factored for; the rate at which Newton's iteration converged last, and
+# what is left after its first step; nothing is known of a step before; part of a step to try
+# after Newton's iteration failed
+HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14, 21)
+MEMORY = 21
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
+JACOBIANS, FACTORIZATIONS = range(8, 10)
+COUNTS = 10
 
 
 class Scheme(NamedTuple):
@@ -48,25 +62,29 @@ class Scheme(NamedTuple):
     dense: int  # coefficients of the dense output
     order: float  # power of h in the error of a step; 0: no estimate, fixed steps
     memory: float = 0.0  # how much the last error counts in step control (`control.next_factor`)
+    implicit: bool = False  # solves with the problem's linearisation
+    carried: int = 0  # rows of `kept`
 
 
 class Method(NamedTuple):
-    """What a method keeps; `memory` is saved with the state, the rest is scratch."""
+    """What a method keeps."""
 
     y: F1  # (n,) the committed point
     k: F2  # (stages, n); row 0 is f at the committed point
     trial: F1  # (n,)
     error: F1  # (n,)
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
-    memory: F1  # (14,) see the names above
-    counts: I1  # (8,) see the names above
+    memory: F1  # (MEMORY,) see the names above
+    counts: I1  # (COUNTS,) see the names above
     bodies: I1  # (1,) how many bodies begin y, for methods that know positions from velocities
+    kept: F2  # (carried, n) what the method needs of the step before; saved with the state
+    ahead: F2  # (carried, n) the same of the step that was tried last
 
 
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (15,) the fields of `Problem`
+    problem: I1  # (21,) the fields of `Problem`
     method: Method
 
 
@@ -79,12 +97,13 @@ class Steps(NamedTuple):
     last: int
     order: float
     memory: float
+    implicit: bool
 
 
 def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
     """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies."""
     n = len(y0)
-    memory = np.zeros(14)
+    memory = np.zeros(MEMORY)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
     memory[H_SMALLEST] = math.inf
@@ -95,8 +114,10 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
         np.zeros(n),
         np.zeros((scheme.dense, n)),
         memory,
-        np.zeros(8, dtype=np.int64),
+        np.zeros(COUNTS, dtype=np.int64),
         np.array([bodies], dtype=np.int64),
+        np.zeros((scheme.carried, n)),
+        np.zeros((scheme.carried, n)),
     )
 
 
@@ -104,11 +125,14 @@ def bind(scheme: Scheme, problem: Problem, method: Method) -> tuple[Steps, Any]:
     """Return the method bound to a problem, and what must live as long as it is used."""
     from mbsim.core import jit
 
+    if scheme.implicit and problem.linearise == 0:
+        raise ValueError("this problem has no linearisation, which an implicit method needs")
     bench = Bench(np.array(problem, dtype=np.int64), method)
     table = pack(bench)
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
-    steps = Steps(context, attempt, fit_dense, scheme.last, scheme.order, scheme.memory)
+    numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
+    steps = Steps(context, attempt, fit_dense, *numbers)
     return steps, (table, bench)
 
 
@@ -118,7 +142,8 @@ def on_bench(context):
     bench = view(context, Bench)
     w = bench.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
-    problem = Problem(*first, w[7], w[8], w[9], w[10], w[11], w[12], w[13], w[14])
+    second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
+    problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19], w[20])
     return problem, bench.method
 
 

@@ -12,36 +12,11 @@ Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 
 
 from __future__ import annotations
 
-import math
-
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.integrators.rotation import turn
 from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, on_bench
-
-
-@jitable
-def turn(y, f, h, at, w):
-    """Turn the quaternion at y[at + 3] by the angular velocity of the middle of the step."""
-    x = y[at + 10] + 0.5 * h * f[at + 10]
-    v = y[at + 11] + 0.5 * h * f[at + 11]
-    z = y[at + 12] + 0.5 * h * f[at + 12]
-    # cosine of half the angle, and sine over half the angle
-    square = 0.25 * h * h * (x * x + v * v + z * z)
-    if square < 1e-3:
-        # the next terms are below 1e-17
-        c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)))
-        s = 1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0))
-    else:
-        half = math.sqrt(square)
-        c, s = math.cos(half), math.sin(half) / half
-    s *= 0.5 * h
-    a, b, d = s * x, s * v, s * z
-    qw, qx, qy, qz = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-    w[at + 3] = c * qw - qx * a - qy * b - qz * d
-    w[at + 4] = c * qx + qw * a + qy * d - qz * b
-    w[at + 5] = c * qy + qw * b + qz * a - qx * d
-    w[at + 6] = c * qz + qw * d + qx * b - qy * a
 
 
 @jitable
@@ -57,7 +32,11 @@ def attempt(p, m, t, h):
             w[at + k] = y[at + k] + h * (y[at + 7 + k] + 0.5 * h * f[at + 7 + k])
             w[at + 7 + k] = y[at + 7 + k] + h * f[at + 7 + k]
             w[at + 10 + k] = y[at + 10 + k] + h * f[at + 10 + k]
-        turn(y, f, h, at, w)
+        # the angular velocity of the middle
+        wx = y[at + 10] + 0.5 * h * f[at + 10]
+        wy = y[at + 11] + 0.5 * h * f[at + 11]
+        wz = y[at + 12] + 0.5 * h * f[at + 12]
+        turn(y, at, h, wx, wy, wz, w)
     code = call_float(p.rhs, (p.context, t + h, h, w, new))
     for i in range(end, n):
         w[i] = y[i] + 0.5 * h * (f[i] + new[i])

@@ -287,6 +287,7 @@ def summary(
         (a.REJECT_ERROR, "local error above tol"),
         (a.REJECT_DEPTH, "impact would begin too deep"),
         (a.REJECT_NOT_FINITE, "force not finite"),
+        (a.REJECT_NEWTON, "Newton's iteration did not converge"),
     )
     found = False
     for name, row in zip(names, log.rejections, strict=True):

@@ -42,7 +42,7 @@ COUNTERS = 7
 LIVE, FREE, FIXED, WANTED = range(4)
 
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
-REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE = range(3)
+REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 
 # entries of `World.doors`
 (
@@ -382,7 +382,7 @@ class Log(NamedTuple):
 
     contacts: F2  # (nc, LOG_COLUMNS)
     counters: I1  # (COUNTERS,)
-    rejections: I2  # (nc + 1, 3)
+    rejections: I2  # (nc + 1, 4)
 
 
 class Work(NamedTuple):

@@ -49,7 +49,7 @@ def empty_log(nc: int) -> a.Log:
     return a.Log(
         contacts,
         np.zeros(a.COUNTERS, dtype=np.int64),
-        np.zeros((nc + 1, 3), dtype=np.int64),
+        np.zeros((nc + 1, 4), dtype=np.int64),
     )
 
 

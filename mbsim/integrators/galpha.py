@@ -1,0 +1,410 @@
+"""Generalised-alpha on the bodies' Lie group: implicit, order 2, for stiff contact and mechanisms.
+
+With a the algorithmic acceleration, an unknown of its own beside the true one, v':
+
+    (1 - am) a1 + am a0 = (1 - af) v1' + af v0',   v1' = f(t1, x1, v1)
+    x1 = x0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1)
+    v1 = v0 + h ((1 - gamma) a0 + gamma a1)
+
+Turns are the exponential of the same mean angular velocity in body axes; states of first order
+take the last line, with rates for accelerations. `a` is the acceleration at t + (am - af) h: so it
+is begun at the start and after events, and moved where the step changes; with that, positions,
+velocities and accelerations are of order 2 from the start. What is fast keeps RHO of itself a
+step. Joints are in f already, and `project` puts the new point back onto positions and velocities.
+
+The error of a step is that of the formulas, the second and third derivative of the velocity times
+h^3 and a constant, from the differences of accelerations of this step and the last.
+Source: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371; M. Arnold, O. Bruls, Multibody
+Syst. Dyn. 18 (2007) 185; O. Bruls, A. Cardona, M. Arnold, Mech. Mach. Theory 48 (2012) 121;
+damping of Newton's iteration: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.address import call_float
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
+from mbsim.integrators.newton import (
+    GO_ON,
+    HOPELESS,
+    QUARTER,
+    SOLVED,
+    as_failure,
+    begin,
+    judge,
+    linearise,
+    may_help,
+    target,
+)
+from mbsim.integrators.rotation import turn
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    FACTORED_STEP,
+    FACTORIZATIONS,
+    FRESH,
+    HAVE_JACOBIAN,
+    LAST_ERROR,
+    LAST_STEP,
+    RATE,
+    RETRY,
+    TOL,
+    Scheme,
+    on_bench,
+)
+
+#: What a step leaves of a vibration that is fast against it.
+RHO = 0.8
+AM, AF = (2.0 * RHO - 1.0) / (RHO + 1.0), RHO / (RHO + 1.0)
+GAMMA = 0.5 - AM + AF
+BETA = 0.25 * (GAMMA + 0.5) ** 2
+#: a is v' + SHIFT h v'' + CURVE h^2 v''' + ...
+SHIFT = AM - AF
+CURVE = 0.5 * (1.0 - AF) - (1.0 - AM) * (0.5 + SHIFT)
+#: Errors of a step in x over h^3 v'', and in v over h^3 v'''.
+ERROR_X = BETA + 0.5 * SHIFT - 1.0 / 6.0
+ERROR_V = CURVE + GAMMA * (0.5 + SHIFT) - 1.0 / 6.0
+
+#: Corrections in one step at most: with an old linearisation, which another may better, with one
+#: of this step, and with a linearisation and a line search for each.
+MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
+#: The least part of a correction that a line search takes.
+LEAST_PART = 1.0 / 128.0
+#: A linearisation is kept for another step where the iteration converged so fast with it.
+KEEP = 0.2
+#: The change of v' at the start is taken over this part of the first step.
+PROBE = 0.05
+
+# rows of k: f at the iterate, residual, correction, the one that a line search foretells, a at
+# begin and end, a before a line search, f at the trial point
+F, R, D, D_NEXT, A0, A1, A_BEFORE, LAST = range(1, 9)
+# rows of `kept`: a and v' at the end of the last step, and the mean v'' of that step
+ALGORITHMIC, DOT, SLOPE = range(3)
+
+
+@jitable
+def is_rate(i, end):
+    """Return whether y[i] is a velocity of a body or a state of first order."""
+    return i >= end or i % BODY_SIZE >= 7
+
+
+@jitable
+def factor(p, m, t, h):
+    """Factor the system of a step of length h; return a code."""
+    m.counts[FACTORIZATIONS] += 1
+    part = (1.0 - AM) / (1.0 - AF)
+    c = np.array((GAMMA / (BETA * h), part / (BETA * h * h), part / (GAMMA * h), 1.0))
+    code = call_float(p.factor, (p.context, t, h, c, c))
+    m.memory[FACTORED_STEP] = h if code == 0.0 else 0.0
+    return code
+
+
+@jitable
+def probe(p, m, t, h):
+    """Begin `kept` with v' and v'' at the committed point; return a code, < 0 for no solution.
+
+    v'' is from two linearly implicit Euler steps: it is that of the motion, not of what is fast.
+    """
+    n = len(m.y)
+    s = PROBE * h
+    if m.memory[HAVE_JACOBIAN] == 0.0:
+        code = linearise(p, m, t, 0.0, m.y, m.k[F])
+        if code != 0.0:
+            return code
+    m.memory[FACTORED_STEP] = 0.0
+    m.counts[FACTORIZATIONS] += 1
+    g = 1.0 / s
+    c = np.array((g, g * g, g, 0.0))
+    if call_float(p.factor, (p.context, t, h, c, c)) != 0.0:
+        return -1.0
+    for i in range(n):
+        m.trial[i] = m.y[i]
+    for j in range(2):
+        m.counts[EVALUATIONS] += 1
+        ahead = (j + 1.0) * s
+        code = call_float(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
+        if code == 0.0:
+            code = call_float(p.solve, (p.context, t, h, m.k[F], m.k[D + j]))
+        if code != 0.0:
+            return code
+        for i in range(n):
+            m.trial[i] += m.k[D + j, i]
+    for i in range(n):
+        m.kept[ALGORITHMIC, i] = m.k[0, i]
+        m.kept[DOT, i] = m.k[0, i]
+        m.kept[SLOPE, i] = (m.k[D + 1, i] - m.k[D, i]) / (s * s)
+    return 0.0
+
+
+@jitable
+def step_before(m):
+    """Return the length of the last step; at the start `kept` is as after one of no length."""
+    return 0.0 if m.memory[FRESH] == 1.0 else m.memory[LAST_STEP]
+
+
+@jitable
+def foretell(m, h):
+    """Write a at the begin for a step of length h, and as it is at the end if v'' stays."""
+    before = step_before(m)
+    for i in range(len(m.y)):
+        slope, dot = m.kept[SLOPE, i], m.kept[DOT, i]
+        a = m.kept[ALGORITHMIC, i] + SHIFT * (h - before) * slope
+        m.k[A0, i] = a
+        m.k[A1, i] = ((1.0 - AF) * (dot + h * slope) + AF * dot - AM * a) / (1.0 - AM)
+
+
+@jitable
+def true_rate(m, i):
+    """Return v' at the end of the step, of a at its begin and end."""
+    a0, a1 = m.k[A0, i], m.k[A1, i]
+    return ((1.0 - AM) * a1 + AM * a0 - AF * m.kept[DOT, i]) / (1.0 - AF)
+
+
+@jitable
+def mean_velocity(m, h, i):
+    """Return the velocity y[i] in the mean of the step, which positions see."""
+    return m.y[i] + h * ((0.5 - BETA) * m.k[A0, i] + BETA * m.k[A1, i])
+
+
+@jitable
+def place(m, h):
+    """Write the point that a leads to into m.trial."""
+    y, w, end = m.y, m.trial, BODY_SIZE * m.bodies[0]
+    for i in range(len(y)):
+        if is_rate(i, end):
+            w[i] = y[i] + h * ((1.0 - GAMMA) * m.k[A0, i] + GAMMA * m.k[A1, i])
+    for at in range(0, end, BODY_SIZE):
+        for i in range(at, at + 3):
+            w[i] = y[i] + h * mean_velocity(m, h, i + 7)
+        wx, wy = mean_velocity(m, h, at + 10), mean_velocity(m, h, at + 11)
+        turn(y, at, h, wx, wy, mean_velocity(m, h, at + 12), w)
+
+
+@jitable
+def evaluate(p, m, t, h, anew):
+    """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
+    place(m, h)
+    if anew:
+        return linearise(p, m, t + h, h, m.trial, m.k[F])
+    m.counts[EVALUATIONS] += 1
+    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[F]))
+
+
+@jitable
+def correction(p, m, t, h, d):
+    """Write Newton's correction of y for the f evaluated last into d; return code and size."""
+    if m.memory[FACTORED_STEP] != h and factor(p, m, t, h) != 0.0:
+        # a singular system is none of an rhs: another step has another
+        return -1.0, 0.0
+    end = BODY_SIZE * m.bodies[0]
+    for i in range(len(m.y)):
+        m.k[R, i] = m.k[F, i] - true_rate(m, i) if is_rate(i, end) else 0.0
+    code = call_float(p.solve, (p.context, t, h, m.k[R], d))
+    if code != 0.0:
+        return code, 0.0
+    return 0.0, call_float(p.norm, (p.context, t, 0.0, d, m.trial))
+
+
+@jitable
+def allowed(p, m, t, h, d):
+    """Return the part of a correction that friction allows."""
+    if p.step_fraction == 0:
+        return 1.0
+    return call_float(p.step_fraction, (p.context, t + h, h, m.trial, d))
+
+
+@jitable
+def take(m, h, part, d):
+    """Add a part of the correction d of y to a.
+
+    The unknown is a, in turns as in shifts: with c1 dtheta - dtheta x w / 2 = dw of the linear
+    system, a changes by dtheta / (beta h^2), not by dw / (gamma h).
+    """
+    end = BODY_SIZE * m.bodies[0]
+    step = part / (GAMMA * h)
+    for i in range(len(m.y)):
+        if is_rate(i, end):
+            m.k[A1, i] += step * d[i]
+    half = 0.5 * BETA * h / GAMMA * step
+    for at in range(10, end, BODY_SIZE):
+        wx, wy, wz = m.trial[at], m.trial[at + 1], m.trial[at + 2]
+        m.k[A1, at] += half * (d[at + 1] * wz - d[at + 2] * wy)
+        m.k[A1, at + 1] += half * (d[at + 2] * wx - d[at] * wz)
+        m.k[A1, at + 2] += half * (d[at] * wy - d[at + 1] * wx)
+
+
+@jitable
+def iterate(p, m, t, h, anew):
+    """Solve for a by Newton's simplified iteration; return a code, < 0 for no solution."""
+    begin(m)
+    foretell(m, h)
+    most = MOST_NEW if anew else MOST_OLD
+    before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
+    while word == GO_ON:
+        iteration += 1
+        code = evaluate(p, m, t, h, anew and iteration == 1)
+        if code != 0.0:
+            return code
+        code, size = correction(p, m, t, h, m.k[D])
+        if code != 0.0:
+            return code
+        part = allowed(p, m, t, h, m.k[D])
+        take(m, h, part, m.k[D])
+        if part == 1.0:
+            word, rate = judge(m, iteration, most, size, before, rate)
+        elif iteration == most:
+            word = HOPELESS
+        before = size
+    m.memory[RATE] = rate
+    return 0.0 if word == SOLVED else -1.0
+
+
+@jitable
+def search(p, m, t, h, size, part):
+    """Take the largest part of a correction after which the next is smaller; return whether.
+
+    That is Deuflhard's natural test: it does not depend on the scales of the equations.
+    """
+    for i in range(len(m.y)):
+        m.k[A_BEFORE, i] = m.k[A1, i]
+    while part >= LEAST_PART:
+        for i in range(len(m.y)):
+            m.k[A1, i] = m.k[A_BEFORE, i]
+        take(m, h, part, m.k[D])
+        if evaluate(p, m, t, h, False) == 0.0:
+            code, left = correction(p, m, t, h, m.k[D_NEXT])
+            if code == 0.0 and left <= (1.0 - 0.25 * part) * size:
+                return True
+        part *= 0.5
+    return False
+
+
+@jitable
+def iterate_damped(p, m, t, h):
+    """Solve for a with a linearisation and a line search for each correction; return a code."""
+    foretell(m, h)
+    m.memory[RETRY] = QUARTER
+    for _ in range(MOST_DAMPED):
+        code = evaluate(p, m, t, h, True)
+        if code != 0.0:
+            return code
+        code, size = correction(p, m, t, h, m.k[D])
+        if code != 0.0:
+            return code
+        part = allowed(p, m, t, h, m.k[D])
+        if size <= target(m.memory[TOL]) and part == 1.0:
+            take(m, h, 1.0, m.k[D])
+            m.memory[RATE] = 0.0
+            return 0.0
+        if not search(p, m, t, h, size, part):
+            return -1.0
+    return -1.0
+
+
+@jitable
+def solve_step(p, m, t, h):
+    """Solve for a: with a linearisation kept if one is good, anew, then damped; return a code."""
+    good = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[RATE] <= KEEP
+    code = -1.0
+    for level in range(0 if good else 1, 3):
+        code = iterate_damped(p, m, t, h) if level == 2 else iterate(p, m, t, h, level == 1)
+        if code == 0.0 or not may_help(code):
+            return code
+    # what fails may still be near a better one
+    m.memory[HAVE_JACOBIAN] = 0.0
+    return as_failure(code)
+
+
+@jitable
+def position_error(m, h, i):
+    """Return the error of a step in what y[i] is the velocity of."""
+    return ERROR_X * h * h * (m.k[A1, i] - m.k[A0, i])
+
+
+@jitable
+def estimate_error(p, m, t, h):
+    """Write the step's error, and what the next needs to know; return its norm over tol."""
+    e, w = m.error, m.trial
+    end, before = BODY_SIZE * m.bodies[0], step_before(m)
+    for i in range(len(m.y)):
+        if is_rate(i, end):
+            dot = true_rate(m, i)
+            slope = (dot - m.kept[DOT, i]) / h
+            bend = 2.0 * (slope - m.kept[SLOPE, i]) / (h + before)
+            m.ahead[ALGORITHMIC, i] = m.k[A1, i]
+            m.ahead[DOT, i] = dot
+            m.ahead[SLOPE, i] = slope
+            e[i] = ERROR_V * h * h * h * bend
+    for at in range(0, end, BODY_SIZE):
+        for i in range(at, at + 3):
+            e[i] = position_error(m, h, i + 7)
+        a = 0.5 * position_error(m, h, at + 10)
+        b = 0.5 * position_error(m, h, at + 11)
+        c = 0.5 * position_error(m, h, at + 12)
+        qw, qx, qy, qz = w[at + 3], w[at + 4], w[at + 5], w[at + 6]
+        e[at + 3] = -qx * a - qy * b - qz * c
+        e[at + 4] = qw * a + qy * c - qz * b
+        e[at + 5] = qw * b + qz * a - qx * c
+        e[at + 6] = qw * c + qx * b - qy * a
+    return call_float(p.norm, (p.context, t, h, e, w)) / m.memory[TOL]
+
+
+@jitable
+def attempt(p, m, t, h):
+    """Solve for the new point, fill trial point and error; return a code."""
+    if m.memory[FRESH] == 1.0:
+        m.memory[RETRY] = QUARTER
+        code = probe(p, m, t, h)
+        if code != 0.0:
+            return as_failure(code)
+    code = solve_step(p, m, t, h)
+    if code != 0.0:
+        return code
+    place(m, h)
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
+    if not m.memory[LAST_ERROR] <= 1.0:
+        return 0.0
+    m.counts[EVALUATIONS] += 1
+    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+
+
+@jitable
+def fit_dense(m, h):
+    """Fill the cubic Hermite polynomial of the step from y to trial."""
+    d, end = m.dense, BODY_SIZE * m.bodies[0]
+    for i in range(len(m.y)):
+        rate = is_rate(i, end)
+        first = m.kept[DOT, i] if rate else m.k[0, i]
+        last = m.ahead[DOT, i] if rate else m.k[LAST, i]
+        rise = m.trial[i] - m.y[i]
+        d[0, i] = m.y[i]
+        d[1, i] = rise
+        d[2, i] = h * first - rise
+        d[3, i] = 2.0 * rise - h * (first + last)
+
+
+def _attempt(context, t, h, a, b):
+    """One step, tried."""
+    p, m = on_bench(context)
+    return float(attempt(p, m, t, h))
+
+
+def _fit_dense(context, t, h, a, b):
+    """Dense output of the step tried last."""
+    _, m = on_bench(context)
+    fit_dense(m, h)
+    return 0.0
+
+
+SCHEME = Scheme(
+    _attempt,
+    _fit_dense,
+    stages=LAST + 1,
+    last=LAST,
+    dense=4,
+    order=3.0,
+    implicit=True,
+    carried=3,
+)

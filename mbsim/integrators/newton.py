@@ -1,0 +1,107 @@
+"""Newton's iteration as the implicit methods share it: linearisation, factors, when to stop.
+
+After E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.8.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_float
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import AT_ONCE, NOT_CONVERGED
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    FACTORED_STEP,
+    FRESH,
+    HAVE_JACOBIAN,
+    JACOBIAN_TIME,
+    JACOBIANS,
+    REST,
+    RETRY,
+    TOL,
+)
+
+# what `judge` says
+GO_ON, SOLVED, HOPELESS = range(3)
+#: What is left unsolved of a step's equations may be this part of its error, or less.
+LEFT = 0.03
+#: No correction need be smaller than this.
+ROUNDING = 1e-14
+#: Hope for the first correction ends here: what was linear a step ago may press on something now.
+LEAST_REST = 0.05
+#: The step after one whose equations were not solved, where nothing is known of what would be.
+HALF, QUARTER = 0.5, 0.25
+
+
+@jitable
+def target(tol):
+    """Return how large what is left may be, in the norm of the error."""
+    return max(ROUNDING, tol * min(LEFT, math.sqrt(tol)))
+
+
+@jitable
+def linearise(p, m, t, h, y, f):
+    """Linearise f at (t, y), h after the committed point, and write f; return a code."""
+    m.counts[EVALUATIONS] += 1
+    m.counts[JACOBIANS] += 1
+    m.memory[FACTORED_STEP] = 0.0
+    code = call_float(p.linearise, (p.context, t, h, y, f))
+    m.memory[HAVE_JACOBIAN] = 1.0 if code == 0.0 else 0.0
+    m.memory[JACOBIAN_TIME] = t
+    return code
+
+
+@jitable
+def begin(m):
+    """Be as hopeful about the first correction as the step before allows."""
+    m.memory[RETRY] = HALF
+    hope = max(m.memory[REST], LEAST_REST**1.25) ** 0.8
+    m.memory[REST] = 1.0 if m.memory[FRESH] == 1.0 else hope
+
+
+@jitable
+def judge(m, iteration, most, size, before, rate_before):
+    """Return the word on correction number `iteration` (from 1) of `size`, and its rate.
+
+    Of a rate r = size / before what is left after this correction is r / (1 - r) of it. A method
+    that would not be done after `most` corrections ends at once, and says in RETRY what part of
+    the step would have been. One that does not get smaller any more, and is small enough for the
+    step's error, is rounding.
+    """
+    goal = target(m.memory[TOL])
+    if not size < math.inf:
+        m.memory[RETRY] = QUARTER
+        return HOPELESS, 1.0
+    rate = rate_before
+    if iteration > 1:
+        quotient = size / before
+        # the geometric mean of two: one alone may be good or bad by chance
+        rate = quotient if rate_before == 0.0 else math.sqrt(quotient * rate_before)
+        if size > goal:
+            if not rate < 0.99:
+                if size <= LEFT * m.memory[TOL]:
+                    return SOLVED, rate_before
+                m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
+                return HOPELESS, rate
+            ahead = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration) / goal
+            if iteration < most and ahead >= 1.0:
+                shrink = 0.8 * min(20.0, ahead) ** (-1.0 / (4.0 + most - 1.0 - iteration))
+                m.memory[RETRY] = min(HALF, max(QUARTER, shrink))
+                return HOPELESS, rate
+        m.memory[REST] = rate / (1.0 - rate) if rate < 0.99 else 1.0
+    if m.memory[REST] * size <= goal or size == 0.0:
+        return SOLVED, rate
+    return (GO_ON if iteration < most else HOPELESS), rate
+
+
+@jitable
+def may_help(code):
+    """Return whether a better linearisation may help against this code."""
+    return code < AT_ONCE
+
+
+@jitable
+def as_failure(code):
+    """Return the code of a step whose equations were not solved for the reason `code`."""
+    return code if code > 0.0 else NOT_CONVERGED

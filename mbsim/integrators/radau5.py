@@ -1,0 +1,316 @@
+"""Implicit Runge-Kutta of order 5: three stages of Radau IIA, for stiff equations and accuracy.
+
+With Z the stages less y, A the method's matrix and W = T^-1 Z, where T^-1 A^-1 T is one real
+number g0 and one complex pair a +- ib, Newton's equations fall into one real and one complex
+system of the size of y:
+
+    (g0/h - J) dW0 = (T^-1 F)_0 - g0/h W0
+    ((a + ib)/h - J) (dW1 + i dW2) = (T^-1 F)_1 - (a W1 - b W2)/h + i ((T^-1 F)_2 - (a W2 + b W1)/h)
+
+The last stage is the new point: stiffly accurate, L-stable. The error is of order 3, filtered by
+the real system. The polynomial through the stages is the dense output, and what the next step
+begins its iteration with.
+Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.8.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.core.address import call_float
+from mbsim.core.jitable import jitable
+from mbsim.integrators.newton import (
+    GO_ON,
+    HALF,
+    SOLVED,
+    as_failure,
+    begin,
+    judge,
+    linearise,
+    may_help,
+)
+from mbsim.integrators.scheme import (
+    AFTER_REJECTION,
+    EVALUATIONS,
+    FACTORED_STEP,
+    FACTORIZATIONS,
+    FRESH,
+    HAVE_JACOBIAN,
+    JACOBIAN_TIME,
+    LAST_ERROR,
+    LAST_STEP,
+    RATE,
+    RETRY,
+    TOL,
+    Scheme,
+    on_bench,
+)
+
+_ROOT = math.sqrt(6.0)
+#: Nodes, and the method's matrix.
+C = np.array(((4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0))
+A = np.array(
+    (
+        ((88 - 7 * _ROOT) / 360, (296 - 169 * _ROOT) / 1800, (-2 + 3 * _ROOT) / 225),
+        ((296 + 169 * _ROOT) / 1800, (88 + 7 * _ROOT) / 360, (-2 - 3 * _ROOT) / 225),
+        ((16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9),
+    )
+)
+#: Eigenvalues of its inverse: one real, one complex pair.
+_THIRD = 81.0 ** (1.0 / 3.0)
+_SIXTH = 9.0 ** (1.0 / 3.0)
+_REAL = (6.0 + _THIRD - _SIXTH) / 30.0
+_A, _B = (12.0 - _THIRD + _SIXTH) / 60.0, (_THIRD + _SIXTH) * math.sqrt(3.0) / 60.0
+G0 = 1.0 / _REAL
+G_RE, G_IM = _A / (_A * _A + _B * _B), _B / (_A * _A + _B * _B)
+# fmt: off
+T = np.array((
+    (0.09123239487089295, -0.14125529502095421, -0.030029194105147425),
+    (0.241717932707107, 0.204129352293799, 0.38294211275726192),
+    (0.96604818261509293, 1.0, 0.0),
+))
+TI = np.array((
+    (4.325579890063155, 0.339199251815809842, 0.541770539935874871),
+    (-4.178718591551904, -0.327682820761062387, 0.476623554500550438),
+    (-0.502872634945786875, 2.57192694985560543, -0.596039204828224932),
+))
+# fmt: on
+#: Error of order 3: weights of the stages.
+E = np.array((-(13.0 + 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 / 3.0))
+
+#: Corrections in one step at most.
+MOST = 7
+#: A linearisation is kept for another step where the iteration converged so fast with it.
+KEEP = 0.01
+
+# rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
+# and solutions of the real system and of the pair, f at the trial point
+F, Z, W, REAL, REAL_D, PAIR, PAIR_D, LAST = 1, 4, 7, 10, 11, 12, 14, 16
+
+
+@jitable
+def factor(p, m, t, h):
+    """Factor both systems for a step of length h; return a code."""
+    m.counts[FACTORIZATIONS] += 1
+    m.memory[FACTORED_STEP] = 0.0
+    g, re, im = G0 / h, G_RE / h, G_IM / h
+    c = np.array((g, g * g, g, 0.0))
+    code = call_float(p.factor, (p.context, t, h, c, c))
+    if code != 0.0:
+        return code
+    pair = np.array((re, im, re * re - im * im, 2.0 * re * im, re, im, 0.0))
+    code = call_float(p.factor_pair, (p.context, t, h, pair, pair))
+    if code == 0.0:
+        m.memory[FACTORED_STEP] = h
+    return code
+
+
+@jitable
+def foretell(m, h):
+    """Write the stages as the last step's polynomial, carried on, has them."""
+    k = m.k
+    n = len(m.y)
+    if m.memory[FRESH] == 1.0:
+        for j in range(3):
+            for i in range(n):
+                k[Z + j, i] = 0.0
+    else:
+        ratio = h / m.memory[LAST_STEP]
+        for j in range(3):
+            s = 1.0 + C[j] * ratio
+            r = 1.0 - s
+            for i in range(n):
+                inner = m.kept[1, i] + s * m.kept[2, i]
+                k[Z + j, i] = s * (m.kept[0, i] + r * inner) - m.kept[0, i]
+    for j in range(3):
+        for i in range(n):
+            k[W + j, i] = TI[j, 0] * k[Z, i] + TI[j, 1] * k[Z + 1, i] + TI[j, 2] * k[Z + 2, i]
+
+
+@jitable
+def evaluate_stages(p, m, t, h):
+    """Evaluate f at the stages; return a code."""
+    for j in range(3):
+        for i in range(len(m.y)):
+            m.trial[i] = m.y[i] + m.k[Z + j, i]
+        m.counts[EVALUATIONS] += 1
+        code = call_float(p.rhs, (p.context, t + C[j] * h, C[j] * h, m.trial, m.k[F + j]))
+        if code != 0.0:
+            return code
+    return 0.0
+
+
+@jitable
+def correct(p, m, t, h):
+    """Correct the stages once; return a code, and the largest correction in the error's norm."""
+    k = m.k
+    n = len(m.y)
+    g, re, im = G0 / h, G_RE / h, G_IM / h
+    real, pair, d, dd = k[REAL], k[PAIR : PAIR + 2], k[REAL_D], k[PAIR_D : PAIR_D + 2]
+    for i in range(n):
+        f0, f1, f2 = k[F, i], k[F + 1, i], k[F + 2, i]
+        w0, w1, w2 = k[W, i], k[W + 1, i], k[W + 2, i]
+        real[i] = TI[0, 0] * f0 + TI[0, 1] * f1 + TI[0, 2] * f2 - g * w0
+        pair[0, i] = TI[1, 0] * f0 + TI[1, 1] * f1 + TI[1, 2] * f2 - (re * w1 - im * w2)
+        pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
+    code = call_float(p.solve, (p.context, t, h, real, d))
+    if code != 0.0:
+        return code, 0.0
+    code = call_float(p.solve_pair, (p.context, t, h, pair, dd))
+    if code != 0.0:
+        return code, 0.0
+    size = 0.0
+    for j in range(3):
+        for i in range(n):
+            m.error[i] = T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
+            k[Z + j, i] += m.error[i]
+        part = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
+        size = max(size, part) if part < math.inf else math.inf
+    for i in range(n):
+        k[W, i] += d[i]
+        k[W + 1, i] += dd[0, i]
+        k[W + 2, i] += dd[1, i]
+    return 0.0, size
+
+
+@jitable
+def iterate(p, m, t, h):
+    """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution."""
+    begin(m)
+    foretell(m, h)
+    before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
+    while word == GO_ON:
+        iteration += 1
+        code = evaluate_stages(p, m, t, h)
+        if code != 0.0:
+            return code
+        code, size = correct(p, m, t, h)
+        if code != 0.0:
+            return code
+        word, rate = judge(m, iteration, MOST, size, before, rate)
+        before = size
+    m.memory[RATE] = rate
+    return 0.0 if word == SOLVED else -1.0
+
+
+@jitable
+def solve_stages(p, m, t, h):
+    """Solve for the stages, with an old linearisation if there is one; return a code."""
+    here = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[JACOBIAN_TIME] == t
+    stale = not here and (m.memory[HAVE_JACOBIAN] == 0.0 or m.memory[RATE] > KEEP)
+    # at most twice: with the old one, then with one of this step's begin
+    while True:
+        if stale:
+            code = linearise(p, m, t, 0.0, m.y, m.k[F])
+            if code != 0.0:
+                return code
+            here = True
+        if m.memory[FACTORED_STEP] != h:
+            code = factor(p, m, t, h)
+            m.memory[RETRY] = HALF
+            # a singular system is none of an rhs: another step has another
+            code = -1.0 if code != 0.0 else 0.0
+        else:
+            code = 0.0
+        if code == 0.0:
+            code = iterate(p, m, t, h)
+            if code == 0.0:
+                return 0.0
+        if here or not may_help(code):
+            return as_failure(code)
+        stale = True
+
+
+@jitable
+def estimate(p, m, t, h, base):
+    """Write the filtered error into m.error from f in row `base`; return its norm over tol."""
+    k, r = m.k, m.k[REAL]
+    for i in range(len(m.y)):
+        r[i] = k[base, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
+    if call_float(p.solve, (p.context, t, h, r, m.error)) != 0.0:
+        return math.inf
+    return call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
+
+
+@jitable
+def estimate_error(p, m, t, h):
+    """Return the error over tol; one that would reject a doubtful step is filtered once more."""
+    error = estimate(p, m, t, h, 0)
+    doubtful = m.memory[FRESH] == 1.0 or m.memory[AFTER_REJECTION] == 1.0
+    if error < 1.0 or not doubtful or not error < math.inf:
+        return error
+    for i in range(len(m.y)):
+        m.error[i] += m.y[i]
+    m.counts[EVALUATIONS] += 1
+    if call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F])) != 0.0:
+        return error
+    return estimate(p, m, t, h, F)
+
+
+@jitable
+def keep_polynomial(m):
+    """Leave the polynomial through begin, stages and trial point for the next step."""
+    k = m.k
+    c0, c1 = C[0], C[1]
+    for i in range(len(m.y)):
+        rise = m.trial[i] - m.y[i]
+        first = (k[Z, i] / c0 - rise) / (1.0 - c0)
+        second = (k[Z + 1, i] / c1 - rise) / (1.0 - c1)
+        bend = (second - first) / (c1 - c0)
+        m.ahead[0, i] = rise
+        m.ahead[1, i] = first - c0 * bend
+        m.ahead[2, i] = bend
+
+
+@jitable
+def attempt(p, m, t, h):
+    """Solve for the stages, fill trial point and error; return a code."""
+    code = solve_stages(p, m, t, h)
+    if code != 0.0:
+        return code
+    for i in range(len(m.y)):
+        m.trial[i] = m.y[i] + m.k[Z + 2, i]
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    error = estimate_error(p, m, t, h)
+    m.memory[LAST_ERROR] = error
+    if not error <= 1.0:
+        return 0.0
+    keep_polynomial(m)
+    m.counts[EVALUATIONS] += 1
+    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+
+
+@jitable
+def fit_dense(m):
+    """Fill the polynomial of the step from y to trial."""
+    for i in range(len(m.y)):
+        m.dense[0, i] = m.y[i]
+        for j in range(3):
+            m.dense[1 + j, i] = m.ahead[j, i]
+
+
+def _attempt(context, t, h, a, b):
+    """One step, tried."""
+    p, m = on_bench(context)
+    return float(attempt(p, m, t, h))
+
+
+def _fit_dense(context, t, h, a, b):
+    """Dense output of the step tried last."""
+    _, m = on_bench(context)
+    fit_dense(m)
+    return 0.0
+
+
+SCHEME = Scheme(
+    _attempt,
+    _fit_dense,
+    stages=LAST + 1,
+    last=LAST,
+    dense=4,
+    order=4.0,
+    implicit=True,
+    carried=3,
+)
