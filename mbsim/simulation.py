@@ -79,8 +79,11 @@ class Runner:
         self.detector = self._open_fcl_door()
         self.problem: Problem
         self.problem, self._table = mechanism(system.scene, method.order == 0.0)
-        if method.implicit and self.problem.linearise == 0:
-            raise ModelError(f"integrator={settings.integrator}: this model has no linearisation")
+        if method.implicit:
+            from mbsim.dynamics.implicit_hooks import implicit_hooks
+
+            made = implicit_hooks(system.scene, self.problem, method.pair)
+            self.problem, self._tangent = made
         self._steps, self._bench = scheme.bind(method, self.problem, self.method)
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p

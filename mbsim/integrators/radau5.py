@@ -7,6 +7,8 @@ system of the size of y:
     (g0/h - J) dW0 = (T^-1 F)_0 - g0/h W0
     ((a + ib)/h - J) (dW1 + i dW2) = (T^-1 F)_1 - (a W1 - b W2)/h + i ((T^-1 F)_2 - (a W2 + b W1)/h)
 
+Stages are projected: equations of joints hold at all of them, and what the residual F asks for
+across these goes to multipliers, as in a stabilised formulation of index 2.
 The last stage is the new point: stiffly accurate, L-stable. The error is of order 3, filtered by
 the real system. The polynomial through the stages is the dense output, and what the next step
 begins its iteration with.
@@ -124,6 +126,19 @@ def foretell(m, h):
             for i in range(n):
                 inner = m.kept[1, i] + s * m.kept[2, i]
                 k[Z + j, i] = s * (m.kept[0, i] + r * inner) - m.kept[0, i]
+
+
+@jitable
+def project_stages(p, m, t, h):
+    """Put the stages onto the problem's manifold, and transform them."""
+    k = m.k
+    n = len(m.y)
+    for j in range(3):
+        for i in range(n):
+            m.trial[i] = m.y[i] + k[Z + j, i]
+        call_float(p.project, (p.context, t + C[j] * h, C[j] * h, m.trial, m.trial))
+        for i in range(n):
+            k[Z + j, i] = m.trial[i] - m.y[i]
     for j in range(3):
         for i in range(n):
             k[W + j, i] = TI[j, 0] * k[Z, i] + TI[j, 1] * k[Z + 1, i] + TI[j, 2] * k[Z + 2, i]
@@ -168,10 +183,8 @@ def correct(p, m, t, h):
             k[Z + j, i] += m.error[i]
         part = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
         size = max(size, part) if part < math.inf else math.inf
-    for i in range(n):
-        k[W, i] += d[i]
-        k[W + 1, i] += dd[0, i]
-        k[W + 2, i] += dd[1, i]
+    if size < math.inf:
+        project_stages(p, m, t, h)
     return 0.0, size
 
 
@@ -180,6 +193,7 @@ def iterate(p, m, t, h):
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
     foretell(m, h)
+    project_stages(p, m, t, h)
     before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -313,4 +327,5 @@ SCHEME = Scheme(
     order=4.0,
     implicit=True,
     carried=3,
+    pair=True,
 )
