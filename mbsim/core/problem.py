@@ -43,8 +43,8 @@ da being the linearised acceleration under joints and equations. `form` says wha
 
 | hook       | a, b                                    | returns                               |
 |------------|-----------------------------------------|---------------------------------------|
-| linearise  | y, f (out)                              | code; as rhs, and keeps the           |
-|            |                                         | linearisation there                   |
+| linearise  | y, f                                    | code; keeps the linearisation where   |
+|            |                                         | rhs has just been asked               |
 | factor     | c1, c2, c3, form; -                     | 0 or SINGULAR; of the linearisation   |
 |            |                                         | kept                                  |
 | solve      | r, d (out)                              | code; by the last `factor`            |

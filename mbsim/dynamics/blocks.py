@@ -5,7 +5,8 @@ its parent, the rows of dq, S times its own and what the joint's force adds (U),
 Children go before their parents, and among those that may go, the one with the fewest
 neighbours. Along a chain this is the articulated-body recursion, and as cheap.
 
-The same code serves real and complex matrices: M is `Real` or `Pair` of `system.tangent`.
+The same code serves real and complex matrices: M is `Real` or `Pair` of `system.tangent`. Loops
+over a block take its size from the array: unrolled, they would take long to compile.
 """
 
 from __future__ import annotations
@@ -172,45 +173,45 @@ def solve_rows(a, swap, size, X):
     for k in range(size):
         other = swap[k]
         if other != k:
-            for c in range(6):
+            for c in range(X.shape[1]):
                 X[k, c], X[other, c] = X[other, c], X[k, c]
     for k in range(size):
         for j in range(k):
             part = a[k, j]
-            for c in range(6):
+            for c in range(X.shape[1]):
                 X[k, c] -= part * X[j, c]
     for k in range(size - 1, -1, -1):
         for j in range(k + 1, size):
             part = a[k, j]
-            for c in range(6):
+            for c in range(X.shape[1]):
                 X[k, c] -= part * X[j, c]
         inverse = 1.0 / a[k, k]
-        for c in range(6):
+        for c in range(X.shape[1]):
             X[k, c] *= inverse
 
 
 @jitable
 def add_block(A, B):
     """Add B to A."""
-    for i in range(6):
-        for j in range(6):
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
             A[i, j] += B[i, j]
 
 
 @jitable
 def take_product(A, Q, X, size):
     """Take Q X from A; Q is 6 x size, X size x 6."""
-    for i in range(6):
+    for i in range(A.shape[0]):
         for q in range(size):
             part = Q[i, q]
-            for j in range(6):
+            for j in range(A.shape[1]):
                 A[i, j] -= part * X[q, j]
 
 
 @jitable
 def times_directions(A, S, size, out):
     """Write A S' into the first columns of `out`, which may be A; S has directions by rows."""
-    for i in range(6):
+    for i in range(A.shape[0]):
         a0, a1, a2, a3, a4, a5 = A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5]
         for q in range(size):
             out[i, q] = (
@@ -227,9 +228,9 @@ def times_directions(A, S, size, out):
 def directions_times(S, A, size, out):
     """Write S A into the first rows of `out`, which is not A."""
     for q in range(size):
-        for j in range(6):
+        for j in range(A.shape[1]):
             total = S[q, 0] * A[0, j]
-            for i in range(1, 6):
+            for i in range(1, A.shape[0]):
                 total += S[q, i] * A[i, j]
             out[q, j] = total
 
@@ -238,7 +239,7 @@ def directions_times(S, A, size, out):
 def copy_rows(A, B, size):
     """Copy the first rows of B into A."""
     for i in range(size):
-        for j in range(6):
+        for j in range(A.shape[1]):
             A[i, j] = B[i, j]
 
 
@@ -262,7 +263,7 @@ def hang(P, M, linear, free, c, first, end):
     for q in range(size):
         for j in range(size):
             total = S[q, 0] * own[0, j] + U[q, 0] * S[j, 0]
-            for i in range(1, 6):
+            for i in range(1, S.shape[1]):
                 total += S[q, i] * own[i, j] + U[q, i] * S[j, i]
             pivot[q, j] = total
     for at in range(first, end):
@@ -271,14 +272,14 @@ def hang(P, M, linear, free, c, first, end):
         directions_times(S, block, size, spare)
         if j == p:
             for q in range(size):
-                for i in range(6):
+                for i in range(spare.shape[1]):
                     spare[q, i] += U[q, i] + U[6 + q, i]
         if p >= 0:
             add_block(A[P.place[p, j]], block)
         copy_rows(block, spare, size)
     if p >= 0:
         above = A[P.place[p, c]]
-        for i in range(6):
+        for i in range(above.shape[0]):
             for q in range(size):
                 above[i, q] += own[i, q]
     return size
@@ -317,7 +318,7 @@ def solve_bodies(P, M, linear, free, g):
         if k >= 0:
             size = free[k]
             if p >= 0:
-                for i in range(6):
+                for i in range(g.shape[1]):
                     g[p, i] += g[c, i]
             g0, g1, g2, g3, g4, g5 = g[c, 0], g[c, 1], g[c, 2], g[c, 3], g[c, 4], g[c, 5]
             for q in range(size):
@@ -328,7 +329,7 @@ def solve_bodies(P, M, linear, free, g):
         for at in range(first, end):
             i = P.neighbour[at]
             Q = M.A[P.place[i, c]]
-            for r in range(6):
+            for r in range(g.shape[1]):
                 for q in range(size):
                     g[i, r] -= Q[r, q] * g[c, q]
     for step in range(nb - 1, -1, -1):
@@ -340,16 +341,16 @@ def solve_bodies(P, M, linear, free, g):
             j = P.neighbour[at]
             X = M.A[P.place[c, j]]
             for q in range(size):
-                for r in range(6):
+                for r in range(g.shape[1]):
                     g[c, q] -= X[q, r] * g[j, r]
         if k >= 0:
             x = M.work[2, 0]
             for q in range(size):
                 x[q] = g[c, q]
-            for i in range(6):
+            for i in range(g.shape[1]):
                 g[c, i] = g[p, i] if p >= 0 else 0.0
             for q in range(size):
-                for i in range(6):
+                for i in range(g.shape[1]):
                     g[c, i] += x[q] * linear.S[k, q, i]
 
 

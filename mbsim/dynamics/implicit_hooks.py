@@ -14,10 +14,10 @@ from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.problem import HOOK, Problem
 from mbsim.dynamics.doors import open_jets
-from mbsim.dynamics.linearise import linearise
+from mbsim.dynamics.linearise import add_bends, linearise
 from mbsim.dynamics.newton_matrix import factor, solve
 from mbsim.dynamics.stiffness import add_applied_slopes, fill_state_slopes
-from mbsim.system.arrays import SLOPES_DOOR, TANGENT_DOOR, Scene
+from mbsim.system.arrays import BEND_DOOR, SLOPES_DOOR, TANGENT_DOOR, Scene
 from mbsim.system.depends import find_depends
 from mbsim.system.tangent import Tangent, make_tangent
 
@@ -25,7 +25,7 @@ _VALUES = types.int64(types.int64, types.float64, types.CPointer(types.float64))
 
 
 def _linearise(context, t, h, a, b):
-    """f(t, y), and the linearised mechanism."""
+    """The mechanism linearised where it has just been evaluated."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
@@ -84,8 +84,18 @@ def _slopes(context, t, y):
     return code
 
 
+def _bend(context, t, y):
+    """How the forces of equations turn with the bodies."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    add_bends(scene, T, t, carray(y, (scene.rows.y.shape[1],)))
+    return 0
+
+
 def open_slopes(scene: Scene) -> None:
-    """Open the door of derivatives of forces where there are some."""
+    """Open the doors of derivatives of forces and equations where there are some."""
+    if len(scene.equations.program) > 0:
+        scene.world.doors[BEND_DOOR] = jit.address(_bend, _VALUES)
     if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
         return
     scene.world.doors[SLOPES_DOOR] = jit.address(_slopes, _VALUES)

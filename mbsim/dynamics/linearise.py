@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, rotate, scale, sub, vector
+from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.blocks import COUPLINGS, couple, drop_fill, forget_pattern
 from mbsim.dynamics.equations import active_count, fill_equation, side_place
-from mbsim.dynamics.evaluate import evaluate
-from mbsim.dynamics.kinematics import place_body, position
+from mbsim.dynamics.kinematics import place_body
 from mbsim.dynamics.stiffness import (
     add_contacts_slopes,
     couple_applied,
@@ -29,7 +28,15 @@ from mbsim.dynamics.stiffness import (
     pushed,
 )
 from mbsim.dynamics.tree import child_axis, origin, parent_axis
-from mbsim.system.arrays import BODY_SIZE, SLOPES_DOOR, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.system.arrays import (
+    BEND_DOOR,
+    BODY_SIZE,
+    SLOPES_DOOR,
+    TURN_AXIS,
+    TURN_CROSS,
+    TURN_FREE,
+    TURN_ROOT,
+)
 
 #: Code of a mechanism with more coupled bodies than there is room for.
 NO_ROOM = 11
@@ -281,10 +288,7 @@ def add_bends(scene, T, t, y):
 
 @jitable
 def linearise(scene, T, t, h, y, dy):
-    """Evaluate y' at (t, y) and keep the linearised mechanism there; return a code."""
-    code = evaluate(scene, t, h, y, dy)
-    if code != 0:
-        return code
+    """Keep the mechanism linearised at (t, y), where dy = f has just been evaluated; return a code."""
     if not find_couplings(scene, T):
         return NO_ROOM
     clear(scene, T)
@@ -293,7 +297,8 @@ def linearise(scene, T, t, h, y, dy):
     for k in range(len(scene.tree.body)):
         fill_joint(scene, T.linear, y, k)
     fill_rows(scene, T.linear)
-    add_bends(scene, T, t, y)
+    if active_count(scene) > 0:
+        call_int(scene.world.doors[BEND_DOOR], (scene, t, y))
     code = add_contacts_slopes(scene, T, t, h, y)
     if code == 0 and scene.world.doors[SLOPES_DOOR] != 0:
         code = call_int(scene.world.doors[SLOPES_DOOR], (scene, t, y))

@@ -20,6 +20,7 @@ formulation of index 2. With K and D of forces and eta = E xi - e the change of 
 from __future__ import annotations
 
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import SINGULAR
 from mbsim.core.rotation import cross, rotate, unrotate, vector
 from mbsim.dynamics.blocks import (
     BLOCKS,
@@ -33,9 +34,6 @@ from mbsim.dynamics.blocks import (
 )
 from mbsim.dynamics.equations import active_count
 from mbsim.system.arrays import BODY_SIZE
-
-#: Code of a matrix without an inverse.
-SINGULAR = 12
 
 
 @jitable
@@ -63,7 +61,7 @@ def times_rate(L, M, b, out):
     spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
     """
     R, B, c1, w, r = L.R[b], M.B[b], M.c[0, 0], L.spin[b], L.r[b]
-    for j in range(3):
+    for j in range(B.shape[0]):
         column = (R[j, 0], R[j, 1], R[j, 2])
         # R B R' e_j
         u0 = B[0, 0] * column[0] + B[0, 1] * column[1] + B[0, 2] * column[2]
@@ -99,7 +97,7 @@ def add_inertia(scene, L, M, b, A):
     m, c1, c2 = scene.bodies.mass[b], M.c[0, 0], M.c[0, 1]
     R, B, J = L.R[b], M.B[b], scene.bodies.inertia[b]
     r, f, N = vector(L.r[b]), vector(L.force[b]), vector(L.torque[b])
-    for j in range(3):
+    for j in range(B.shape[0]):
         e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
         # a turn about O
         own = (R[j, 0], R[j, 1], R[j, 2])
@@ -134,8 +132,8 @@ def fill_matrix(scene, T, M):
     """Fill A."""
     P, L = T.pattern, T.linear
     for k in range(P.count[COUPLINGS], P.count[BLOCKS]):
-        for i in range(6):
-            for j in range(6):
+        for i in range(M.A.shape[1]):
+            for j in range(M.A.shape[2]):
                 M.A[k, i, j] = 0.0
     E = M.work[2]
     last = -1
@@ -146,13 +144,13 @@ def fill_matrix(scene, T, M):
             if k < 0 or k >= P.count[COUPLINGS]:
                 continue
             K, D, A = L.K[k], L.D[k], M.A[k]
-            for i in range(6):
-                for j in range(6):
+            for i in range(A.shape[0]):
+                for j in range(A.shape[1]):
                     A[i, j] = -K[i, j]
-                for q in range(6):
+                for q in range(A.shape[1]):
                     part = D[i, q]
                     if part != 0.0:
-                        for j in range(6):
+                        for j in range(A.shape[1]):
                             A[i, j] -= part * E[q, j]
         last = b
     for b in range(last + 1):
@@ -190,7 +188,7 @@ def along_row(L, M, row, slope, x):
     """Return a row of the border times displacements; of a state's slope with their rates."""
     total = 0.0 * x[0, 0]
     for b in range(len(L.w)):
-        for i in range(6):
+        for i in range(x.shape[1]):
             if L.row[row, b, i] != 0.0:
                 total += L.row[row, b, i] * x[b, i]
     if slope == 0:
@@ -198,12 +196,12 @@ def along_row(L, M, row, slope, x):
     E = M.work[2]
     for b in range(len(L.w)):
         used = False
-        for i in range(6):
+        for i in range(x.shape[1]):
             used = used or L.row_rate[row, b, i] != 0.0
         if used:
             times_rate(L, M, b, E)
-            for i in range(6):
-                for j in range(6):
+            for i in range(x.shape[1]):
+                for j in range(x.shape[1]):
                     total += L.row_rate[row, b, i] * E[i, j] * x[b, j]
     return total
 
@@ -216,7 +214,7 @@ def factor_rest(scene, T, M):
     for k in range(size):
         row, y = bordered(scene, k), M.answer[k]
         for b in range(len(P.order)):
-            for i in range(6):
+            for i in range(y.shape[1]):
                 y[b, i] = L.column[row, b, i]
         solve_bodies(P, M, L, scene.tree.free, y)
     for k in range(size):
@@ -283,8 +281,8 @@ def fill_right_side(scene, T, M, r):
         ask_body(scene, L, M, b, r)
     for k in range(P.count[COUPLINGS]):
         a, b, D = P.pair[k, 0], P.pair[k, 1], L.D[k]
-        for i in range(6):
-            for j in range(6):
+        for i in range(D.shape[0]):
+            for j in range(D.shape[1]):
                 M.g[a, i] += D[i, j] * M.rate[b, j]
 
 
@@ -302,12 +300,12 @@ def solve_border_part(scene, T, M, r):
         place = scene.states.place[k - held]
         x[k] = r[place] + along_row(L, M, row, 1, M.g)
         for b in range(len(P.order)):
-            for i in range(6):
+            for i in range(M.rate.shape[1]):
                 x[k] += L.row_rate[row, b, i] * M.rate[b, i]
     solve_border(M.border, M.border_swap, size, x)
     for k in range(size):
         for b in range(len(P.order)):
-            for i in range(6):
+            for i in range(M.g.shape[1]):
                 M.g[b, i] += M.answer[k, b, i] * x[k]
 
 

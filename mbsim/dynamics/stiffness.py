@@ -57,26 +57,23 @@ def lever(scene, linear, y, b, p, force, torque, row):
 @jitable
 def add_product(target, factor, u, v):
     """Add factor u v' to a block."""
-    for i in range(6):
+    for i in range(target.shape[0]):
         part = factor * u[i]
         if part != 0.0:
-            for j in range(6):
+            for j in range(target.shape[1]):
                 target[i, j] += part * v[j]
 
 
 @jitable
 def add_two_sided(P, blocks, nb, i, j, factor, u, v):
     """Add factor u v' of a force between bodies i and j; rows 0 of u and v are of i, 1 of j."""
-    if i < nb:
-        add_product(blocks[P.place[i, i]], factor, u[0], v[0])
-    if j < nb:
-        add_product(blocks[P.place[j, j]], factor, u[1], v[1])
-    if i < nb and j < nb and i != j:
-        add_product(blocks[P.place[i, j]], -factor, u[0], v[1])
-        add_product(blocks[P.place[j, i]], -factor, u[1], v[0])
-    elif i < nb and i == j:
-        add_product(blocks[P.place[i, i]], -factor, u[0], v[1])
-        add_product(blocks[P.place[i, i]], -factor, u[1], v[0])
+    for of in range(2):
+        a = i if of == 0 else j
+        for by in range(2):
+            b = i if by == 0 else j
+            if a < nb and b < nb:
+                size = factor if of == by else -factor
+                add_product(blocks[P.place[a, b]], size, u[of], v[by])
 
 
 @jitable
@@ -606,4 +603,3 @@ def fill_state_slopes(scene, T, t, y):
         for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
             other = T.depends.state[at]
             L.slopes[z, other] = state_rise(scene, T, t, y, program, other)
-

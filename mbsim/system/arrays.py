@@ -58,8 +58,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     VALUE_DOOR,
     TANGENT_DOOR,  # the packed arrays of `system.tangent`, where a method is implicit
     SLOPES_DOOR,
-) = range(12)
-DOORS = 12
+    BEND_DOOR,
+) = range(13)
+DOORS = 13
 
 # entries of `Applied.kind`
 (
