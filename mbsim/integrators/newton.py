@@ -86,8 +86,7 @@ def judge(m, iteration, most, size, before, rate_before):
                 return HOPELESS, rate
             ahead = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration) / goal
             if iteration < most and ahead >= 1.0:
-                shrink = 0.8 * min(20.0, ahead) ** (-1.0 / (4.0 + most - 1.0 - iteration))
-                m.memory[RETRY] = min(HALF, max(QUARTER, shrink))
+                m.memory[RETRY] = HALF
                 return HOPELESS, rate
         m.memory[REST] = rate / (1.0 - rate) if rate < 0.99 else 1.0
     if m.memory[REST] * size <= goal or size == 0.0:

@@ -600,8 +600,10 @@ def test_newtons_iteration_goes_on_while_it_is_worth_it():
     # 0.6^5 / 0.4 of 0.6 is far from it
     words, memory = judged([1.0, 0.6])
     assert words == [go_on, hopeless]
-    assert 0.25 <= memory[scheme.RETRY] < 0.5
-    assert judged([1.0, 3.0])[0] == [go_on, hopeless]
+    assert memory[scheme.RETRY] == newton.HALF
+    words, memory = judged([1.0, 3.0])
+    assert words == [go_on, hopeless]
+    assert memory[scheme.RETRY] == newton.QUARTER
     assert judged([math.nan])[0] == [hopeless]
     assert judged([1.0] + [1e-3] * 6, most=7, tol=1e9)[0][0] == solved
     # rounding does not fall any more
@@ -614,7 +616,7 @@ def test_the_step_of_an_implicit_method_is_kept_where_it_would_hardly_grow():
     assert control.foretold_factor(1e-20, 1.0, 4.0, 0.0) == control.GROW
     assert control.foretold_factor(0.1, 0.1, 4.0, 1.0) == pytest.approx(0.9 * 10**0.25)
     # the error grew by ten though the step did not: it will again
-    assert control.foretold_factor(0.1, 0.01, 4.0, 1.0) == 1.0 * 0.9
+    assert control.foretold_factor(0.1, 0.01, 4.0, 1.0) == pytest.approx(0.9)
     assert control.foretold_factor(0.9, 0.1, 4.0, 1.0) < 0.6
 
 
@@ -650,7 +652,7 @@ def test_radau5_agrees_with_an_explicit_method(exact_motions, motion):
 def test_radau5_is_of_order_5_on_a_top(exact_motions):
     (kind, y0, given), (y, _) = MOVING["top"], exact_motions["top"]
     errors = {"q": [], "w": []}
-    for n in (32, 64, 128):
+    for n in (64, 128, 256):
         off = np.abs(fixed_steps(kind, y0, n, end=2.0, tol=1e-11, given=given).state.y - y)
         errors["q"].append((2.0 / n, off[3:7].max()))
         errors["w"].append((2.0 / n, off[10:13].max()))
