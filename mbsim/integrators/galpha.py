@@ -262,7 +262,7 @@ def iterate(p, m, t, h, anew):
 
 @jitable
 def search(p, m, t, h, size, part):
-    """Take the largest part of a correction after which the next is smaller; return whether.
+    """Take the largest part of a correction after which the next is smaller; return a code.
 
     That is Deuflhard's natural test: it does not depend on the scales of the equations.
     """
@@ -272,12 +272,15 @@ def search(p, m, t, h, size, part):
         for i in range(len(m.y)):
             m.k[A1, i] = m.k[A_BEFORE, i]
         take(m, h, part, m.k[D])
-        if evaluate(p, m, t, h, False) == 0.0:
+        code = evaluate(p, m, t, h, False)
+        if not may_help(code):
+            return code
+        if code == 0.0:
             code, left = correction(p, m, t, h, m.k[D_NEXT])
             if code == 0.0 and left <= (1.0 - 0.25 * part) * size:
-                return True
+                return 0.0
         part *= 0.5
-    return False
+    return -1.0
 
 
 @jitable
@@ -297,8 +300,9 @@ def iterate_damped(p, m, t, h):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0.0
-        if not search(p, m, t, h, size, part):
-            return -1.0
+        code = search(p, m, t, h, size, part)
+        if code != 0.0:
+            return code
     return -1.0
 
 

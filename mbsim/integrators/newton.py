@@ -96,7 +96,7 @@ def judge(m, iteration, most, size, before, rate_before):
 
 @jitable
 def may_help(code):
-    """Return whether a better linearisation may help against this code."""
+    """Return whether a better linearisation or a smaller correction may help against a code."""
     return code < AT_ONCE
 
 

@@ -236,17 +236,23 @@ def estimate(p, m, t, h, base):
 
 @jitable
 def estimate_error(p, m, t, h):
-    """Return the error over tol; one that would reject a doubtful step is filtered once more."""
+    """Write the error over tol; one that would reject a doubtful step is filtered once more.
+
+    Returns a code.
+    """
     error = estimate(p, m, t, h, 0)
+    m.memory[LAST_ERROR] = error
     doubtful = m.memory[FRESH] == 1.0 or m.memory[AFTER_REJECTION] == 1.0
     if error < 1.0 or not doubtful or not error < math.inf:
-        return error
+        return 0.0
     for i in range(len(m.y)):
         m.error[i] += m.y[i]
     m.counts[EVALUATIONS] += 1
-    if call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F])) != 0.0:
-        return error
-    return estimate(p, m, t, h, F)
+    code = call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F]))
+    if code == 0.0:
+        m.memory[LAST_ERROR] = estimate(p, m, t, h, F)
+    # the first estimate stands where the second cannot be had
+    return 0.0 if may_help(code) else code
 
 
 @jitable
@@ -273,10 +279,9 @@ def attempt(p, m, t, h):
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + m.k[Z + 2, i]
     call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
-    error = estimate_error(p, m, t, h)
-    m.memory[LAST_ERROR] = error
-    if not error <= 1.0:
-        return 0.0
+    code = estimate_error(p, m, t, h)
+    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+        return code
     keep_polynomial(m)
     m.counts[EVALUATIONS] += 1
     return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
