@@ -10,7 +10,9 @@ Turns are the exponential of the same mean angular velocity in body axes; states
 take the last line, with rates for accelerations. `a` is the acceleration at t + (am - af) h: so it
 is begun at the start and after events, and moved where the step changes; with that, positions,
 velocities and accelerations are of order 2 from the start. What is fast keeps RHO of itself a
-step. Joints are in f already, and `project` puts the new point back onto positions and velocities.
+step. Iterates are projected onto positions and velocities that joints allow, as in a stabilised
+formulation of index 2, and v1' is f there with the multipliers of joints; corrections are along
+them.
 
 The error of a step is that of the formulas, the second and third derivative of the velocity times
 h^3 and a constant, from the differences of accelerations of this step and the last.
@@ -185,6 +187,7 @@ def place(m, h):
 def evaluate(p, m, t, h, anew):
     """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
     place(m, h)
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
     if anew:
         return linearise(p, m, t + h, h, m.trial, m.k[F])
     m.counts[EVALUATIONS] += 1
@@ -333,7 +336,10 @@ def estimate_error(p, m, t, h):
     end, before = BODY_SIZE * m.bodies[0], step_before(m)
     for i in range(len(m.y)):
         if is_rate(i, end):
-            dot = true_rate(m, i)
+            dot = m.k[LAST, i]
+            # what joints ask for beside what the iteration can change is in v' alone
+            a0, before_dot = m.k[A0, i], m.kept[DOT, i]
+            m.k[A1, i] = ((1.0 - AF) * dot + AF * before_dot - AM * a0) / (1.0 - AM)
             slope = (dot - m.kept[DOT, i]) / h
             bend = 2.0 * (slope - m.kept[SLOPE, i]) / (h + before)
             m.ahead[ALGORITHMIC, i] = m.k[A1, i]
@@ -367,11 +373,12 @@ def attempt(p, m, t, h):
         return code
     place(m, h)
     call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
-    m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
-    if not m.memory[LAST_ERROR] <= 1.0:
-        return 0.0
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+    code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+    if code != 0.0:
+        return code
+    m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
+    return 0.0
 
 
 @jitable

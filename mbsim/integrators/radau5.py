@@ -7,6 +7,9 @@ system of the size of y:
     (g0/h - J) dW0 = (T^-1 F)_0 - g0/h W0
     ((a + ib)/h - J) (dW1 + i dW2) = (T^-1 F)_1 - (a W1 - b W2)/h + i ((T^-1 F)_2 - (a W2 + b W1)/h)
 
+Stages are projected: equations of joints hold at all of them, and what the residual F asks for
+across these goes to multipliers, as in a stabilised formulation of index 2. What counts of a
+correction is by how much the projected stage moves.
 The last stage is the new point: stiffly accurate, L-stable. The error is of order 3, filtered by
 the real system. The polynomial through the stages is the dense output, and what the next step
 begins its iteration with.
@@ -124,8 +127,29 @@ def foretell(m, h):
             for i in range(n):
                 inner = m.kept[1, i] + s * m.kept[2, i]
                 k[Z + j, i] = s * (m.kept[0, i] + r * inner) - m.kept[0, i]
+
+
+@jitable
+def project_stage(p, m, t, h, j):
+    """Put stage j onto the problem's manifold, and leave by how much it moved in m.error.
+
+    On entry m.error is by how much it is to move.
+    """
+    z = m.k[Z + j]
+    for i in range(len(m.y)):
+        m.trial[i] = m.y[i] + (z[i] + m.error[i])
+    call_float(p.project, (p.context, t + C[j] * h, C[j] * h, m.trial, m.trial))
+    for i in range(len(m.y)):
+        m.error[i] = (m.trial[i] - m.y[i]) - z[i]
+        z[i] += m.error[i]
+
+
+@jitable
+def transform(m):
+    """Write the transformed stages."""
+    k = m.k
     for j in range(3):
-        for i in range(n):
+        for i in range(len(m.y)):
             k[W + j, i] = TI[j, 0] * k[Z, i] + TI[j, 1] * k[Z + 1, i] + TI[j, 2] * k[Z + 2, i]
 
 
@@ -165,13 +189,11 @@ def correct(p, m, t, h):
     for j in range(3):
         for i in range(n):
             m.error[i] = T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
-            k[Z + j, i] += m.error[i]
+        if call_float(p.norm, (p.context, t, 0.0, m.error, m.y)) < math.inf:
+            project_stage(p, m, t, h, j)
         part = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
         size = max(size, part) if part < math.inf else math.inf
-    for i in range(n):
-        k[W, i] += d[i]
-        k[W + 1, i] += dd[0, i]
-        k[W + 2, i] += dd[1, i]
+    transform(m)
     return 0.0, size
 
 
@@ -180,6 +202,11 @@ def iterate(p, m, t, h):
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
     foretell(m, h)
+    for j in range(3):
+        for i in range(len(m.y)):
+            m.error[i] = 0.0
+        project_stage(p, m, t, h, j)
+    transform(m)
     before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -318,4 +345,5 @@ SCHEME = Scheme(
     order=4.0,
     implicit=True,
     carried=3,
+    pair=True,
 )

@@ -64,6 +64,7 @@ class Scheme(NamedTuple):
     memory: float = 0.0  # how much the last error counts in step control (`control.next_factor`)
     implicit: bool = False  # solves with the problem's linearisation
     carried: int = 0  # rows of `kept`
+    pair: bool = False  # solves with complex coefficients as well
 
 
 class Method(NamedTuple):

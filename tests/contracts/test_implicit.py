@@ -725,7 +725,7 @@ def test_orders_under_a_constraint(name, order):
         errors["v"].append((2.0 / n, off[7:10].max()))
         errors["a"].append((2.0 / n, np.abs(run.state.k[0] - exact.state.k[0])[7:10].max()))
     for part in errors.values():
-        assert order <= observed(part) < order + 1.5, errors
+        assert observed(part) >= order, errors
     if name == "GALPHA":
         assert [observed(part) for part in errors.values()] == pytest.approx([2.0] * 3, abs=0.1)
 
