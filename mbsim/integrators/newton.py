@@ -84,8 +84,9 @@ def judge(m, iteration, most, size, before, rate_before):
                     return SOLVED, rate_before
                 m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
                 return HOPELESS, rate
-            ahead = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration) / goal
-            if iteration < most and ahead >= 1.0:
+            # what projections undo of the first correction comes back in the second, not again
+            left = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration)
+            if 2 < iteration < most and left >= goal:
                 m.memory[RETRY] = HALF
                 return HOPELESS, rate
         m.memory[REST] = rate / (1.0 - rate) if rate < 0.99 else 1.0

@@ -607,9 +607,9 @@ def test_newtons_iteration_goes_on_while_it_is_worth_it():
     assert memory[scheme.REST] == pytest.approx(0.01 / 0.99)
     # so much is known of the rate before there is one
     assert judged([9e-5], rest=0.01)[0] == [solved]
-    # 0.6^5 / 0.4 of 0.6 is far from it
-    words, memory = judged([1.0, 0.6])
-    assert words == [go_on, hopeless]
+    # 0.6^4 / 0.4 of 0.36 is far from it; one rate alone is not believed
+    words, memory = judged([1.0, 0.6, 0.36])
+    assert words == [go_on, go_on, hopeless]
     assert memory[scheme.RETRY] == newton.HALF
     words, memory = judged([1.0, 3.0])
     assert words == [go_on, hopeless]
