@@ -211,7 +211,7 @@ def fill_rows(scene, L):
 
 
 @jitable
-def take_bend(scene, L, y, e, term, O, size, way):
+def take_bend(scene, L, y, e, term, origins, size, way):
     """Add what one displacement made of a term's gradient, over its size, to a table by column.
 
     Rows 0 to 5 of `L.law` are the wrench on I's body, columns 0 to 5 the ways, 6 to 11 J's body.
@@ -224,7 +224,7 @@ def take_bend(scene, L, y, e, term, O, size, way):
         moment = (G[0], G[1], G[2])
         if k >= 0:
             # O may have moved with its root
-            moment = add(moment, cross(sub(origin(scene, y, k), O[side]), force))
+            moment = add(moment, cross(sub(origin(scene, y, k), origins[side]), force))
         for i in range(3):
             L.law[i, 6 * side + way] += size * moment[i]
             L.law[3 + i, 6 * side + way] += size * force[i]
@@ -241,7 +241,7 @@ def place_of_origin(scene, y, m):
 def bend_by(scene, T, t, y, row, e, term, b):
     """Add how the force of a term turns as body b is displaced."""
     L, eq, P, at = T.linear, scene.equations, T.pattern, BODY_SIZE * b
-    O = (place_of_origin(scene, y, eq.i[term]), place_of_origin(scene, y, eq.j[term]))
+    origins = (place_of_origin(scene, y, eq.i[term]), place_of_origin(scene, y, eq.j[term]))
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
     size = scene.sweep.multiplier[row] / (2.0 * _PUSH)
     for i in range(6):
@@ -253,7 +253,7 @@ def bend_by(scene, T, t, y, row, e, term, b):
             sign = 1.0 if side == 0 else -1.0
             pushed(scene, y, b, way, sign * _PUSH * scale_of_way)
             fill_equation(scene, t, y, e)
-            take_bend(scene, L, y, e, term, O, sign * size / scale_of_way, way)
+            take_bend(scene, L, y, e, term, origins, sign * size / scale_of_way, way)
             for k in range(7):
                 y[at + k] = kept[k]
             place_body(scene, y, b)
@@ -288,7 +288,7 @@ def add_bends(scene, T, t, y):
 
 @jitable
 def linearise(scene, T, t, h, y, dy):
-    """Keep the mechanism linearised at (t, y), where dy = f has just been evaluated; return a code."""
+    """Keep the mechanism linearised at (t, y), where dy = f(t, y); return a code."""
     if not find_couplings(scene, T):
         return NO_ROOM
     clear(scene, T)

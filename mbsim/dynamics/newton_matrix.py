@@ -2,8 +2,8 @@
 
 Sought is d = (dx, dq, dv, dw, dz) with, for residuals r,
 
-    dv = c1 dx - r_x,   dw = B theta - rho,   da = c2 dx - r_a,   d(alpha) = c2/c1 B theta - r_alpha,
-    c3 dz - d(z') = r_z,
+    dv = c1 dx - r_x,   dw = B theta - rho,   c3 dz - d(z') = r_z,
+    da = c2 dx - r_a,   d(alpha) = c2/c1 B theta - r_alpha,
 
 da and d(alpha) the accelerations that the linearised mechanism gives; theta is the turn in body
 axes, dq = q (0, theta/2), r_q = q (., rho/2). A first-order method (form 0) linearises q' = q (0,

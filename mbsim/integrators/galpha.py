@@ -11,8 +11,7 @@ take the last line, with rates for accelerations. `a` is the acceleration at t +
 is begun at the start and after events, and moved where the step changes; with that, positions,
 velocities and accelerations are of order 2 from the start. What is fast keeps RHO of itself a
 step. Iterates are projected onto positions and velocities that joints allow, as in a stabilised
-formulation of index 2, and v1' is f there with the multipliers of joints; corrections are along
-them.
+formulation of index 2; corrections are along them, and what joints ask for across comes from f.
 
 The error of a step is that of the formulas, the second and third derivative of the velocity times
 h^3 and a constant, from the differences of accelerations of this step and the last.
@@ -75,6 +74,8 @@ MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
 LEAST_PART = 1.0 / 128.0
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
+#: A body is free if `project` undoes no more than this part of a change of its velocity.
+FREE = 1e-6
 #: The change of v' at the start is taken over this part of the first step.
 PROBE = 0.05
 
@@ -265,7 +266,7 @@ def iterate(p, m, t, h, anew):
 
 @jitable
 def search(p, m, t, h, size, part):
-    """Take the largest part of a correction after which the next is smaller; return whether.
+    """Take the largest part of a correction after which the next is smaller; return a code.
 
     That is Deuflhard's natural test: it does not depend on the scales of the equations.
     """
@@ -275,12 +276,15 @@ def search(p, m, t, h, size, part):
         for i in range(len(m.y)):
             m.k[A1, i] = m.k[A_BEFORE, i]
         take(m, h, part, m.k[D])
-        if evaluate(p, m, t, h, False) == 0.0:
+        code = evaluate(p, m, t, h, False)
+        if not may_help(code):
+            return code
+        if code == 0.0:
             code, left = correction(p, m, t, h, m.k[D_NEXT])
             if code == 0.0 and left <= (1.0 - 0.25 * part) * size:
-                return True
+                return 0.0
         part *= 0.5
-    return False
+    return -1.0
 
 
 @jitable
@@ -300,8 +304,9 @@ def iterate_damped(p, m, t, h):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0.0
-        if not search(p, m, t, h, size, part):
-            return -1.0
+        code = search(p, m, t, h, size, part)
+        if code != 0.0:
+            return code
     return -1.0
 
 
@@ -320,6 +325,38 @@ def solve_step(p, m, t, h):
 
 
 @jitable
+def find_joint_part(p, m, t, h):
+    """Write f less v' of the bodies that joints hold into row R of k, 0 for others.
+
+    What joints ask for beside what the iteration can change is in f alone, and v' is to have it.
+    Of a body that `project` lets go where it wants, the difference is what the iteration left,
+    times what is stiff: v' is better without it.
+    """
+    w, r, end = m.error, m.k[R], BODY_SIZE * m.bodies[0]
+    for i in range(len(w)):
+        w[i] = m.trial[i]
+        m.k[D, i] = m.trial[i]
+        r[i] = 0.0
+        if i < end and is_rate(i, end):
+            r[i] = m.k[LAST, i] - true_rate(m, i)
+            w[i] += h * r[i]
+    call_float(p.project, (p.context, t + h, h, w, w))
+    for at in range(7, end, BODY_SIZE):
+        undone, whole = 0.0, 0.0
+        for i in range(at, at + 6):
+            undone = max(undone, abs(r[i] - (w[i] - m.trial[i]) / h))
+            whole = max(whole, abs(r[i]))
+        if undone <= FREE * whole:
+            for i in range(at, at + 6):
+                r[i] = 0.0
+    # the norm is to see what was put right of the step, not of this
+    place(m, h)
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    for i in range(len(w)):
+        m.trial[i] = m.k[D, i]
+
+
+@jitable
 def position_error(m, h, i):
     """Return the error of a step in what y[i] is the velocity of."""
     return ERROR_X * h * h * (m.k[A1, i] - m.k[A0, i])
@@ -332,8 +369,7 @@ def estimate_error(p, m, t, h):
     end, before = BODY_SIZE * m.bodies[0], step_before(m)
     for i in range(len(m.y)):
         if is_rate(i, end):
-            dot = m.k[LAST, i]
-            # what joints ask for beside what the iteration can change is in v' alone
+            dot = true_rate(m, i) + (m.k[R, i] if i < end else 0.0)
             a0, before_dot = m.k[A0, i], m.kept[DOT, i]
             m.k[A1, i] = ((1.0 - AF) * dot + AF * before_dot - AM * a0) / (1.0 - AM)
             slope = (dot - m.kept[DOT, i]) / h
@@ -373,6 +409,8 @@ def attempt(p, m, t, h):
     code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
     if code != 0.0:
         return code
+    if m.bodies[0] > 0:
+        find_joint_part(p, m, t, h)
     m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
     return 0.0
 

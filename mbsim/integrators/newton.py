@@ -86,10 +86,10 @@ def judge(m, iteration, most, size, before, rate_before):
                     return SOLVED, rate_before
                 m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
                 return HOPELESS, rate
-            ahead = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration) / goal
-            if iteration < most and ahead >= 1.0:
-                shrink = 0.8 * min(20.0, ahead) ** (-1.0 / (4.0 + most - 1.0 - iteration))
-                m.memory[RETRY] = min(HALF, max(QUARTER, shrink))
+            # what projections undo of the first correction comes back in the second, not again
+            left = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration)
+            if 2 < iteration < most and left >= goal:
+                m.memory[RETRY] = HALF
                 return HOPELESS, rate
         m.memory[REST] = rate / (1.0 - rate) if rate < 0.99 else 1.0
     if m.memory[REST] * size <= goal or size == 0.0:
@@ -99,7 +99,7 @@ def judge(m, iteration, most, size, before, rate_before):
 
 @jitable
 def may_help(code):
-    """Return whether a better linearisation may help against this code."""
+    """Return whether a better linearisation or a smaller correction may help against a code."""
     return code < AT_ONCE
 
 

@@ -8,7 +8,8 @@ system of the size of y:
     ((a + ib)/h - J) (dW1 + i dW2) = (T^-1 F)_1 - (a W1 - b W2)/h + i ((T^-1 F)_2 - (a W2 + b W1)/h)
 
 Stages are projected: equations of joints hold at all of them, and what the residual F asks for
-across these goes to multipliers, as in a stabilised formulation of index 2.
+across these goes to multipliers, as in a stabilised formulation of index 2. What counts of a
+correction is by how much the projected stage moves.
 The last stage is the new point: stiffly accurate, L-stable. The error is of order 3, filtered by
 the real system. The polynomial through the stages is the dense output, and what the next step
 begins its iteration with.
@@ -23,6 +24,7 @@ import numpy as np
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -129,18 +131,60 @@ def foretell(m, h):
 
 
 @jitable
-def project_stages(p, m, t, h):
-    """Put the stages onto the problem's manifold, and transform them."""
+def project_stage(p, m, t, h, j):
+    """Put stage j onto the problem's manifold, and leave by how much it moved in m.error.
+
+    On entry m.error is by how much it is to move.
+    """
+    z = m.k[Z + j]
+    for i in range(len(m.y)):
+        m.trial[i] = m.y[i] + (z[i] + m.error[i])
+    call_float(p.project, (p.context, t + C[j] * h, C[j] * h, m.trial, m.trial))
+    for i in range(len(m.y)):
+        m.error[i] = (m.trial[i] - m.y[i]) - z[i]
+        z[i] += m.error[i]
+
+
+@jitable
+def put_along(p, m, t, r, w):
+    """Leave of what r asks of the bodies' positions what their joints allow at the step's begin.
+
+    w is scratch. The rest is the multipliers'. Were it left in, `project` would share it out
+    between velocities, along other lines than those of the forces, and their order would fall
+    to 2.
+    """
+    y, end = m.y, BODY_SIZE * m.bodies[0]
+    for i in range(len(y)):
+        w[i] = y[i]
+    for at in range(0, end, BODY_SIZE):
+        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        ra, rb, rc, rd = r[at + 3], r[at + 4], r[at + 5], r[at + 6]
+        for i in range(3):
+            w[at + 7 + i] += r[at + i]
+        # an angular velocity, 2 conj(q) r
+        w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
+        w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
+        w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
+    call_float(p.project, (p.context, t, 0.0, w, w))
+    for at in range(0, end, BODY_SIZE):
+        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        for i in range(3):
+            r[at + i] = w[at + 7 + i] - y[at + 7 + i]
+        wx = 0.5 * (w[at + 10] - y[at + 10])
+        wy = 0.5 * (w[at + 11] - y[at + 11])
+        wz = 0.5 * (w[at + 12] - y[at + 12])
+        r[at + 3] = -b * wx - c * wy - d * wz
+        r[at + 4] = a * wx + c * wz - d * wy
+        r[at + 5] = a * wy + d * wx - b * wz
+        r[at + 6] = a * wz + b * wy - c * wx
+
+
+@jitable
+def transform(m):
+    """Write the transformed stages."""
     k = m.k
-    n = len(m.y)
     for j in range(3):
-        for i in range(n):
-            m.trial[i] = m.y[i] + k[Z + j, i]
-        call_float(p.project, (p.context, t + C[j] * h, C[j] * h, m.trial, m.trial))
-        for i in range(n):
-            k[Z + j, i] = m.trial[i] - m.y[i]
-    for j in range(3):
-        for i in range(n):
+        for i in range(len(m.y)):
             k[W + j, i] = TI[j, 0] * k[Z, i] + TI[j, 1] * k[Z + 1, i] + TI[j, 2] * k[Z + 2, i]
 
 
@@ -170,6 +214,9 @@ def correct(p, m, t, h):
         real[i] = TI[0, 0] * f0 + TI[0, 1] * f1 + TI[0, 2] * f2 - g * w0
         pair[0, i] = TI[1, 0] * f0 + TI[1, 1] * f1 + TI[1, 2] * f2 - (re * w1 - im * w2)
         pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
+    if m.bodies[0] > 0:
+        for r in (real, pair[0], pair[1]):
+            put_along(p, m, t, r, m.trial)
     code = call_float(p.solve, (p.context, t, h, real, d))
     if code != 0.0:
         return code, 0.0
@@ -180,11 +227,11 @@ def correct(p, m, t, h):
     for j in range(3):
         for i in range(n):
             m.error[i] = T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
-            k[Z + j, i] += m.error[i]
+        if call_float(p.norm, (p.context, t, 0.0, m.error, m.y)) < math.inf:
+            project_stage(p, m, t, h, j)
         part = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
         size = max(size, part) if part < math.inf else math.inf
-    if size < math.inf:
-        project_stages(p, m, t, h)
+    transform(m)
     return 0.0, size
 
 
@@ -193,7 +240,11 @@ def iterate(p, m, t, h):
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
     foretell(m, h)
-    project_stages(p, m, t, h)
+    for j in range(3):
+        for i in range(len(m.y)):
+            m.error[i] = 0.0
+        project_stage(p, m, t, h, j)
+    transform(m)
     before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -243,24 +294,34 @@ def estimate(p, m, t, h, base):
     k, r = m.k, m.k[REAL]
     for i in range(len(m.y)):
         r[i] = k[base, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
+    if m.bodies[0] > 0:
+        put_along(p, m, t, r, m.error)
     if call_float(p.solve, (p.context, t, h, r, m.error)) != 0.0:
         return math.inf
+    # last, for the norm sees what was put right
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
     return call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
 
 
 @jitable
 def estimate_error(p, m, t, h):
-    """Return the error over tol; one that would reject a doubtful step is filtered once more."""
+    """Write the error over tol; one that would reject a doubtful step is filtered once more.
+
+    Returns a code.
+    """
     error = estimate(p, m, t, h, 0)
+    m.memory[LAST_ERROR] = error
     doubtful = m.memory[FRESH] == 1.0 or m.memory[AFTER_REJECTION] == 1.0
     if error < 1.0 or not doubtful or not error < math.inf:
-        return error
+        return 0.0
     for i in range(len(m.y)):
         m.error[i] += m.y[i]
     m.counts[EVALUATIONS] += 1
-    if call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F])) != 0.0:
-        return error
-    return estimate(p, m, t, h, F)
+    code = call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F]))
+    if code == 0.0:
+        m.memory[LAST_ERROR] = estimate(p, m, t, h, F)
+    # the first estimate stands where the second cannot be had
+    return 0.0 if may_help(code) else code
 
 
 @jitable
@@ -286,11 +347,9 @@ def attempt(p, m, t, h):
         return code
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + m.k[Z + 2, i]
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
-    error = estimate_error(p, m, t, h)
-    m.memory[LAST_ERROR] = error
-    if not error <= 1.0:
-        return 0.0
+    code = estimate_error(p, m, t, h)
+    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+        return code
     keep_polynomial(m)
     m.counts[EVALUATIONS] += 1
     return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))

@@ -98,7 +98,7 @@ def fake_system_of(model: Model) -> Any:
         tree=SimpleNamespace(of_body=np.arange(nb + 1), free=np.array([4])),
         equations=SimpleNamespace(active=np.array([0, 1, 2, 3])),
         states=SimpleNamespace(place=np.zeros(0, dtype=np.int64)),
-        log=a.Log(log, np.zeros(a.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 3), np.int64)),
+        log=a.Log(log, np.zeros(a.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 4), np.int64)),
         rows=rows,
     )
     return SimpleNamespace(

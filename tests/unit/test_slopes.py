@@ -102,8 +102,7 @@ def test_slope_is_the_limit_of_differences(text, seed):
     def difference(change):
         """Return the derivative by Richardson's extrapolation of central differences."""
         rows = [
-            (f(change(h)) - f(change(-h))) / (2 * h)
-            for h in (STEP, STEP / 2, STEP / 4, STEP / 8)
+            (f(change(h)) - f(change(-h))) / (2 * h) for h in (STEP, STEP / 2, STEP / 4, STEP / 8)
         ]
         for k in range(1, 4):
             rows = [(4**k * b - a) / (4**k - 1) for a, b in zip(rows, rows[1:], strict=False)]
