@@ -399,7 +399,8 @@ class Governor:
     I(b) turns with the angular momentum h about the shaft: 2 J b'' = I'(b) (h / I)^2 / 2 + ...
     """
 
-    def __init__(self, speed=2 * np.pi, g=9.81):
+    def __init__(self, speed=2 * np.pi, g=9.81, stiffness=8e5, damping=4e4):
+        self.stiffness, self.damping = stiffness, damping
         self.hinge, self.g = 0.05, g
         self.rod, self.ball, self.slider = 0.3, 5.0, 3.0
         self.J = self.ball + self.rod * (1 / 3 + 1e-4 / 12)
@@ -421,7 +422,8 @@ class Governor:
         x, z = self.coupler(b, s)
         dx, dz = -0.5 * np.sin(b) * db, -0.5 * np.cos(b) * db - ds
         length = np.hypot(x, z)
-        tension = 8e5 * (length - 0.5) + 4e4 * (x * dx + z * dz) / length
+        rate = (x * dx + z * dz) / length
+        tension = self.stiffness * (length - 0.5) + self.damping * rate
         step = 1e-30
         slope = self.inertia(b + 1j * step).imag / step
         spin = self.h / self.inertia(b)
@@ -431,10 +433,10 @@ class Governor:
         dds = 2 * tension * z / (length * self.slider) - self.g
         return [db, ds, ddb, dds, spin]
 
-    def solve(self, times):
+    def solve(self, times, method="DOP853"):
         """Return b, s, b', s' and the shaft's angle at the times."""
         return solve_ivp(
-            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method="DOP853",
+            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method=method,
             t_eval=times, rtol=1e-10, atol=1e-12,
         ).y  # fmt: skip
 
@@ -448,7 +450,7 @@ class Governor:
             + (2 * self.ball + 2 * self.rod)
             - (2 * self.ball + self.rod) * np.sin(b)
         )
-        return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2
+        return kinetic, self.g * height + self.stiffness * (np.hypot(x, z) - 0.5) ** 2
 
 
 def geneva_wheel(times, speed, a, pin, walls, inertia, damper, law):
