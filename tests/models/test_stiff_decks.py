@@ -67,21 +67,23 @@ def test_table_is_the_closed_form(name):
     np.testing.assert_allclose(CLOSED[name](times), exact[:, 0], rtol=1e-13, atol=0.0)
 
 
-@EACH
-def test_decks_that_explicit_methods_run_in_no_time_are_near_their_tables(deck):
-    limits = {
-        "bushing_chain": 1e-6,
-        "lugre": 1e-4,
-        "preloaded_stop": 1e-3,
-        "rebound": 1e-5,
-        "squeezer": 1e-6,
-        "standing_cylinder": 1e-4,
-        "torsion_top": 1e-5,
-    }
-    if deck.name not in limits:
-        pytest.skip("seconds of run time: tests/bench/test_stiff.py runs it")
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [
+        ("bushing_chain", 1e-6),
+        ("lugre", 1e-4),
+        ("preloaded_stop", 1e-3),
+        ("rebound", 1e-5),
+        ("squeezer", 1e-6),
+        ("standing_cylinder", 1e-4),
+        ("torsion_top", 1e-5),
+    ],
+)
+def test_decks_that_an_explicit_method_runs_in_no_time_are_near_their_tables(name, limit):
+    # the others: tests/bench/test_stiff.py
+    deck = named(name)
     results = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), tol=1e-7)
-    assert stiff.error(deck, ours.outcome(results, 0.0)) < limits[deck.name]
+    assert stiff.error(deck, ours.outcome(results, 0.0)) < limit
 
 
 def test_rows_at_other_times_are_refused():
@@ -102,7 +104,7 @@ def test_rolling_sphere_against_its_three_equations_and_drakes_closed_form():
         return step(v / vs) if v < vs else 1.0 - 0.5 * fade**2 * (3.0 - 2.0 * fade)
 
     def rhs(t, y):
-        x, v, w, z, vz = y
+        _, v, w, z, vz = y
         depth = r - z
         push = max(0.0, k * depth * (1.0 - d * vz)) if depth > 0 else 0.0
         slip = v - (r - depth / 2) * w
