@@ -178,7 +178,9 @@ class Ladders:
 
     def too_long(self, setting: Setting) -> str:
         """Return why a setting is left out; empty where it is not."""
-        tol, seconds = self.last.get(setting.integrator, (0.0, 0.0))
+        if setting.integrator not in self.last:
+            return ""
+        tol, seconds = self.last[setting.integrator]
         if setting.tol < tol:
             took = "was given up" if seconds == math.inf else f"took {seconds:.0f} s"
             return f"left out: {setting.integrator} {took} at a looser tolerance"

@@ -433,10 +433,10 @@ class Governor:
         dds = 2 * tension * z / (length * self.slider) - self.g
         return [db, ds, ddb, dds, spin]
 
-    def solve(self, times, method="DOP853"):
+    def solve(self, times):
         """Return b, s, b', s' and the shaft's angle at the times."""
         return solve_ivp(
-            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method=method,
+            self.rhs, (times[0], times[-1]), [np.pi / 6, 0.5, 0, 0, 0], method="DOP853",
             t_eval=times, rtol=1e-10, atol=1e-12,
         ).y  # fmt: skip
 
