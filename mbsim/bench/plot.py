@@ -63,6 +63,7 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
             _line(axes, front(points(chosen, measure)), f"mbsim {name}, {label}", dashed)
     _targets(axes, scene, front(points(candidates(scene, mine, ours=False), scene.measure)))
     _winners(axes, own_fronts(scene, mine))
+    axes.margins(y=0.1)
     axes.set(xscale="log", yscale="log", title=f"{scene.name}: {scene.title}")
     axes.set_xlabel(f"{scene.unit}   (better: left; strip: our fastest method)")
     axes.set_ylabel("wall seconds per simulated second   (better: down)")
