@@ -33,7 +33,7 @@ def landed(times, settled, z0, low, mass, stiffness, *law, g=9.81):
 
 
 def rebound(times):
-    return landed(times, 0.45, 0.2, 0.1, 1.0, 1e9, 1.0, 1.5e4, 5e-9)
+    return landed(times, 0.46, 0.2, 0.1, 1.0, 1e9, 1.0, 1.5e4, 5e-9)
 
 
 def standing_cylinder(times):
