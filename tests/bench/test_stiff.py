@@ -21,6 +21,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from decks_io import MODELS, USERFUNCS
+
 import mbsim
 from mbsim.bench import ours, stiff
 from mbsim.bench.front import Point, front, time_at
@@ -133,6 +135,29 @@ def test_every_method_runs_every_stiff_deck(deck):
             runs_of.setdefault(method, []).append(found)
     show_ratios(runs_of)
     assert all(np.isfinite(r.error) for runs in runs_of.values() for r in runs)
+
+
+def every_deck():
+    """Yield name, model and settings of every deck of `models/`, the stiff ones too."""
+    for path in sorted(MODELS.rglob("*.xml")):
+        plugins = [USERFUNCS / "seed_cffsub.py"] if path.stem == "seed_contact" else []
+        yield path.relative_to(MODELS).with_suffix(""), mbsim.read_model(path), plugins
+
+
+@pytest.mark.skipif("AUTO" not in METHODS, reason="AUTO is not in the catalogue")
+def test_auto_against_the_better_of_explicit_and_stiff():
+    """At default settings, by time of the loop: best of three, after one that compiles."""
+    fixed = [name for name in COMPARED if name != "AUTO"]
+    for name, model, plugins in every_deck():
+        times = {}
+        for method in (*fixed, "AUTO"):
+            runs = [mbsim.simulate(model, integrator=method, plugins=plugins) for _ in range(4)]
+            times[method] = min(float(done.stats["loop_s"]) for done in runs[1:])
+        better = min(fixed, key=times.get)
+        ratio = times["AUTO"] / times[better]
+        said = "  ".join(f"{method} {1e3 * time:.2f} ms" for method, time in times.items())
+        print(f"{name!s:30} AUTO / {better} {ratio:.2f}   {said}", flush=True)
+        assert math.isfinite(ratio)
 
 
 @pytest.mark.parametrize("method", COMPARED)

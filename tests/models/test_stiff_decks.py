@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import squeezer
 from decks_io import MODELS
-from models.reference import Governor
+from models.reference import Governor, four_bar_on_stop
 from models.stiff_references import CLOSED, named, planned_times, run
 
 import mbsim
@@ -154,6 +154,20 @@ def test_governor_against_its_two_equations():
     assert np.abs(own[1] - exact[:, deck.columns.index("3/z")]).max() < 1e-8
     x, y = exact[:, 1], exact[:, 2]
     assert np.abs(np.unwrap(np.arctan2(y, x)) - own[4]).max() < 1e-7
+
+
+@pytest.mark.slow
+def test_four_bar_with_friction_against_its_one_equation_over_the_first_hops():
+    times, exact = stiff.table(named("four_bar_stop"))
+    early = times < 0.2 + 1e-9
+    spring = (np.array([-0.1, 0.15]), 400.0, 0.15, 2.0)
+    wall = (np.array([0.16, 0.0]), np.array([1.0, 0.0]), 0.02)
+    bars, masses, law = (0.1, 0.3, 0.2), (0.5, 1.0, 0.8), (1e9, 1.0, 1e4, 1e-8)
+    settings = {"friction": (0.3, 1e-5), "method": "Radau", "rtol": 1e-9, "atol": 1e-11}
+    own, _ = four_bar_on_stop(
+        times[early], np.pi / 3, bars, masses, 0.3, spring, wall, law, **settings
+    )
+    assert np.abs(own - np.arctan2(exact[early, 1], exact[early, 0])).max() < 1e-8
 
 
 def test_lugre_against_its_three_equations_and_published_numbers():
