@@ -105,12 +105,12 @@ def ratios(runs, explicit, kind):
     return {e: t / m for e, (m, t) in both.items() if m and t}
 
 
-def best(found):
-    """Return the ratio at the error where it is largest, as text."""
+def spread(found):
+    """Return the smallest and the largest ratio with the errors where they are, as text."""
     if not found:
         return "no common error"
-    error = max(found, key=found.get)
-    return f"{found[error]:.3g} (at {error:.0e})"
+    low, high = min(found, key=found.get), max(found, key=found.get)
+    return f"{found[low]:.3g} (at {low:.0e}) to {found[high]:.3g} (at {high:.0e})"
 
 
 def show_ratios(runs_of):
@@ -178,6 +178,6 @@ def test_summary():
                 for kind in ("evaluations", "law calls")
             ]
             name = deck.name if deck.stiff else f"{deck.name} (not stiff)"
-            by_calls = f", law calls {best(found[1])}" if found[1] else ""
-            print(f"{name:23} {method:7} evaluations {best(found[0])}{by_calls}")
+            by_calls = f", law calls {spread(found[1])}" if found[1] else ""
+            print(f"{name:23} {method:7} evaluations {spread(found[0])}{by_calls}")
     assert set(summary) <= {deck.name for deck in stiff.DECKS}
