@@ -81,17 +81,28 @@ def coordinates(angles):
     }
 
 
-def scene():
-    """Return the squeezer as a Scene: planar in xy, no gravity; torque and spring as statements."""
-    angles = body_angles(START)
+def points(angles):
+    """Return the joints' places P, E, D, H, G of the absolute angles of the bodies."""
     k1, k2, k3, k4, k5, k6, k7 = angles
-    a, b, c = (np.array([*p, 0.0]) for p in (A, B, C))
-    o = np.zeros(3)
+    a, b = (np.array([*p, 0.0]) for p in (A, B))
     p = _along(k1, RR)
     h, g = a + _along(k5, ZT), a + _across(k7, U)
     e = p - _along(k2, D)
     d = b + _across(k3, SC) + _along(k3, SD)
-    centres = (
+    # three ways round to E: a check of the geometry, to the digits of the start
+    assert np.abs(b + _across(k3, SS) - e).max() < 1e-14
+    assert np.abs(h + _across(k4, E) - e).max() < 1e-14
+    assert np.abs(g + _along(k6, ZF) - e).max() < 1e-14
+    return p, e, d, h, g
+
+
+def centres(angles):
+    """Return the seven centres of mass of the absolute angles of the bodies."""
+    k1, k2, k3, k4, k5, k6, k7 = angles
+    a, b = (np.array([*p, 0.0]) for p in (A, B))
+    p = _along(k1, RR)
+    h, g = a + _along(k5, ZT), a + _across(k7, U)
+    return (
         _along(k1, RA),
         p - _along(k2, DA),
         b + _across(k3, SA) + _along(k3, SB),
@@ -100,13 +111,17 @@ def scene():
         g + _along(k6, ZF - FA),
         a + _across(k7, UA) - _along(k7, UB),
     )
-    # three ways round to E: a check of the geometry, to the digits of the start
-    assert np.abs(b + _across(k3, SS) - e).max() < 1e-14
-    assert np.abs(h + _across(k4, E) - e).max() < 1e-14
-    assert np.abs(g + _along(k6, ZF) - e).max() < 1e-14
+
+
+def scene():
+    """Return the squeezer as a Scene: planar in xy, no gravity; torque and spring as statements."""
+    angles = body_angles(START)
+    a, b, c = (np.array([*p, 0.0]) for p in (A, B, C))
+    o = np.zeros(3)
+    p, e, d, h, g = points(angles)
     bodies = [
         mech.Body(m, (J, J, J), centre, turn(angle))
-        for m, J, centre, angle in zip(MASS, INERTIA, centres, angles, strict=True)
+        for m, J, centre, angle in zip(MASS, INERTIA, centres(angles), angles, strict=True)
     ]
     pins = ((1, 0, o), (2, 1, p), (3, 0, b), (3, 2, e), (4, 2, e), (6, 2, e))
     pins += ((5, 0, a), (4, 5, h), (7, 0, a), (6, 7, g))

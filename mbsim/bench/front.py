@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from mbsim.bench.measurement import OURS, Measurement
@@ -73,6 +73,33 @@ def fronts(scene: Scene, rows: Sequence[Measurement]) -> tuple[list[Point], list
         front(points(candidates(scene, rows, ours), scene.held_to(ours))) for ours in (True, False)
     )
     return mine, theirs
+
+
+def method(row: Measurement) -> str:
+    """Return the integrator of a run of ours."""
+    return row.setting.split()[0]
+
+
+def own_fronts(scene: Scene, rows: Sequence[Measurement]) -> dict[str, list[Point]]:
+    """Return the front of each of our methods on a scene, by what ours are held to."""
+    mine = candidates(scene, rows, ours=True)
+    measure = scene.held_to(ours=True)
+    names = dict.fromkeys(map(method, mine))
+    found = {n: front(points((r for r in mine if method(r) == n), measure)) for n in names}
+    return {name: each for name, each in found.items() if each}
+
+
+def winner(each: Mapping[str, Sequence[Point]], error: float) -> tuple[str, float] | None:
+    """Return the method that reaches an error first and by how many times, None if none does.
+
+    The factor is the second's time over its time; infinite where no other reaches the error.
+    """
+    times = {name: time_at(points, error) for name, points in each.items()}
+    reached = sorted((t, name) for name, t in times.items() if t is not None)
+    if not reached:
+        return None
+    second = reached[1][0] if len(reached) > 1 else math.inf
+    return reached[0][1], second / reached[0][0]
 
 
 def front(all_points: Iterable[Point]) -> list[Point]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import math
 import statistics
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -15,14 +17,23 @@ from mbsim import __version__
 from mbsim.bench.measurement import OURS, Measurement, failed, measured
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scene import Scene, Variation
-from mbsim.errors import Interrupted, MbsimError
-from mbsim.settings import settle
+from mbsim.errors import Interrupted, MbsimError, ModelError
+from mbsim.settings import INTEGRATORS, settle
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
-_COUNTS = ("steps", "rejected", "rhs_evaluations", "output_evaluations", "normal_calls")
+_COUNTS = (
+    "steps",
+    "rejected",
+    "rhs_evaluations",
+    "output_evaluations",
+    "normal_calls",
+    "friction_calls",
+    "jacobians",
+    "factorizations",
+)
 
 
 class TookTooLong(MbsimError):
@@ -47,12 +58,37 @@ def settings(
     scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]
 ) -> list[Setting]:
     """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own."""
+    chosen = integrators or scene.integrators or able(scene.deck(scene.variations[0]))
     return [
         Setting(integrator, tol, variation)
         for variation in scene.variations
-        for integrator in (integrators or scene.integrators)
+        for integrator in chosen
         for tol in (tolerances or scene.tolerances)
     ]
+
+
+@functools.lru_cache(maxsize=64)
+def able(text: str) -> tuple[str, ...]:
+    """Return the methods that can run a deck, e.g. not VERLET where it has joints."""
+    from mbsim.reader.xml import read_model
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "deck.xml"
+        path.write_text(text, encoding="utf-8")
+        try:
+            deck = read_model(path)
+        except MbsimError:
+            return INTEGRATORS  # what is wrong is said where it is run
+    return tuple(name for name in INTEGRATORS if _can_run(deck, name))
+
+
+def _can_run(deck: Model, integrator: str) -> bool:
+    """Return whether a method takes a model."""
+    try:
+        settle(deck, integrator=integrator)
+    except ModelError:
+        return False
+    return True
 
 
 def deck_file(scene: Scene, variation: Variation, folder: Path) -> Path:
@@ -123,6 +159,36 @@ def _repeat(deck: Model, setting: Setting, limit: float, count: int) -> Outcome:
     return run(deck, setting, count, limit)
 
 
+class Ladders:
+    """How far down the tolerances each method is worth trying on a scene.
+
+    A run that takes longer than `patience` seconds is the last of its method, for tighter ones
+    take longer yet; one that was given up is not tried again with another variation either.
+    """
+
+    def __init__(self, patience: float):
+        self.patience = patience
+        self.last: dict[str, tuple[float, float]] = {}  # tolerance and seconds of such a run
+
+    def note(self, setting: Setting, seconds: float) -> None:
+        """Remember a run that took long; inf is one that was given up."""
+        if seconds > self.patience or seconds == math.inf:
+            known = self.last.get(setting.integrator, (0.0, 0.0))
+            self.last[setting.integrator] = max(known, (setting.tol, seconds))
+
+    def too_long(self, setting: Setting) -> str:
+        """Return why a setting is left out; empty where it is not."""
+        if setting.integrator not in self.last:
+            return ""
+        tol, seconds = self.last[setting.integrator]
+        if setting.tol < tol:
+            took = "was given up" if seconds == math.inf else f"took {seconds:.0f} s"
+            return f"left out: {setting.integrator} {took} at a looser tolerance"
+        if setting.tol == tol and seconds == math.inf:
+            return f"left out: {setting.integrator} was given up at this tolerance"
+        return ""
+
+
 def measure(
     scene: Scene,
     integrators: Sequence[str],
@@ -134,7 +200,12 @@ def measure(
     from mbsim.reader.xml import read_model
 
     warm: set[tuple[Path, str]] = set()
+    ladders = Ladders(math.inf if tolerances else scene.patience)
     for setting in settings(scene, integrators, tolerances):
+        if why_not := ladders.too_long(setting):
+            row = failed(scene, OURS, __version__, setting.text, why_not)
+            yield row._replace(note=why_not)
+            continue
         path = deck_file(scene, setting.variation, folder)
         try:
             deck = read_model(path)
@@ -147,7 +218,7 @@ def measure(
                 # what this deck needs is compiled or loaded; its first millisecond is enough
                 simulate_once(deck, setting)
                 warm.add((path, setting.integrator))
-            yield measured(
+            row = measured(
                 scene,
                 OURS,
                 __version__,
@@ -155,8 +226,13 @@ def measure(
                 functools.partial(_repeat, deck, setting, scene.limit),
                 repeats,
             )
+            ladders.note(setting, row.wall_s)
+            yield row
         except Interrupted:
             raise
+        except TookTooLong as error:
+            ladders.note(setting, math.inf)
+            yield failed(scene, OURS, __version__, setting.text, _first_line(error))
         except MbsimError as error:
             yield failed(scene, OURS, __version__, setting.text, _first_line(error))
 

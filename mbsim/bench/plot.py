@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from mbsim.bench.front import Point, candidates, excluded, front, points
+from mbsim.bench.front import (
+    Point,
+    candidates,
+    excluded,
+    front,
+    method,
+    own_fronts,
+    points,
+    winner,
+)
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
+from mbsim.settings import INTEGRATORS
 
 _COLOURS = {"mujoco": "tab:blue", "exudyn": "tab:green", "pybullet": "tab:purple"}
-_OWN_COLOURS = ("tab:red", "tab:orange", "tab:brown", "tab:pink")
+_OWN_COLOURS = ("tab:red", "tab:orange", "tab:brown", "black", "tab:cyan", "tab:pink", "tab:olive")
 _MARKERS = {"mujoco": "s", "exudyn": "^", "pybullet": "D"}
+
+#: Pieces of the strip that says which method is first.
+_STRIP = 200
 
 #: Errors beyond these say no more: exact on one side, wrong on the other.
 _RANGE = (1e-12, 10.0)
@@ -37,10 +52,9 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
         style = {"color": _COLOURS.get(engine, "tab:gray"), "marker": _MARKERS.get(engine, "v")}
         _series(axes, scene, theirs, engine, style)
     own = [row for row in mine if row.engine == OURS]
-    integrators = list(dict.fromkeys(row.setting.split()[0] for row in own))
-    for k, name in enumerate(integrators):
-        chosen = [row for row in own if row.setting.split()[0] == name]
-        style = {"color": _OWN_COLOURS[k % len(_OWN_COLOURS)], "marker": "o"}
+    for name in dict.fromkeys(map(method, own)):
+        chosen = [row for row in own if method(row) == name]
+        style = {"color": own_colour(name), "marker": "o"}
         _series(axes, scene, chosen, f"mbsim {name}", style | {"linewidth": 2.0})
         _label_ends(axes, front(points(chosen, scene.measure)), str(style["color"]))
         if scene.second is not None:
@@ -48,13 +62,35 @@ def draw(scene: Scene, rows: Sequence[Measurement], path: Path) -> None:
             dashed = style | {"linestyle": "--"}
             _line(axes, front(points(chosen, measure)), f"mbsim {name}, {label}", dashed)
     _targets(axes, scene, front(points(candidates(scene, mine, ours=False), scene.measure)))
+    _winners(axes, own_fronts(scene, mine))
+    axes.margins(y=0.1)
     axes.set(xscale="log", yscale="log", title=f"{scene.name}: {scene.title}")
-    axes.set_xlabel(f"{scene.unit}   (better: left)")
+    axes.set_xlabel(f"{scene.unit}   (better: left; strip: our fastest method)")
     axes.set_ylabel("wall seconds per simulated second   (better: down)")
     axes.grid(True, which="major", alpha=0.3)
     if mine:
         figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     figure.savefig(path, dpi=110)
+
+
+def own_colour(name: str) -> str:
+    """Return the colour of one of our methods, the same in every picture."""
+    place = INTEGRATORS.index(name) if name in INTEGRATORS else len(_OWN_COLOURS) - 1
+    return _OWN_COLOURS[place % len(_OWN_COLOURS)]
+
+
+def _winners(axes: Any, each: dict[str, list[Point]]) -> None:
+    """Draw a strip along the bottom: at each error the colour of our fastest method."""
+    errors = [_clipped(p.error) for shown in each.values() for p in _visible(shown)]
+    if len(each) < 2 or min(errors, default=0.0) == max(errors, default=0.0):
+        return
+    low, high = math.log10(min(errors)), math.log10(max(errors))
+    edges = [low + (high - low) * k / _STRIP for k in range(_STRIP + 1)]
+    for left, right in pairwise(edges):
+        first = winner(each, 10.0 ** (0.5 * (left + right)))
+        if first is not None:
+            place = {"ymin": 0.0, "ymax": 0.015, "linewidth": 0.0}
+            axes.axvspan(10.0**left, 10.0**right, color=own_colour(first[0]), **place)
 
 
 def _series(

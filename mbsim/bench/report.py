@@ -7,7 +7,17 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from mbsim.bench.front import Cell, candidates, excluded, front, fronts, points, time_at
+from mbsim.bench.front import (
+    Cell,
+    candidates,
+    excluded,
+    front,
+    fronts,
+    own_fronts,
+    points,
+    time_at,
+    winner,
+)
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
 from mbsim.errors import ResultsError
@@ -117,6 +127,7 @@ def markdown(
         parts += ["## Time to reach the error of the best peer", comparison(cells)]
         parts.append(_summary(cells))
     parts += ["## Our time to reach an error", own_times(scenes, rows)]
+    parts += ["## Which of our methods is first, by how many times", winners(scenes, rows)]
     many = scaling(rows)
     parts += ["## Our time with the number of spheres", many] if many else []
     long = chain_growth(rows)
@@ -175,6 +186,24 @@ def own_times(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
             shown = ["" if time is None else f"{time:.3g}" for time in times]
             lines.append([scene.name, measure, *shown])
     return table(("scene", "measure", *(f"{error:.0e}" for error in DECADES)), lines)
+
+
+def winners(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
+    """Return for every decade of error our fastest method, and the second's time over its time."""
+    lines = []
+    for scene in scenes:
+        each = own_fronts(scene, rows)
+        found = [winner(each, error) for error in DECADES]
+        shown = ["" if first is None else _first(*first, len(each)) for first in found]
+        lines.append([scene.name, *shown])
+    return table(("scene", *(f"{error:.0e}" for error in DECADES)), lines)
+
+
+def _first(name: str, factor: float, methods: int) -> str:
+    """Return a winner as text: alone where there is nobody to beat."""
+    if math.isinf(factor):
+        return name if methods == 1 else f"{name} only"
+    return f"{name} {factor:.2g}x"
 
 
 def front_table(scene: Scene, rows: Sequence[Measurement]) -> str:

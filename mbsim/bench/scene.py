@@ -15,9 +15,6 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 #: Errors of the peers' front at which we are compared where a scene does not say otherwise.
 COMPARED = (1e-7, 1e-2)
 
-#: Our integrators where a scene does not say otherwise.
-INTEGRATORS = ("DOPRI5", "DOP853")
-
 Variation = Mapping[str, float]
 Deck = Callable[[Variation], str]
 Errors = Callable[[Outcome, str], dict[str, float]]
@@ -73,13 +70,15 @@ class Scene:
     elsewhere
         Figures from another machine that are shown beside the comparison.
     integrators, tolerances
-        Of our runs.
+        Of our runs, tolerances from loose to tight; no `integrators` means all that can run it.
     sample
         Time between the rows that every engine stores [s]; who stores fewer is not compared.
     repeats
         Largest number of repeats of any run, where runs are long.
     limit
         Seconds after which a run of ours is given up.
+    patience
+        A method whose run took longer [s] has no tighter runs, unless tolerances are asked for.
     """
 
     name: str
@@ -97,11 +96,12 @@ class Scene:
     second: tuple[str, str] | None = None
     pass_below: float | None = None
     elsewhere: tuple[Elsewhere, ...] = ()
-    integrators: tuple[str, ...] = INTEGRATORS
+    integrators: tuple[str, ...] = ()
     tolerances: tuple[float, ...] = TOLERANCES
     sample: float = SAMPLE
     repeats: int | None = None
     limit: float = 120.0
+    patience: float = 5.0
 
     def held_to(self, ours: bool) -> str:
         """Return the measure that counts for our runs or for the peers'."""

@@ -346,15 +346,20 @@ def four_bar_place(a, bars, base):
     return B, B + p, dB, w * np.array([-s[1], s[0]]), u, w
 
 
-def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81):
+def four_bar_on_stop(
+    times, start, bars, masses, base, spring, wall, law, g=9.81, friction=(0.0, 1.0), **method
+):
     """Return crank angle and place of the rocker's ball of a four-bar that falls on a stop.
 
     Bars are slender and uniform. `spring` is (anchor, stiffness, free length, damping) to the
-    rocker pin; `wall` is (place, outward normal, radius of the ball at the pin). The kinetic
-    energy is M(a) a'^2 / 2; M' by the complex step.
+    rocker pin; `wall` is (place, outward normal, radius of the ball at the pin), `friction` mu and
+    the transition velocity. It acts half the depth above the deepest point of the ball, which turns
+    with the rocker. The kinetic energy is M(a) a'^2 / 2; M' by the complex step.
     """
     anchor, stiffness, free, damping = spring
     foot, normal, radius = wall
+    across = np.array([-normal[1], normal[0]])
+    settings = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13} | method
 
     def terms(a):
         B, C, dB, dC, u, w = four_bar_place(a, bars, base)
@@ -362,19 +367,23 @@ def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81
         middle = (dB + dC) / 2
         M = M + masses[1] * (middle @ middle + bars[1] ** 2 * u**2 / 12)
         height = masses[0] * B[1] / 2 + masses[1] * (B[1] + C[1]) / 2 + masses[2] * C[1] / 2
-        return M, g * height, C, dC
+        return M, g * height, C, dC, w
 
     def gap(t, y):
         return normal @ (four_bar_place(y[0], bars, base)[1] - foot) - radius
 
     def rhs(t, y):
         h = 1e-30
-        M, V, C, dC = terms(y[0] + 1j * h)
+        M, V, C, dC, w = terms(y[0] + 1j * h)
         C, dC, v = C.real, dC.real, dC.real * y[1]
         away = C - anchor
         x = np.sqrt(away @ away)
         pull = -(stiffness * (x - free) + damping * (away @ v) / x) * (away @ dC) / x
-        push = impact(-gap(t, y), -(normal @ v), *law) * (normal @ dC)
+        press, mu, u = impact(-gap(t, y), -(normal @ v), *law), *friction
+        # along the wall: the ball's centre, and its turning at the point of contact
+        slide = across @ dC - (radius + gap(t, y) / 2) * w.real
+        u = np.clip(slide * y[1] / u, -1.0, 1.0)
+        push = press * (normal @ dC) - mu * press * u * (3.0 - u * u) / 2.0 * slide
         return [y[1], (pull + push - V.imag / h - 0.5 * M.imag / h * y[1] ** 2) / M.real]
 
     gap.terminal = True
@@ -383,11 +392,12 @@ def four_bar_on_stop(times, start, bars, masses, base, spring, wall, law, g=9.81
     while t < times[-1]:
         gap.direction = -1.0 if free_now else 1.0
         found = solve_ivp(
-            rhs, (t, times[-1]), y, method="DOP853", rtol=1e-11, atol=1e-13, events=gap,
-            max_step=5e-3 if free_now else 1e-4, dense_output=True,
+            rhs, (t, times[-1]), y, events=gap, max_step=5e-3 if free_now else 1e-4,
+            dense_output=True, **settings,
         )  # fmt: skip
         rows = (times >= t) & (times <= found.t[-1])
-        angles[rows] = found.sol(times[rows])[0]
+        if rows.any():
+            angles[rows] = found.sol(times[rows])[0]
         t, y = float(found.t[-1]), list(found.y[:, -1])
         free_now = not free_now
     return angles, np.array([four_bar_place(a, bars, base)[1] for a in angles])
@@ -399,7 +409,8 @@ class Governor:
     I(b) turns with the angular momentum h about the shaft: 2 J b'' = I'(b) (h / I)^2 / 2 + ...
     """
 
-    def __init__(self, speed=2 * np.pi, g=9.81):
+    def __init__(self, speed=2 * np.pi, g=9.81, stiffness=8e5, damping=4e4):
+        self.stiffness, self.damping = stiffness, damping
         self.hinge, self.g = 0.05, g
         self.rod, self.ball, self.slider = 0.3, 5.0, 3.0
         self.J = self.ball + self.rod * (1 / 3 + 1e-4 / 12)
@@ -421,7 +432,8 @@ class Governor:
         x, z = self.coupler(b, s)
         dx, dz = -0.5 * np.sin(b) * db, -0.5 * np.cos(b) * db - ds
         length = np.hypot(x, z)
-        tension = 8e5 * (length - 0.5) + 4e4 * (x * dx + z * dz) / length
+        rate = (x * dx + z * dz) / length
+        tension = self.stiffness * (length - 0.5) + self.damping * rate
         step = 1e-30
         slope = self.inertia(b + 1j * step).imag / step
         spin = self.h / self.inertia(b)
@@ -448,7 +460,7 @@ class Governor:
             + (2 * self.ball + 2 * self.rod)
             - (2 * self.ball + self.rod) * np.sin(b)
         )
-        return kinetic, self.g * height + 8e5 * (np.hypot(x, z) - 0.5) ** 2
+        return kinetic, self.g * height + self.stiffness * (np.hypot(x, z) - 0.5) ** 2
 
 
 def roller_follower(

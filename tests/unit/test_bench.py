@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbsim.bench import linkages, oracle, peers, report, runner
+from mbsim.bench import linkages, oracle, peers, plot, report, runner
 from mbsim.bench import ours as own
 from mbsim.bench import parameters as p
-from mbsim.bench.front import Point, compare, front, time_at
+from mbsim.bench.front import Point, compare, front, own_fronts, time_at, winner
 from mbsim.bench.measurement import OURS, Measurement, measured
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import pybullet
 from mbsim.bench.scene import Elsewhere, Scene, Target
 from mbsim.bench.scenes import all_scenes, s01_top, s03_rolling, s07_grains, s10_hard_ball
 from mbsim.cli.main import main
+from mbsim.integrators.catalog import METHODS
 from mbsim.model.frames import marker_frames
 from mbsim.reader.xml import read_model
 
@@ -336,9 +337,10 @@ def test_integrators_are_those_of_the_scene_unless_asked_for():
     def used(name, *asked):
         return {s.integrator for s in own.settings(scenes[name], asked, [])}
 
-    assert used("S2a") == used("S1") == {"DOPRI5", "DOP853"}
-    assert used("S7_125") == {"DOPRI5", "VERLET"}
-    assert used("S7_1000") == used("S7_8000") == {"VERLET"}
+    joined = set(METHODS) - {"VERLET"}
+    assert used("S2a") == used("S1") == used("S7_125") == used("S7_1000") == set(METHODS)
+    assert used("S8_2") == used("S11_lugre") == joined
+    assert used("S7_8000") == {"VERLET"}
     assert used("S7_1000", "DOPRI5") == {"DOPRI5"}
     assert runner.choose_integrators([]) == []
     assert runner.choose_integrators(["verlet"]) == ["VERLET"]
@@ -382,6 +384,94 @@ def test_growth_of_an_evaluation_with_the_length_of_a_chain():
     assert [cell.strip() for cell in line.split("|")[2:-1]] == ["1000", "4500", "4.50", "5", "met"]
     assert "lost" in report.chain_growth([chain(10, 2e-3, 2000), chain(40, 21e-3, 4000)])
     assert report.chain_growth([grains(125, 0.025)]) == ""
+
+
+METHOD_RUNS = [
+    row(OURS, 1e-2, 1.0, "A tol=0.01"),
+    row(OURS, 1e-4, 100.0, "A tol=0.0001"),
+    row(OURS, 2e-2, 4.0, "B tol=0.01"),
+    row(OURS, 1e-6, 16.0, "B tol=0.0001"),
+    row("peer", 1e-9, 1e-3, "C fast"),
+]
+
+
+def test_the_first_of_our_methods_is_told_by_error():
+    each = own_fronts(scene(), METHOD_RUNS)
+    assert {name: len(points) for name, points in each.items()} == {"A": 2, "B": 2}
+    assert winner(each, 1e-1) == ("A", pytest.approx(4.0))
+    name, factor = winner(each, 1e-4)
+    assert name == "B"
+    assert factor == pytest.approx(100.0 / time_at(each["B"], 1e-4))
+    assert winner(each, 1e-6) == ("B", math.inf)
+    assert winner(each, 1e-7) is None
+
+
+def test_report_says_which_method_is_first_at_each_decade():
+    (line,) = report.winners([scene()], METHOD_RUNS).splitlines()[2:]
+    cells = [cell.strip() for cell in line.split("|")[2:-1]]
+    assert cells[0].startswith("A ")
+    assert cells[0].endswith("x")
+    assert cells[-2:] == ["B only", ""]
+    (line,) = report.winners([scene()], METHOD_RUNS[:2]).splitlines()[2:]
+    assert [cell.strip() for cell in line.split("|")[2:-1]] == ["A", "A", "A", "", "", ""]
+
+
+def test_our_methods_have_one_colour_each():
+    assert len({plot.own_colour(name) for name in METHODS}) == len(METHODS)
+
+
+def test_the_picture_shows_where_each_method_is_first(tmp_path, monkeypatch):
+    from matplotlib.axes import Axes
+
+    strip, real = [], Axes.axvspan
+    monkeypatch.setattr(
+        Axes,
+        "axvspan",
+        lambda self, left, right, **style: (
+            strip.append((left, right, style["color"])),
+            real(self, left, right, **style),
+        )[1],
+    )
+    monkeypatch.setattr(plot, "own_colour", {"A": "tab:red", "B": "tab:blue"}.get)
+    plot.draw(scene(), METHOD_RUNS, tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size > 0
+    each = own_fronts(scene(), METHOD_RUNS)
+    colours = {"A": "tab:red", "B": "tab:blue"}
+    assert {colour for *_, colour in strip} == set(colours.values())
+    for left, right, colour in strip:
+        assert colour == colours[winner(each, math.sqrt(left * right))[0]]
+
+
+def test_tighter_runs_are_left_out_after_a_long_one():
+    ladders = own.Ladders(5.0)
+    assert ladders.too_long(own.Setting("A", -1.0, {})) == ""
+    ladders.note(own.Setting("A", 1e-3, {}), 4.0)
+    assert ladders.too_long(own.Setting("A", 1e-4, {})) == ""
+    ladders.note(own.Setting("A", 1e-4, {}), 6.0)
+    assert ladders.too_long(own.Setting("A", 1e-4, {"k": 2.0})) == ""
+    assert ladders.too_long(own.Setting("B", 1e-9, {})) == ""
+    assert ladders.too_long(own.Setting("A", 1e-5, {})) == (
+        "left out: A took 6 s at a looser tolerance"
+    )
+    ladders.note(own.Setting("B", 1e-2, {}), math.inf)
+    assert "given up at this tolerance" in ladders.too_long(own.Setting("B", 1e-2, {"k": 2.0}))
+    assert "given up at a looser" in ladders.too_long(own.Setting("B", 1e-3, {}))
+
+
+def test_runs_that_are_left_out_have_a_line_unless_tolerances_are_asked_for(tmp_path):
+    quick = replace(all_scenes()["S4stick"], end_time=0.05, patience=0.0, limit=20.0)
+    quick = replace(quick, integrators=("DOPRI5",), tolerances=(1e-3, 1e-5))
+    rows = list(own.measure(quick, (), (), 1, tmp_path))
+    notes = [each.note for each in rows if "tol=1e-05" in each.setting]
+    assert notes
+    assert all(note.startswith("left out: DOPRI5 took") for note in notes)
+    assert not any(each.note.startswith("left out") for each in rows if "tol=0.001" in each.setting)
+    rows = own.measure(quick, (), (1e-3, 1e-5), 1, tmp_path)
+    assert not any(each.note.startswith("left out") for each in rows)
+
+
+def test_a_faulty_deck_is_left_to_every_method():
+    assert own.able("<MotionSolve/>") == tuple(METHODS)
 
 
 def test_a_scene_says_at_which_errors_it_is_compared():
@@ -497,7 +587,8 @@ def test_every_scene_writes_xml():
     for made in all_scenes().values():
         for variation in made.variations:
             root = etree.fromstring(made.deck(variation).encode())
-            assert root.find("Command/Simulate").get("end_time") == repr(made.end_time)
+            said = float(root.find("Command/Simulate").get("end_time"))
+            assert said == made.end_time
 
 
 def test_walls_of_the_grains_look_inward(tmp_path):
@@ -541,7 +632,10 @@ def test_a_run_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
     )
     assert done.exit_code == 0, done.stderr
     notes = {row["note"].split(" at time")[0] for row in json.loads(done.stdout)["rows"]}
-    assert notes == {"failed: given up after -1 s"}
+    assert notes == {
+        "failed: given up after -1 s",
+        "left out: DOPRI5 was given up at this tolerance",
+    }
 
 
 def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
