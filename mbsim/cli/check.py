@@ -23,7 +23,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     from mbsim.model.names import is_adams
     from mbsim.reader.xml import read_model
     from mbsim.settings import settle
-    from mbsim.system.build import check_expressions
+    from mbsim.system.acting import check_expressions
     from mbsim.system.pairing import plan_pairs
 
     deck = read_model(model, overrides)

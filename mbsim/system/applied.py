@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import (
     Bushing,
@@ -151,10 +150,14 @@ def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:
     """Return address and parameters of the law of an element; address 0 where it has none."""
     if isinstance(element, JointLimit):
         normal = NORMAL_LAWS[element.cnf_type]
+        from mbsim.laws import abi  # what only a run needs
+
         return abi.normal_address(normal), abi.normal_constants(normal, element)
     if not isinstance(element, JointFriction) or element.cff_type == "COULOMB_OFF":
         return 0, np.zeros(0)
     friction = FRICTION_LAWS[element.cff_type]
+    from mbsim.laws import abi  # what only a run needs
+
     return abi.friction_address(friction), abi.friction_parameters(friction, element)
 
 

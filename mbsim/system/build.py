@@ -7,7 +7,7 @@ without friction no friction law, a law that does not look at X no X.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
-from mbsim.system.applied import applied_forces
+from mbsim.system.acting import acting
 from mbsim.system.contacts import (
     contacts_table,
     crowds_table,
@@ -27,19 +27,15 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
-from mbsim.system.dependence import check_states, in_order
-from mbsim.system.kinks import kinks_table
 from mbsim.system.markers import MarkerTable
-from mbsim.system.mechanism import Mechanism, constrain, sweep
+from mbsim.system.mechanism import sweep
 from mbsim.system.pairing import (
     Plans,
     plan_pairs,
     shape_class,
 )
-from mbsim.system.programs import ProgramTable
 from mbsim.system.scratch import empty_log, empty_rows, scratch, start_state
-from mbsim.system.states import sensors_table, states_table
-from mbsim.system.weight import Pull, pulls
+from mbsim.system.weight import Pull
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -150,17 +146,6 @@ def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
     return y
 
 
-def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
-    """Make the programs of requests, the last of all; return request and F number of each."""
-    made = []
-    for request in model.requests.values():
-        for k, expression in enumerate(request.exprs):
-            if expression is not None:
-                programs.add(expression, request, forces=True, accelerations=True)
-                made.append((request.id, k + 1))
-    return made
-
-
 def _load_user_friction(
     model: Model,
     plugins: Sequence[Path],
@@ -203,15 +188,6 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
-def _state_reader(model: Model, programs: ProgramTable, looks: bool) -> StateReader | None:
-    """Return what serves py_sysfnc where a script has it."""
-    if not looks:
-        return None
-    from mbsim.system.subroutines import StateReader
-
-    return StateReader(model, programs)
-
-
 def _users(users: dict[tuple[str, int], UserSubroutine], seen: int) -> a.Users:
     """Return the rows of user subroutines; `seen`: how much of y friction subroutines look at."""
     return a.Users(
@@ -220,78 +196,6 @@ def _users(users: dict[tuple[str, int], UserSubroutine], seen: int) -> a.Users:
         np.zeros(1, dtype=np.int64),
         np.zeros(seen),
     )
-
-
-@dataclass
-class Acting:
-    """What acts and what is asked for, as rows and programs, which are made in one order."""
-
-    programs: ProgramTable
-    applied: a.Applied
-    applied_ids: list[tuple[str, int]]
-    mechanism: Mechanism
-    states: a.States
-    sensors: a.Sensors
-    kinks: a.Kinks
-    reader: StateReader | None
-    pulls: list[Pull]
-    values: list[tuple[int, int]]
-
-
-def acting(
-    model: Model,
-    table: MarkerTable,
-    first_state: int,
-    subroutines: Mapping[tuple[str, int], UserSubroutine | None],
-    looks: bool,
-    runs: bool = True,
-) -> Acting:
-    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
-
-    `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
-    look at, is left out unless it `runs`.
-    """
-    programs = ProgramTable(
-        table,
-        model.variables,
-        model.differentials,
-        first_state,
-        tuple(model.sensors),
-        model.splines,
-        model.arrays,
-    )
-    programs.users = {element: k for k, element in enumerate(subroutines)}
-    applied, applied_ids = applied_forces(model, table, programs, laws=runs)
-    mechanism = constrain(model, table, programs)
-    applied, applied_ids = in_order(
-        model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
-    )
-    states = states_table(model, programs)
-    held = (mechanism.connections, mechanism.elements, programs)
-    check_states(model, states, applied, applied_ids, *held)
-    return Acting(
-        programs,
-        applied,
-        applied_ids,
-        mechanism,
-        states,
-        sensors_table(model, programs),
-        kinks_table(model, programs, applied),
-        _state_reader(model, programs, looks) if runs else None,
-        pulls(model, programs),
-        _values(model, programs),  # the last of all
-    )
-
-
-def check_expressions(model: Model) -> None:
-    """Raise what is wrong with expressions where they stand, as `build` would."""
-    from mbsim.system.subroutines import wanted
-
-    placement = place(model)
-    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
-    rows.update({id: k for k, id in enumerate(placement.bodies)})
-    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
-    acting(model, MarkerTable(placement, rows), 0, users, looks=False, runs=False)
 
 
 def build(

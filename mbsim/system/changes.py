@@ -12,7 +12,8 @@ from mbsim.errors import DeckError, Fault
 from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Change
 from mbsim.system import arrays as a
-from mbsim.system.build import System, acting
+from mbsim.system.acting import acting
+from mbsim.system.build import System
 from mbsim.system.contacts import contacts_table
 from mbsim.system.markers import MarkerTable
 

@@ -27,12 +27,15 @@ from mbsim.expressions.elementary import NUMBER
 from mbsim.expressions.tree import Call, Expression, Node, Number
 from mbsim.model.elements import Model
 from mbsim.system import arrays as a
-from mbsim.system.programs import USER, Instruction, ProgramTable
+from mbsim.system.programs import ELEMENT, NET, USER, Instruction, ProgramTable
 
 #: Switches of one expression that are watched at most: so many bits a number has.
 MOST_SWITCHES = 48
 #: Instructions of the program of an expression's switches at most; with more none is watched.
 LONGEST = 2000
+
+#: A user's function is not to be asked more often than forces are; forces are not known yet.
+_NOT_ASKED = (USER, NET, ELEMENT)
 
 _NAUGHT = Number(0.0)
 
@@ -128,10 +131,9 @@ def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.K
     still = [Instruction(NUMBER, value=0.0)]
     for expression in _acting(model):
         found = switches(expression.root, variables)
-        row = programs.add(Expression(expression.text, _sides(found)))
+        row = programs.add(Expression(expression.text, _sides(found)), forces=True)
         made = programs.programs[row]
-        if len(made) > LONGEST or any(instruction.op == USER for instruction in made):
-            # a user's function is not to be asked more often than forces are
+        if len(made) > LONGEST or any(made_op.op in _NOT_ASKED for made_op in made):
             programs.programs[row] = made = still
         any_found = any_found or len(made) > 1
         rows.append(row)

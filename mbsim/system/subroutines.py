@@ -20,12 +20,13 @@ from mbsim.expressions.elementary import TIME
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Number
-from mbsim.model.elements import Model, Subroutine
+from mbsim.model.elements import Model
 from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
 from mbsim.plugins.loader import Scripts
 from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
 from mbsim.system import arrays as a
+from mbsim.system.acting import wanted
 from mbsim.system.programs import ANGLE, Instruction, ProgramTable
 
 #: Angles that subroutines may follow over whole turns, beyond those that the deck names.
@@ -40,26 +41,6 @@ ARRAYS = {
 }
 ARRAYS["DISP"] = ARRAYS["TDISP"] + ARRAYS["RDISP"]
 ARRAYS["VEL"] = ARRAYS["TVEL"] + ARRAYS["RVEL"]
-
-
-def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
-    """Return statement, XML statement, id, subroutine and number of results of all users'."""
-    found = []
-    for force in model.scalar_forces.values():
-        if force.user is not None:
-            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
-    for variable in model.variables.values():
-        if variable.user is not None:
-            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
-    for statement, xml, table in (
-        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
-        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
-    ):
-        for vector in table.values():
-            if vector.user is not None:
-                count = sum(expr is not None for expr in vector.exprs)
-                found.append((statement, xml, vector.id, vector.user, count))
-    return found
 
 
 def load(

@@ -1,0 +1,133 @@
+"""What acts in a model and what is asked for, as rows and programs; laws only where it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mbsim.model.elements import Model, Subroutine
+from mbsim.model.placement import place
+from mbsim.system import arrays as a
+from mbsim.system.applied import applied_forces
+from mbsim.system.dependence import check_states, in_order
+from mbsim.system.kinks import kinks_table
+from mbsim.system.markers import MarkerTable
+from mbsim.system.mechanism import Mechanism, constrain
+from mbsim.system.programs import ProgramTable
+from mbsim.system.states import sensors_table, states_table
+from mbsim.system.weight import Pull, pulls
+
+if TYPE_CHECKING:
+    from mbsim.plugins.subroutine import UserSubroutine
+    from mbsim.system.subroutines import StateReader
+
+
+def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
+    """Return statement, XML statement, id, subroutine and number of results of all users'."""
+    found = []
+    for force in model.scalar_forces.values():
+        if force.user is not None:
+            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
+    for variable in model.variables.values():
+        if variable.user is not None:
+            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
+    for statement, xml, table in (
+        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
+        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
+    ):
+        for vector in table.values():
+            if vector.user is not None:
+                count = sum(expr is not None for expr in vector.exprs)
+                found.append((statement, xml, vector.id, vector.user, count))
+    return found
+
+
+def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
+    """Make the programs of requests, the last of all; return request and F number of each."""
+    made = []
+    for request in model.requests.values():
+        for k, expression in enumerate(request.exprs):
+            if expression is not None:
+                programs.add(expression, request, forces=True, accelerations=True)
+                made.append((request.id, k + 1))
+    return made
+
+
+def _state_reader(model: Model, programs: ProgramTable, looks: bool) -> StateReader | None:
+    """Return what serves py_sysfnc where a script has it."""
+    if not looks:
+        return None
+    from mbsim.system.subroutines import StateReader
+
+    return StateReader(model, programs)
+
+
+@dataclass
+class Acting:
+    """What acts and what is asked for, as rows and programs, which are made in one order."""
+
+    programs: ProgramTable
+    applied: a.Applied
+    applied_ids: list[tuple[str, int]]
+    mechanism: Mechanism
+    states: a.States
+    sensors: a.Sensors
+    kinks: a.Kinks
+    reader: StateReader | None
+    pulls: list[Pull]
+    values: list[tuple[int, int]]
+
+
+def acting(
+    model: Model,
+    table: MarkerTable,
+    first_state: int,
+    subroutines: Mapping[tuple[str, int], UserSubroutine | None],
+    looks: bool,
+    runs: bool = True,
+) -> Acting:
+    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
+
+    `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
+    look at, is left out unless it `runs`.
+    """
+    programs = ProgramTable(
+        table,
+        model.variables,
+        model.differentials,
+        first_state,
+        tuple(model.sensors),
+        model.splines,
+        model.arrays,
+    )
+    programs.users = {element: k for k, element in enumerate(subroutines)}
+    applied, applied_ids = applied_forces(model, table, programs, laws=runs)
+    mechanism = constrain(model, table, programs)
+    applied, applied_ids = in_order(
+        model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
+    )
+    states = states_table(model, programs)
+    held = (mechanism.connections, mechanism.elements, programs)
+    check_states(model, states, applied, applied_ids, *held)
+    return Acting(
+        programs,
+        applied,
+        applied_ids,
+        mechanism,
+        states,
+        sensors_table(model, programs),
+        kinks_table(model, programs, applied),
+        _state_reader(model, programs, looks) if runs else None,
+        pulls(model, programs),
+        _values(model, programs),  # the last of all
+    )
+
+
+def check_expressions(model: Model) -> None:
+    """Raise what is wrong with expressions where they stand, as `build` would."""
+    placement = place(model)
+    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
+    rows.update({id: k for k, id in enumerate(placement.bodies)})
+    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
+    acting(model, MarkerTable(placement, rows), 0, users, looks=False, runs=False)
