@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -105,7 +106,7 @@ def test_slope_is_the_limit_of_differences(text, seed):
             (f(change(h)) - f(change(-h))) / (2 * h) for h in (STEP, STEP / 2, STEP / 4, STEP / 8)
         ]
         for k in range(1, 4):
-            rows = [(4**k * b - a) / (4**k - 1) for a, b in zip(rows, rows[1:], strict=False)]
+            rows = [(4**k * b - a) / (4**k - 1) for a, b in itertools.pairwise(rows)]
         return rows[0]
 
     def exact(body, way):
