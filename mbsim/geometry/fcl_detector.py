@@ -13,6 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.geometry.mesh_contact import (
+    Surface,
+    against_convex,
+    of_meshes,
+    under_plane,
+    under_sphere,
+)
 from mbsim.geometry.support import CONVEX, ROUND, face_normal, round_normal, support
 from mbsim.model.elements import Graphic
 
@@ -51,6 +58,7 @@ class FclDetector:
         self._scene = scene
         self._graphics = graphics
         self._objects: dict[tuple[int, int], Any] = {}
+        self._surfaces: dict[int, Surface] = {}
         self._fcl: Any = None
         self.failure: BaseException | None = None
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._answer)
@@ -155,7 +163,11 @@ class FclDetector:
         most = _MESH_CONTACTS if meshes else last - first
         request = fcl.CollisionRequest(num_max_contacts=most, enable_contact=True)
         result = fcl.CollisionResult()
-        fcl.collide(objects[0], objects[1], request, result)
+        if "PLANE" not in (self._graphics[i].shape, self._graphics[j].shape) or not meshes:
+            fcl.collide(objects[0], objects[1], request, result)
+        if meshes:
+            self._put_mesh(i, j, result.contacts, scene.work.points[first])
+            return
         # FCL's normal points from its first object to its second
         found = [
             (c.penetration_depth, np.array(c.pos), -np.array(c.normal)) for c in result.contacts
@@ -175,6 +187,66 @@ class FclDetector:
             points[slot, 1:4] = p
             points[slot, 4:7] = sign * n
             points[slot, 7] = 1.0
+
+    def _surface(self, g: int) -> Surface:
+        """Return the mesh of graphic g with its normals and neighbours."""
+        if g not in self._surfaces:
+            graphic = self._graphics[g]
+            assert graphic.vertices is not None
+            assert graphic.faces is not None
+            convex = graphic.hull is not None
+            self._surfaces[g] = Surface(graphic.vertices, graphic.faces, convex)
+        return self._surfaces[g]
+
+    def _put_mesh(self, i: int, j: int, contacts: list[Any], row: Any) -> None:
+        """Fill the row of a pair with a mesh from the triangles in contact."""
+        row[0] = -0.0
+        shapes = (self._graphics[i].shape, self._graphics[j].shape)
+        if not contacts and "PLANE" not in shapes:
+            return
+        # everything is measured in the axes of the mesh, of J's if both are meshes
+        turned = self._graphics[j].shape != "MESH"
+        mesh, other = (i, j) if turned else (j, i)
+        p, R = self._frame(mesh)
+        if self._graphics[other].shape == "MESH":
+            depth, at, n = self._on_mesh(i, j, contacts)
+        else:
+            depth, at, n = self._on_other(mesh, other, contacts)
+        row[0] = depth if depth > 0.0 else -0.0
+        row[1:4] = p + R @ at
+        row[4:7] = -(R @ n) if turned else R @ n
+        row[7] = 1.0
+
+    def _on_mesh(self, i: int, j: int, contacts: list[Any]) -> tuple[float, Any, Any]:
+        """Return (depth, point, normal) of two meshes in J's axes."""
+        (p_i, R_i), (p_j, R_j) = self._frame(i), self._frame(j)
+        frame = (R_j.T @ (p_i - p_j), R_j.T @ R_i)
+        pairs = np.array([(c.b1, c.b2) for c in contacts])
+        return of_meshes(self._surface(i), self._surface(j), frame, pairs)
+
+    def _on_other(self, mesh: int, other: int, contacts: list[Any]) -> tuple[float, Any, Any]:
+        """Return (depth, point, normal out of the mesh) of a mesh and a shape, in its axes."""
+        surface, shape = self._surface(mesh), self._graphics[other].shape
+        size = self._scene.graphics.size[other]
+        (p, R), (p_o, R_o) = self._frame(mesh), self._frame(other)
+        centre, axes = R.T @ (p_o - p), R.T @ R_o
+        if shape == "PLANE":
+            up = axes[:, 2]
+            depth, low = under_plane(surface, up, float(up @ centre))
+            return depth, low + 0.5 * depth * up, -up
+        # FCL gives the triangle first, wherever the mesh stands
+        touched = np.array([c.b1 for c in contacts])
+        if shape == "SPHERE":
+            return under_sphere(surface, touched, centre, float(size[0]))
+        normals = np.array([c.normal for c in contacts]) @ R
+        own = np.empty((0, 3))
+        if shape == "BOX":
+            own = np.vstack([axes.T, -axes.T])
+        elif shape in ("CYLINDER", "FRUSTUM"):
+            own = np.vstack([axes[:, 2], -axes[:, 2]])
+        return against_convex(
+            surface, touched, normals, lambda d: support(shape, size, centre, axes, d), own
+        )
 
     def _sharpen(self, i: int, j: int, n: Any) -> Any:
         """Return the normal made exact where a shape is round and the other round or a box."""
