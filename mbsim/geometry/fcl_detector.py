@@ -16,7 +16,9 @@ import numpy as np
 from mbsim.geometry.mesh_contact import (
     Surface,
     against_convex,
+    lowest_side,
     of_meshes,
+    place,
     under_plane,
     under_sphere,
 )
@@ -264,20 +266,49 @@ class FclDetector:
                 size[i], frame_i, lambda d: support(shape_j, size[j], *frame_j, -d), -n
             )
             return n if face is None else -face
+        if shape_i in CONVEX and shape_j in CONVEX:
+            return self._nearest_flat(i, j, n)
         return n
+
+    def _nearest_flat(self, i: int, j: int, n: Any) -> Any:
+        """Return a flat side's normal near n where the shapes overlap no more along it, else n."""
+        best, least = n, self._overlap(i, j, n)
+        for g in (i, j):
+            R = self._frame(g)[1]
+            own = {"BOX": R.T, "CYLINDER": R.T[2:], "FRUSTUM": R.T[2:]}
+            for axis in own.get(self._graphics[g].shape, R.T[:0]):
+                along = float(axis @ n)
+                if abs(along) < 0.9:
+                    continue
+                flat = axis * np.sign(along)
+                depth = self._overlap(i, j, flat)
+                if depth <= least * (1.0 + 1e-9):
+                    best, least = flat, depth
+        return best
+
+    def _overlap(self, i: int, j: int, n: Any) -> float:
+        """Return how far convex shapes overlap along n."""
+        size = self._scene.graphics.size
+        low = support(self._graphics[i].shape, size[i], *self._frame(i), -n)
+        high = support(self._graphics[j].shape, size[j], *self._frame(j), n)
+        return float(n @ (high - low))
 
     def _refine(self, i: int, j: int, depth: float, p: Any, n: Any) -> tuple[float, Any]:
         """Return depth and midpoint made exact along n from the shapes' support points."""
         shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
         size = self._scene.graphics.size
+
+        def far(g: int, d: Any) -> Any:
+            return support(self._graphics[g].shape, size[g], *self._frame(g), d)
+
         if shape_i in CONVEX:
-            low = support(shape_i, size[i], *self._frame(i), -n)
+            low = far(i, -n)
         elif shape_i == "PLANE":
             low = self._frame(i)[0]
         else:
             return depth, p
         if shape_j in CONVEX:
-            high = support(shape_j, size[j], *self._frame(j), n)
+            high = far(j, n)
         elif shape_j == "PLANE":
             high = self._frame(j)[0]
         else:
@@ -287,8 +318,15 @@ class FclDetector:
             return exact, low + 0.5 * exact * n
         if shape_j in ROUND:
             return exact, high - 0.5 * exact * n
-        # between flat shapes FCL chooses where, the normal says how high
-        return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
+        # FCL may choose any point of what is down, however it is tilted
+        lowest = lowest_side(lambda d: far(i, d), n, exact) if shape_i in CONVEX else None
+        highest = lowest_side(lambda d: far(j, d), -n, exact) if shape_j in CONVEX else None
+        if lowest is None or highest is None:
+            side = highest if lowest is None else lowest
+            assert side is not None
+            p = place(side, side, n)
+            return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
+        return exact, place(highest, lowest, n)
 
     def _slot_of(self, p: Any, first: int, last: int) -> int:
         """Return the free slot whose committed incident is nearest, else the first free one."""

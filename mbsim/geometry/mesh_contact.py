@@ -260,21 +260,26 @@ def against_convex(
         points = surface.vertices[corners]
         m = distinct(surface.normals[patch])
         turned = normals[here]
-        turned = turned * np.where(
-            (turned * surface.normals[touched[here]]).sum(axis=1) < 0.0, -1.0, 1.0
-        )[:, None]
-        others = np.vstack([own, distinct(turned)[:MOST_DIRECTIONS]])
-        least, normal = np.inf, m[0]
-        for rank, n in [*((0, n) for n in m), *((1, n) for n in others)]:
+        turned = (
+            turned
+            * np.where((turned * surface.normals[touched[here]]).sum(axis=1) < 0.0, -1.0, 1.0)[
+                :, None
+            ]
+        )
+        others = distinct(turned)[:MOST_DIRECTIONS]
+        least, normal, vertex = np.inf, m[0], -1
+        for rank, n in [*((0, n) for n in m), *((1, n) for n in own), *((2, n) for n in others)]:
             along = points @ n
             top = int(np.argmax(along))
             depth = float(along[top]) - _lowest(shape, n)
-            if rank == 1 and (
+            if rank > 0 and (
                 depth >= (1.0 - FACES_FIRST) * least or not surface.allows(int(corners[top]), n)
             ):
                 continue
             if depth < least:
-                least, normal = depth, n
+                least, normal, vertex = depth, n, int(corners[top]) if rank == 2 else -1
+        if vertex >= 0:
+            least, normal = _settled(surface, vertex, points, shape, normal)
         if least > best[0]:
             best = (least, normal, patch)
     depth, n, patch = best
@@ -282,6 +287,69 @@ def against_convex(
     along = corners @ n
     highest = corners[along >= along.max() - 0.5 * depth]
     return depth, place(highest, lowest_side(shape, n, depth), n), n
+
+
+def _least(f: Any, reach: float) -> tuple[float, float]:
+    """Return (f, x) of the least f(x) within +-reach, by golden sections."""
+    part = 0.5 * (np.sqrt(5.0) - 1.0)
+    low, high = -reach, reach
+    a, b = high - part * (high - low), low + part * (high - low)
+    fa, fb = f(a), f(b)
+    while high - low > 1e-9:
+        if fa < fb:
+            high, b, fb = b, a, fa
+            a = high - part * (high - low)
+            fa = f(a)
+        else:
+            low, a, fa = a, b, fb
+            b = low + part * (high - low)
+            fb = f(b)
+    return min((fa, a), (fb, b))
+
+
+def _settled(
+    surface: Surface, vertex: int, points: Array, shape: Any, n: Array
+) -> tuple[float, Array]:
+    """Return (depth, n) of least overlap near n, which FCL knows to some 1e-3 only.
+
+    On an edge n turns about it, on a vertex any way.
+    """
+    ways = surface.vertices[surface.faces[surface.faces_at(vertex)].ravel()]
+    ways = ways - surface.vertices[vertex]
+    length = np.linalg.norm(ways, axis=1)
+    ways = ways[length > 0.0] / length[length > 0.0, None]
+    e = ways[int(np.argmin(np.abs(ways @ n)))]
+    best = (float((points @ n).max()) - _lowest(shape, n), n)
+    for on_edge in (True, False):
+        if not on_edge or abs(float(e @ n)) < 4.0 * SLOPE:
+            found = _turned(points, shape, n, e, on_edge)
+            best = found if found[0] < best[0] else best
+    return best
+
+
+def _turned(points: Array, shape: Any, n: Array, e: Array, on_edge: bool) -> tuple[float, Array]:
+    """Return (depth, n) of least overlap among turns about e, or about e and across it."""
+    depth = np.inf
+    if on_edge:
+        n = n - (n @ e) * e
+        n = n / np.linalg.norm(n)
+    else:
+        e = e - (e @ n) * n
+        e = e / np.linalg.norm(e)
+    for _ in range(1 if on_edge else 3):
+        for t in (np.cross(e, n), e)[: 1 if on_edge else 2]:
+
+            def turned(angle: float, n: Array = n, t: Array = t) -> Array:
+                return np.asarray(np.cos(angle) * n + np.sin(angle) * t)
+
+            def overlap(angle: float, turned: Any = turned) -> float:
+                d = turned(angle)
+                return float((points @ d).max()) - _lowest(shape, d)
+
+            depth, angle = _least(overlap, 5.0 * SLOPE)
+            n = turned(angle)
+            n, e = n / np.linalg.norm(n), e if on_edge else e - (e @ n) * n
+    return depth, n
 
 
 def _inner_faces(
