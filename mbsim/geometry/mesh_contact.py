@@ -15,6 +15,7 @@ here:
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ MOST_DIRECTIONS = 48
 _SAME = 2e-3
 #: Pairs of triangles whose edges are crossed with each other.
 _CROSSED = 24
+#: Eight tilts by twice the slope.
+_AROUND = 2.0 * SLOPE * np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 #: Numbers at once in the test of points against all triangles.
 _CHUNK = 2_000_000
 
@@ -444,6 +447,19 @@ def _of_patches(
     return None
 
 
+def _across(n: Array) -> tuple[Array, Array]:
+    """Return two unit vectors across n and each other."""
+    x, y, z = n.tolist()
+    if abs(z) < 0.7:
+        length = (x * x + y * y) ** 0.5
+        t = (-y / length, x / length, 0.0)
+    else:
+        length = (y * y + z * z) ** 0.5
+        t = (0.0, -z / length, y / length)
+    s = (y * t[2] - z * t[1], z * t[0] - x * t[2], x * t[1] - y * t[0])
+    return np.array(t), np.array(s)
+
+
 def place(high: Array, low: Array, n: Array) -> Array:
     """Return the middle of what two touching sides have in common, seen along n.
 
@@ -454,10 +470,7 @@ def place(high: Array, low: Array, n: Array) -> Array:
     n : ndarray, shape (3,)
         Unit normal from J into I.
     """
-    along = np.eye(3)[int(np.argmin(np.abs(n)))]
-    t = along - (along @ n) * n
-    t /= np.linalg.norm(t)
-    axes = np.column_stack([t, np.cross(n, t)])
+    axes = np.column_stack(_across(n))
     a, b = high @ axes, low @ axes
     first = np.maximum(a.min(axis=0), b.min(axis=0))
     last = np.minimum(a.max(axis=0), b.max(axis=0))
@@ -467,13 +480,7 @@ def place(high: Array, low: Array, n: Array) -> Array:
 
 def lowest_side(shape: Any, n: Array, depth: float) -> Array:
     """Return points of a convex shape that are lowest along n, to half the depth, shape (k, 3)."""
-    along = np.eye(3)[int(np.argmin(np.abs(n)))]
-    t = np.cross(n, along)
-    t /= np.linalg.norm(t)
-    s = np.cross(n, t)
-    points = [shape(-n)]
-    for k in range(8):
-        d = n + 2.0 * SLOPE * (np.cos(0.25 * np.pi * k) * t + np.sin(0.25 * np.pi * k) * s)
-        points.append(shape(-d / np.linalg.norm(d)))
-    heights = np.array(points) @ n
-    return np.array(points)[heights <= heights.min() + 0.5 * depth]
+    ways = -(n + _AROUND @ np.array(_across(n))) / np.sqrt(1.0 + 4.0 * SLOPE**2)
+    points = np.array([shape(-n), *(shape(d) for d in ways)])
+    heights = points @ n
+    return points[heights <= heights.min() + 0.5 * depth]

@@ -10,12 +10,12 @@ import pytest
 
 pytest.importorskip("fcl")
 
+from test_pairs import random_rotation
+
 from mbsim.geometry.fcl_detector import FclDetector
 from mbsim.geometry.support import support
 from mbsim.model.elements import Graphic
 from mbsim.model.hull import polyhedron_of
-
-from test_pairs import random_rotation
 
 SIZES = {
     "SPHERE": (0.3, 0.0, 0.0),
