@@ -82,15 +82,18 @@ class Surface:
         ways = self.vertices[self.faces[self.faces_at(vertex)].ravel()] - self.vertices[vertex]
         return bool((ways @ n <= SLOPE * np.linalg.norm(ways, axis=1)).all())
 
-    def patches(self, touched: Indices) -> list[Indices]:
-        """Return the touched faces as convex pieces of surface.
+    def groups(self, touched: Indices) -> list[tuple[Indices, list[Indices]]]:
+        """Return the touched faces in one piece each, with its convex pieces where it is not.
 
-        A piece grows over edges while all its vertices stay below all its planes.
+        A convex piece grows over edges while all its vertices stay below all its planes.
         """
         if self.convex:
-            return [touched]
-        pieces = self._connected(touched)
-        return [part for piece in pieces for part in self._split(piece)]
+            return [(touched, [])]
+        flat = FLAT * self.size
+        return [
+            (group, [] if self._rise(group, group) <= flat else self._split(group))
+            for group in self._connected(touched)
+        ]
 
     def _connected(self, touched: Indices) -> list[Indices]:
         """Return the touched faces grouped by common edges."""
@@ -119,8 +122,6 @@ class Surface:
     def _split(self, group: Indices) -> list[Indices]:
         """Return a connected group of faces as convex pieces."""
         flat = FLAT * self.size
-        if self._rise(group, group) <= flat:
-            return [group]
         left, pieces = set(group.tolist()), []
         for seed in group.tolist():
             if seed not in left:
@@ -257,39 +258,51 @@ def against_convex(
         Directions of the shape's flat sides.
     """
     best = (-np.inf, np.zeros(3), touched)
-    for patch in surface.patches(np.unique(touched)):
-        here = np.isin(touched, patch)
-        corners = np.unique(surface.faces[patch])
-        points = surface.vertices[corners]
-        m = distinct(surface.normals[patch])
-        turned = normals[here]
-        turned = (
-            turned
-            * np.where((turned * surface.normals[touched[here]]).sum(axis=1) < 0.0, -1.0, 1.0)[
-                :, None
-            ]
+    for group, pieces in surface.groups(np.unique(touched)):
+        whole, *parts = (
+            (*_patch_under(surface, patch, touched, normals, shape, own), patch)
+            for patch in [group, *pieces]
         )
-        others = distinct(turned)[:MOST_DIRECTIONS]
-        least, normal, vertex = np.inf, m[0], -1
-        for rank, n in [*((0, n) for n in m), *((1, n) for n in own), *((2, n) for n in others)]:
-            along = points @ n
-            top = int(np.argmax(along))
-            depth = float(along[top]) - _lowest(shape, n)
-            if rank > 0 and (
-                depth >= (1.0 - FACES_FIRST) * least or not surface.allows(int(corners[top]), n)
-            ):
-                continue
-            if depth < least:
-                least, normal, vertex = depth, n, int(corners[top]) if rank == 2 else -1
-        if vertex >= 0:
-            least, normal = _settled(surface, vertex, points, shape, normal)
-        if least > best[0]:
-            best = (least, normal, patch)
+        # to clear the hull of all is enough to clear each: what a piece cannot know of its
+        # neighbours does not make it deeper
+        deepest = max(parts, key=_first) if parts else whole
+        best = max(best, min(whole, deepest, key=_first), key=_first)
     depth, n, patch = best
     corners = surface.vertices[np.unique(surface.faces[patch])]
     along = corners @ n
     highest = corners[along >= along.max() - 0.5 * depth]
     return depth, place(highest, lowest_side(shape, n, depth), n), n
+
+
+def _first(found: tuple[float, Any, Any]) -> float:
+    return found[0]
+
+
+def _patch_under(
+    surface: Surface, patch: Indices, touched: Indices, normals: Array, shape: Any, own: Array
+) -> tuple[float, Array]:
+    """Return (depth, normal out of the mesh) of the hull of some faces; see `against_convex`."""
+    here = np.isin(touched, patch)
+    corners = np.unique(surface.faces[patch])
+    points = surface.vertices[corners]
+    m = distinct(surface.normals[patch])
+    turned = normals[here]
+    along = (turned * surface.normals[touched[here]]).sum(axis=1)
+    others = distinct(np.where(along < 0.0, -1.0, 1.0)[:, None] * turned)[:MOST_DIRECTIONS]
+    least, normal, vertex = np.inf, m[0], -1
+    for rank, n in [*((0, n) for n in m), *((1, n) for n in own), *((2, n) for n in others)]:
+        along = points @ n
+        top = int(np.argmax(along))
+        depth = float(along[top]) - _lowest(shape, n)
+        if rank > 0 and (
+            depth >= (1.0 - FACES_FIRST) * least or not surface.allows(int(corners[top]), n)
+        ):
+            continue
+        if depth < least:
+            least, normal, vertex = depth, n, int(corners[top]) if rank == 2 else -1
+    if vertex >= 0:
+        least, normal = _settled(surface, vertex, points, shape, normal)
+    return least, normal
 
 
 def _least(f: Any, reach: float) -> tuple[float, float]:
@@ -395,17 +408,24 @@ def of_meshes(
     faces_j = _inner_faces(surface_j, surface_i, (-R.T @ p, R.T), np.unique(pairs[:, 1]))
     moved = surface_i.vertices @ R.T + p
     best = (-np.inf, np.zeros(3), np.zeros(3))
-    patches_j = surface_j.patches(faces_j)
-    for patch_i in surface_i.patches(faces_i):
-        for patch_j in patches_j:
-            here = np.isin(pairs[:, 0], patch_i) & np.isin(pairs[:, 1], patch_j)
-            if not here.any():
-                continue
-            found = _of_patches(
-                surface_i, surface_j, moved, R, (patch_i, patch_j), pairs[here][:_CROSSED]
-            )
-            if found is not None and found[0] > best[0]:
-                best = found
+    groups_j = surface_j.groups(faces_j)
+
+    def of(patch_i: Indices, patch_j: Indices) -> tuple[float, Array, Array] | None:
+        here = np.isin(pairs[:, 0], patch_i) & np.isin(pairs[:, 1], patch_j)
+        if not here.any():
+            return None
+        few = pairs[here][:_CROSSED]
+        return _of_patches(surface_i, surface_j, moved, R, (patch_i, patch_j), few)
+
+    for group_i, pieces_i in surface_i.groups(faces_i):
+        for group_j, pieces_j in groups_j:
+            found = [of(group_i, group_j)]
+            if pieces_i or pieces_j:
+                tries = (of(i, j) for i in pieces_i or [group_i] for j in pieces_j or [group_j])
+                found.append(max((t for t in tries if t is not None), key=_first, default=None))
+            known = [one for one in found if one is not None]
+            if known:
+                best = max(best, min(known, key=_first), key=_first)
     return best
 
 

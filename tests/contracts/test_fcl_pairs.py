@@ -217,3 +217,20 @@ def test_a_sphere_on_a_mesh_is_its_distance_to_the_surface(name):
         np.testing.assert_allclose(world.T @ rows[0, 4:7], n, atol=1e-6)
         checked += 1
     assert checked == 60
+
+
+@pytest.mark.parametrize("floor", ["BOX", "CYLINDER", "FINE"])
+def test_a_ball_of_twisted_squares_on_a_flat_side(floor):
+    """The ball is not quite convex: what a piece cannot know of its neighbours adds no depth."""
+    assert graphic("BALL").hull is None
+    height = 0.4 if floor == "CYLINDER" else 0.2
+    asked = Asked(floor, "BALL")
+    rng = np.random.default_rng(6)
+    for turn, world in zip(turns(12, 7), turns(12, 8), strict=True):
+        depth = rng.uniform(1e-3, 3e-3)
+        top = farthest("BALL", turn, np.array([0.0, 0.0, 1.0]))
+        origin = top + np.array([0.02, 0.01, height - depth])
+        rows = asked.rows((world @ origin, world), (np.zeros(3), world @ turn))
+        assert len(rows) == 1
+        assert rows[0, 0] == pytest.approx(depth, rel=0.01)
+        assert rows[0, 4:7] @ world[:, 2] > 1.0 - 1e-5
