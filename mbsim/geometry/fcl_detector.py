@@ -108,8 +108,7 @@ class FclDetector:
     def _prism(self, bottom: float, top: float, half: float) -> Any:
         """Return a frustum, which FCL does not have, as a polyhedron around it.
 
-        Its depth is made exact afterwards where the other shape is convex; against a mesh it is
-        too wide by at most r (1/cos(pi/n) - 1).
+        Its depth is made exact afterwards; touch is seen too early by at most r (1/cos(pi/n) - 1).
         """
         n = _SIDES
         angle = 2.0 * np.pi * np.arange(n) / n
