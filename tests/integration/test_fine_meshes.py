@@ -66,6 +66,5 @@ def test_a_body_rests_on_the_pole_of_a_fine_ball(tmp_path, shape):
     height = results["bodies/2/position"][-1]
     # balanced on a point: what FCL's solver leaves of an ellipsoid's normal makes it roll off
     part, aside = (0.02, 1e-5) if shape == "Sphere" else (0.1, 0.02)
-    print(height[:2])
     assert height[2] == pytest.approx(0.6 - depth, abs=part * depth)
     np.testing.assert_allclose(height[:2], 0.0, atol=aside)
