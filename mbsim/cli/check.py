@@ -2,7 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import click
+
+if TYPE_CHECKING:
+    from mbsim.model.elements import Model
+
+
+def _without_file(deck: Model) -> Iterator[str]:
+    """Yield forces and variables whose user subroutine is in no file that the deck names."""
+    for name, table in (
+        ("Force_Scalar_TwoBody", deck.scalar_forces),
+        ("Force_Vector_TwoBody", deck.vector_forces),
+        ("Force_Vector_OneBody", deck.body_forces),
+        ("Reference_Variable", deck.variables),
+    ):
+        for element in table.values():
+            if element.user is not None and not element.user.script_name:
+                yield f"{name}[{element.id}]"
 
 
 @click.command("check")
@@ -41,6 +60,8 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     for contact_id in deck.contacts:
         for text in pair_texts(plans, contact_id):
             click.echo(f"  Force_Contact[{contact_id}]: {text}")
+    for element in _without_file(deck):
+        click.echo(f"  {element}: its subroutine names no file; a run needs --plugin FILE.py")
     if not deck.simulations:
         more = " and --print-interval" if is_adams(deck.file) else ""
         click.echo(f"  no Simulate: a run needs --end-time{more}")

@@ -223,6 +223,8 @@ def _closing(before: str) -> str:
 
 def _like(name: str) -> str:
     """Return a hint at the known name that is nearest; nothing is near to a very long one."""
+    if name == "T":
+        return "; the time is TIME"
     if len(name) > 2 * max(map(len, FUNCTIONS)):
         return ""
     near = difflib.get_close_matches(name, [*FUNCTIONS, *CONSTANTS, "TIME"], 1)

@@ -13,6 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.geometry.mesh_contact import (
+    Surface,
+    against_convex,
+    lowest_side,
+    of_meshes,
+    place,
+    under_plane,
+    under_sphere,
+)
 from mbsim.geometry.support import CONVEX, ROUND, face_normal, round_normal, support
 from mbsim.model.elements import Graphic
 
@@ -51,6 +60,7 @@ class FclDetector:
         self._scene = scene
         self._graphics = graphics
         self._objects: dict[tuple[int, int], Any] = {}
+        self._surfaces: dict[int, Surface] = {}
         self._fcl: Any = None
         self.failure: BaseException | None = None
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._answer)
@@ -98,8 +108,7 @@ class FclDetector:
     def _prism(self, bottom: float, top: float, half: float) -> Any:
         """Return a frustum, which FCL does not have, as a polyhedron around it.
 
-        Its depth is made exact afterwards where the other shape is convex; against a mesh it is
-        too wide by at most r (1/cos(pi/n) - 1).
+        Its depth is made exact afterwards; touch is seen too early by at most r (1/cos(pi/n) - 1).
         """
         n = _SIDES
         angle = 2.0 * np.pi * np.arange(n) / n
@@ -155,7 +164,11 @@ class FclDetector:
         most = _MESH_CONTACTS if meshes else last - first
         request = fcl.CollisionRequest(num_max_contacts=most, enable_contact=True)
         result = fcl.CollisionResult()
-        fcl.collide(objects[0], objects[1], request, result)
+        if "PLANE" not in (self._graphics[i].shape, self._graphics[j].shape) or not meshes:
+            fcl.collide(objects[0], objects[1], request, result)
+        if meshes:
+            self._put_mesh(i, j, result.contacts, scene.work.points[first])
+            return
         # FCL's normal points from its first object to its second
         found = [
             (c.penetration_depth, np.array(c.pos), -np.array(c.normal)) for c in result.contacts
@@ -176,6 +189,66 @@ class FclDetector:
             points[slot, 4:7] = sign * n
             points[slot, 7] = 1.0
 
+    def _surface(self, g: int) -> Surface:
+        """Return the mesh of graphic g with its normals and neighbours."""
+        if g not in self._surfaces:
+            graphic = self._graphics[g]
+            assert graphic.vertices is not None
+            assert graphic.faces is not None
+            convex = graphic.hull is not None
+            self._surfaces[g] = Surface(graphic.vertices, graphic.faces, convex)
+        return self._surfaces[g]
+
+    def _put_mesh(self, i: int, j: int, contacts: list[Any], row: Any) -> None:
+        """Fill the row of a pair with a mesh from the triangles in contact."""
+        row[0] = -0.0
+        shapes = (self._graphics[i].shape, self._graphics[j].shape)
+        if not contacts and "PLANE" not in shapes:
+            return
+        # everything is measured in the axes of the mesh, of J's if both are meshes
+        turned = self._graphics[j].shape != "MESH"
+        mesh, other = (i, j) if turned else (j, i)
+        p, R = self._frame(mesh)
+        if self._graphics[other].shape == "MESH":
+            depth, at, n = self._on_mesh(i, j, contacts)
+        else:
+            depth, at, n = self._on_other(mesh, other, contacts)
+        row[0] = depth if depth > 0.0 else -0.0
+        row[1:4] = p + R @ at
+        row[4:7] = -(R @ n) if turned else R @ n
+        row[7] = 1.0
+
+    def _on_mesh(self, i: int, j: int, contacts: list[Any]) -> tuple[float, Any, Any]:
+        """Return (depth, point, normal) of two meshes in J's axes."""
+        (p_i, R_i), (p_j, R_j) = self._frame(i), self._frame(j)
+        frame = (R_j.T @ (p_i - p_j), R_j.T @ R_i)
+        pairs = np.array([(c.b1, c.b2) for c in contacts])
+        return of_meshes(self._surface(i), self._surface(j), frame, pairs)
+
+    def _on_other(self, mesh: int, other: int, contacts: list[Any]) -> tuple[float, Any, Any]:
+        """Return (depth, point, normal out of the mesh) of a mesh and a shape, in its axes."""
+        surface, shape = self._surface(mesh), self._graphics[other].shape
+        size = self._scene.graphics.size[other]
+        (p, R), (p_o, R_o) = self._frame(mesh), self._frame(other)
+        centre, axes = R.T @ (p_o - p), R.T @ R_o
+        if shape == "PLANE":
+            up = axes[:, 2]
+            depth, low = under_plane(surface, up, float(up @ centre))
+            return depth, low + 0.5 * depth * up, -up
+        # FCL gives the triangle first, wherever the mesh stands
+        touched = np.array([c.b1 for c in contacts])
+        if shape == "SPHERE":
+            return under_sphere(surface, touched, centre, float(size[0]))
+        normals = np.array([c.normal for c in contacts]) @ R
+        own = np.empty((0, 3))
+        if shape == "BOX":
+            own = np.vstack([axes.T, -axes.T])
+        elif shape in ("CYLINDER", "FRUSTUM"):
+            own = np.vstack([axes[:, 2], -axes[:, 2]])
+        return against_convex(
+            surface, touched, normals, lambda d: support(shape, size, centre, axes, d), own
+        )
+
     def _sharpen(self, i: int, j: int, n: Any) -> Any:
         """Return the normal made exact where a shape is round and the other round or a box."""
         shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
@@ -192,20 +265,49 @@ class FclDetector:
                 size[i], frame_i, lambda d: support(shape_j, size[j], *frame_j, -d), -n
             )
             return n if face is None else -face
+        if shape_i in CONVEX and shape_j in CONVEX:
+            return self._nearest_flat(i, j, n)
         return n
+
+    def _nearest_flat(self, i: int, j: int, n: Any) -> Any:
+        """Return a flat side's normal near n where the shapes overlap no more along it, else n."""
+        best, least = n, self._overlap(i, j, n)
+        for g in (i, j):
+            R = self._frame(g)[1]
+            own = {"BOX": R.T, "CYLINDER": R.T[2:], "FRUSTUM": R.T[2:]}
+            for axis in own.get(self._graphics[g].shape, R.T[:0]):
+                along = float(axis @ n)
+                if abs(along) < 0.9:
+                    continue
+                flat = axis * np.sign(along)
+                depth = self._overlap(i, j, flat)
+                if depth <= least * (1.0 + 1e-9):
+                    best, least = flat, depth
+        return best
+
+    def _overlap(self, i: int, j: int, n: Any) -> float:
+        """Return how far convex shapes overlap along n."""
+        size = self._scene.graphics.size
+        low = support(self._graphics[i].shape, size[i], *self._frame(i), -n)
+        high = support(self._graphics[j].shape, size[j], *self._frame(j), n)
+        return float(n @ (high - low))
 
     def _refine(self, i: int, j: int, depth: float, p: Any, n: Any) -> tuple[float, Any]:
         """Return depth and midpoint made exact along n from the shapes' support points."""
         shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
         size = self._scene.graphics.size
+
+        def far(g: int, d: Any) -> Any:
+            return support(self._graphics[g].shape, size[g], *self._frame(g), d)
+
         if shape_i in CONVEX:
-            low = support(shape_i, size[i], *self._frame(i), -n)
+            low = far(i, -n)
         elif shape_i == "PLANE":
             low = self._frame(i)[0]
         else:
             return depth, p
         if shape_j in CONVEX:
-            high = support(shape_j, size[j], *self._frame(j), n)
+            high = far(j, n)
         elif shape_j == "PLANE":
             high = self._frame(j)[0]
         else:
@@ -215,8 +317,15 @@ class FclDetector:
             return exact, low + 0.5 * exact * n
         if shape_j in ROUND:
             return exact, high - 0.5 * exact * n
-        # between flat shapes FCL chooses where, the normal says how high
-        return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
+        # FCL may choose any point of what is down, however it is tilted
+        lowest = lowest_side(lambda d: far(i, d), n, exact) if shape_i in CONVEX else None
+        highest = lowest_side(lambda d: far(j, d), -n, exact) if shape_j in CONVEX else None
+        if lowest is None or highest is None:
+            side = highest if lowest is None else lowest
+            assert side is not None
+            p = place(side, side, n)
+            return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
+        return exact, place(highest, lowest, n)
 
     def _slot_of(self, p: Any, first: int, last: int) -> int:
         """Return the free slot whose committed incident is nearest, else the first free one."""

@@ -18,7 +18,8 @@ def _ascending(entry: Entry, values: Numbers, name: str) -> bool:
         if not values[k] > values[k - 1]:
             one, other = f"{values[k - 1]:g}", f"{values[k]:g}"
             given = name if entry.given(name) else ""
-            entry.fault(f"{name[0]} must ascend; {other} stands behind {one}", given)
+            axis = "x" if name == "points" else name[0]
+            entry.fault(f"{axis} must ascend; {other} stands behind {one}", given)
             return False
     return True
 

@@ -301,6 +301,16 @@ def test_a_bug_is_a_traceback(model: str, monkeypatch: Any) -> None:
         call("check", model)
 
 
+def test_check_says_which_subroutine_needs_a_plugin(model: str, tmp_path: Path) -> None:
+    text = Path(model).read_text()
+    force = '<Force_Vector_OneBody id="7" type="ForceOnly" i_marker_id="20" {}/></Model>'
+    given = force.format('usrsub_param_string="USER(1)" usrsub_fnc_name="VFOSUB"')
+    deck = tmp_path / "deck.xml"
+    deck.write_text(text.replace("</Model>", given))
+    done = call("check", str(deck))
+    assert "Force_Vector_OneBody[7]: its subroutine names no file" in done.output
+
+
 def test_check_imports_little(model: str) -> None:
     code = (
         "import sys; from mbsim.cli.main import main\n"

@@ -105,6 +105,7 @@ def test_tree_keeps_text_names_and_columns():
         ("\u0663", "means nothing", 1),
         ("TIEM", "there is no function TIEM; did you mean TIME?", 1),
         ("1 + STPE(1,2,3,4,5)", "did you mean STEP?", 5),
+        ("STEP(T, 0, 0, 1, 1)", "there is no function T; the time is TIME", 6),
         ("xyzzy(1)", "there is no function XYZZY", 1),
         ("SIN", "'(' after SIN", 4),
         ("SIN(1, 2)", "SIN has 2 arguments, not 1", 1),

@@ -165,6 +165,7 @@ def test_a_spline_by_text_by_attributes_and_by_file(tmp_path):
         ('<Reference_Spline id="1" x="0 1">0 1 1 2</Reference_Spline>', "needs its points once"),
         ('<Reference_Spline id="1" x="0 1" y="1 2 3"/>', "must be 2 numbers, 1 for each of 2 x"),
         ('<Reference_Spline id="1" x="0 0" y="1 2"/>', "x must ascend; 0 stands behind 0"),
+        ('<Reference_Spline id="1">0 1 0 2</Reference_Spline>', ": x must ascend; 0 stands behind"),
         ('<Reference_Spline id="1" x="0 1" y="1 2 3 4" z="2 1"/>', "z must ascend"),
         ('<Reference_Spline id="1" x="0 1" y="1 2" z="2"/>', "needs 2 values of z"),
         ('<Reference_Spline id="1" x="0" y="1"/>', "2 points or more"),
