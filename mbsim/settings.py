@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.integrators.catalog import METHODS
+from mbsim.integrators.catalog import EXPLICIT, IMPLICIT, METHODS
 from mbsim.model.elements import Model, Simulation
 from mbsim.model.names import element_name, is_adams
 
@@ -18,8 +18,13 @@ DEFAULT_TOL = 1e-5
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
 INTEGRATORS = tuple(METHODS)
-#: MotionSolve's names, all run by the first method.
-_MOTIONSOLVE_NAMES = ("ABAM", "VSTIFF", "MSTIFF", "DSTIFF")
+#: MotionSolve's names, and the method that runs them.
+_MOTIONSOLVE_NAMES = {
+    "ABAM": EXPLICIT,
+    "VSTIFF": IMPLICIT,
+    "MSTIFF": IMPLICIT,
+    "DSTIFF": IMPLICIT,
+}
 
 
 @dataclass(frozen=True)
@@ -122,16 +127,16 @@ def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
 
     `asked` has for every name that was given where it was said.
     """
-    first = INTEGRATORS[0]
     notes = []
     methods: dict[str, str] = {}
     for name, where in sorted(asked.items()):
         if name in _MOTIONSOLVE_NAMES:
-            notes.append(f"integrator {name}: run by {first} ({METHODS[first]})")
+            runs = _MOTIONSOLVE_NAMES[name]
+            notes.append(f"integrator {name}: run by {runs} ({METHODS[runs]})")
         elif name not in INTEGRATORS:
             allowed = ", ".join((*INTEGRATORS, *_MOTIONSOLVE_NAMES))
             raise ModelError(f"{where}={name} is not known; there are {allowed}")
-        methods.setdefault(first if name in _MOTIONSOLVE_NAMES else name, where)
+        methods.setdefault(_MOTIONSOLVE_NAMES.get(name, name), where)
     if len(methods) > 1:
         both = " and ".join(f"{where}={name}" for name, where in methods.items())
         raise ModelError(f"{both}: one method runs all Simulates")

@@ -61,30 +61,16 @@ class Runner:
         changes: list[Parameters] | None = None,
     ) -> None:
         from mbsim.core import jit
-        from mbsim.core.problem import Problem
-        from mbsim.dynamics.hooks import mechanism
-        from mbsim.integrators import catalog, driver, scheme
+        from mbsim.integrators import driver
+        from mbsim.methods import Methods
         from mbsim.sensing import Sensing
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
-        method = catalog.load(settings.integrator)
-        self.method = scheme.make(
-            method,
-            system.y0,
-            settings.stages[0].simulation.start_time,
-            len(system.body_ids),
-        )
-        system.scene.world.fixed_step[0] = int(method.order == 0.0)
         self.detector = self._open_fcl_door()
-        self.problem: Problem
-        self.problem, self._table = mechanism(system.scene, method.order == 0.0)
-        if method.implicit:
-            from mbsim.dynamics.implicit_hooks import implicit_hooks
-
-            made = implicit_hooks(system.scene, self.problem, method.pair)
-            self.problem, self._tangent = made
-        self._steps, self._bench = scheme.bind(method, self.problem, self.method)
+        start = settings.stages[0].simulation.start_time
+        self.methods = Methods(system, settings.integrator, start)
+        self.method, self.problem = self.methods.arrays, self.methods.problem
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
@@ -316,6 +302,7 @@ class Runner:
         for name, group in groups.items():
             for field, array in zip(group._fields, group, strict=True):
                 array[...] = saved[f"{name}/{field}"]
+        self.methods.bind()
         self.stage = int(saved["stage"])
         self.sensing.restore(saved)
 
@@ -402,7 +389,7 @@ class Runner:
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
-                self._steps,
+                self.methods.steps,
                 simulation.end_time,
                 stage.tol,
                 self.sensing.h_max,
@@ -430,7 +417,13 @@ class Runner:
                 )
             now, steps = float(method.memory[scheme.TIME]), int(method.counts[scheme.STEPS])
             pace.watch(self.system, method.y, now, steps)
-            if outcome == problem.STEP_TOO_SMALL:
+            if outcome == problem.CHANGES_OVER:
+                self.log.line(self.methods.change_over())
+            if outcome == problem.STEP_TOO_SMALL and self.methods.retreat():
+                self.log.line(
+                    f"time {now:.9g}: the implicit step became too small: explicit from here on"
+                )
+            elif outcome == problem.STEP_TOO_SMALL:
                 give_up(self.system, self.settings, self.method)
             if self.interrupted:
                 raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
@@ -455,6 +448,7 @@ class Runner:
             "output_evaluations": int(counts[scheme.OUTPUTS]),
             "jacobians": int(counts[scheme.JACOBIANS]),
             "factorizations": int(counts[scheme.FACTORIZATIONS]),
+            "method_changes": self.methods.changes,
             "narrowphase_pairs": int(counters[a.NARROWPHASE]),
             "skipped_pairs": int(counters[a.SKIPPED]),
             "pair_listings": int(counters[a.LISTINGS]),

@@ -105,7 +105,7 @@ SINGULAR = 51
 AT_ONCE = 100
 
 # what `advance` returns
-DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED = range(6)
+DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER = range(7)
 
 # what `kinks` is asked: whether sides differ, to keep them too, and that a step was taken
 ASK, SETTLE, PASS = 0.0, 1.0, 2.0

@@ -9,12 +9,20 @@ if TYPE_CHECKING:
     from mbsim.integrators.scheme import Scheme
 
 #: Name for --integrator and what it is; the module of the same name in lower case has `SCHEME`.
-METHODS = {
+SCHEMES = {
     "DOPRI5": "explicit, order 5",
     "DOP853": "explicit, order 8",
     "VERLET": "explicit, order 2, one evaluation a step within its stability bound",
     "GALPHA": "implicit, order 2, for stiff contact and mechanisms",
     "RADAU5": "implicit, order 5, for stiff equations and accuracy",
+}
+
+#: The methods between which AUTO changes over, and its name.
+EXPLICIT, IMPLICIT, AUTO = "DOPRI5", "RADAU5", "AUTO"
+#: All names for --integrator, the default first.
+METHODS = {
+    AUTO: f"{EXPLICIT}, and {IMPLICIT} while a model is stiff",
+    **SCHEMES,
 }
 
 

@@ -8,9 +8,20 @@ that stays true with constraints.
 
 from __future__ import annotations
 
+import math
+
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
-from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, TOL, Scheme, on_bench
+from mbsim.core.layout import BODY_SIZE
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    LAST_ERROR,
+    STIFFNESS,
+    TOL,
+    WATCH,
+    Scheme,
+    on_bench,
+)
 
 C2, C3, C4, C5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
 A21 = 1 / 5
@@ -79,7 +90,27 @@ def attempt(p, m, t, h):
             E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
         )
     m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / m.memory[TOL]
+    if m.memory[WATCH] == 1.0:
+        m.memory[STIFFNESS] = stiffness(m, h)
     return 0.0
+
+
+@jitable
+def stiffness(m, h):
+    """Return the step times the rate of f between the last two stages, of bodies and states.
+
+    Bodies alone, where there are some: what is summed up beside them has other units.
+    """
+    k = m.k
+    n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(m.y)
+    above, below = 0.0, 0.0
+    for i in range(n):
+        rise = k[6, i] - k[5, i]
+        way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
+        way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
+        above += rise * rise
+        below += way * way
+    return math.sqrt(above / below) if below > 0.0 else 0.0
 
 
 @jitable

@@ -17,6 +17,7 @@ from mbsim.core.problem import (
     BY_ERROR,
     BY_NEWTON,
     BY_NOT_FINITE,
+    CHANGES_OVER,
     DONE,
     FAILED,
     HAPPENED,
@@ -29,6 +30,7 @@ from mbsim.core.problem import (
     STABLE_EVERY,
     STEP_TOO_SMALL,
 )
+from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
     foretold_factor,
     next_factor,
@@ -62,6 +64,7 @@ from mbsim.integrators.scheme import (
     STEPS,
     TIME,
     TOL,
+    WATCH,
     on_bench,
 )
 
@@ -498,4 +501,6 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0
             return HAPPENED
+        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, h, t_end):
+            return CHANGES_OVER
     return DONE

@@ -45,7 +45,11 @@ LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(
 # what is left after its first step; nothing is known of a step before; part of a step to try
 # after Newton's iteration failed
 HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14, 21)
-MEMORY = 21
+# of AUTO (`changing.py`): whether it watches; step times largest rate as the last step found it;
+# steps found stiff, and those not stiff since; how many make it change over; implicit steps
+# since; whether the implicit method runs
+WATCH, STIFFNESS, STIFF_STEPS, CALM_STEPS, PATIENCE, IMPLICIT_STEPS, STIFF = range(21, 28)
+MEMORY = 28
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 JACOBIANS, FACTORIZATIONS = range(8, 10)
@@ -99,6 +103,7 @@ class Steps(NamedTuple):
     order: float
     memory: float
     implicit: bool
+    probe: int  # `attempt` of the explicit method where AUTO may change back to it, else 0
 
 
 def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
@@ -122,7 +127,18 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
     )
 
 
-def bind(scheme: Scheme, problem: Problem, method: Method) -> tuple[Steps, Any]:
+def both(one: Scheme, other: Scheme) -> Scheme:
+    """Return a scheme whose arrays hold what either method needs."""
+    return one._replace(
+        stages=max(one.stages, other.stages),
+        dense=max(one.dense, other.dense),
+        carried=max(one.carried, other.carried),
+    )
+
+
+def bind(
+    scheme: Scheme, problem: Problem, method: Method, probe: Scheme | None = None
+) -> tuple[Steps, Any]:
     """Return the method bound to a problem, and what must live as long as it is used."""
     from mbsim.core import jit
 
@@ -133,7 +149,8 @@ def bind(scheme: Scheme, problem: Problem, method: Method) -> tuple[Steps, Any]:
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
     numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
-    steps = Steps(context, attempt, fit_dense, *numbers)
+    probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
+    steps = Steps(context, attempt, fit_dense, *numbers, probes)
     return steps, (table, bench)
 
 

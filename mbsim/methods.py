@@ -1,0 +1,95 @@
+"""Which method runs: the one that was asked for, or those between which AUTO changes over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from mbsim.integrators import catalog, scheme
+from mbsim.integrators.changing import FIRST_PATIENCE
+
+if TYPE_CHECKING:
+    from mbsim.core.problem import Problem
+    from mbsim.system.build import System
+
+#: Bodies of the largest model for which AUTO looks whether it is stiff.
+MOST_BODIES = 300
+
+
+class Methods:
+    """The arrays of a run's method, and its functions bound to the mechanism.
+
+    AUTO's two methods have their arrays in common, so that one goes on where the other ends.
+    """
+
+    def __init__(self, system: System, name: str, start: float) -> None:
+        from mbsim.dynamics.hooks import mechanism
+
+        self.system = system
+        changing = name == catalog.AUTO
+        self.explicit = catalog.load(catalog.EXPLICIT if changing else name)
+        self.other = catalog.load(catalog.IMPLICIT) if changing else None
+        bodies = len(system.body_ids)
+        held = scheme.both(self.explicit, self.other) if self.other else self.explicit
+        self.arrays = scheme.make(held, system.y0, start, bodies)
+        fixed = self.explicit.order == 0.0
+        system.scene.world.fixed_step[0] = int(fixed)
+        self.problem: Problem
+        self.problem, self._table = mechanism(system.scene, fixed)
+        self._tangent: Any = None
+        self.steps: scheme.Steps
+        if changing and bodies <= MOST_BODIES:
+            self.arrays.memory[scheme.WATCH] = 1.0
+            self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
+        self.changes = 0
+        self.bind()
+
+    @property
+    def is_stiff(self) -> bool:
+        """Whether AUTO's implicit method runs."""
+        return bool(self.arrays.memory[scheme.STIFF] == 1.0)
+
+    def bind(self) -> None:
+        """Bind the method that memory names, as after a checkpoint."""
+        running = self.explicit
+        if self.other is not None and self.is_stiff:
+            running = self.other
+        if running.implicit and self._tangent is None:
+            from mbsim.dynamics.implicit_hooks import implicit_hooks
+
+            made = implicit_hooks(self.system.scene, self.problem, running.pair)
+            self.problem, self._tangent = made
+        probe = self.explicit if running is self.other else None
+        self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
+
+    def change_over(self) -> str:
+        """Let AUTO's other method go on from the committed point; return what is to be said."""
+        memory = self.arrays.memory
+        stiff = not self.is_stiff
+        memory[scheme.STIFF] = float(stiff)
+        memory[scheme.FRESH] = 1.0
+        memory[scheme.HAVE_JACOBIAN] = 0.0
+        memory[scheme.ERROR_BEFORE] = 1.0
+        for name in (scheme.STIFF_STEPS, scheme.CALM_STEPS, scheme.IMPLICIT_STEPS):
+            memory[name] = 0.0
+        if stiff:
+            # one that goes to and fro waits longer each time
+            memory[scheme.PATIENCE] *= 2.0
+        self.arrays.dense[...] = 0.0
+        self.changes += 1
+        self.bind()
+        now, h = memory[scheme.TIME], memory[scheme.STEP]
+        if stiff:
+            why = f"stability bounds the step of {h:.3g}"
+            return f"time {now:.9g}: stiff, {why}: {catalog.IMPLICIT} from here on"
+        return f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
+
+    def retreat(self) -> bool:
+        """Let AUTO's explicit method try where the implicit one cannot; return whether it can."""
+        if self.other is None or not self.is_stiff:
+            return False
+        self.change_over()
+        memory = self.arrays.memory
+        memory[scheme.WATCH] = 0.0
+        memory[scheme.STEP] = 0.0
+        memory[scheme.HAVE_F] = 0.0
+        return True
