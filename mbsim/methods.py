@@ -40,6 +40,7 @@ class Methods:
         if changing and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
+            self.arrays.memory[scheme.BEGUN] = start
         self.changes = 0
         self.bind()
 
@@ -69,8 +70,9 @@ class Methods:
         memory[scheme.FRESH] = 1.0
         memory[scheme.HAVE_JACOBIAN] = 0.0
         memory[scheme.ERROR_BEFORE] = 1.0
-        for name in (scheme.STIFF_STEPS, scheme.CALM_STEPS, scheme.IMPLICIT_STEPS):
-            memory[name] = 0.0
+        memory[scheme.BEGUN], memory[scheme.PACE] = memory[scheme.TIME], 0.0
+        memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
+        memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
         if stiff:
             # one that goes to and fro waits longer each time
             memory[scheme.PATIENCE] *= 2.0
@@ -79,8 +81,9 @@ class Methods:
         self.bind()
         now, h = memory[scheme.TIME], memory[scheme.STEP]
         if stiff:
-            why = f"stability bounds the step of {h:.3g}"
-            return f"time {now:.9g}: stiff, {why}: {catalog.IMPLICIT} from here on"
+            largest = memory[scheme.STIFFNESS]
+            why = f"the step of {h:.3g} is {largest:.2g} of the fastest rate, or steps are too many"
+            return f"time {now:.9g}: {why}: {catalog.IMPLICIT} from here on"
         return f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
 
     def retreat(self) -> bool:

@@ -45,7 +45,7 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
 @click.option(
     "--integrator",
     metavar="NAME",
-    help=f"{_METHODS}; MotionSolve's names run the one of their kind.  [default: the deck's, else the first]",
+    help=f"{_METHODS}; MotionSolve's names run their kind.  [default: the deck's, else the first]",
 )
 @click.option(
     "--tol",

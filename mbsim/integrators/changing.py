@@ -4,7 +4,8 @@ The explicit method estimates the largest rate of f from its last two stages, wh
 time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
 some 3.3, stability and not the error bounds the steps: the model is stiff. The implicit method
 tries an explicit step now and then; where that is good enough, and stable, at half the length,
-it costs less.
+it costs less. Friction that turns sign from step to step within the tolerance hides its rate: a
+run with very many steps ahead tries the implicit method now and then all the same.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
 
@@ -15,9 +16,12 @@ import math
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import (
+    BEGUN,
     CALM_STEPS,
+    EXPLICIT_STEPS,
     IMPLICIT_STEPS,
     LAST_ERROR,
+    PACE,
     PATIENCE,
     STEP,
     STIFF_STEPS,
@@ -29,14 +33,18 @@ from mbsim.integrators.scheme import (
 BOUND, WITHIN = 3.0, 2.5
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
+#: Steps over which their number a time is taken: an impact is shorter.
+WINDOW = 200
 #: A change is worth it for so many steps that are still to be taken.
 WORTH = 2000
+#: With so many ahead the implicit method is tried after so many steps for each of patience.
+MANY, TRIAL = 20_000, 20
 #: Implicit steps between trials of an explicit one.
 TRY_EVERY = 20
 
 
 @jitable
-def is_stiff(m, h, t_end):
+def is_stiff(m, t_end):
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
         m.memory[STIFF_STEPS] += 1.0
@@ -45,8 +53,15 @@ def is_stiff(m, h, t_end):
         m.memory[CALM_STEPS] += 1.0
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
-    enough = m.memory[STIFF_STEPS] >= m.memory[PATIENCE]
-    return enough and t_end - m.memory[TIME] > WORTH * h
+    m.memory[EXPLICIT_STEPS] += 1.0
+    t = m.memory[TIME]
+    if m.memory[EXPLICIT_STEPS] % WINDOW == 0.0:
+        m.memory[PACE] = WINDOW / (t - m.memory[BEGUN])
+        m.memory[BEGUN] = t
+    ahead = (t_end - t) * m.memory[PACE]
+    if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
+        return ahead > WORTH
+    return ahead > MANY and m.memory[EXPLICIT_STEPS] >= TRIAL * m.memory[PATIENCE]
 
 
 @jitable
@@ -74,8 +89,8 @@ def is_calm(p, m, steps, t_end):
 
 
 @jitable
-def changes_over(p, m, steps, h, t_end):
+def changes_over(p, m, steps, t_end):
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return is_calm(p, m, steps, t_end)
-    return is_stiff(m, h, t_end)
+    return is_stiff(m, t_end)

@@ -501,6 +501,6 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0
             return HAPPENED
-        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, h, t_end):
+        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, t_end):
             return CHANGES_OVER
     return DONE

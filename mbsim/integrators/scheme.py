@@ -46,10 +46,12 @@ LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(
 # after Newton's iteration failed
 HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14, 21)
 # of AUTO (`changing.py`): whether it watches; step times largest rate as the last step found it;
-# steps found stiff, and those not stiff since; how many make it change over; implicit steps
-# since; whether the implicit method runs
-WATCH, STIFFNESS, STIFF_STEPS, CALM_STEPS, PATIENCE, IMPLICIT_STEPS, STIFF = range(21, 28)
-MEMORY = 28
+# steps found stiff, and those not stiff since; how many make it change over; steps of either
+# method since the last change; whether the implicit method runs; steps a time over the last
+# window of them, and when it began
+WATCH, STIFFNESS, STIFF_STEPS, CALM_STEPS, PATIENCE = range(21, 26)
+EXPLICIT_STEPS, IMPLICIT_STEPS, STIFF, PACE, BEGUN = range(26, 31)
+MEMORY = 31
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 JACOBIANS, FACTORIZATIONS = range(8, 10)
