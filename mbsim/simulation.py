@@ -519,8 +519,8 @@ def simulate(
     end_time, print_interval : float, optional
         Instead of the deck's [T]; of an Adams deck both are needed.
     integrator : str, optional
-        "DOPRI5" (order 5), "DOP853" (order 8) or "VERLET" (order 2, free bodies in contact);
-        default: the deck's, else the first.
+        A name of `integrators.catalog.METHODS`; default: the deck's, else "AUTO", DOPRI5 and RADAU5
+        while the model is stiff.
     tol : float, optional
         Local error of a step, dimensionless (README, "Tolerance"); default: the deck's, else 1e-5,
         of Adams decks 1e-8.

@@ -20,7 +20,7 @@ from models.reference import angle_between, top_attitude
 from models.test_models import rotation_matrices
 from validation.test_contact_physics import RESTITUTION
 
-from mbsim.integrators.catalog import METHODS, load
+from mbsim.integrators.catalog import SCHEMES, load
 
 pytestmark = pytest.mark.bench
 
@@ -67,7 +67,7 @@ def test_against_closed_forms(tmp_path):
 
 def _cost(results_of, error_of):
     """Print error, steps, evaluations and time of the loop, best of 5, of both methods."""
-    for method in (name for name in METHODS if load(name).order > 0.0):
+    for method in (name for name in SCHEMES if load(name).order > 0.0):
         for tol in 10.0 ** -np.arange(4, 15):
             runs = [results_of(tol=tol, integrator=method) for _ in range(6)][1:]
             error, stats = error_of(runs[0]), runs[0].stats

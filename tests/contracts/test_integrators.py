@@ -29,7 +29,7 @@ def is_explicit(method):
     return method.order > 0.0 and not method.implicit
 
 
-METHODS = [name for name in catalog.METHODS if is_explicit(catalog.load(name))]
+METHODS = [name for name in catalog.SCHEMES if is_explicit(catalog.load(name))]
 #: Order of the step and of the dense output.
 ORDERS = {"DOPRI5": (5, 4), "DOP853": (8, 7)}
 BOTH = pytest.mark.parametrize("name", METHODS)

@@ -1,0 +1,81 @@
+"""AUTO changes over where a model is stiff and back where it is not, and says so."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import MODELS
+
+import mbsim
+from mbsim import simulation
+from mbsim.errors import Interrupted
+
+STIFF = MODELS / "stiff"
+
+
+def test_it_is_the_default_and_explicit_where_nothing_is_stiff():
+    model = mbsim.read_model(MODELS / "free_top.xml")
+    auto, explicit = mbsim.simulate(model), mbsim.simulate(model, integrator="DOPRI5")
+    assert auto.attributes["integrator"] == "AUTO"
+    assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
+    np.testing.assert_array_equal(auto["bodies/2/quaternion"], explicit["bodies/2/quaternion"])
+
+
+def test_a_block_that_creeps_is_stiff_from_soon_on(tmp_path):
+    model = mbsim.read_model(STIFF / "incline_creep.xml")
+    auto = mbsim.simulate(model, output=tmp_path)
+    implicit = mbsim.simulate(model, integrator="RADAU5", tol=1e-8)
+    assert auto.stats["method_changes"] >= 1
+    assert auto.stats["steps"] < 2000
+    here, there = (r["bodies/2/position"] for r in (auto, implicit))
+    assert np.abs(here - there).max() < 1e-7
+    log = (tmp_path / "incline_creep.log").read_text()
+    assert "RADAU5 from here on" in log
+
+
+def test_it_changes_back():
+    model = mbsim.read_model(MODELS / "slider_crank_clearance.xml")
+    auto = mbsim.simulate(model)
+    assert auto.stats["method_changes"] >= 2
+
+
+@pytest.mark.parametrize("name", ["incline_creep", "lugre"])
+def test_resumed_after_a_change_it_goes_on_with_the_method_that_ran(tmp_path, name):
+    """The linearisation is not saved, so that rows agree to the tolerance and not to the bit."""
+    model = mbsim.read_model(STIFF / f"{name}.xml")
+    end = model.simulations[0].end_time
+
+    def stop(time, step, until):
+        if time > 0.3 * end:
+            raise Interrupted("enough")
+
+    before = simulation.RETURN_SECONDS, simulation.FIRST_BUDGET
+    simulation.RETURN_SECONDS, simulation.FIRST_BUDGET = 1e-5, 5
+    try:
+        with pytest.raises(Interrupted):
+            mbsim.simulate(model, output=tmp_path, progress=stop, tol=1e-6)
+    finally:
+        simulation.RETURN_SECONDS, simulation.FIRST_BUDGET = before
+    rest = mbsim.simulate(model, output=tmp_path, resume=True, tol=1e-6)
+    whole = mbsim.simulate(model, tol=1e-6)
+    assert whole.stats["method_changes"] >= 1
+    assert abs(rest.stats["steps"] - whole.stats["steps"]) < 0.2 * whole.stats["steps"]
+    for body in model.bodies.values():
+        if not body.is_ground:
+            key = f"bodies/{body.id}/position"
+            np.testing.assert_allclose(rest[key], whole[key], atol=1e-5)
+
+
+def test_motionsolve_names_run_their_kind(tmp_path):
+    model = mbsim.read_model(MODELS / "free_top.xml")
+    explicit = mbsim.simulate(model, integrator="ABAM", end_time=0.1)
+    stiff = mbsim.simulate(model, integrator="DSTIFF", end_time=0.1)
+    assert explicit.attributes["integrator"] == "DOPRI5"
+    assert stiff.attributes["integrator"] == "RADAU5"
+    assert stiff.stats["jacobians"] > 0
