@@ -7,7 +7,7 @@ A force F along the rows u of two bodies (wrench on I; less that of J) has
 with xi the displacement and eta the change of velocity of a body, both about its O. Incidents
 are frozen: contact point, normal and tangents stay where they are on the bodies, and X and memory
 as they are. Laws are asked at neighbouring arguments, expressions give exact derivatives.
-Bushings count as for small angles. Where forces look at reactions, and press friction in joints,
+Where forces look at reactions, and press friction in joints,
 these are taken as they are.
 """
 
@@ -25,6 +25,7 @@ from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.dynamics.wrenches import rotation_vector, turned_back, turning_torque
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -292,6 +293,16 @@ def pushed(scene, y, body, way, size):
 
 
 @jitable
+def keep_spin(scene, y, body, axis, size):
+    """Change the angular velocity in body axes so that a turn of the body leaves it as it is."""
+    R, at = scene.work.R[body], BODY_SIZE * body + 10
+    w = (y[at], y[at + 1], y[at + 2])
+    change = cross((R[axis, 0], R[axis, 1], R[axis, 2]), w)
+    for k in range(3):
+        y[at + k] -= size * change[k]
+
+
+@jitable
 def program_rise(scene, T, t, y, program, body, row):
     """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
 
@@ -306,6 +317,8 @@ def program_rise(scene, T, t, y, program, body, row):
             before = value(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
+            if 3 <= way < POSES:
+                keep_spin(scene, y, body, way - 3, size)
             pushed(scene, y, body, way, size)
             rise = (value(scene, t, y, program) - before) / size
             for k in range(7):
@@ -508,18 +521,82 @@ def add_axis_rate(scene, T, f, by_rate, n, u, turns):
 
 
 @jitable
-def add_bushing_slopes(scene, T, y, f):
-    """Add a bushing: stiffness and damping along and about J's axes, as for small angles."""
+def turning_rise(theta, k, way, out):
+    """Fill how a bushing's spring torque changes as I turns about J's axis `way` [per rad].
+
+    d theta = J(theta)^-1 e, which is J^-T of -theta; the torque is asked at neighbouring theta.
+    """
+    back = scale(-1.0, theta)
+    d = turned_back(back, unit(way))
+    up = turning_torque(add(theta, scale(_PUSH, d)), k)
+    low = turning_torque(sub(theta, scale(_PUSH, d)), k)
+    for i in range(3):
+        out[i] = (up[i] - low[i]) / (2.0 * _PUSH)
+
+
+@jitable
+def add_bushing_rate(scene, T, y, f, e, factor, u):
+    """Add how the rate along J's axis e, at I's origin p, changes with poses.
+
+    theta_I . (arm x (e x w_I)) + theta_J . (e x v) - h . (dp - dx_J), h = e x w_J, x_J J's cg.
+    """
     P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    i, work = scene.applied.i[f], scene.work
+    both = sides_of(scene, f)
+    bi, bj = both
+    p, none = marker_point(scene, y, i), (0.0, 0.0, 0.0)
+    v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
+    h = cross(e, vector(work.w[bj]))
+    if bi < nb:
+        lever(scene, L, y, bi, p, scale(-1.0, h), none, L.rise)
+        turned = cross(marker_arm(scene, i), cross(e, vector(work.w[bi])))
+        for k in range(3):
+            L.rise[k] += turned[k]
+        add_one_sided(P, L, nb, both, bi, factor, u)
+    if bj < nb:
+        lever(scene, L, y, bj, position(scene, y, bj), h, cross(e, v), L.rise)
+        add_one_sided(P, L, nb, both, bj, factor, u)
+
+
+@jitable
+def add_bushing_spin(scene, T, f, e, factor, u):
+    """Add how the spin about J's axis e changes as that turns: theta_J . (e x w)."""
     bi, bj = sides_of(scene, f)
-    none = (0.0, 0.0, 0.0)
+    turned = cross(e, sub(vector(scene.work.w[bi]), vector(scene.work.w[bj])))
+    for k in range(3):
+        T.linear.rise[k] = turned[k]
+        T.linear.rise[3 + k] = 0.0
+    if bj < len(scene.bodies.mass):
+        both = (bi, bj)
+        add_one_sided(T.pattern, T.linear, len(scene.bodies.mass), both, bj, factor, u)
+
+
+@jitable
+def add_bushing_slopes(scene, T, y, f):
+    """Add a bushing: stiffness and damping along and about J's axes."""
+    P, L, nb, par = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.par[f]
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    bi, bj = sides_of(scene, f)
+    none, p = (0.0, 0.0, 0.0), marker_point(scene, y, i)
+    for side in range(2):
+        for k in range(6):
+            e = marker_axis(scene, j, k % 3)
+            force, torque = (e, none) if k < 3 else (none, e)
+            lever(scene, L, y, bi if side == 0 else bj, p, force, torque, L.basis[side, k])
+    theta = rotation_vector(scene, i, j)
     for k in range(6):
-        e = marker_axis(scene, scene.applied.j[f], k % 3)
-        u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
-        par = scene.applied.par[f]
-        add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
+        e, u = marker_axis(scene, j, k % 3), L.basis[:, k]
         add_two_sided(P, L.D, nb, bi, bj, -par[6 + k], u, u)
-    add_geometry(scene, T, y, f, scene.applied.j[f], 0)
+        if k < 3:
+            add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
+            add_bushing_rate(scene, T, y, f, e, -par[6 + k], u)
+            continue
+        add_bushing_spin(scene, T, f, e, -par[6 + k], u)
+        turning_rise(theta, (par[3], par[4], par[5]), k - 3, L.rates)
+        for row in range(3):
+            rise = -L.rates[row]
+            add_two_sided(P, L.K, nb, bi, bj, rise, L.basis[:, 3 + row], u)
+    add_geometry(scene, T, y, f, j, 0)
 
 
 @jitable
