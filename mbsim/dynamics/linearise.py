@@ -158,11 +158,25 @@ def couple_equations(scene, P):
     for row in range(active_count(scene)):
         e = eq.active[row]
         for term in range(eq.first[e], eq.first[e + 1]):
-            a, b = scene.markers.body[eq.i[term]], scene.markers.body[eq.j[term]]
-            nb = len(scene.bodies.mass)
-            if a < nb and b < nb and a != b and not couple(P, a, b):
-                return False
+            a = scene.markers.body[eq.i[term]]
+            first, end = terms_behind(scene, e, term)
+            for by in range(first, end):
+                for side in range(2):
+                    b = scene.markers.body[eq.i[by] if side == 0 else eq.j[by]]
+                    nb = len(scene.bodies.mass)
+                    if a < nb and b < nb and a != b and not couple(P, a, b):
+                        return False
     return True
+
+
+@jitable
+def terms_behind(scene, e, term):
+    """Return the range of terms on whose bodies the gradient of a term depends."""
+    eq = scene.equations
+    if eq.general[e] == 1:
+        # one term for each body of one expression
+        return eq.first[e], eq.first[e + 1]
+    return term, term + 1
 
 
 @jitable
@@ -279,10 +293,12 @@ def add_bends(scene, T, t, y):
     for row in range(active_count(scene)):
         e = eq.active[row]
         for term in range(eq.first[e], eq.first[e + 1]):
-            for side in range(2):
-                b = scene.markers.body[eq.i[term] if side == 0 else eq.j[term]]
-                if b < len(scene.bodies.mass) and on_tree(scene, b):
-                    bend_by(scene, T, t, y, row, e, term, b)
+            first, end = terms_behind(scene, e, term)
+            for by in range(first, end):
+                for side in range(2):
+                    b = scene.markers.body[eq.i[by] if side == 0 else eq.j[by]]
+                    if b < len(scene.bodies.mass) and on_tree(scene, b):
+                        bend_by(scene, T, t, y, row, e, term, b)
         fill_equation(scene, t, y, e)
 
 

@@ -135,25 +135,21 @@ def fill_matrix(scene, T, M):
         for i in range(M.A.shape[1]):
             for j in range(M.A.shape[2]):
                 M.A[k, i, j] = 0.0
-    E = M.work[2]
-    last = -1
+    E, last = M.work[2], -1
+    for k in range(P.count[COUPLINGS]):
+        b, K, D, A = P.pair[k, 1], L.K[k], L.D[k], M.A[k]
+        if b != last:
+            times_rate(L, M, b, E)
+            last = b
+        for i in range(A.shape[0]):
+            for j in range(A.shape[1]):
+                A[i, j] = -K[i, j]
+            for q in range(A.shape[1]):
+                part = D[i, q]
+                if part != 0.0:
+                    for j in range(A.shape[1]):
+                        A[i, j] -= part * E[q, j]
     for b in range(len(P.order)):
-        times_rate(L, M, b, E)
-        for a in range(len(P.order)):
-            k = P.place[a, b]
-            if k < 0 or k >= P.count[COUPLINGS]:
-                continue
-            K, D, A = L.K[k], L.D[k], M.A[k]
-            for i in range(A.shape[0]):
-                for j in range(A.shape[1]):
-                    A[i, j] = -K[i, j]
-                for q in range(A.shape[1]):
-                    part = D[i, q]
-                    if part != 0.0:
-                        for j in range(A.shape[1]):
-                            A[i, j] -= part * E[q, j]
-        last = b
-    for b in range(last + 1):
         add_inertia(scene, L, M, b, M.A[P.place[b, b]])
 
 

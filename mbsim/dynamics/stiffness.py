@@ -7,7 +7,8 @@ A force F along the rows u of two bodies (wrench on I; less that of J) has
 with xi the displacement and eta the change of velocity of a body, both about its O. Incidents
 are frozen: contact point, normal and tangents stay where they are on the bodies, and X and memory
 as they are. Laws are asked at neighbouring arguments, expressions give exact derivatives.
-Bushings count as for small angles.
+Where forces look at reactions, and press friction in joints,
+these are taken as they are.
 """
 
 from __future__ import annotations
@@ -19,16 +20,22 @@ from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
 from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
 from mbsim.dynamics.expressions import run, value
+from mbsim.dynamics.joint_friction import FORCE, RADIUS, SPEED, ask_law
 from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.dynamics.wrenches import rotation_vector, turned_back, turning_torque
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
+    BALL_FRICTION,
     BODY_SIZE,
     BUSHING,
+    LATE,
     LINE_FORCE,
+    SCREW_FRICTION,
+    SLIDE_FRICTION,
     SLIDE_LIMIT,
     TURN_LIMIT,
     VECTOR_FORCE,
@@ -219,6 +226,13 @@ def sides_of(scene, f):
 
 
 @jitable
+def base_kind(scene, f):
+    """Return the kind of applied force f, whether it is settled with reactions or not."""
+    kind = scene.applied.kind[f]
+    return kind - LATE if kind >= LATE else kind
+
+
+@jitable
 def depends_on(scene, T, f, k):
     """Return program k (0 to 6) of applied force f, -1 for none."""
     return scene.applied.program[f] if k == 6 else scene.applied.components[f, k]
@@ -232,6 +246,12 @@ def couple_applied(scene, P, T):
         i, j = sides_of(scene, f)
         if i < nb and j < nb and i != j and not couple(P, i, j):
             return False
+        # whose axes a force is along
+        axes = scene.applied.axes[f] if base_kind(scene, f) == VECTOR_FORCE else scene.applied.j[f]
+        along = scene.markers.body[axes]
+        for a in (i, j):
+            if a < nb and along < nb and a != along and not couple(P, a, along):
+                return False
         for k in range(7):
             program = depends_on(scene, T, f, k)
             if program < 0:
@@ -273,6 +293,16 @@ def pushed(scene, y, body, way, size):
 
 
 @jitable
+def keep_spin(scene, y, body, axis, size):
+    """Change the angular velocity in body axes so that a turn of the body leaves it as it is."""
+    R, at = scene.work.R[body], BODY_SIZE * body + 10
+    w = (y[at], y[at + 1], y[at + 2])
+    change = cross((R[axis, 0], R[axis, 1], R[axis, 2]), w)
+    for k in range(3):
+        y[at + k] -= size * change[k]
+
+
+@jitable
 def program_rise(scene, T, t, y, program, body, row):
     """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
 
@@ -287,6 +317,8 @@ def program_rise(scene, T, t, y, program, body, row):
             before = value(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
+            if 3 <= way < POSES:
+                keep_spin(scene, y, body, way - 3, size)
             pushed(scene, y, body, way, size)
             rise = (value(scene, t, y, program) - before) / size
             for k in range(7):
@@ -489,18 +521,82 @@ def add_axis_rate(scene, T, f, by_rate, n, u, turns):
 
 
 @jitable
-def add_bushing_slopes(scene, T, y, f):
-    """Add a bushing: stiffness and damping along and about J's axes, as for small angles."""
+def turning_rise(theta, k, way, out):
+    """Fill how a bushing's spring torque changes as I turns about J's axis `way` [per rad].
+
+    d theta = J(theta)^-1 e, which is J^-T of -theta; the torque is asked at neighbouring theta.
+    """
+    back = scale(-1.0, theta)
+    d = turned_back(back, unit(way))
+    up = turning_torque(add(theta, scale(_PUSH, d)), k)
+    low = turning_torque(sub(theta, scale(_PUSH, d)), k)
+    for i in range(3):
+        out[i] = (up[i] - low[i]) / (2.0 * _PUSH)
+
+
+@jitable
+def add_bushing_rate(scene, T, y, f, e, factor, u):
+    """Add how the rate along J's axis e, at I's origin p, changes with poses.
+
+    theta_I . (arm x (e x w_I)) + theta_J . (e x v) - h . (dp - dx_J), h = e x w_J, x_J J's cg.
+    """
     P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    i, work = scene.applied.i[f], scene.work
+    both = sides_of(scene, f)
+    bi, bj = both
+    p, none = marker_point(scene, y, i), (0.0, 0.0, 0.0)
+    v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
+    h = cross(e, vector(work.w[bj]))
+    if bi < nb:
+        lever(scene, L, y, bi, p, scale(-1.0, h), none, L.rise)
+        turned = cross(marker_arm(scene, i), cross(e, vector(work.w[bi])))
+        for k in range(3):
+            L.rise[k] += turned[k]
+        add_one_sided(P, L, nb, both, bi, factor, u)
+    if bj < nb:
+        lever(scene, L, y, bj, position(scene, y, bj), h, cross(e, v), L.rise)
+        add_one_sided(P, L, nb, both, bj, factor, u)
+
+
+@jitable
+def add_bushing_spin(scene, T, f, e, factor, u):
+    """Add how the spin about J's axis e changes as that turns: theta_J . (e x w)."""
     bi, bj = sides_of(scene, f)
-    none = (0.0, 0.0, 0.0)
+    turned = cross(e, sub(vector(scene.work.w[bi]), vector(scene.work.w[bj])))
+    for k in range(3):
+        T.linear.rise[k] = turned[k]
+        T.linear.rise[3 + k] = 0.0
+    if bj < len(scene.bodies.mass):
+        both = (bi, bj)
+        add_one_sided(T.pattern, T.linear, len(scene.bodies.mass), both, bj, factor, u)
+
+
+@jitable
+def add_bushing_slopes(scene, T, y, f):
+    """Add a bushing: stiffness and damping along and about J's axes."""
+    P, L, nb, par = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.par[f]
+    i, j = scene.applied.i[f], scene.applied.j[f]
+    bi, bj = sides_of(scene, f)
+    none, p = (0.0, 0.0, 0.0), marker_point(scene, y, i)
+    for side in range(2):
+        for k in range(6):
+            e = marker_axis(scene, j, k % 3)
+            force, torque = (e, none) if k < 3 else (none, e)
+            lever(scene, L, y, bi if side == 0 else bj, p, force, torque, L.basis[side, k])
+    theta = rotation_vector(scene, i, j)
     for k in range(6):
-        e = marker_axis(scene, scene.applied.j[f], k % 3)
-        u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
-        par = scene.applied.par[f]
-        add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
+        e, u = marker_axis(scene, j, k % 3), L.basis[:, k]
         add_two_sided(P, L.D, nb, bi, bj, -par[6 + k], u, u)
-    add_geometry(scene, T, y, f, scene.applied.j[f], 0)
+        if k < 3:
+            add_two_sided(P, L.K, nb, bi, bj, -par[k], u, u)
+            add_bushing_rate(scene, T, y, f, e, -par[6 + k], u)
+            continue
+        add_bushing_spin(scene, T, f, e, -par[6 + k], u)
+        turning_rise(theta, (par[3], par[4], par[5]), k - 3, L.rates)
+        for row in range(3):
+            rise = -L.rates[row]
+            add_two_sided(P, L.K, nb, bi, bj, rise, L.basis[:, 3 + row], u)
+    add_geometry(scene, T, y, f, j, 0)
 
 
 @jitable
@@ -518,6 +614,63 @@ def add_vector_slopes(scene, T, t, y, f):
 
 
 @jitable
+def rub_slopes(scene, t, f):
+    """Return slip speed s, dF/ds and F/s of friction f in a joint, its normal force as it is."""
+    row = scene.work.rub[f]
+    s, kept = row[SPEED], _PART * row[SPEED] + _PART_OF_SPEED * scene.world.scale[1]
+    low, high = max(s - kept, 0.0), s + kept
+    row[SPEED] = low
+    before = ask_law(scene, t, f)
+    row[SPEED] = high
+    by_speed = (ask_law(scene, t, f) - before) / (high - low)
+    row[SPEED] = s
+    return s, by_speed, row[FORCE] / s if s > 0.0 else by_speed
+
+
+@jitable
+def add_rub_slopes(scene, T, t, y, f):
+    """Add friction in a joint: dF/ds along the slip s, F/s across it.
+
+    Of slip and wrenches there are one (slide or turn), two (screw) or three (ball) components.
+    """
+    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
+    i, j, ball = scene.applied.i[f], scene.applied.j[f], kind == BALL_FRICTION
+    bi, bj = sides_of(scene, f)
+    radius, z = scene.applied.par[f, RADIUS], marker_axis(scene, j, 2)
+    w = sub(vector(scene.work.w[bi]), vector(scene.work.w[bj]))
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    s, along, over = rub_slopes(scene, t, f)
+    none, count = (0.0, 0.0, 0.0), 3 if ball else 2
+    slip = L.rates
+    for k in range(count):
+        e = unit(k) if ball else z
+        # of slide and turn, the slide is the second
+        slides = not ball and k == 1
+        used = ball or kind == SCREW_FRICTION or slides == (kind == SLIDE_FRICTION)
+        size = (1.0 if slides else radius) if used else 0.0
+        slip[k] = size * dot(v if slides else w, e)
+        wrench = scale(size, e)
+        force, torque = (wrench, none) if slides else (none, wrench)
+        lever(scene, L, y, bi, marker_point(scene, y, i), force, torque, L.basis[0, k])
+        lever(scene, L, y, bj, marker_point(scene, y, j), force, torque, L.basis[1, k])
+    for a in range(count):
+        for b in range(count):
+            part = over if a == b else 0.0
+            if s > 0.0:
+                part += (along - over) * slip[a] * slip[b] / (s * s)
+            u = L.basis[:, a]
+            add_two_sided(P, L.D, nb, bi, bj, part, u, L.basis[:, b])
+            if ball:
+                continue
+            if b == 1:
+                add_rate_by_pose(scene, T, f, u, part, z)
+                add_axis_rate(scene, T, f, part, z, u, False)
+            else:
+                add_axis_rate(scene, T, f, part * radius, z, u, True)
+    add_geometry(scene, T, y, f, -1 if ball else j, 1)
+
+
+@jitable
 def limit_slopes(scene, f, x, rate):
     """Return dF/dx and dF/dx' of a limit."""
     step = _PUSH * max(abs(x), 1e-3 * scene.world.scale[0])
@@ -530,7 +683,7 @@ def limit_slopes(scene, f, x, rate):
 @jitable
 def add_scalar_slopes(scene, T, t, y, f):
     """Add a force along a line, along an axis or about one."""
-    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
+    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), base_kind(scene, f)
     bi, bj = sides_of(scene, f)
     none, x, rate = (0.0, 0.0, 0.0), 0.0, 0.0
     if kind == LINE_FORCE:
@@ -576,12 +729,15 @@ def add_scalar_slopes(scene, T, t, y, f):
 def add_applied_slopes(scene, T, t, y):
     """Add what forces between markers do."""
     for f in range(len(scene.applied.kind)):
-        kind = scene.applied.kind[f]
+        kind = base_kind(scene, f)
         if kind == BUSHING:
             add_bushing_slopes(scene, T, y, f)
         elif kind == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
-        elif kind <= TURN_LIMIT:
+        elif kind >= SLIDE_FRICTION:
+            if scene.applied.law[f] != 0:
+                add_rub_slopes(scene, T, t, y, f)
+        else:
             add_scalar_slopes(scene, T, t, y, f)
     return 0
 

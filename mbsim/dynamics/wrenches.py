@@ -98,15 +98,20 @@ def rotation_vector(scene, i, j):
 @jitable
 def turning_torque(theta, k):
     """Return J(theta)^-T k theta, `k` the three stiffnesses about J's axes."""
-    spring = (k[0] * theta[0], k[1] * theta[1], k[2] * theta[2])
+    return turned_back(theta, (k[0] * theta[0], k[1] * theta[1], k[2] * theta[2]))
+
+
+@jitable
+def turned_back(theta, a):
+    """Return J(theta)^-T a."""
     square = dot(theta, theta)
     if square < _SMALL * _SMALL:
         c = 1.0 / 12.0 + square / 720.0
     else:
         half = 0.5 * math.sqrt(square)
         c = (1.0 - half / math.tan(half)) / square
-    turned = cross(theta, spring)
-    return add(add(spring, scale(0.5, turned)), scale(c, cross(theta, turned)))
+    turned = cross(theta, a)
+    return add(add(a, scale(0.5, turned)), scale(c, cross(theta, turned)))
 
 
 @jitable

@@ -58,6 +58,7 @@ class Linear(NamedTuple):
     basis: F3  # (2, 6, 6) scratch
     law: F2  # (6, 12) scratch
     rise: F1  # (13,) scratch
+    rates: F1  # (3,) scratch
 
 
 class Real(NamedTuple):
@@ -165,6 +166,7 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((2, 6, 6)),
         np.zeros((6, 12)),
         np.zeros(13),
+        np.zeros(3),
     )
     real = Real(*_factor_arrays(nb, m, n, blocks, np.float64))
     complex_blocks = (nb, m, n, blocks) if pair else (0, 0, 0, 0)
