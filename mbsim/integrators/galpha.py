@@ -75,6 +75,8 @@ MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
 LEAST_PART = 1.0 / 128.0
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
+#: A turn across an angular velocity, over that, which is none but for rounding.
+SWUNG = 1e-14
 #: The change of v' at the start is taken over this part of the first step.
 PROBE = 0.05
 
@@ -184,21 +186,59 @@ def place(m, h):
 
 
 @jitable
+def swung(m):
+    """Return whether a body was turned between m.error and m.trial across its angular velocity.
+
+    The turn is twice the vector part of conj(q) q' in body axes.
+    """
+    p, q = m.error, m.trial
+    for at in range(3, BODY_SIZE * m.bodies[0], BODY_SIZE):
+        x = p[at] * q[at + 1] - p[at + 1] * q[at] - p[at + 2] * q[at + 3] + p[at + 3] * q[at + 2]
+        y = p[at] * q[at + 2] + p[at + 1] * q[at + 3] - p[at + 2] * q[at] - p[at + 3] * q[at + 1]
+        z = p[at] * q[at + 3] - p[at + 1] * q[at + 2] + p[at + 2] * q[at + 1] - p[at + 3] * q[at]
+        u, v, w = p[at + 7], p[at + 8], p[at + 9]
+        across = max(abs(y * w - z * v), max(abs(z * u - x * w), abs(x * v - y * u)))
+        if across > SWUNG * max(abs(u), max(abs(v), abs(w))):
+            return True
+    return False
+
+
+@jitable
 def settle(p, m, t, h):
     """Write the point that a leads to into m.trial, where joints allow it, and let a follow.
 
+    Returns whether it was projected twice: the norm has then not seen how far the first went.
     So a has across joints what velocities on them ask for, as in a formulation of index 2, and
     what is stiff does not come in. Of free bodies `project` leaves velocities as they are.
     """
     place(m, h)
     end = BODY_SIZE * m.bodies[0]
-    for at in range(7, end, BODY_SIZE):
-        for i in range(at, at + 6):
-            m.error[i] = m.trial[i]
+    for i in range(end):
+        m.error[i] = m.trial[i]
     call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    twice = swung(m)
+    if twice:
+        # that turned velocities along joints as well, in body axes: only what is across counts
+        for at in range(7, end, BODY_SIZE):
+            for i in range(at, at + 6):
+                m.trial[i] = m.error[i]
+        call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
     for at in range(7, end, BODY_SIZE):
         for i in range(at, at + 6):
             m.k[A1, i] += (m.trial[i] - m.error[i]) / (GAMMA * h)
+    return twice
+
+
+@jitable
+def show_drift(p, m, t, h):
+    """Let the norm see by how much joints put the trial point right."""
+    n = len(m.y)
+    for i in range(n):
+        m.k[D, i] = m.trial[i]
+    place(m, h)
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    for i in range(n):
+        m.trial[i] = m.k[D, i]
 
 
 @jitable
@@ -385,7 +425,8 @@ def attempt(p, m, t, h):
     code = solve_step(p, m, t, h)
     if code != 0.0:
         return code
-    settle(p, m, t, h)
+    if settle(p, m, t, h):
+        show_drift(p, m, t, h)
     m.counts[EVALUATIONS] += 1
     code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
     if code != 0.0:
