@@ -20,7 +20,7 @@ from mbsim.bench import ours, stiff
 FIXED = {
     "slider_crank": (MODELS / "slider_crank.xml", 1.0, (1600, 3200), 1.5e-7),
     "top": (MODELS / "stiff" / "torsion_top.xml", 0.2, (800, 1600), 1e-6),
-    "squeezer": (MODELS / "stiff" / "squeezer.xml", 0.01, (400, 800), 1e-3),
+    "squeezer": (MODELS / "stiff" / "squeezer.xml", 0.01, (400, 800), 0.1),
 }
 
 
