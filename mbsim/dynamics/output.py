@@ -6,8 +6,8 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, rotate, sub, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, SLIP, STORED, TORQUE, contact_of, sides
+from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
+from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, SLIP, STORED, TORQUE, contact_of, sides
 from mbsim.dynamics.kinematics import position
 from mbsim.system.arrays import (
     BODY_SIZE,
@@ -19,6 +19,9 @@ from mbsim.system.arrays import (
     STORED_ENERGY,
     VALUES_DOOR,
 )
+
+#: What Newton's iteration leaves of friction, over the normal force, counts by this part.
+FRICTION_PART = 1.0
 
 
 @jitable
@@ -146,6 +149,42 @@ def beyond_noise(scene, b, h, dv, dw):
 
 
 @jitable
+def speed_change(scene, e, y, b, p):
+    """Return by how much body b's point at p is faster with velocities that differ by e."""
+    if b == len(scene.bodies.mass):
+        return 0.0, 0.0, 0.0
+    at = BODY_SIZE * b
+    turn = rotate(scene.work.R[b], (e[at + 10], e[at + 11], e[at + 12]))
+    return add((e[at + 7], e[at + 8], e[at + 9]), cross(turn, sub(p, position(scene, y, b))))
+
+
+@jitable
+def friction_left(scene, e, y):
+    """Return the largest change of friction that e causes, over the normal force.
+
+    By friction's slopes where it was linearised last, 0 where none was.
+    """
+    work, largest = scene.work, 0.0
+    for k in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[k]
+        grip, point, normal = work.grip[s], work.points[s], work.slot[s, NORMAL]
+        if normal <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
+            continue
+        gi, gj = sides(scene, s)
+        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        tx = vector(work.t[s])
+        v = sub(
+            speed_change(scene, e, y, scene.graphics.body[gi], p),
+            speed_change(scene, e, y, scene.graphics.body[gj], p),
+        )
+        u, w = dot(v, tx), dot(v, cross(n, tx))
+        change = max(abs(grip[0] * u + grip[1] * w), abs(grip[2] * u + grip[3] * w))
+        if not change <= largest * normal:
+            largest = change / normal
+    return largest
+
+
+@jitable
 def scaled_error(scene, h, e, y):
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
@@ -189,6 +228,8 @@ def scaled_error(scene, h, e, y):
     if h > 0.0:
         # what was not integrated but put right, as after a motion that jumps
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
+    else:
+        largest = max(largest, (FRICTION_PART * friction_left(scene, e, y)) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

@@ -187,6 +187,8 @@ def add_contact_slopes(scene, T, t, h, y, s):
     code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
     if code != 0:
         return code
+    for k in range(4):
+        work.grip[s, k] = L.law[k // 2, k % 2]
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

@@ -11,7 +11,8 @@ take the last line, with rates for accelerations. `a` is the acceleration at t +
 is begun at the start and after events, and moved where the step changes; with that, positions,
 velocities and accelerations are of order 2 from the start. What is fast keeps RHO of itself a
 step. Iterates are projected onto positions and velocities that joints allow, as in a stabilised
-formulation of index 2; corrections are along them, and what joints ask for across comes from f.
+formulation of index 2: corrections are along joints, and what a has across them is what keeps
+velocities on them. Their forces come from f.
 
 The error of a step is that of the formulas, the second and third derivative of the velocity times
 h^3 and a constant, from the differences of accelerations of this step and the last.
@@ -74,8 +75,8 @@ MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
 LEAST_PART = 1.0 / 128.0
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
-#: A body is free if `project` undoes no more than this part of a change of its velocity.
-FREE = 1e-6
+#: A turn across an angular velocity, over that, which is none but for rounding.
+SWUNG = 1e-14
 #: The change of v' at the start is taken over this part of the first step.
 PROBE = 0.05
 
@@ -185,10 +186,65 @@ def place(m, h):
 
 
 @jitable
-def evaluate(p, m, t, h, anew):
-    """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
+def swung(m):
+    """Return whether a body was turned between m.error and m.trial across its angular velocity.
+
+    The turn is twice the vector part of conj(q) q' in body axes.
+    """
+    p, q = m.error, m.trial
+    for at in range(3, BODY_SIZE * m.bodies[0], BODY_SIZE):
+        x = p[at] * q[at + 1] - p[at + 1] * q[at] - p[at + 2] * q[at + 3] + p[at + 3] * q[at + 2]
+        y = p[at] * q[at + 2] + p[at + 1] * q[at + 3] - p[at + 2] * q[at] - p[at + 3] * q[at + 1]
+        z = p[at] * q[at + 3] - p[at + 1] * q[at + 2] + p[at + 2] * q[at + 1] - p[at + 3] * q[at]
+        u, v, w = p[at + 7], p[at + 8], p[at + 9]
+        across = max(abs(y * w - z * v), max(abs(z * u - x * w), abs(x * v - y * u)))
+        if across > SWUNG * max(abs(u), max(abs(v), abs(w))):
+            return True
+    return False
+
+
+@jitable
+def settle(p, m, t, h):
+    """Write the point that a leads to into m.trial, where joints allow it, and let a follow.
+
+    Returns whether it was projected twice: the norm has then not seen how far the first went.
+    So a has across joints what velocities on them ask for, as in a formulation of index 2, and
+    what is stiff does not come in. Of free bodies `project` leaves velocities as they are.
+    """
+    place(m, h)
+    end = BODY_SIZE * m.bodies[0]
+    for i in range(end):
+        m.error[i] = m.trial[i]
+    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    twice = swung(m)
+    if twice:
+        # that turned velocities along joints as well, in body axes: only what is across counts
+        for at in range(7, end, BODY_SIZE):
+            for i in range(at, at + 6):
+                m.trial[i] = m.error[i]
+        call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    for at in range(7, end, BODY_SIZE):
+        for i in range(at, at + 6):
+            m.k[A1, i] += (m.trial[i] - m.error[i]) / (GAMMA * h)
+    return twice
+
+
+@jitable
+def show_drift(p, m, t, h):
+    """Let the norm see by how much joints put the trial point right."""
+    n = len(m.y)
+    for i in range(n):
+        m.k[D, i] = m.trial[i]
     place(m, h)
     call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    for i in range(n):
+        m.trial[i] = m.k[D, i]
+
+
+@jitable
+def evaluate(p, m, t, h, anew):
+    """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
+    settle(p, m, t, h)
     if anew:
         return linearise(p, m, t + h, h, m.trial, m.k[F])
     m.counts[EVALUATIONS] += 1
@@ -325,38 +381,6 @@ def solve_step(p, m, t, h):
 
 
 @jitable
-def find_joint_part(p, m, t, h):
-    """Write f less v' of the bodies that joints hold into row R of k, 0 for others.
-
-    What joints ask for beside what the iteration can change is in f alone, and v' is to have it.
-    Of a body that `project` lets go where it wants, the difference is what the iteration left,
-    times what is stiff: v' is better without it.
-    """
-    w, r, end = m.error, m.k[R], BODY_SIZE * m.bodies[0]
-    for i in range(len(w)):
-        w[i] = m.trial[i]
-        m.k[D, i] = m.trial[i]
-        r[i] = 0.0
-        if i < end and is_rate(i, end):
-            r[i] = m.k[LAST, i] - true_rate(m, i)
-            w[i] += h * r[i]
-    call_float(p.project, (p.context, t + h, h, w, w))
-    for at in range(7, end, BODY_SIZE):
-        undone, whole = 0.0, 0.0
-        for i in range(at, at + 6):
-            undone = max(undone, abs(r[i] - (w[i] - m.trial[i]) / h))
-            whole = max(whole, abs(r[i]))
-        if undone <= FREE * whole:
-            for i in range(at, at + 6):
-                r[i] = 0.0
-    # the norm is to see what was put right of the step, not of this
-    place(m, h)
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
-    for i in range(len(w)):
-        m.trial[i] = m.k[D, i]
-
-
-@jitable
 def position_error(m, h, i):
     """Return the error of a step in what y[i] is the velocity of."""
     return ERROR_X * h * h * (m.k[A1, i] - m.k[A0, i])
@@ -369,9 +393,7 @@ def estimate_error(p, m, t, h):
     end, before = BODY_SIZE * m.bodies[0], step_before(m)
     for i in range(len(m.y)):
         if is_rate(i, end):
-            dot = true_rate(m, i) + (m.k[R, i] if i < end else 0.0)
-            a0, before_dot = m.k[A0, i], m.kept[DOT, i]
-            m.k[A1, i] = ((1.0 - AF) * dot + AF * before_dot - AM * a0) / (1.0 - AM)
+            dot = true_rate(m, i)
             slope = (dot - m.kept[DOT, i]) / h
             bend = 2.0 * (slope - m.kept[SLOPE, i]) / (h + before)
             m.ahead[ALGORITHMIC, i] = m.k[A1, i]
@@ -403,14 +425,12 @@ def attempt(p, m, t, h):
     code = solve_step(p, m, t, h)
     if code != 0.0:
         return code
-    place(m, h)
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    if settle(p, m, t, h):
+        show_drift(p, m, t, h)
     m.counts[EVALUATIONS] += 1
     code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
     if code != 0.0:
         return code
-    if m.bodies[0] > 0:
-        find_joint_part(p, m, t, h)
     m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
     return 0.0
 

@@ -82,6 +82,7 @@ def scratch(
         hit=np.zeros(ns + 1, dtype=np.int64),
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
+        grip=np.zeros((ns, 4)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),
         block=np.zeros((nb, 20)),

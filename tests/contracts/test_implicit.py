@@ -197,6 +197,19 @@ def spread_out(box, c):
         s[i, i - 7] = 1.0
 
 
+@jitable
+def keep_to_rod(box, small):
+    """Let the mass of the pendulum move across its rod only; return what is left of a residual."""
+    across = np.eye(len(small))
+    if box.numbers[0] == PENDULUM:
+        x, z = box.at[0], box.at[2]
+        square = x * x + z * z
+        across[0, 0], across[0, 2] = z * z / square, -x * z / square
+        across[2, 0], across[2, 2] = -x * z / square, x * x / square
+        small[:] = across @ small @ across + np.eye(len(small)) - across
+    return across
+
+
 def _factor(context, t, h, a, b):
     box, c = view(context, Box), carray(a, (4,))
     if c[3] == 1.0:
@@ -214,8 +227,10 @@ def _factor(context, t, h, a, b):
                 for k in range(len(box.at)):
                     small[i, j] -= box.jacobian[first + i, k] * box.spread[k, j]
         box.real[:] = 0.0
+        across = keep_to_rod(box, small)
         if not invert(small, box.small) or box.numbers[3] == 1:
             return SINGULAR
+        box.small[:] = box.small @ across
         for i in range(len(box.at)):
             for j in range(len(small)):
                 for k in range(len(small)):

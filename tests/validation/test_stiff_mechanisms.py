@@ -1,0 +1,74 @@
+"""GALPHA under joints: orders at fixed steps, stiff forces beside joints."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import MODELS
+
+import mbsim
+from mbsim.bench import ours, stiff
+
+#: Deck, end, steps, and tol with the first of them: only Newton's iteration and no step knows it.
+FIXED = {
+    "slider_crank": (MODELS / "slider_crank.xml", 1.0, (1600, 3200), 1.5e-7),
+    "top": (MODELS / "stiff" / "torsion_top.xml", 0.2, (800, 1600), 1e-6),
+    "squeezer": (MODELS / "stiff" / "squeezer.xml", 0.01, (400, 800), 0.1),
+}
+
+
+def at_end(folder, path, end, method, tol, h_max=None):
+    """Return {signal: numbers} at the end of a run whose steps are h_max long."""
+    text = path.read_text(encoding="utf-8")
+    if h_max is not None:
+        text = text.replace("<Command>", f'<Command><Param_Transient h_max="{h_max!r}"/>')
+    deck = folder / f"{path.stem}.xml"
+    deck.write_text(text, encoding="utf-8")
+    found = mbsim.simulate(
+        mbsim.read_model(deck), integrator=method, tol=tol, end_time=end, print_interval=end
+    )
+    bodies = ("position", "velocity", "acceleration")
+    kept = [k for k in found.keys() if k.startswith("joints/") and k.endswith("/force")]
+    kept += [k for k in found.keys() if k.startswith("bodies/") and k.split("/")[-1] in bodies]
+    return {k: np.asarray(found[k])[-1] for k in kept}
+
+
+@pytest.mark.parametrize("name", list(FIXED))
+def test_galpha_is_of_order_2_in_motion_and_reactions(name, tmp_path):
+    path, end, counts, tol = FIXED[name]
+    exact = at_end(tmp_path, path, end, "RADAU5", 1e-11)
+    errors: dict[str, list[float]] = {}
+    for n in counts:
+        # errors of a step are of order 3
+        found = at_end(tmp_path, path, end, "GALPHA", tol * (counts[0] / n) ** 3, end / n)
+        for kind in ("position", "velocity", "acceleration", "force"):
+            off = [np.abs(found[k] - exact[k]).max() for k in exact if k.endswith(kind)]
+            errors.setdefault(kind, []).append(max(off))
+    for kind, (first, last) in errors.items():
+        assert math.log2(first / last) == pytest.approx(2.0, abs=0.3), (kind, first, last)
+
+
+@pytest.mark.parametrize(
+    ("name", "tol", "most"),
+    [("stiff_governor", 1e-3, 2e-2), ("stiff_governor", 1e-5, 5e-4), ("torsion_top", 1e-5, 5e-3)],
+)
+def test_galpha_bears_stiff_forces_under_joints(name, tol, most):
+    deck = next(deck for deck in stiff.DECKS if deck.name == name)
+    found = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), integrator="GALPHA", tol=tol)
+    assert stiff.error(deck, ours.outcome(found, 0.0)) < most
+
+
+def test_what_joints_turn_is_no_news_to_newton():
+    # a body that is turned back into its joint turns its velocity along: were that taken for what
+    # joints ask for, Newton's iteration would undo it and end nowhere
+    deck = next(deck for deck in stiff.DECKS if deck.name == "stiff_governor")
+    found = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), integrator="GALPHA", tol=1e-7)
+    assert found.stats["jacobians"] < 0.3 * found.stats["steps"]
+    assert found.stats["rejected"] < 0.02 * found.stats["steps"]
