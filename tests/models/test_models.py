@@ -48,7 +48,7 @@ def test_every_deck_is_in_the_readme():
     tables = text[text.index("## Decks in `models/`") : text.index("## Joints, motions, forces")]
     rows = [line for line in tables.splitlines() if line.startswith("| `")]
     listed = {name for row in rows for name in re.findall(r"`(\w+\.xml)`", row.split("|")[1])}
-    assert listed == {deck.name for deck in MODELS.glob("*.xml")}
+    assert listed == {deck.name for deck in MODELS.rglob("*.xml")}
 
 
 @BOTH

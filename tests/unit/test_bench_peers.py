@@ -115,6 +115,9 @@ def test_every_setting_stores_the_rows_that_are_asked_for(engine):
 def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
     for name, scene in all_scenes().items():
         cases = [make() for make in peers.load("exudyn")._cases(name).values()]
+        if not cases:
+            assert name.startswith("S11_"), "only the stiff decks are ours alone"
+            continue
         assert any(case.solver.step <= scene.sample for case in cases)
         assert all(case.sample == scene.sample for case in cases)
 
