@@ -13,11 +13,20 @@ from numba import carray, types
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.problem import HOOK, Problem
+from mbsim.dynamics.connection_slopes import add_connection_slopes
 from mbsim.dynamics.doors import open_jets
 from mbsim.dynamics.linearise import add_bends, linearise
 from mbsim.dynamics.newton_matrix import factor, solve
 from mbsim.dynamics.stiffness import add_applied_slopes, fill_state_slopes
-from mbsim.system.arrays import BEND_DOOR, SLOPES_DOOR, TANGENT_DOOR, Scene
+from mbsim.system.arrays import (
+    BALL_FRICTION,
+    BEND_DOOR,
+    BUSHING,
+    SLIDE_FRICTION,
+    SLOPES_DOOR,
+    TANGENT_DOOR,
+    Scene,
+)
 from mbsim.system.depends import find_depends
 from mbsim.system.tangent import Tangent, make_tangent
 
@@ -84,6 +93,17 @@ def _slopes(context, t, y):
     return code
 
 
+def _all_slopes(context, t, y):
+    """The same, of bushings and friction in joints too."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    a = carray(y, (scene.rows.y.shape[1],))
+    code = add_applied_slopes(scene, T, t, a)
+    add_connection_slopes(scene, T, t, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
 def _bend(context, t, y):
     """How the forces of equations turn with the bodies."""
     scene = view(context, Scene)
@@ -98,7 +118,10 @@ def open_slopes(scene: Scene) -> None:
         scene.world.doors[BEND_DOOR] = jit.address(_bend, _VALUES)
     if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
         return
-    scene.world.doors[SLOPES_DOOR] = jit.address(_slopes, _VALUES)
+    kinds = set(scene.applied.kind.tolist())
+    more = kinds & {BUSHING, *range(SLIDE_FRICTION, BALL_FRICTION + 1)}
+    hook = _all_slopes if more else _slopes
+    scene.world.doors[SLOPES_DOOR] = jit.address(hook, _VALUES)
     if len(scene.programs.start) > 1:
         open_jets(scene)
 

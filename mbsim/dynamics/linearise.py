@@ -18,7 +18,7 @@ from __future__ import annotations
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
-from mbsim.dynamics.blocks import COUPLINGS, couple, drop_fill, forget_pattern
+from mbsim.dynamics.blocks import COUPLINGS, STALE, couple, drop_fill, find_order, forget_pattern
 from mbsim.dynamics.equations import active_count, fill_equation, side_place
 from mbsim.dynamics.kinematics import place_body
 from mbsim.dynamics.stiffness import (
@@ -181,12 +181,15 @@ def terms_behind(scene, e, term):
 
 @jitable
 def find_couplings(scene, T):
-    """Couple what acts on each other; return whether there is room."""
+    """Couple what acts on each other and order the bodies; return whether there is room."""
     P = T.pattern
     for attempt in range(2):
         if P.count[COUPLINGS] == 0 or attempt == 1:
             forget_pattern(P)
-        if couple_contacts(scene, P) and couple_applied(scene, P, T) and couple_equations(scene, P):
+        room = (
+            couple_contacts(scene, P) and couple_applied(scene, P, T) and couple_equations(scene, P)
+        )
+        if room and (P.count[STALE] == 0 or find_order(P)):
             return True
         # couplings of the past take the room of these
         drop_fill(P)

@@ -25,10 +25,8 @@ from mbsim.core.rotation import cross, rotate, unrotate, vector
 from mbsim.dynamics.blocks import (
     BLOCKS,
     COUPLINGS,
-    STALE,
     eliminate,
     factor_border,
-    find_order,
     solve_bodies,
     solve_border,
 )
@@ -157,8 +155,6 @@ def fill_matrix(scene, T, M):
 def factor(scene, T, M, h):
     """Factor the matrix for the coefficients in M.c; return 0 or a code."""
     P, L, free = T.pattern, T.linear, scene.tree.free
-    if P.count[STALE] == 1 and not find_order(P):
-        return SINGULAR
     fill_turns(T, M, h)
     fill_matrix(scene, T, M)
     if not eliminate(P, M, L, free):
