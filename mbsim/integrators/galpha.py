@@ -39,6 +39,7 @@ from mbsim.integrators.newton import (
     judge,
     linearise,
     may_help,
+    note,
     target,
 )
 from mbsim.integrators.rotation import turn
@@ -360,6 +361,7 @@ def iterate_damped(p, m, t, h):
         code, size = correction(p, m, t, h, m.k[D])
         if code != 0.0:
             return code
+        note(m, size)
         part = allowed(p, m, t, h, m.k[D])
         if size <= target(m.memory[TOL]) and part == 1.0:
             take(m, h, 1.0, m.k[D])

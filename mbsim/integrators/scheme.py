@@ -43,9 +43,10 @@ LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(
 # of implicit methods: whether the problem keeps a linearisation, and where it was taken;
 # the step that it was factored for; the rate at which Newton's iteration converged last, and
 # what is left after its first step; nothing is known of a step before; part of a step to try
-# after Newton's iteration failed
+# after Newton's iteration failed; the last correction's size, and that of the one before
 HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14, 21)
-MEMORY = 21
+CORRECTION, CORRECTION_BEFORE = range(21, 23)
+MEMORY = 23
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 JACOBIANS, FACTORIZATIONS = range(8, 10)
