@@ -30,20 +30,45 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
         problem.BY_NOT_FINITE: "a force or acceleration is not finite",
         problem.BY_NEWTON: "Newton's iteration does not converge",
     }[int(counts[scheme.LAST_REASON])]
+    unsolved = counts[scheme.LAST_REASON] == problem.BY_NEWTON
+    if unsolved:
+        reason += _corrections(memory[scheme.CORRECTION_BEFORE], memory[scheme.CORRECTION])
     body, contact = int(trouble[0]), int(trouble[1])
     where = []
-    if counts[scheme.LAST_REASON] == problem.BY_ERROR and 0 <= body < len(system.body_ids):
+    by_body = unsolved or counts[scheme.LAST_REASON] == problem.BY_ERROR
+    if by_body and 0 <= body < len(system.body_ids):
         where.append(system.body_name(body))
     where.extend(_out_of_reach(system, settings))
     if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
         where.extend(_not_finite(system)[:1])
     if 0 <= contact < len(system.contact_ids):
         where.append(f"Force_Contact[{system.contact_ids[contact]}]")
+    elif unsolved:
+        where.extend(_held_by(system, body))
     raise SolverError(
         f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
         f"because {reason}; at {', '.join(where) or 'no single element'}. "
         "Results up to there are kept."
     )
+
+
+def _corrections(before: float, last: float) -> str:
+    """Return what is said of the last two corrections [parts of the scale that tol is of]."""
+    if last == 0.0:
+        return " (no correction was found: its linear equations are singular)"
+    return f" (its last corrections were {before:.3g} and {last:.3g}, over the scale of tol)"
+
+
+def _held_by(system: System, body: int) -> list[str]:
+    """Return the joints and motions that hold a body."""
+    scene = system.scene
+    markers, ends = scene.markers.body, scene.connections
+    found = []
+    for row in range(len(system.connections)):
+        ends_of = [int(m) for m in (ends.i[row], ends.j[row]) if m >= 0]
+        if body in markers[ends_of]:
+            found.append(system.connection_name(row))
+    return found
 
 
 def _out_of_reach(system: System, settings: Settings) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import FIRST_PATIENCE
 
@@ -13,6 +14,11 @@ if TYPE_CHECKING:
 
 #: Bodies of the largest model for which AUTO looks whether it is stiff.
 MOST_BODIES = 300
+
+
+def holds_displacements(system: System) -> bool:
+    """Return whether all motions give displacements, as implicit methods need it."""
+    return bool((system.scene.equations.level == 2).all())
 
 
 class Methods:
@@ -37,7 +43,13 @@ class Methods:
         self.problem, self._table = mechanism(system.scene, fixed)
         self._tangent: Any = None
         self.steps: scheme.Steps
-        if changing and bodies <= MOST_BODIES:
+        free = holds_displacements(system)
+        if self.explicit.implicit and not free:
+            raise ModelError(
+                f"{system.model.file}: integrator={name}: the model has a motion that gives velocities "
+                "or accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
+            )
+        if changing and free and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
             self.arrays.memory[scheme.BEGUN] = start

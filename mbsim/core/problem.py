@@ -11,7 +11,9 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | rhs    | y, f (out)                  | code; f = f(t, y), h after the last committed point   |
 | project| y (in and out), -           | code; y back onto its manifold                        |
 | norm   | local error, y              | largest error over its scale, dimensionless; h = 0:   |
-|        |                             | of a difference of two states that is no step's error |
+|        |                             | of a difference of two states that is no step's error,|
+|        |                             | with what it changes of friction over normal forces;  |
+|        |                             | h = FRICTION_ALONE: only that                         |
 | check  | y new, -                    | 1, or the part of the step to take instead            |
 | commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
 |        |                             | rows are full; 4 `stable` must be asked again         |
@@ -94,6 +96,9 @@ class Problem(NamedTuple):
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
+
+#: What `norm` is given for h where only friction counts.
+FRICTION_ALONE = -1.0
 
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3

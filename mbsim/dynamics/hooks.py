@@ -9,12 +9,12 @@ from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
-from mbsim.core.problem import BY_CHECK, HOOK, Problem
+from mbsim.core.problem import BY_CHECK, FRICTION_ALONE, HOOK, Problem
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
-from mbsim.dynamics.output import blame, no_room, scaled_error, write_row
+from mbsim.dynamics.output import blame, friction_left, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import (
     BODY_SIZE,
@@ -56,6 +56,8 @@ def _norm(context, t, h, a, b):
     """The scaled local error."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
+    if h == FRICTION_ALONE:
+        return friction_left(scene, carray(a, (n,)), carray(b, (n,)))
     return scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
 
 

@@ -20,9 +20,6 @@ from mbsim.system.arrays import (
     VALUES_DOOR,
 )
 
-#: What Newton's iteration leaves of friction, over the normal force, counts by this part.
-FRICTION_PART = 1.0
-
 
 @jitable
 def fill_energy(scene, y, row):
@@ -189,7 +186,8 @@ def scaled_error(scene, h, e, y):
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
     Detection that is exact only to a given noise makes forces uncertain; what the noise of a
-    step can do to a velocity is not chased. With h = 0, `e` is no step's error. The worst body
+    step can do to a velocity is not chased. With h = 0, `e` is no step's error, and what it does
+    to friction, over the normal force, counts as well. The worst body
     is left in `trouble[0]`.
     """
     length, speed = scene.world.scale[0], scene.world.scale[1]
@@ -229,7 +227,7 @@ def scaled_error(scene, h, e, y):
         # what was not integrated but put right, as after a motion that jumps
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     else:
-        largest = max(largest, (FRICTION_PART * friction_left(scene, e, y)) ** 2)
+        largest = max(largest, friction_left(scene, e, y) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

@@ -28,6 +28,7 @@ import numpy as np
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import FRICTION_ALONE
 from mbsim.integrators.newton import (
     GO_ON,
     HOPELESS,
@@ -38,6 +39,7 @@ from mbsim.integrators.newton import (
     judge,
     linearise,
     may_help,
+    note,
     target,
 )
 from mbsim.integrators.rotation import turn
@@ -67,6 +69,10 @@ CURVE = 0.5 * (1.0 - AF) - (1.0 - AM) * (0.5 + SHIFT)
 #: Errors of a step in x over h^3 v'', and in v over h^3 v'''.
 ERROR_X = BETA + 0.5 * SHIFT - 1.0 / 6.0
 ERROR_V = CURVE + GAMMA * (0.5 + SHIFT) - 1.0 / 6.0
+
+#: A step's error may change friction by this part of the normal force. What is fast fades slowly,
+#: so friction that saturates on the wrong side would chatter.
+ROUGH = 1e-3
 
 #: Corrections in one step at most: with an old linearisation, which another may better, with one
 #: of this step, and with a linearisation and a line search for each.
@@ -355,6 +361,7 @@ def iterate_damped(p, m, t, h):
         code, size = correction(p, m, t, h, m.k[D])
         if code != 0.0:
             return code
+        note(m, size)
         part = allowed(p, m, t, h, m.k[D])
         if size <= target(m.memory[TOL]) and part == 1.0:
             take(m, h, 1.0, m.k[D])
@@ -411,7 +418,8 @@ def estimate_error(p, m, t, h):
         e[at + 4] = qw * a + qy * c - qz * b
         e[at + 5] = qw * b + qz * a - qx * c
         e[at + 6] = qw * c + qx * b - qy * a
-    return call_float(p.norm, (p.context, t, h, e, w)) / m.memory[TOL]
+    error = call_float(p.norm, (p.context, t, h, e, w)) / m.memory[TOL]
+    return max(error, call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH)
 
 
 @jitable

@@ -11,6 +11,8 @@ from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE, NOT_CONVERGED
 from mbsim.integrators.scheme import (
+    CORRECTION,
+    CORRECTION_BEFORE,
     EVALUATIONS,
     FACTORED_STEP,
     FRESH,
@@ -55,9 +57,18 @@ def linearise(p, m, t, h, y, f):
 
 
 @jitable
+def note(m, size):
+    """Note the size of a correction, for what is said of an iteration that does not end."""
+    m.memory[CORRECTION_BEFORE] = m.memory[CORRECTION]
+    m.memory[CORRECTION] = size
+
+
+@jitable
 def begin(m):
     """Be as hopeful about the first correction as the step before allows."""
     m.memory[RETRY] = HALF
+    m.memory[CORRECTION] = 0.0
+    note(m, 0.0)
     hope = max(m.memory[REST], LEAST_REST**1.25) ** 0.8
     m.memory[REST] = 1.0 if m.memory[FRESH] == 1.0 else hope
 
@@ -72,6 +83,7 @@ def judge(m, iteration, most, size, before, rate_before):
     step's error, is rounding.
     """
     goal = target(m.memory[TOL])
+    note(m, size)
     if not size < math.inf:
         m.memory[RETRY] = QUARTER
         return HOPELESS, 1.0

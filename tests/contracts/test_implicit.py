@@ -18,6 +18,7 @@ from mbsim.core.problem import (
     BY_NEWTON,
     DONE,
     FAILED,
+    FRICTION_ALONE,
     HOOK,
     PAUSED,
     SINGULAR,
@@ -151,7 +152,7 @@ def _norm(context, t, h, a, b):
     box = view(context, Box)
     n = len(box.scale)
     e, y, worst = carray(a, (n,)), carray(b, (n,)), 0.0
-    if h > 0.0 and box.numbers[2] == 1:
+    if h == FRICTION_ALONE or (h > 0.0 and box.numbers[2] == 1):
         return 0.0
     for i in range(n):
         part = abs(e[i]) / max(abs(y[i]), box.scale[i])

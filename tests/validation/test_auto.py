@@ -14,7 +14,7 @@ from decks_io import MODELS
 
 import mbsim
 from mbsim import simulation
-from mbsim.errors import Interrupted
+from mbsim.errors import Interrupted, ModelError
 
 STIFF = MODELS / "stiff"
 
@@ -79,3 +79,26 @@ def test_motionsolve_names_run_their_kind(tmp_path):
     assert explicit.attributes["integrator"] == "DOPRI5"
     assert stiff.attributes["integrator"] == "RADAU5"
     assert stiff.stats["jacobians"] > 0
+
+
+RAIL = """<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Reference_Marker id="20" body_id="2"/>
+<Constraint_Joint id="7" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>
+<Motion_Joint id="1" joint_id="7" motion_type="T" val_type="A" type="Expression"
+ expr="10*SIN(10*TIME)"/>"""
+
+
+@pytest.mark.parametrize("method", ["GALPHA", "RADAU5"])
+def test_a_motion_of_accelerations_is_left_to_explicit_methods(tmp_path, method):
+    path = tmp_path / "rail.xml"
+    commands = '<Simulate analysis_type="Transient" end_time="1" print_interval="0.5"/>'
+    path.write_text(
+        f"<MotionSolve><Model>{RAIL}</Model><Command>{commands}</Command></MotionSolve>"
+    )
+    model = mbsim.read_model(path)
+    with pytest.raises(ModelError, match="velocities or accelerations"):
+        mbsim.simulate(model, integrator=method)
+    # z'' = 10 sin 10t from rest: z = t - sin(10t)/10
+    auto = mbsim.simulate(model)
+    assert auto["bodies/2/position"][-1, 2] == pytest.approx(1 - np.sin(10) / 10, abs=1e-5)

@@ -15,6 +15,7 @@ from decks_io import MODELS
 
 import mbsim
 from mbsim.bench import ours, stiff
+from mbsim.errors import SolverError
 
 #: Deck, end, steps, and tol with the first of them: only Newton's iteration and no step knows it.
 FIXED = {
@@ -72,3 +73,43 @@ def test_what_joints_turn_is_no_news_to_newton():
     found = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), integrator="GALPHA", tol=1e-7)
     assert found.stats["jacobians"] < 0.3 * found.stats["steps"]
     assert found.stats["rejected"] < 0.02 * found.stats["steps"]
+
+
+@pytest.mark.parametrize("name", ["incline_creep", "box_stack", "jammed_wedge"])
+@pytest.mark.parametrize(("method", "most"), [("RADAU5", 1e-3), ("GALPHA", 3e-2)])
+def test_steep_friction_does_not_chatter_at_a_loose_tolerance(name, method, most):
+    # corrections below the tolerance of velocities are above the slip at which friction turns over
+    deck = next(deck for deck in stiff.DECKS if deck.name == name)
+    found = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), integrator=method, tol=1e-3)
+    assert stiff.error(deck, ours.outcome(found, 0.0)) < most
+    assert found.stats["rhs_evaluations"] < 3000
+    assert found.stats["rejected"] < 60
+
+
+#: A rail, and a force against the motion so large that no step on the clock is short enough.
+UNSOLVABLE = """<MotionSolve><Model>
+  <Body_Rigid id="1" label="ground" isground="TRUE"/>
+  <Reference_Marker id="10" body_id="1"/>
+  <Reference_Marker id="11" body_id="1"/>
+  <Body_Rigid id="2" label="slider" cg_id="20" mass="1"
+    inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+  <Reference_Marker id="20" body_id="2"/>
+  <Constraint_Joint id="7" label="rail" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>
+  <Force_Vector_TwoBody id="6" type="ForceOnly" i_marker_id="20" j_floating_marker_id="11"
+    ref_marker_id="10" fx_expression="0" fy_expression="0"
+    fz_expression="1-1E12*SIGN(1,VZ(20))"/>
+</Model><Command>
+  <Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/>
+</Command></MotionSolve>"""
+
+
+def test_a_run_that_newton_ends_says_how_far_it_came_and_where(tmp_path):
+    deck = tmp_path / "rail.xml"
+    deck.write_text(UNSOLVABLE, encoding="utf-8")
+    said = (
+        r"the step fell to \S+ at time 0 because Newton's iteration does not converge "
+        r"\(its last corrections were \S+ and \S+, over the scale of tol\); "
+        r"at Body_Rigid\[2\], Constraint_Joint\[7\]\. Results up to there are kept"
+    )
+    with pytest.raises(SolverError, match=said):
+        mbsim.simulate(mbsim.read_model(deck), integrator="RADAU5")
