@@ -46,8 +46,8 @@ class Methods:
         free = holds_displacements(system)
         if self.explicit.implicit and not free:
             raise ModelError(
-                f"{system.model.file}: integrator={name}: the model has a motion that gives velocities "
-                "or accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
+                f"{system.model.file}: integrator={name}: the model has a motion of velocities or "
+                "accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
             )
         if changing and free and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
