@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import FIRST_PATIENCE
+from mbsim.system.tangent import MOST_BODIES as MOST_LINEARISED
 
 if TYPE_CHECKING:
     from mbsim.core.problem import Problem
@@ -48,6 +49,11 @@ class Methods:
             raise ModelError(
                 f"{system.model.file}: integrator={name}: the model has a motion of velocities or "
                 "accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
+            )
+        if self.explicit.implicit and bodies > MOST_LINEARISED:
+            raise ModelError(
+                f"{system.model.file}: integrator={name}: {bodies} bodies are more than the "
+                f"{MOST_LINEARISED} that implicit methods take; take VERLET or DOPRI5"
             )
         if changing and free and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
