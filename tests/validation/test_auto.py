@@ -102,3 +102,11 @@ def test_a_motion_of_accelerations_is_left_to_explicit_methods(tmp_path, method)
     # z'' = 10 sin 10t from rest: z = t - sin(10t)/10
     auto = mbsim.simulate(model)
     assert auto["bodies/2/position"][-1, 2] == pytest.approx(1 - np.sin(10) / 10, abs=1e-5)
+
+
+def test_too_many_bodies_are_said(monkeypatch):
+    from mbsim import methods
+
+    monkeypatch.setattr(methods, "MOST_LINEARISED", 0)
+    with pytest.raises(ModelError, match="1 bodies are more than the 0"):
+        mbsim.simulate(mbsim.read_model(MODELS / "free_top.xml"), integrator="RADAU5")
