@@ -53,9 +53,6 @@ da being the linearised acceleration under joints and equations. `form` says wha
 | factor_pair| re c1, im c1, re c2, .. im c3, form; -  | 0 or SINGULAR; does not disturb the   |
 |            |                                         | factors of `factor`                   |
 | solve_pair | r, d (out), real parts, then imaginary  | code; by the last `factor_pair`       |
-| step_fraction | y, d                                 | largest part (0..1) of a correction d |
-|            |                                         | of y that lets no friction jump over  |
-|            |                                         | zero slip (may be left out)           |
 """
 
 from __future__ import annotations
@@ -86,12 +83,11 @@ class Problem(NamedTuple):
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
     kinks: int = 0  # only for problems whose forces change their branch
-    linearise: int = 0  # this and the next four only for implicit methods
+    linearise: int = 0  # this and the rest only for implicit methods
     factor: int = 0
     solve: int = 0
     factor_pair: int = 0
     solve_pair: int = 0
-    step_fraction: int = 0  # optional
 
 
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.

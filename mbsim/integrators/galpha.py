@@ -31,7 +31,6 @@ from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import FRICTION_ALONE
 from mbsim.integrators.newton import (
     GO_ON,
-    HOPELESS,
     QUARTER,
     SOLVED,
     as_failure,
@@ -273,14 +272,6 @@ def correction(p, m, t, h, d):
 
 
 @jitable
-def allowed(p, m, t, h, d):
-    """Return the part of a correction that friction allows."""
-    if p.step_fraction == 0:
-        return 1.0
-    return call_float(p.step_fraction, (p.context, t + h, h, m.trial, d))
-
-
-@jitable
 def take(m, h, part, d):
     """Add a part of the correction d of y to a.
 
@@ -315,25 +306,22 @@ def iterate(p, m, t, h, anew):
         code, size = correction(p, m, t, h, m.k[D])
         if code != 0.0:
             return code
-        part = allowed(p, m, t, h, m.k[D])
-        take(m, h, part, m.k[D])
-        if part == 1.0:
-            word, rate = judge(m, iteration, most, size, before, rate)
-        elif iteration == most:
-            word = HOPELESS
+        take(m, h, 1.0, m.k[D])
+        word, rate = judge(m, iteration, most, size, before, rate)
         before = size
     m.memory[RATE] = rate
     return 0.0 if word == SOLVED else -1.0
 
 
 @jitable
-def search(p, m, t, h, size, part):
+def search(p, m, t, h, size):
     """Take the largest part of a correction after which the next is smaller; return a code.
 
     That is Deuflhard's natural test: it does not depend on the scales of the equations.
     """
     for i in range(len(m.y)):
         m.k[A_BEFORE, i] = m.k[A1, i]
+    part = 1.0
     while part >= LEAST_PART:
         for i in range(len(m.y)):
             m.k[A1, i] = m.k[A_BEFORE, i]
@@ -362,12 +350,11 @@ def iterate_damped(p, m, t, h):
         if code != 0.0:
             return code
         note(m, size)
-        part = allowed(p, m, t, h, m.k[D])
-        if size <= target(m.memory[TOL]) and part == 1.0:
+        if size <= target(m.memory[TOL]):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0.0
-        code = search(p, m, t, h, size, part)
+        code = search(p, m, t, h, size)
         if code != 0.0:
             return code
     return -1.0

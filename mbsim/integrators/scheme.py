@@ -92,7 +92,7 @@ class Method(NamedTuple):
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (21,) the fields of `Problem`
+    problem: I1  # (20,) the fields of `Problem`
     method: Method
 
 
@@ -164,7 +164,7 @@ def on_bench(context):
     w = bench.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
-    problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19], w[20])
+    problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19])
     return problem, bench.method
 
 

@@ -318,16 +318,6 @@ def _far(context, t, h, a, b):
     return 1e300
 
 
-def _half_of_large(context, t, h, a, b):
-    # as friction that may not jump over zero slip asks for
-    d = carray(b, (len(view(context, Box).scale),))
-    return 0.5 if abs(d[0]) > 1e-7 else 1.0
-
-
-def _half(context, t, h, a, b):
-    return 0.5
-
-
 HOOKS = (_rhs, _zero, _norm, _one, _zero, _zero, _none, _far, _keep, _zero)
 BOTH = pytest.mark.parametrize("name", ["RADAU5", "GALPHA"])
 LINEAR = ("linearise", "factor", "solve", "factor_pair", "solve_pair")
@@ -346,7 +336,6 @@ class Run:
         fixed=False,
         rows=0,
         name="RADAU5",
-        fraction=None,
     ):
         n, bodies = len(y0), int(kind >= BODY)
         freedoms = n - 7 * bodies
@@ -369,8 +358,6 @@ class Run:
         problem = Problem(int(self._table.ctypes.data), *plain)
         hooks = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
         linear = dict(zip(LINEAR, (jit.address(f, HOOK) for f in hooks), strict=True))
-        if fraction is not None:
-            linear["step_fraction"] = jit.address(fraction, HOOK)
         self.problem = problem._replace(**linear)
         method = catalog.load(name)
         self.state = scheme.make(method, np.array(y0), 0.0, bodies)
@@ -769,19 +756,6 @@ def test_a_bounce_on_a_stiff_floor(name):
     assert found[1e-9][9] > 0.1
     np.testing.assert_allclose(found[1e-4], found[1e-9], rtol=0, atol=5e-3)
     np.testing.assert_allclose(found[1e-6], found[1e-9], rtol=0, atol=2e-4)
-
-
-def test_corrections_may_be_shortened():
-    y0 = body(x=(1.0, 0.5, 0.0), z=(0.3,))
-    whole = Run(BODY, y0, given=1e4, name="GALPHA")
-    shortened = Run(BODY, y0, given=1e4, name="GALPHA", fraction=_half_of_large)
-    assert whole(2.0, 1e-4) == shortened(2.0, 1e-4) == DONE
-    np.testing.assert_allclose(shortened.state.y, whole.state.y, rtol=0, atol=2e-2)
-    assert shortened.count(scheme.EVALUATIONS) > whole.count(scheme.EVALUATIONS)
-    # a correction that may never be taken in full is no solution
-    never = Run(BODY, y0, given=1e4, name="GALPHA", fraction=_half)
-    assert never(2.0, 1e-4) == STEP_TOO_SMALL
-    assert never.count(scheme.LAST_REASON) == BY_NEWTON
 
 
 def test_restart_after_a_change_begins_the_acceleration_anew():
