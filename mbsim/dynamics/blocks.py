@@ -154,7 +154,7 @@ def factor_small(a, swap, size):
 
 @jitable
 def solve_small(a, swap, size, x):
-    """Replace the vector x by a^-1 x."""
+    """Replace the vector x by a^-1 x; what has no pivot is 0."""
     for k in range(size):
         if swap[k] != k:
             x[k], x[swap[k]] = x[swap[k]], x[k]
@@ -162,6 +162,9 @@ def solve_small(a, swap, size, x):
         for j in range(k):
             x[k] -= a[k, j] * x[j]
     for k in range(size - 1, -1, -1):
+        if a[k, k] == 0.0:
+            x[k] = 0.0
+            continue
         for j in range(k + 1, size):
             x[k] -= a[k, j] * x[j]
         x[k] /= a[k, k]
@@ -378,21 +381,3 @@ def factor_border(a, swap, size):
             part = a[i, k]
             for j in range(k + 1, size):
                 a[i, j] -= part * a[k, j]
-
-
-@jitable
-def solve_border(a, swap, size, x):
-    """Replace x by a^-1 x; what has no pivot is 0."""
-    for k in range(size):
-        if swap[k] != k:
-            x[k], x[swap[k]] = x[swap[k]], x[k]
-    for k in range(size):
-        for j in range(k):
-            x[k] -= a[k, j] * x[j]
-    for k in range(size - 1, -1, -1):
-        if a[k, k] == 0.0:
-            x[k] = 0.0
-            continue
-        for j in range(k + 1, size):
-            x[k] -= a[k, j] * x[j]
-        x[k] /= a[k, k]

@@ -28,7 +28,7 @@ from mbsim.dynamics.blocks import (
     eliminate,
     factor_border,
     solve_bodies,
-    solve_border,
+    solve_small,
 )
 from mbsim.dynamics.equations import active_count
 from mbsim.system.arrays import BODY_SIZE
@@ -294,7 +294,7 @@ def solve_border_part(scene, T, M, r):
         for b in range(len(P.order)):
             for i in range(M.rate.shape[1]):
                 x[k] += L.row_rate[row, b, i] * M.rate[b, i]
-    solve_border(M.border, M.border_swap, size, x)
+    solve_small(M.border, M.border_swap, size, x)
     for k in range(size):
         for b in range(len(P.order)):
             for i in range(M.g.shape[1]):
