@@ -374,9 +374,10 @@ def accept(p, m, steps, t, h, asked):
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
-    for j in range(len(m.kept)):
-        for i in range(len(m.y)):
-            m.kept[j, i] = m.ahead[j, i]
+    if steps.implicit:
+        for j in range(len(m.kept)):
+            for i in range(len(m.y)):
+                m.kept[j, i] = m.ahead[j, i]
     m.memory[FRESH] = 0.0
     if word >= 4.0:
         word -= 4.0
