@@ -84,6 +84,7 @@ class Methods:
         """Let AUTO's other method go on from the committed point; return what is to be said."""
         memory = self.arrays.memory
         stiff = not self.is_stiff
+        bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0
         memory[scheme.HAVE_JACOBIAN] = 0.0
@@ -99,9 +100,8 @@ class Methods:
         self.bind()
         now, h = memory[scheme.TIME], memory[scheme.STEP]
         if stiff:
-            largest = memory[scheme.STIFFNESS]
-            why = f"the step of {h:.3g} is {largest:.2g} of the fastest rate, or steps are too many"
-            return f"time {now:.9g}: {why}: {catalog.IMPLICIT} from here on"
+            why = "stability bounds the step of" if bound else "too many steps are ahead, of"
+            return f"time {now:.9g}: {why} {h:.3g}: {catalog.IMPLICIT} from here on"
         return f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
 
     def retreat(self) -> bool:

@@ -97,9 +97,9 @@ def attempt(p, m, t, h):
 
 @jitable
 def stiffness(m, h):
-    """Return the step times the rate of f between the last two stages, of bodies and states.
+    """Return the step times the rate of f between the last two stages.
 
-    Bodies alone, where there are some: what is summed up beside them has other units.
+    Of bodies alone, where there are some: what is summed up beside them has other units.
     """
     k = m.k
     n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(m.y)
