@@ -23,6 +23,7 @@ from models.reference import (
     geneva_wheel,
     hopping_follower,
     loose_slider,
+    roller_follower,
 )
 
 import mbsim
@@ -48,6 +49,18 @@ def cam(results):
     found = results["contacts/301/force/z"]
     depth = far(results["bodies/3/position/z"] - 0.025, lift) / np.abs(top - lift).max()
     return {"force": far(found, force) / force.max(), "depth": depth}
+
+
+def cam_roller(results):
+    t, law, rub = results["time"], (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    sizes = (20 * np.pi, 0.01, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23))
+    height, spin, forces = roller_follower(t, *sizes, law, rub, 0.0299757)
+    found = results["contacts/301/force/z"]
+    return {
+        "height": far(results["bodies/4/position/z"], height),
+        "spin": far(results["bodies/4/angular_velocity/y"], spin) / np.abs(spin).max(),
+        "force": far(found, forces[:, 2]) / forces[:, 0].max(),
+    }
 
 
 def cam_hops(results):
@@ -111,6 +124,7 @@ def clearance(results):
 
 CASES = [
     ("cam.xml", cam, {}),
+    ("cam_roller.xml", cam_roller, {}),
     ("cam.xml", cam_hops, {"overrides": ["Motion_Joint[1].expr=204.3*TIME"], "end_time": 0.15}),
     ("flyball_governor.xml", governor, {}),
     ("four_bar_stop.xml", four_bar_stop, {}),
