@@ -29,11 +29,14 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.laws.abi import FRICTION_INPUTS, MEMORY_OUT
 from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, NORMAL_CALLS, PYTHON_CALLS
 
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
+# of friction with memory: dF/d(depth) of the normal force, energy stored, mode
+STIFFNESS, HELD, MODE = 12, 13, 14
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -122,6 +125,45 @@ def add_wrench(scene, y, b, p, force, torque):
 
 
 @jitable
+def slipping_mass(scene, s):
+    """Return the mass of both bodies of slot s as one slips on the other."""
+    inverse = 0.0
+    for g in sides(scene, s):
+        b = scene.graphics.body[g]
+        if b < len(scene.bodies.mass):
+            inverse += 1.0 / scene.bodies.mass[b]
+    return 1.0 / inverse if inverse > 0.0 else 0.0
+
+
+@jitable
+def remember(scene, y, s, c, given):
+    """Give a friction law what it kept, and what only laws with memory look at."""
+    state, at, z = scene.state, FRICTION_INPUTS, scene.slots.z[s]
+    given[20] = 1.0 if scene.world.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+    given[21] = scene.work.slot[s, STIFFNESS]
+    given[22] = slipping_mass(scene, s)
+    for k in range(scene.contacts.memory[c]):
+        if z >= 0:
+            given[at + k] = y[z + k]
+        elif scene.world.past[0] == 1:
+            given[at + k] = state.before[s, k]
+        else:
+            given[at + k] = state.memory[s, k]
+
+
+@jitable
+def keep(scene, dy, s, c, out):
+    """Keep what a friction law with memory made of it."""
+    row, z = scene.work.slot[s], scene.slots.z[s]
+    row[HELD], row[MODE] = out[5], out[6]
+    for k in range(scene.contacts.memory[c]):
+        if z >= 0:
+            dy[z + k] = out[MEMORY_OUT + k]
+        else:
+            scene.work.memory[s, k] = out[MEMORY_OUT + k]
+
+
+@jitable
 def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     """Call the friction law of contact c for slot s into `law_out`; return its code."""
     contacts, work = scene.contacts, scene.work
@@ -138,6 +180,8 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     given[10] = normal
     given[11] = 0.0
     given[12] = 0.0
+    if contacts.memory[c] > 0:
+        remember(scene, y, s, c, given)
     scene.log.counters[FRICTION_CALLS] += 1
     scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
     if contacts.interpreted[c] == 1:
@@ -204,6 +248,10 @@ def add_contact(scene, t, h, y, dy, s):
     share = point[7]
     normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
+    row = work.slot[s]
+    # of a power law F = k d^e, whose energy is F d / (e + 1)
+    row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
+    row[HELD] = row[MODE] = 0.0
 
     force = scale(normal, n)
     torque = (0.0, 0.0, 0.0)
@@ -221,6 +269,8 @@ def add_contact(scene, t, h, y, dy, s):
             return USER_NOT_FINITE
         if scene.world.fixed_step[0] == 1 and h > 0.0:
             hold_back(scene, y, bi, bj, p, n, h, slip, out)
+        if contacts.memory[c] > 0:
+            keep(scene, dy, s, c, out)
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
         torque = add(scale(mx, tx), add(scale(my, ty), scale(tz, n)))
@@ -241,7 +291,6 @@ def add_contact(scene, t, h, y, dy, s):
     dy[len(dy) - len(contacts.id) + c] += lost
 
     # what recorder, log and commit want to know
-    row = work.slot[s]
     row[DEPTH], row[RATE], row[NORMAL] = depth, rate, normal
     row[SLIP] = math.hypot(slip[0], slip[1])
     for k in range(3):

@@ -289,7 +289,14 @@ def put_aside(scene, k, s, row):
             else:
                 group[s, j] = row[at]
             at += 1
-    for values in (state.depth, state.rate, state.normal):
+    for group in (state.memory, state.before):
+        for j in range(group.shape[1]):
+            if k == 0:
+                row[at] = group[s, j]
+            else:
+                group[s, j] = row[at]
+            at += 1
+    for values in (state.depth, state.rate, state.normal, state.mode):
         if k == 0:
             row[at] = values[s]
         else:
@@ -314,11 +321,12 @@ def close_ranks(scene):
     """Move the crowds' pairs to places in the order of the list, with their slots that touch.
 
     An evaluation then walks through memory from front to back; pairs that come and go would
-    scatter them. Where a law carries X its places in y stay, so nothing is moved.
+    scatter them. Where a law carries X or integrates memory its places in y stay, so nothing is
+    moved.
     """
     pairs, crowds, state, work = scene.pairs, scene.crowds, scene.state, scene.work
     fixed, live, last = pairs.count[FIXED], pairs.count[LIVE], len(state.hit) - 1
-    if scene.slots.x[pairs.slot[fixed]] >= 0:
+    if scene.slots.x[pairs.slot[fixed]] >= 0 or scene.slots.z[pairs.slot[fixed]] >= 0:
         return
     for k in range(fixed, live):
         pair, row = pairs.live[k], crowds.moved[k]

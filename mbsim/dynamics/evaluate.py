@@ -101,3 +101,12 @@ def evaluate(scene, t, h, y, dy):
     if scene.world.doors[JOINTS_DOOR] != 0:
         return call_int(scene.world.doors[JOINTS_DOOR], (scene, ACCELERATE, t, y, dy))
     return 0
+
+
+@jitable
+def evaluate_past(scene, t, h, y, dy):
+    """Do the same at a point within the last step, where friction knows what it did before it."""
+    scene.world.past[0] = 1
+    code = evaluate(scene, t, h, y, dy)
+    scene.world.past[0] = 0
+    return code

@@ -11,13 +11,14 @@ from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.problem import BY_CHECK, FRICTION_ALONE, HOOK, Problem
 from mbsim.dynamics.crowd import follow
-from mbsim.dynamics.evaluate import evaluate
+from mbsim.dynamics.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, friction_left, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import (
     BODY_SIZE,
+    EVALUATE_DOOR,
     JOINTS_DOOR,
     KEEP,
     LISTINGS,
@@ -88,7 +89,7 @@ def _look(context, t, h, a, b):
     """Peaks at an inner point of a step."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    code = evaluate_past(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     if code == 0:
         watch_peaks(scene, t)
     return float(code)
@@ -111,7 +112,7 @@ def _output(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     f = carray(b, (n,))
-    code = evaluate(scene, t, h, carray(a, (n,)), f)
+    code = evaluate_past(scene, t, h, carray(a, (n,)), f)
     if code != 0:
         return -float(code)
     full = write_row(scene, t, carray(a, (n,)), f)
@@ -189,5 +190,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     if len(scene.kinks.program) > 0 and not fixed_step:
         from mbsim.dynamics.kinks import kinks_hook
 
+        scene.world.doors[EVALUATE_DOOR] = problem.rhs
         problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
     return problem, table

@@ -14,6 +14,7 @@ from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import (
     DEPTH,
     FORCE,
+    MODE,
     NORMAL,
     RATE,
     SLIP,
@@ -25,6 +26,7 @@ from mbsim.dynamics.contact import (
 from mbsim.dynamics.detection import measure_pair
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import axis
+from mbsim.laws import catalog
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPROACH,
@@ -39,9 +41,11 @@ from mbsim.system.arrays import (
     PEAK_FORCE_TIME,
     PEAK_SLIP,
     REBOUND,
+    STICK,
     TOUCH,
     TOUCHES,
 )
+from mbsim.system.arrays import SLIP as SLIP_EVENT
 
 
 @jitable
@@ -279,6 +283,21 @@ def another_point(scene, y, h, s):
 
 
 @jitable
+def commit_memory(scene, t, s, fresh):
+    """Keep what friction in slot s makes of the step, anew if `fresh`; return 1 if f changed."""
+    state, work = scene.state, scene.work
+    for k in range(state.memory.shape[1]):
+        state.before[s, k] = state.memory[s, k]
+        state.memory[s, k] = 0.0 if fresh else work.memory[s, k]
+    mode = 0.0 if fresh else work.slot[s, MODE]
+    if mode != state.mode[s] and mode > 0.0 and state.mode[s] > 0.0:
+        record_event(scene, t, STICK if mode == catalog.STICK else SLIP_EVENT, s)
+    changed = 1 if mode != state.mode[s] else 0
+    state.mode[s] = mode
+    return changed
+
+
+@jitable
 def commit_slot(scene, t, h, y, s):
     """Write the incident of slot s for the accepted point; return 1 if y changed under contact."""
     state, work = scene.state, scene.work
@@ -293,14 +312,20 @@ def commit_slot(scene, t, h, y, s):
         log_touch(scene, t, h, y, s)
     elif now == 0 and before == 1:
         log_leave(scene, t, h, y, s)
-    # X of an incident that ended, or that is another than before, begins again at 0; at
-    # touch X has gathered since the touch within the step and stays
-    at = scene.slots.x[s]
-    if at >= 0 and fresh and not (now == 1 and before == 0):
+    # X and memory of an incident that ended, or that is another than before, begin again at 0;
+    # at touch they have gathered since the touch within the step and stay
+    x, z, begins = scene.slots.x[s], scene.slots.z[s], now == 1 and before == 0
+    if fresh and not begins and (x >= 0 or z >= 0):
         for k in range(3):
-            y[at + k] = 0.0
+            if x >= 0:
+                y[x + k] = 0.0
+        for k in range(scene.contacts.memory[contact_of(scene, s)]):
+            if z >= 0:
+                y[z + k] = 0.0
     else:
         changed = 0
+    if scene.contacts.memory[contact_of(scene, s)] > 0:
+        changed = max(changed, commit_memory(scene, t, s, fresh and not begins))
     state.touching[s] = now
     if now == 1:
         state.depth[s] = work.slot[s, DEPTH]

@@ -1,6 +1,7 @@
 """Where the step under trial leaves the branch that a force was on: see `system.kinks`.
 
-What an expression or a limit is on is a number, its side. The driver ends a step where a side
+What an expression or a limit is on is a number, its side; so is what all incidents do whose
+friction has modes. The driver ends a step where a side
 becomes another than it was at the committed state.
 """
 
@@ -8,13 +9,14 @@ from __future__ import annotations
 
 from numba import carray
 
-from mbsim.core.address import view
+from mbsim.core.address import call_float, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
+from mbsim.dynamics.contact import MODE
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import HEAT, SIDE, SLIDE_LIMIT, Scene
+from mbsim.system.arrays import EVALUATE_DOOR, HEAT, SIDE, SLIDE_LIMIT, Scene
 
 #: Each change of side heats by 1, each step takes a tenth of the heat. What is hotter than this
 #: changes at nearly every step, as the sign of what is at rest does: then steps are not cut.
@@ -37,19 +39,35 @@ def side_of_limit(scene, y, f):
 
 
 @jitable
+def modes(scene):
+    """Return a number that tells what the incidents that go on do: stick or slip."""
+    total, hit = 0.0, scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        if scene.state.touching[hit[k]] == 1:
+            total += (1.0 + hit[k]) * scene.work.slot[hit[k], MODE]
+    return total
+
+
+@jitable
 def side(scene, t, y, k):
     """Return on which side row k of `Kinks` is; the bodies have been placed."""
     program = scene.kinks.program[k]
     if program >= 0:
         return value(scene, t, y, program)
+    if scene.kinks.limit[k] < 0:
+        return modes(scene)
     return side_of_limit(scene, y, scene.kinks.limit[k])
 
 
 @jitable
-def watch(scene, t, y, what):
+def watch(scene, context, t, y, what):
     """Return 1 if a side differs from that kept, else 0; unless it is only asked, keep them."""
-    place_bodies(scene, y)
-    sides, differs = scene.state.sides, 0.0
+    sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
+    if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
+        # what friction does follows from all the rest
+        call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+    else:
+        place_bodies(scene, y)
     for k in range(len(scene.kinks.program)):
         now = side(scene, t, y, k)
         other = now != sides[k, SIDE]
@@ -59,10 +77,12 @@ def watch(scene, t, y, what):
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
+    # where modes change at nearly every step they are left to each evaluation
+    scene.world.frozen[0] = 1 if sides[last, HEAT] <= HOT else 0
     return differs
 
 
 def kinks_hook(context, t, h, a, b):
     """Whether a force is on another branch; h says whether that is to be kept."""
     scene = view(context, Scene)
-    return watch(scene, t, carray(a, (scene.rows.y.shape[1],)), h)
+    return watch(scene, context, t, carray(a, (scene.rows.y.shape[1],)), h)

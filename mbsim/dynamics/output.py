@@ -7,7 +7,17 @@ import math
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
-from mbsim.dynamics.contact import DEPTH, FORCE, NORMAL, SLIP, STORED, TORQUE, contact_of, sides
+from mbsim.dynamics.contact import (
+    DEPTH,
+    FORCE,
+    HELD,
+    NORMAL,
+    SLIP,
+    STORED,
+    TORQUE,
+    contact_of,
+    sides,
+)
 from mbsim.dynamics.kinematics import position
 from mbsim.system.arrays import (
     BODY_SIZE,
@@ -25,7 +35,7 @@ from mbsim.system.arrays import (
 def fill_energy(scene, y, row):
     """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
-    kinetic, potential = 0.0, 0.0
+    kinetic, potential, dissipated = 0.0, 0.0, 0.0
     for b in range(len(bodies.mass)):
         at = BODY_SIZE * b
         v = (y[at + 7], y[at + 8], y[at + 9])
@@ -34,8 +44,8 @@ def fill_energy(scene, y, row):
         potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
     hit = scene.work.hit
     for k in range(hit[len(hit) - 1]):
-        potential += scene.work.slot[hit[k], STORED]
-    dissipated = 0.0
+        potential += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], HELD]
+        dissipated -= scene.work.slot[hit[k], HELD]
     for c in range(len(scene.contacts.id)):
         dissipated += y[len(y) - len(scene.contacts.id) + c]
     for f in range(len(scene.applied.kind)):
@@ -213,6 +223,10 @@ def scaled_error(scene, h, e, y):
             if at >= 0:
                 square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
                 largest = max(largest, max(square, e[at + 2] ** 2))
+            at, memory = scene.slots.z[hit[k]], scene.contacts.memory[contact_of(scene, hit[k])]
+            if at >= 0:
+                for j in range(memory):
+                    largest = max(largest, e[at + j] ** 2)
     # the energy balance closes as well as the motion
     first = len(e) - max(1, len(scene.contacts.id))
     for kept in scene.world.ledger:

@@ -2,8 +2,10 @@
 
 Normal law      int64 f(double depth, double rate, const double *par, double out[3])
                 out: force [F], force at rate 0 [F], stored energy [F L]
-Friction law    int64 f(int64 id, const double in[19], const double *par, double out[5])
-                in: the fields of `FrictionInput` in order; out: Fx, Fy, Mx, My, Tz on I
+Friction law    int64 f(int64 id, const double *in, const double *par, double *out)
+                in: the FRICTION_INPUTS fields of `FrictionInput` in order, then the law's memory;
+                out: Fx, Fy, Mx, My, Tz on I; of a law with memory then the energy stored, its mode,
+                and its new memory or the rates of that, from MEMORY_OUT on
 
 `id` is the Force_Contact's. The result is 0, or a code that stops the run: 1 says that an
 interpreted user function raised (the guard in `plugins` holds the exception), 2 that a
@@ -25,7 +27,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
-FRICTION_INPUTS = 19
+FRICTION_INPUTS = 23
+#: Fields of a law's output before its memory: force, torques, stored energy, mode.
+MEMORY_OUT = 7
 RAISED_INTERPRETED = 1
 RAISED_COMPILED = 2
 STOPPED_BY_USER = AT_ONCE
@@ -37,7 +41,7 @@ FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
 
 @jitable
 def friction_input(a):
-    """Return the `FrictionInput` that lies in the 19 numbers of array `a`."""
+    """Return the `FrictionInput` that lies in the numbers of array `a`."""
     return FrictionInput(
         a[0],
         a[1],
@@ -49,6 +53,10 @@ def friction_input(a):
         a[12],
         (a[13], a[14], a[15]),
         (a[16], a[17], a[18]),
+        a[19],
+        a[20],
+        a[21],
+        a[22],
     )
 
 
@@ -73,13 +81,31 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     def entry(element, inputs, par, out):
         values = to_fixed_tuple(carray(par, (count,)), count)
         result = carray(out, (5,))
-        given = friction_input(carray(inputs, (19,)))
+        given = friction_input(carray(inputs, (FRICTION_INPUTS,)))
         fx, fy, mx, my, tz = force(given, *values)
         result[0] = fx
         result[1] = fy
         result[2] = mx
         result[3] = my
         result[4] = tz
+        return 0
+
+    return entry
+
+
+def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int) -> Any:
+    """Return `force` of `count` parameters and so many numbers of memory as a C function."""
+
+    def entry(element, inputs, par, out):
+        values = to_fixed_tuple(carray(par, (count,)), count)
+        a = carray(inputs, (FRICTION_INPUTS + memory,))
+        kept = to_fixed_tuple(a[FRICTION_INPUTS:], memory)
+        result = carray(out, (MEMORY_OUT + memory,))
+        found, new = force(friction_input(a), kept, *values)
+        for k in range(MEMORY_OUT):
+            result[k] = found[k]
+        for k in range(memory):
+            result[MEMORY_OUT + k] = new[k]
         return 0
 
     return entry
@@ -94,7 +120,12 @@ def normal_address(law: NormalLaw) -> int:
 @functools.cache
 def friction_address(law: FrictionLaw) -> int:
     """Return the address of a friction law behind `FRICTION_SIGNATURE`."""
-    return jit.address(_adapt_friction(law.force, len(law.parameters)), FRICTION_SIGNATURE)
+    count = len(law.parameters)
+    if law.memory:
+        adapted = _adapt_with_memory(law.force, count, law.memory)
+    else:
+        adapted = _adapt_friction(law.force, count)
+    return jit.address(adapted, FRICTION_SIGNATURE)
 
 
 def normal_constants(law: NormalLaw, contact: Any) -> np.ndarray[Any, Any]:
@@ -105,4 +136,6 @@ def normal_constants(law: NormalLaw, contact: Any) -> np.ndarray[Any, Any]:
 
 def friction_parameters(law: FrictionLaw, contact: Any) -> np.ndarray[Any, Any]:
     """Return the law's parameters as the contact element gives them, shape (n,)."""
-    return np.array([getattr(contact, name) for name in law.parameters], dtype=np.float64)
+    own = {each.name: each.default for each in law.own} | dict(contact.friction)
+    values = [own[name] if name in own else getattr(contact, name) for name in law.parameters]
+    return np.array(values, dtype=np.float64)

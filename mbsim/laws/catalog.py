@@ -4,10 +4,17 @@ A normal law is ``law(depth, depth_rate, *constants)`` and returns three numbers
 the force at rate 0 (the elastic part) and the energy stored, which is the integral of the
 elastic part over depth. Power is lost at (force - elastic) * rate, and no law may make that
 negative. A friction law is ``force(inputs, *parameters)`` with `inputs` a `FrictionInput`.
-Parameters are attributes of Force_Contact, in the deck's words; where the formula of a normal
-law takes other numbers than the deck gives, ``constants(*parameters)`` makes them once, before
-the run. A law file is a formula with its source; nothing in it is about arrays, XML or
-compilation.
+Parameters are attributes of Force_Contact, in the deck's words; those that one law alone has
+are declared with it as a `Parameter`. Where the formula of a normal law takes other numbers than
+the deck gives, ``constants(*parameters)`` makes them once, before the run. A law file is a formula
+with its source; nothing in it is about arrays, XML or compilation.
+
+A friction law with memory is ``force(inputs, memory, *parameters)``, `memory` being its own numbers
+at the committed state, and returns ``(Fx, Fy, Mx, My, Tz, stored, mode), memory``: the energy that
+it will give back, STICK or SLIP, and its numbers at the point asked for, which the host keeps if
+the step is accepted. They are 0 at touch. A law that is ``integrated`` gets the numbers
+at the point itself and returns their rates instead: the integrator carries them, and takes an error
+of 1 in them for large.
 """
 
 from __future__ import annotations
@@ -36,12 +43,29 @@ class NormalLaw(NamedTuple):
         return code.co_varnames[2 : code.co_argcount]
 
 
+class Parameter(NamedTuple):
+    """An attribute of Force_Contact that a friction law brings with it."""
+
+    name: str
+    default: float | None = None  # None: it must be given
+    positive: bool = False  # else it may be 0 as well
+
+
+#: What a law with memory does: mode 0 says that it began.
+BEGUN, STICK, SLIP = 0.0, 1.0, 2.0
+
+
 class FrictionLaw(NamedTuple):
     """A friction law: its function, and the Force_Contact attributes it takes in order."""
 
     name: str
-    force: Callable[..., tuple[float, float, float, float, float]]
+    force: Callable[..., Any]
     parameters: tuple[str, ...]
+    own: tuple[Parameter, ...] = ()  # which of these are its own
+    memory: int = 0  # numbers that it keeps
+    integrated: bool = False  # whether it gives their rates
+    uses_x: bool = False  # whether it looks at X
+    modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
 
 
 class FrictionInput(NamedTuple):
@@ -57,6 +81,10 @@ class FrictionInput(NamedTuple):
     radius: float  # of the contact patch [L], 0 for a point
     loci: Vector  # contact point on I, from the graphic's marker, in its axes [L]
     locj: Vector  # the same on J
+    dflag: float  # 1 where a derivative is being formed
+    frozen: float  # 1 where a law with modes keeps to the committed one, to the end of the step
+    stiffness: float  # of the normal force, by depth [F/L]; this and the next only with memory
+    mass: float  # that slips: 1/(1/m_I + 1/m_J) [M, scaled so that F = m a]
 
 
 NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")
@@ -79,11 +107,22 @@ def normal_law(
     return register
 
 
-def friction_law(name: str, *parameters: str) -> Any:
+def friction_law(
+    name: str,
+    *parameters: str | Parameter,
+    memory: int = 0,
+    integrated: bool = False,
+    uses_x: bool = False,
+    modes: bool = False,
+) -> Any:
     """Register the decorated function as the friction law `name` of these attributes."""
 
     def register(force: Callable[..., Any]) -> Callable[..., Any]:
-        FRICTION_LAWS.put(name, FrictionLaw(name, jitable(force), parameters))
+        own = tuple(each for each in parameters if isinstance(each, Parameter))
+        names = tuple(getattr(each, "name", each) for each in parameters)
+        made = jitable(force)
+        law = FrictionLaw(name, made, names, own, memory, integrated, uses_x, modes)
+        FRICTION_LAWS.put(name, law)
         return force
 
     return register

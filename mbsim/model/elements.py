@@ -147,6 +147,7 @@ class Contact:
     mu_dynamic: float = 0.0
     stiction_trans_vel: float = 1e-3
     friction_trans_vel: float = 1e-3
+    friction: tuple[tuple[str, float], ...] = ()  # attributes that only its friction law has
     cff: Subroutine = Subroutine()
     source: Source = Source()
 

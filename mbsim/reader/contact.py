@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
     CFF_TYPES,
@@ -30,8 +31,7 @@ from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 CFF_USES: dict[str, set[str]] = {
-    "COULOMB_ON": {"mu_static", "mu_dynamic", *_SPEEDS},
-    "COULOMB_DYNAMICONLY": {"mu_dynamic", "friction_trans_vel"},
+    **{name: set(FRICTION_LAWS[name].parameters) for name in FRICTION_LAWS},
     "COULOMB_OFF": set(),
     "USERCFF": {
         *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
@@ -51,7 +51,7 @@ def _build_contact(entry: Entry) -> None:
         check_normal(entry, cnf_type)
     if entry.get("cff_type") is not None or not entry.given("cff_type"):
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
-    if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
+    if cff_type in FRICTION_LAWS:
         check_coulomb(entry, cff_type)
 
     contact = el.Contact(
@@ -81,10 +81,30 @@ def _build_contact(entry: Entry) -> None:
         mu_dynamic=entry.get("mu_dynamic", 0.0),
         stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
+        friction=_own_attributes(entry, cff_type),
         cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
         source=entry.source,
     )
     entry.register(entry.draft.contacts, contact)
+
+
+def _own_attributes(entry: Entry, cff_type: str) -> tuple[tuple[str, float], ...]:
+    """Return the attributes given that only this friction law has; fault what it must have."""
+    if cff_type not in FRICTION_LAWS:
+        return ()
+    given = []
+    for own in FRICTION_LAWS[cff_type].own:
+        if entry.given(own.name):
+            given.append((own.name, entry.get(own.name, 0.0)))
+        elif own.default is None:
+            entry.fault(f'cff_type="{cff_type}" needs {own.name}', own.name)
+    return tuple(given)
+
+
+def _of_laws() -> dict[str, Spec]:
+    """Return the attributes that friction laws bring with them."""
+    laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
+    return {p.name: Spec(POSITIVE if p.positive else NOT_NEGATIVE) for law in laws for p in law.own}
 
 
 def _check_count(entry: Entry, side: str) -> None:
@@ -100,7 +120,10 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
     for name in _SPEEDS:
         if name in CFF_USES[cff_type]:
             warn_default_speed(entry, name)
-    if cff_type != "COULOMB_ON":
+    if "mu_static" not in CFF_USES[cff_type] or "mu_dynamic" not in CFF_USES[cff_type]:
+        return
+    check_coefficients(entry)
+    if not set(_SPEEDS) <= CFF_USES[cff_type]:
         return
     vs, vd = (entry.get(name, DEFAULT_SPEED) for name in _SPEEDS)
     known = all(entry.get(name) is not None or not entry.given(name) for name in _SPEEDS)
@@ -111,6 +134,10 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
             "each defaults to 1e-3",
             given,
         )
+
+
+def check_coefficients(entry: Entry) -> None:
+    """Warn where less friction holds than slips."""
     mu_static, mu_dynamic = entry.get("mu_static", 0.0), entry.get("mu_dynamic", 0.0)
     if mu_dynamic > mu_static:
         entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
@@ -165,6 +192,7 @@ FORCE_CONTACT = Statement(
         "mu_dynamic": Spec(NOT_NEGATIVE),
         "stiction_trans_vel": Spec(POSITIVE),
         "friction_trans_vel": Spec(POSITIVE),
+        **_of_laws(),
         "cff_param_string": Spec(USER),
         "cff_fnc_name": Spec(TEXT),
         "cff_dll_name": Spec(TEXT),

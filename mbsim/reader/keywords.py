@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from mbsim.laws.catalog import FRICTION_LAWS
+
 
 def fold(name: str) -> str:
     """Return `name` without case, `_` and outer blanks, the form in which names are compared."""
@@ -38,12 +40,13 @@ CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="")
 #: Laws that need no shapes: those of limits.
 CNF_OF_LIMITS = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="")
 CNF_NOT_BUILT = spellings(VOLUME="", USERCNF="USER")
-CFF_TYPES = spellings(
-    COULOMB_ON="ON",
-    COULOMB_OFF="OFF",
-    COULOMB_DYNAMICONLY="DYNAMICONLY DYNAMICSONLY COULOMB_DYNAMICSONLY",
-    USERCFF="",
-)
+_OTHER_WORDS = {
+    "COULOMB_ON": "ON",
+    "COULOMB_OFF": "OFF",
+    "COULOMB_DYNAMICONLY": "DYNAMICONLY DYNAMICSONLY COULOMB_DYNAMICSONLY",
+    "USERCFF": "",
+}
+CFF_TYPES = spellings(**(dict.fromkeys(FRICTION_LAWS, "") | _OTHER_WORDS))
 CFF_OF_JOINTS = {word: name for word, name in CFF_TYPES.items() if name.startswith("COULOMB")}
 MASTER_SURFACES = spellings(I="", J="", I_AND_J="", AUTO="")
 ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")

@@ -7,10 +7,11 @@ those that are near, and the list follows the motion (dynamics.crowd). Everythin
 units, global frame unless said otherwise.
 
 The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (3), unit
-quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then X (3) of every
-slot whose law uses it; then the user's own states, one number each; then the work of motions and
-what applied forces dissipated, where there are any (`World.ledger`); last the energy that each
-contact has dissipated so far (one number where there is no contact, so that y is never empty).
+quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then, slot by
+slot, X (3) where the law uses it and the law's memory where that is integrated; then the user's own
+states, one number each; then the work of motions and what applied forces dissipated, where there
+are any (`World.ledger`); last the energy that each contact has dissipated so far (one number where
+there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations
@@ -59,8 +60,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     TANGENT_DOOR,  # the packed arrays of `system.tangent`, where a method is implicit
     SLOPES_DOOR,
     BEND_DOOR,
-) = range(13)
-DOORS = 13
+    EVALUATE_DOOR,  # the whole rhs
+) = range(14)
+DOORS = 14
 
 # entries of `Applied.kind`
 (
@@ -195,6 +197,8 @@ class Contacts(NamedTuple):
     friction_par: F2  # (nc, widest)
     interpreted: I1  # (nc,) 1 where the friction law enters Python
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
+    memory: I1  # (nc,) numbers that the friction law keeps
+    integrated: I1  # (nc,) 1 where these are part of y
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
 
@@ -204,6 +208,7 @@ class Slots(NamedTuple):
 
     pair: I1  # (ns,)
     x: I1  # (ns,) where X starts in y, -1 where it is not carried
+    z: I1  # (ns,) where the law's memory starts in y, -1 where it is not integrated
 
 
 class Markers(NamedTuple):
@@ -261,7 +266,8 @@ class Kinks(NamedTuple):
     """What may change its branch within a step, which then ends there; see system.kinks."""
 
     program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
-    limit: I1  # (n,) row of `Applied`, -1 for an expression
+    limit: I1  # (n,) row of `Applied`, -1 for an expression; the last may have neither: it is
+    # for what all incidents do whose friction has modes
 
 
 class Users(NamedTuple):
@@ -357,6 +363,8 @@ class World(NamedTuple):
     scale: F1  # (3,) length L, speed V and energy of the error norm
     doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate
+    past: I1  # (1,) 1 while a point within the last step is evaluated
+    frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
 
 
@@ -373,6 +381,9 @@ class State(NamedTuple):
     depth: F1  # (ns,)
     rate: F1  # (ns,) of depth
     normal: F1  # (ns,) normal force
+    memory: F2  # (ns, most) of friction laws
+    before: F2  # (ns, most) the same at the begin of the last step
+    mode: F1  # (ns,) of a friction law with memory: STICK, SLIP, or 0
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
@@ -403,14 +414,16 @@ class Work(NamedTuple):
     hit: I1  # (ns + 1,) slots that touch, their number last
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
+    memory: F2  # (ns, most) of friction laws at the trial point
     grip: F2  # (ns, 4) friction by slip, 2 x 2 by rows, where it was linearised last
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
     block: F2  # (nb, 20) stiffness that acts on a body (3 x 3) and its turning part, damping
     bound: F1  # (2,) squared frequency and rate of damping, the largest so far
     best: F1  # (4,) pair that gave it: contact, energy at touch, force behind it, inverse mass
-    law_in: F1  # (FRICTION_INPUTS,)
-    law_out: F1  # (5,)
+    idle: F1  # (ny,) y' at points that are only looked at; (0,) where none is
+    law_in: F1  # (FRICTION_INPUTS + most,)
+    law_out: F1  # (MEMORY_OUT + most,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
     rub: F2  # (nf, 9) of friction: see dynamics.joint_friction
     late: F2  # (nu, 5) of what is settled with the reactions, see dynamics.late_forces
@@ -467,8 +480,8 @@ class Rows(NamedTuple):
     used: I1  # (3,) rows, incidents, events
 
 
-SLOT_COLUMNS = 12
-SPARE = 38
+SLOT_COLUMNS = 15
+SPARE = 42  # and twice the memory
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 
 

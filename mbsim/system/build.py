@@ -27,6 +27,7 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
+from mbsim.system.kinks import has_modes
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import sweep
 from mbsim.system.pairing import (
@@ -248,20 +249,23 @@ def build(
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
     pairs, ns = pairs_table(plans, kinds, graphic_row)
     contacts, uses_x = contacts_table(contact_list, user)
+    most = int(contacts.memory.max(initial=0))
 
-    # X goes behind the bodies in y, slot by slot, for the laws that look at it
+    # X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
-    wanted = np.zeros(ns, dtype=bool)
+    wide = np.zeros((ns, 2), dtype=np.int64)
+    each = np.column_stack([3 * uses_x, contacts.integrated * contacts.memory])
     for k, plan in enumerate(plans.pairs):
-        wanted[pairs.slot[k] : pairs.last[k]] = uses_x[contact_row[plan.kind.contact]]
-    if any(uses_x[contact_row[crowd.contact]] for crowd in plans.crowds):
-        wanted[pairs.slot[len(plans.pairs)] :] = True
-    x = np.full(ns, -1, dtype=np.int64)
-    carried = np.flatnonzero(wanted)
-    x[carried] = a.BODY_SIZE * nb + 3 * np.arange(len(carried))
+        wide[pairs.slot[k] : pairs.last[k]] = each[contact_row[plan.kind.contact]]
+    for crowd in plans.crowds:
+        places = wide[pairs.slot[len(plans.pairs)] :]
+        places[...] = np.maximum(places, each[contact_row[crowd.contact]])
+    begins = a.BODY_SIZE * nb + np.concatenate([[0], np.cumsum(wide.ravel())])
+    carried = int(begins[-1]) - a.BODY_SIZE * nb
+    x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
 
     table = MarkerTable(placement, row)
-    first_state = a.BODY_SIZE * nb + 3 * len(carried)
+    first_state = a.BODY_SIZE * nb + carried
     rubs = any(friction.looks for friction in user.values())
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
     rows = acting(model, table, first_state, subroutines, looks)
@@ -271,7 +275,7 @@ def build(
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
     ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
-    y0 = _initial_y(placement, 3 * len(carried) + nz + kept)
+    y0 = _initial_y(placement, carried + nz + kept)
     y0[states.place] = [state.ic for state in model.differentials.values()]
     markers, angles = table.arrays()
     instructions = rows.programs.arrays(mechanism.elements, rows.applied_ids, contact_ids)
@@ -279,6 +283,7 @@ def build(
         # the last number is TIME where it stands still
         instructions = instructions._replace(number=np.append(instructions.number, 0.0))
 
+    looked = len(y0) if has_modes(model) else 0
     speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(
         bodies=_bodies(placement),
@@ -286,10 +291,10 @@ def build(
         kinds=kinds_table(kinds, contact_row),
         pairs=pairs,
         crowds=crowds_table(
-            plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot), ns
+            plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot), ns, most
         ),
         contacts=contacts,
-        slots=a.Slots(slot_pair, x),
+        slots=a.Slots(slot_pair, x, z),
         markers=markers,
         angles=angles,
         programs=instructions,
@@ -307,6 +312,8 @@ def build(
             _scales(placement, speed),
             np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
             ledger,
         ),
         state=start_state(
@@ -316,9 +323,10 @@ def build(
             table.start_angles(),
             len(rows.sensors.id),
             len(rows.kinks.program),
+            most,
         ),
         log=empty_log(len(contact_ids)),
-        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu),
+        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
         sweep=sweep(mechanism),
         rows=empty_rows(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)

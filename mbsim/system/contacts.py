@@ -162,6 +162,7 @@ def crowds_table(
     contacts: dict[int, int],
     places: int,
     slots: int,
+    memory: int,
 ) -> a.Crowds:
     """Return the contacts whose near pairs are found as they move."""
     n, ng = len(plans.crowds), len(graphics.body)
@@ -183,7 +184,7 @@ def crowds_table(
         head=np.zeros(ng if n else 0, dtype=np.int64),
         next=np.zeros(places if n else 0, dtype=np.int64),
         moved=np.zeros((places if n else 0, 5), dtype=np.int64),
-        spare=np.zeros((slots if n else 0, a.SPARE)),
+        spare=np.zeros((slots if n else 0, a.SPARE + 2 * memory)),
     )
     at = 0
     for k, crowd in enumerate(plans.crowds):
@@ -220,6 +221,7 @@ def contacts_table(
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
+    memory, integrated = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     for k, contact in enumerate(contacts):
         law = NORMAL_LAWS[contact.cnf_type]
         normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
@@ -234,6 +236,8 @@ def contacts_table(
             friction_law = FRICTION_LAWS[contact.cff_type]
             friction.append(abi.friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
+            uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
+            integrated[k] = friction_law.integrated
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -250,7 +254,11 @@ def contacts_table(
         interpreted=np.array(
             [c.id in user and not user[c.id].compiled for c in contacts], dtype=np.int64
         ),
-        framed=np.array([contact.id in user for contact in contacts], dtype=np.int64),
+        framed=np.array(
+            [c.id in user or memory[k] > 0 for k, c in enumerate(contacts)], dtype=np.int64
+        ),
+        memory=memory,
+        integrated=integrated,
         ignore_deeper=np.array(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),

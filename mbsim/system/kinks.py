@@ -25,6 +25,7 @@ import numpy as np
 
 from mbsim.expressions.elementary import NUMBER
 from mbsim.expressions.tree import Call, Expression, Node, Number
+from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.model.elements import Model
 from mbsim.system import arrays as a
 from mbsim.system.programs import ELEMENT, NET, USER, Instruction, ProgramTable
@@ -124,8 +125,14 @@ def _acting(model: Model) -> Iterator[Expression]:
         yield state.expr
 
 
+def has_modes(model: Model) -> bool:
+    """Return whether the friction of some contact is one that sticks or slips."""
+    laws = [contact.cff_type for contact in model.contacts.values()]
+    return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
+
+
 def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.Kinks:
-    """Return what is watched for kinks: a program for each expression, and limits of joints."""
+    """Return what is watched for kinks: a program for each expression, limits of joints, modes."""
     variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
     rows, any_found = [], any(s.changes for s in model.simulations)
     still = [Instruction(NUMBER, value=0.0)]
@@ -140,7 +147,8 @@ def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.K
     if not any_found:
         rows = []
     limits = [f for f, kind in enumerate(applied.kind) if kind in (a.SLIDE_LIMIT, a.TURN_LIMIT)]
+    last = [-1] if has_modes(model) else []
     return a.Kinks(
-        np.array([*rows, *(-1 for _ in limits)], dtype=np.int64),
-        np.array([*(-1 for _ in rows), *limits], dtype=np.int64),
+        np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),
+        np.array([*(-1 for _ in rows), *limits, *last], dtype=np.int64),
     )

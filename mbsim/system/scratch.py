@@ -16,7 +16,13 @@ INCIDENTS = 100_000
 
 
 def start_state(
-    nb: int, ng: int, ns: int, angle: np.ndarray[Any, Any], sensors: int = 0, kinks: int = 0
+    nb: int,
+    ng: int,
+    ns: int,
+    angle: np.ndarray[Any, Any],
+    sensors: int = 0,
+    kinks: int = 0,
+    memory: int = 0,
 ) -> a.State:
     """Return the incident table before anything touched."""
     sensed = np.zeros((sensors, 5))
@@ -34,6 +40,9 @@ def start_state(
         depth=np.zeros(ns),
         rate=np.zeros(ns),
         normal=np.zeros(ns),
+        memory=np.zeros((ns, memory)),
+        before=np.zeros((ns, memory)),
+        mode=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
         sides=np.zeros((kinks, 2)),
@@ -54,7 +63,16 @@ def empty_log(nc: int) -> a.Log:
 
 
 def scratch(
-    nb: int, graphics: a.Graphics, np_: int, ns: int, nc: int, nf: int, nj: int, nu: int
+    nb: int,
+    graphics: a.Graphics,
+    np_: int,
+    ns: int,
+    nc: int,
+    nf: int,
+    nj: int,
+    nu: int,
+    memory: int,
+    looked: int,
 ) -> a.Work:
     """Return scratch, with the ground's rows as they stay."""
     ng = len(graphics.body)
@@ -82,14 +100,16 @@ def scratch(
         hit=np.zeros(ns + 1, dtype=np.int64),
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
+        memory=np.zeros((ns, memory)),
         grip=np.zeros((ns, 4)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),
         block=np.zeros((nb, 20)),
         bound=np.zeros(2),
         best=np.zeros(4),
-        law_in=np.zeros(abi.FRICTION_INPUTS),
-        law_out=np.zeros(5),
+        idle=np.zeros(looked),
+        law_in=np.zeros(abi.FRICTION_INPUTS + memory),
+        law_out=np.zeros(abi.MEMORY_OUT + memory),
         applied=np.zeros((nf, 8)),
         rub=np.zeros((nf, 9)),
         late=np.zeros((nu, 5)),

@@ -1,0 +1,127 @@
+"""STICTION: Coulomb friction that holds, by a spring between the surfaces that slips at its limit.
+
+z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
+
+    stick    F = -k z - c v                     while |F| <= mu_s N
+    slip     F = -mu_d N z/|z|,  |z| = mu_d N/k   while v goes on along z
+
+A step of the integrator keeps to one of these and ends where it changes. At the end of a step that
+slips, z is brought back to what the force needs (return mapping). Within it, z/|z| follows the
+direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
+
+k is `tangential_stiffness`, or 0.824 times the stiffness of the normal force at its depth: Mindlin's
+2 (1 - nu)/(2 - nu) for nu = 0.3. Where k grows with the depth the force in the spring stays, where it
+falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`, or
+what is critical for the mass of the bodies that slip: 2 sqrt(k m).
+With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way, up
+to mu_s N r.
+Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
+65 (1991) 153-166; J. C. Simo, T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.laws.catalog import SLIP, STICK, Parameter, friction_law
+
+#: Tangential over normal stiffness where none is given.
+MINDLIN = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
+
+# what is kept: spring x, y, twist; X then; stiffness then; mode
+_X, _STIFFNESS, _MODE = 3, 6, 7
+
+
+@jitable
+def _direction(zx, zy, kept, v, k, limit):
+    """Return the unit vector against which a slipping spring pulls."""
+    length, speed = math.hypot(zx, zy), math.hypot(v[0], v[1])
+    if zx * v[0] + zy * v[1] > 0.0 and limit > 0.0:
+        # the spring follows the slip over its own length
+        gone = math.hypot(zx - kept[0], zy - kept[1]) * k / limit
+        rest = math.exp(-gone)
+        zx = kept[0] * rest + (1.0 - rest) * limit / k * v[0] / speed
+        zy = kept[1] * rest + (1.0 - rest) * limit / k * v[1] / speed
+        length = math.hypot(zx, zy)
+    if length > 0.0:
+        return zx / length, zy / length
+    return (v[0] / speed, v[1] / speed) if speed > 0.0 else (0.0, 0.0)
+
+
+@jitable
+def _turn(inputs, memory, mode, mu, k, c, radius):
+    """Return the torque about the normal and what is left of the twist."""
+    twist = memory[2] + inputs.x[2] - memory[_X + 2]
+    torque = -k * twist - (c * radius * radius * inputs.xdot[2] if mode == STICK else 0.0)
+    most = mu * inputs.nforce * radius
+    if abs(torque) > most:
+        torque = math.copysign(most, torque)
+        twist = -torque / k
+    return torque, twist
+
+
+@friction_law(
+    "STICTION",
+    "mu_static",
+    "mu_dynamic",
+    Parameter("tangential_stiffness", math.nan, positive=True),
+    Parameter("tangential_damping", math.nan),
+    Parameter("rotational_stiffness", 0.0),
+    Parameter("torsion_radius", 0.0),
+    memory=8,
+    uses_x=True,
+    modes=True,
+)
+def stiction(
+    inputs,
+    memory,
+    mu_static,
+    mu_dynamic,
+    tangential_stiffness,
+    tangential_damping,
+    rotational_stiffness,
+    torsion_radius,
+):
+    """Return (Fx, Fy, Mx, My, Tz, energy of the springs, mode) and what is kept."""
+    k = MINDLIN * inputs.stiffness if math.isnan(tangential_stiffness) else tangential_stiffness
+    if k <= 0.0 or inputs.nforce <= 0.0:
+        still = (0.0, 0.0, 0.0, inputs.x[0], inputs.x[1], inputs.x[2], 0.0, SLIP)
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), still
+    c = tangential_damping
+    if math.isnan(c):
+        c = 2.0 * math.sqrt(k * inputs.mass)
+
+    # the spring as it would be if nothing slipped
+    ease = memory[_STIFFNESS] / k if 0.0 < memory[_STIFFNESS] < k else 1.0
+    kept = (memory[0] * ease, memory[1] * ease)
+    zx = kept[0] + inputs.x[0] - memory[_X]
+    zy = kept[1] + inputs.x[1] - memory[_X + 1]
+    v = inputs.xdot
+    fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
+
+    slipped = memory[_MODE] == SLIP
+    if slipped and inputs.frozen == 0.0 and zx * v[0] + zy * v[1] < 0.0:
+        slipped = False
+    holds = math.hypot(fx, fy) <= mu_static * inputs.nforce
+    if slipped:
+        mode = STICK if zx * v[0] + zy * v[1] < 0.0 else SLIP
+        slides = True
+    else:
+        mode = STICK if holds else SLIP
+        slides = not holds and (inputs.frozen == 0.0 or memory[_MODE] != STICK)
+
+    limit = mu_dynamic * inputs.nforce
+    if slides or mode == SLIP:
+        ux, uy = _direction(zx, zy, kept, v, k, limit)
+        size = min(limit, k * math.hypot(zx, zy)) if slipped else limit
+        zx, zy = size / k * ux, size / k * uy
+        if slides:
+            fx, fy = -k * zx, -k * zy
+    torque, twist = 0.0, 0.0
+    if rotational_stiffness > 0.0:
+        mu = mu_dynamic if slides else mu_static
+        torque, twist = _turn(inputs, memory, mode, mu, rotational_stiffness, c, torsion_radius)
+    stored = 0.5 * (k * (zx * zx + zy * zy) + rotational_stiffness * twist * twist)
+    held = (zx, zy, twist, inputs.x[0], inputs.x[1], inputs.x[2], k, mode)
+    return (fx, fy, 0.0, 0.0, torque, stored, mode), held
