@@ -14,6 +14,7 @@ import numpy.typing as npt
 F1 = Annotated[npt.NDArray[np.float64], "float64", 1]
 F2 = Annotated[npt.NDArray[np.float64], "float64", 2]
 F3 = Annotated[npt.NDArray[np.float64], "float64", 3]
+F4 = Annotated[npt.NDArray[np.float64], "float64", 4]
 I1 = Annotated[npt.NDArray[np.int64], "int64", 1]
 I2 = Annotated[npt.NDArray[np.int64], "int64", 2]
 C1 = Annotated[npt.NDArray[np.complex128], "complex128", 1]

@@ -135,6 +135,10 @@ def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem,
     table = pack(tangent)
     scene.world.doors[TANGENT_DOOR] = int(table.ctypes.data)
     open_slopes(scene)
+    if len(tangent.keeps.table) > 0:
+        from mbsim.dynamics.memory_slopes import open_memory
+
+        open_memory(scene, pair)
     hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
     if pair:
         hooks |= {"factor_pair": _factor_pair, "solve_pair": _solve_pair}

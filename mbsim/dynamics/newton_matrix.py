@@ -19,6 +19,7 @@ formulation of index 2. With K and D of forces and eta = E xi - e the change of 
 
 from __future__ import annotations
 
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import SINGULAR
 from mbsim.core.rotation import cross, rotate, unrotate, vector
@@ -32,6 +33,9 @@ from mbsim.dynamics.blocks import (
 )
 from mbsim.dynamics.equations import active_count
 from mbsim.system.arrays import BODY_SIZE
+
+# what is asked for at the doors of `memory_slopes`
+FACTOR, RIGHT, RECOVER = range(1, 4)
 
 
 @jitable
@@ -152,11 +156,20 @@ def fill_matrix(scene, T, M):
 
 
 @jitable
+def ask_memory(scene, M, what, r, d):
+    """Let friction that carries numbers in y add its part, see `memory_slopes`."""
+    door = scene.world.doors[M.door[0]]
+    if door != 0:
+        call_int(door, (scene, what, r, d))
+
+
+@jitable
 def factor(scene, T, M, h):
     """Factor the matrix for the coefficients in M.c; return 0 or a code."""
     P, L, free = T.pattern, T.linear, scene.tree.free
     fill_turns(T, M, h)
     fill_matrix(scene, T, M)
+    ask_memory(scene, M, FACTOR, M.r[0], M.r[1])
     if not eliminate(P, M, L, free):
         return SINGULAR
     return factor_rest(scene, T, M)
@@ -325,11 +338,13 @@ def write_answer(scene, T, M, r, d):
 def solve(scene, T, M, r, d):
     """Solve for the residual r; r and d (n,) in the layout of y."""
     fill_right_side(scene, T, M, r)
+    ask_memory(scene, M, RIGHT, r, d)
     solve_bodies(T.pattern, M, T.linear, scene.tree.free, M.g)
     solve_border_part(scene, T, M, r)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
-        # X, work and losses are sums of what bodies do
+        # work and losses are sums of what bodies do
         d[k] = r[k] / M.c[0, 2]
+    ask_memory(scene, M, RECOVER, r, d)
     write_answer(scene, T, M, r, d)
     held = active_count(scene)
     for z in range(len(scene.states.program)):

@@ -31,6 +31,7 @@ from mbsim.system.arrays import (
     BUSHING,
     LATE,
     LINE_FORCE,
+    MEMORY_DOOR,
     SLIDE_FRICTION,
     SLIDE_LIMIT,
     TURN_LIMIT,
@@ -39,6 +40,8 @@ from mbsim.system.arrays import (
 
 #: Differences of the laws' arguments, as parts of them and of the model's speed.
 _PART, _PART_OF_SPEED = 1e-6, 1e-8
+#: What `memory_slopes` is asked to keep.
+FILL = 0
 #: Differences of the state for user subroutines, as parts of length or speed, and radians.
 _PUSH = 1e-7
 
@@ -102,7 +105,10 @@ def ask_friction(scene, t, h, y, s, c, around, given):
     """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
     loci, locj = around
     slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
-    return friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
+    scene.work.law_in[19] = 1.0
+    code = friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
+    scene.work.law_in[19] = 0.0
+    return code
 
 
 @jitable
@@ -202,6 +208,11 @@ def add_contact_slopes(scene, T, t, h, y, s):
         if by_normal != 0.0:
             add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
+    if scene.world.doors[MEMORY_DOOR] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
+        K = T.keeps
+        count = K.held[len(K.held) - 1]
+        K.held[count], K.press[count, 0], K.press[count, 1] = s, by_depth, by_rate
+        return call_int(scene.world.doors[MEMORY_DOOR], (scene, FILL, y, y))
     return 0
 
 
@@ -209,6 +220,7 @@ def add_contact_slopes(scene, T, t, h, y, s):
 def add_contacts_slopes(scene, T, t, h, y):
     """Add what all incidents do; return a code."""
     hit = scene.work.hit
+    T.keeps.held[len(T.keeps.held) - 1] = 0
     for k in range(hit[len(hit) - 1]):
         code = add_contact_slopes(scene, T, t, h, y, hit[k])
         if code != 0:

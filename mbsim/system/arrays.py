@@ -61,8 +61,10 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     SLOPES_DOOR,
     BEND_DOOR,
     EVALUATE_DOOR,  # the whole rhs
-) = range(14)
-DOORS = 14
+    MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
+    MEMORY_PAIR_DOOR,  # the same in complex ones
+) = range(16)
+DOORS = 16
 
 # entries of `Applied.kind`
 (

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbsim.core.arrays import C2, C3, F1, F2, F3, I1, I2
-from mbsim.system.arrays import TURN_ROOT, Scene
+from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
+from mbsim.system.arrays import MEMORY_DOOR, MEMORY_PAIR_DOOR, TURN_ROOT, Scene
 
 #: Blocks that are made room for beside those of a model whose bodies are all coupled.
 _ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
@@ -77,6 +77,8 @@ class Real(NamedTuple):
     work: F3  # (4, 6, 6) scratch
     c: F2  # (1, 4) coefficients c1, c2, c3, form
     r: F2  # (2, n) residual and answer in the layout of y
+    keep: F3  # (slots + 1, carried, carried) Z of `dynamics.memory_slopes`, scratch last
+    door: I1  # (1,) entry of `World.doors` at which that is asked for
 
 
 class Pair(NamedTuple):
@@ -95,6 +97,20 @@ class Pair(NamedTuple):
     work: C3
     c: C2
     r: C2
+    keep: C3
+    door: I1
+
+
+class Keeps(NamedTuple):
+    """Friction that looks at X or integrates memory, see `dynamics.memory_slopes`."""
+
+    held: I1  # (slots + 1,) slots in contact, their number last
+    table: F3  # (slots, 5 + carried, 6 + carried) forces, then rates of what is carried; by slip,
+    # spin and normal force, then by what is carried
+    lever: F4  # (slots, 2, 6, 6) wrenches on I's and on J's body of units along n, x, y, and about
+    # x, y, n
+    press: F2  # (slots, 2) of the normal force by depth and by its rate
+    scratch: F2  # (2, 5 + carried)
 
 
 class Depends(NamedTuple):
@@ -112,6 +128,7 @@ class Tangent(NamedTuple):
 
     pattern: Pattern
     linear: Linear
+    keeps: Keeps
     depends: Depends
     real: Real
     pair: Pair
@@ -168,14 +185,32 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros(13),
         np.zeros(3),
     )
-    real = Real(*_factor_arrays(nb, m, n, blocks, np.float64))
-    complex_blocks = (nb, m, n, blocks) if pair else (0, 0, 0, 0)
-    return Tangent(
-        pattern, linear, depends, real, Pair(*_factor_arrays(*complex_blocks, np.complex128))
+    slots, wide = _carried(scene)
+    keeps = Keeps(
+        whole(slots + 1),
+        np.zeros((slots, 5 + wide, 6 + wide)),
+        np.zeros((slots, 2, 6, 6)),
+        np.zeros((slots, 2)),
+        np.zeros((2, 5 + wide)),
     )
+    sizes = nb, m, n, blocks, slots + 1, wide
+    real = Real(*_factor_arrays(*sizes, np.float64), np.array([MEMORY_DOOR]))
+    sizes = sizes if pair else (0, 0, 0, 0, 0, 0)
+    both = Pair(*_factor_arrays(*sizes, np.complex128), np.array([MEMORY_PAIR_DOOR]))
+    return Tangent(pattern, linear, keeps, depends, real, both)
 
 
-def _factor_arrays(nb: int, m: int, n: int, blocks: int, kind: type) -> tuple[np.ndarray, ...]:
+def _carried(scene: Scene) -> tuple[int, int]:
+    """Return how many slots carry X or memory in y, and the most numbers that one carries."""
+    x, z = scene.slots.x >= 0, scene.slots.z >= 0
+    any_slot = int(np.count_nonzero(x | z))
+    most = 3 * int(x.any()) + (int(scene.contacts.memory.max(initial=0)) if z.any() else 0)
+    return any_slot, most
+
+
+def _factor_arrays(
+    nb: int, m: int, n: int, blocks: int, slots: int, wide: int, kind: type
+) -> tuple[np.ndarray, ...]:
     """Return the arrays of a factorisation."""
     return (
         np.zeros((blocks, 6, 6), dtype=kind),
@@ -191,4 +226,5 @@ def _factor_arrays(nb: int, m: int, n: int, blocks: int, kind: type) -> tuple[np
         np.zeros((4, 6, 6), dtype=kind),
         np.zeros((1, 4), dtype=kind),
         np.zeros((2, n), dtype=kind),
+        np.zeros((slots, wide, wide), dtype=kind),
     )

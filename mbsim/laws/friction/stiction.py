@@ -2,19 +2,19 @@
 
 z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
 
-    stick    F = -k z - c v                     while |F| <= mu_s N
+    stick    F = -k z - c v, at most mu_s N     while k |z| <= mu_s N
     slip     F = -mu_d N z/|z|,  |z| = mu_d N/k   while v goes on along z
 
 A step of the integrator keeps to one of these and ends where it changes. At the end of a step that
 slips, z is brought back to what the force needs (return mapping). Within it, z/|z| follows the
 direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
 
-k is `tangential_stiffness`, or 0.824 times the stiffness of the normal force at its depth: Mindlin's
-2 (1 - nu)/(2 - nu) for nu = 0.3. Where k grows with the depth the force in the spring stays, where it
-falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`, or
-what is critical for the mass of the bodies that slip: 2 sqrt(k m).
-With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way, up
-to mu_s N r.
+k is `tangential_stiffness`, or 0.824 times the stiffness of the normal force at its depth:
+Mindlin's 2 (1 - nu)/(2 - nu) for nu = 0.3. Where k grows with the depth the force in the spring
+stays, where it falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`,
+or what is critical for the mass of the bodies that slip: 2 sqrt(k m).
+With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
+up to mu_s N r.
 Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
 65 (1991) 153-166; J. C. Simo, T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
 """
@@ -98,29 +98,34 @@ def stiction(
     zx = kept[0] + inputs.x[0] - memory[_X]
     zy = kept[1] + inputs.x[1] - memory[_X + 1]
     v = inputs.xdot
-    fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
+    length = math.hypot(zx, zy)
+    goes_back = zx * v[0] + zy * v[1] < 0.0
 
-    slipped = memory[_MODE] == SLIP
-    if slipped and inputs.frozen == 0.0 and zx * v[0] + zy * v[1] < 0.0:
-        slipped = False
-    holds = math.hypot(fx, fy) <= mu_static * inputs.nforce
-    if slipped:
-        mode = STICK if zx * v[0] + zy * v[1] < 0.0 else SLIP
-        slides = True
-    else:
-        mode = STICK if holds else SLIP
-        slides = not holds and (inputs.frozen == 0.0 or memory[_MODE] != STICK)
-
-    limit = mu_dynamic * inputs.nforce
-    if slides or mode == SLIP:
+    slips = memory[_MODE] == SLIP and (inputs.frozen == 1.0 or not goes_back)
+    if slips:
+        mode = STICK if goes_back else SLIP
+        limit = mu_dynamic * inputs.nforce
         ux, uy = _direction(zx, zy, kept, v, k, limit)
-        size = min(limit, k * math.hypot(zx, zy)) if slipped else limit
+        # less where the normal force grew faster than the spring follows; at the slip's begin
+        # that is a kink, of which derivatives are to see the side that lies ahead
+        size = limit if inputs.dflag == 1.0 else min(limit, k * length)
+        fx, fy = -size * ux, -size * uy
         zx, zy = size / k * ux, size / k * uy
-        if slides:
-            fx, fy = -k * zx, -k * zy
+    else:
+        limit = mu_static * inputs.nforce
+        mode = STICK if k * length <= limit else SLIP
+        if mode == SLIP and (inputs.frozen == 0.0 or memory[_MODE] != STICK):
+            limit = mu_dynamic * inputs.nforce
+        fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
+        force = math.hypot(fx, fy)
+        if force > limit:
+            fx, fy = fx * limit / force, fy * limit / force
+        if mode == SLIP:
+            rest = mu_dynamic * inputs.nforce / (k * length)
+            zx, zy = rest * zx, rest * zy
     torque, twist = 0.0, 0.0
     if rotational_stiffness > 0.0:
-        mu = mu_dynamic if slides else mu_static
+        mu = mu_dynamic if slips else mu_static
         torque, twist = _turn(inputs, memory, mode, mu, rotational_stiffness, c, torsion_radius)
     stored = 0.5 * (k * (zx * zx + zy * zy) + rotational_stiffness * twist * twist)
     held = (zx, zy, twist, inputs.x[0], inputs.x[1], inputs.x[2], k, mode)
