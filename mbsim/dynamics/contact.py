@@ -126,13 +126,14 @@ def add_wrench(scene, y, b, p, force, torque):
 
 @jitable
 def slipping_mass(scene, s):
-    """Return the mass of both bodies of slot s as one slips on the other."""
+    """Return the mass of both bodies of slot s as one slips on the other, a part for each point."""
     inverse = 0.0
     for g in sides(scene, s):
         b = scene.graphics.body[g]
         if b < len(scene.bodies.mass):
             inverse += 1.0 / scene.bodies.mass[b]
-    return 1.0 / inverse if inverse > 0.0 else 0.0
+    points = max(1, scene.pairs.touches[scene.slots.pair[s]])
+    return 1.0 / (points * inverse) if inverse > 0.0 else 0.0
 
 
 @jitable
@@ -142,6 +143,7 @@ def remember(scene, y, s, c, given):
     given[20] = 1.0 if scene.world.frozen[0] == 1 and state.touching[s] == 1 else 0.0
     given[21] = scene.work.slot[s, STIFFNESS]
     given[22] = slipping_mass(scene, s)
+    given[23] = math.nan
     for k in range(scene.contacts.memory[c]):
         if z >= 0:
             given[at + k] = y[z + k]
@@ -187,10 +189,15 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     if contacts.interpreted[c] == 1:
         for k in range(len(scene.users.seen)):
             scene.users.seen[k] = y[k]
-    return call_int(
-        contacts.friction_law[c],
-        (contacts.id[c], given, contacts.friction_par[c], work.law_out),
-    )
+    out = work.law_out
+    if contacts.sliding_law[c] != 0:
+        call = (contacts.id[c], given, contacts.sliding_par[c], out)
+        code = call_int(contacts.sliding_law[c], call)
+        if code != 0:
+            return code
+        given[23] = math.hypot(out[0], out[1])
+    call = (contacts.id[c], given, contacts.friction_par[c], out)
+    return call_int(contacts.friction_law[c], call)
 
 
 @jitable

@@ -30,7 +30,7 @@ from mbsim.laws.abi import MEMORY_OUT
 from mbsim.system.arrays import MEMORY_DOOR, MEMORY_PAIR_DOOR, TANGENT_DOOR, Scene
 from mbsim.system.tangent import Tangent
 
-#: Differences of X, as a part of the model's length, and of memory, which is of size 1.
+#: Differences of X, as a part of the model's length, and of memory, as a part of its size.
 _PUSH_X, _PUSH = 1e-10, 1e-6
 #: Places of slip x, slip y and spin about the normal among the arguments of friction.
 _OF_X = (0, 1, 4)
@@ -79,7 +79,7 @@ def push_of(scene, y, s, given, column):
         if scene.slots.x[s] >= 0 and j < 3:
             length = scene.world.scale[0] if j < 2 else 1.0
             return _PUSH_X * (length + abs(y[place_of(scene, s, j)]))
-        return _PUSH
+        return _PUSH * scene.contacts.size[contact_of(scene, s)]
     if column < 2:
         return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1]
     if column < 5:

@@ -225,8 +225,9 @@ def scaled_error(scene, h, e, y):
                 largest = max(largest, max(square, e[at + 2] ** 2))
             at, memory = scene.slots.z[hit[k]], scene.contacts.memory[contact_of(scene, hit[k])]
             if at >= 0:
+                size = scene.contacts.size[contact_of(scene, hit[k])]
                 for j in range(memory):
-                    largest = max(largest, e[at + j] ** 2)
+                    largest = max(largest, (e[at + j] / size) ** 2)
     # the energy balance closes as well as the motion
     first = len(e) - max(1, len(scene.contacts.id))
     for kept in scene.world.ledger:

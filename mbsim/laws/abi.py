@@ -27,7 +27,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
-FRICTION_INPUTS = 23
+FRICTION_INPUTS = 24
 #: Fields of a law's output before its memory: force, torques, stored energy, mode.
 MEMORY_OUT = 7
 RAISED_INTERPRETED = 1
@@ -57,6 +57,7 @@ def friction_input(a):
         a[20],
         a[21],
         a[22],
+        a[23],
     )
 
 

@@ -13,8 +13,9 @@ A friction law with memory is ``force(inputs, memory, *parameters)``, `memory` b
 at the committed state, and returns ``(Fx, Fy, Mx, My, Tz, stored, mode), memory``: the energy that
 it will give back, STICK or SLIP, and its numbers at the point asked for, which the host keeps if
 the step is accepted. They are 0 at touch. A law that is ``integrated`` gets the numbers
-at the point itself and returns their rates instead: the integrator carries them, and takes an error
-of 1 in them for large.
+at the point itself and returns their rates instead, which the integrator carries; its
+``size(load, *parameters)`` says how large they are under a usual load, by which their error is
+judged.
 """
 
 from __future__ import annotations
@@ -63,8 +64,9 @@ class FrictionLaw(NamedTuple):
     parameters: tuple[str, ...]
     own: tuple[Parameter, ...] = ()  # which of these are its own
     memory: int = 0  # numbers that it keeps
-    integrated: bool = False  # whether it gives their rates
+    size: Callable[..., float] | None = None  # given: it gives their rates; see above
     uses_x: bool = False  # whether it looks at X
+    takes_function: bool = False  # whether a user's function may give its friction of sliding
     modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
 
 
@@ -84,7 +86,8 @@ class FrictionInput(NamedTuple):
     dflag: float  # 1 where a derivative is being formed
     frozen: float  # 1 where a law with modes keeps to the committed one, to the end of the step
     stiffness: float  # of the normal force, by depth [F/L]; this and the next only with memory
-    mass: float  # that slips: 1/(1/m_I + 1/m_J) [M, scaled so that F = m a]
+    mass: float  # that slips, 1/(1/m_I + 1/m_J), a part for each point [M, such that F = m a]
+    limit: float  # friction of the user's own function in sliding [F], NaN where there is none
 
 
 NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")
@@ -111,8 +114,9 @@ def friction_law(
     name: str,
     *parameters: str | Parameter,
     memory: int = 0,
-    integrated: bool = False,
+    size: Callable[..., float] | None = None,
     uses_x: bool = False,
+    takes_function: bool = False,
     modes: bool = False,
 ) -> Any:
     """Register the decorated function as the friction law `name` of these attributes."""
@@ -121,7 +125,7 @@ def friction_law(
         own = tuple(each for each in parameters if isinstance(each, Parameter))
         names = tuple(getattr(each, "name", each) for each in parameters)
         made = jitable(force)
-        law = FrictionLaw(name, made, names, own, memory, integrated, uses_x, modes)
+        law = FrictionLaw(name, made, names, own, memory, size, uses_x, takes_function, modes)
         FRICTION_LAWS.put(name, law)
         return force
 

@@ -152,6 +152,11 @@ class Contact:
     source: Source = Source()
 
     @property
+    def asks_user(self) -> bool:
+        """Whether a function of the user's gives its friction, or a law's friction of sliding."""
+        return self.cff_type == "USERCFF" or bool(self.cff.fnc_name)
+
+    @property
     def with_itself(self) -> bool:
         """Whether I and J are the same graphics: all of them touch each other."""
         return set(self.i_graphics_id) == set(self.j_graphics_id)

@@ -30,13 +30,20 @@ from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
+_USERS = {
+    *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
+    *("script_name", "interpreter"),
+}
 CFF_USES: dict[str, set[str]] = {
-    **{name: set(FRICTION_LAWS[name].parameters) for name in FRICTION_LAWS},
-    "COULOMB_OFF": set(),
-    "USERCFF": {
-        *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
-        *("script_name", "interpreter"),
+    **{
+        name: {
+            *FRICTION_LAWS[name].parameters,
+            *(_USERS if FRICTION_LAWS[name].takes_function else ()),
+        }
+        for name in FRICTION_LAWS
     },
+    "COULOMB_OFF": set(),
+    "USERCFF": _USERS,
 }
 CFF_ALL = set().union(*CFF_USES.values())
 
@@ -82,10 +89,17 @@ def _build_contact(entry: Entry) -> None:
         stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
         friction=_own_attributes(entry, cff_type),
-        cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
+        cff=subroutine(entry, "cff", "CFFSUB") if _asks_user(entry, cff_type) else el.Subroutine(),
         source=entry.source,
     )
     entry.register(entry.draft.contacts, contact)
+
+
+def _asks_user(entry: Entry, cff_type: str) -> bool:
+    """Return whether the user's function is to be called."""
+    if cff_type in FRICTION_LAWS:
+        return FRICTION_LAWS[cff_type].takes_function and entry.given("cff_fnc_name")
+    return cff_type == "USERCFF"
 
 
 def _own_attributes(entry: Entry, cff_type: str) -> tuple[tuple[str, float], ...]:

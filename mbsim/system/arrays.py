@@ -197,10 +197,14 @@ class Contacts(NamedTuple):
     normal_par: F2  # (nc, widest)
     friction_law: I1  # (nc,) address, 0 for none
     friction_par: F2  # (nc, widest)
+    sliding_law: (
+        I1  # (nc,) address of the user's function that gives a law's sliding friction, or 0
+    )
+    sliding_par: F2  # (nc, widest)
     interpreted: I1  # (nc,) 1 where the friction law enters Python
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
-    integrated: I1  # (nc,) 1 where these are part of y
+    size: F1  # (nc,) a usual size of these where they are part of y, else 0
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
 

@@ -122,6 +122,13 @@ def _speed_scale(model: Model, placement: Placement, end_time: float) -> float:
     return max(fastest, math.sqrt(g * length), length / end_time if end_time > 0.0 else 0.0)
 
 
+def _usual_load(placement: Placement, speed: float) -> float:
+    """Return a force by which friction is judged: m V^2/L of the lightest body, so often m g."""
+    lightest = min((body.mass for body in placement.bodies.values()), default=1.0)
+    V = speed if speed > 0.0 else placement.L
+    return lightest * V * V / placement.L
+
+
 def _scales(placement: Placement, speed: float) -> np.ndarray[Any, Any]:
     """Return length, speed and energy of the error norm, all above 0."""
     V = speed if speed > 0.0 else placement.L
@@ -155,7 +162,7 @@ def _load_user_friction(
     scripts: dict[Path, Script],
 ) -> dict[int, UserFriction]:
     """Load the users' CFFSUBs; scenes without one do not import what that needs."""
-    wanted = [c for c in model.contacts.values() if c.cff_type == "USERCFF"]
+    wanted = [c for c in model.contacts.values() if c.asks_user]
     if not wanted:
         return {}
     from mbsim.plugins import failure, host, load_friction
@@ -248,13 +255,15 @@ def build(
     graphics = graphics_table(model, placement, graphic_ids, row, shapes)
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
     pairs, ns = pairs_table(plans, kinds, graphic_row)
-    contacts, uses_x = contacts_table(contact_list, user)
+    speed = _speed_scale(model, placement, end_time)
+    load = _usual_load(placement, speed)
+    contacts, uses_x = contacts_table(contact_list, user, load)
     most = int(contacts.memory.max(initial=0))
 
     # X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
     wide = np.zeros((ns, 2), dtype=np.int64)
-    each = np.column_stack([3 * uses_x, contacts.integrated * contacts.memory])
+    each = np.column_stack([3 * uses_x, (contacts.size > 0.0) * contacts.memory])
     for k, plan in enumerate(plans.pairs):
         wide[pairs.slot[k] : pairs.last[k]] = each[contact_row[plan.kind.contact]]
     for crowd in plans.crowds:
@@ -284,7 +293,6 @@ def build(
         instructions = instructions._replace(number=np.append(instructions.number, 0.0))
 
     looked = len(y0) if has_modes(model) else 0
-    speed = _speed_scale(model, placement, end_time)
     scene = a.Scene(
         bodies=_bodies(placement),
         graphics=graphics,

@@ -216,16 +216,16 @@ def _full_damping_depth(contact: Contact) -> float:
 
 
 def contacts_table(
-    contacts: list[Contact], user: dict[int, UserFriction]
+    contacts: list[Contact], user: dict[int, UserFriction], load: float
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
-    """Return the contacts, and for each whether X has to be carried."""
+    """Return the contacts, and for each whether X has to be carried; `load`: a usual force."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, integrated = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    memory, size = np.zeros(n, dtype=np.int64), np.zeros(n)
     for k, contact in enumerate(contacts):
         law = NORMAL_LAWS[contact.cnf_type]
         normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
-        if contact.id in user:
+        if contact.cff_type == "USERCFF":
             friction.append(user[contact.id].par)
             addresses.append(user[contact.id].address)
             uses_x[k] = user[contact.id].uses_x
@@ -237,7 +237,8 @@ def contacts_table(
             friction.append(abi.friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
-            integrated[k] = friction_law.integrated
+            if friction_law.size is not None:
+                size[k] = friction_law.size(load, *friction[-1])
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -245,12 +246,20 @@ def contacts_table(
             wide[k, : len(values)] = values
         return wide
 
+    sliding = [
+        (user[c.id].address, user[c.id].par)
+        if c.id in user and c.cff_type != "USERCFF"
+        else (0, np.zeros(0))
+        for c in contacts
+    ]
     made = a.Contacts(
         id=np.array([contact.id for contact in contacts], dtype=np.int64),
         normal_law=np.array([address for address, _ in normal], dtype=np.int64),
         normal_par=table([values for _, values in normal]),
         friction_law=np.array(addresses, dtype=np.int64),
         friction_par=table(friction),
+        sliding_law=np.array([at for at, _ in sliding], dtype=np.int64),
+        sliding_par=table([par for _, par in sliding]),
         interpreted=np.array(
             [c.id in user and not user[c.id].compiled for c in contacts], dtype=np.int64
         ),
@@ -258,7 +267,7 @@ def contacts_table(
             [c.id in user or memory[k] > 0 for k, c in enumerate(contacts)], dtype=np.int64
         ),
         memory=memory,
-        integrated=integrated,
+        size=size,
         ignore_deeper=np.array(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),

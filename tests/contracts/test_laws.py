@@ -1,4 +1,4 @@
-"""What every law has to keep: run over all that are registered."""
+"""What every normal law has to keep: run over all that are registered."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mbsim.laws import abi
-from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS, FrictionInput
+from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact
 
 SHARED = {"stiffness": 1e5, "damping": 50.0, "dmax": 1e-3, "penalty": 1e4}
@@ -32,30 +32,7 @@ NORMAL_CASES = {
     **{f"POISSON {e}": ("POISSON", {"restitution_coef": e}) for e in (0.0, 0.5, 1.0)},
     "POISSON wide": ("POISSON", {"restitution_coef": 0.2, "normal_trans_vel": 0.5}),
 }
-FRICTION_VALUES = {
-    "mu_static": 0.5,
-    "mu_dynamic": 0.3,
-    "stiction_trans_vel": 0.01,
-    "friction_trans_vel": 0.05,
-}
 POINTER = ctypes.c_void_p
-
-
-def friction_parameters(law):
-    return [FRICTION_VALUES[name] for name in law.parameters]
-
-
-def slip(x, y, spin=0.0, nforce=10.0):
-    zero = (0.0, 0.0, 0.0)
-    return FrictionInput(0.0, 0.0, zero, (x, y, spin), (0.0, 0.0), nforce, 0.0, 0.0, zero, zero)
-
-
-def flat(inputs):
-    """Return a FrictionInput as the 19 numbers of the internal signature."""
-    values = []
-    for field in inputs:
-        values.extend(field if isinstance(field, tuple) else [field])
-    return np.array(values)
 
 
 @pytest.fixture(params=list(NORMAL_CASES))
@@ -64,11 +41,6 @@ def normal(request):
     name, attributes = NORMAL_CASES[request.param]
     law = NORMAL_LAWS[name]
     return law, abi.normal_constants(law, Contact(id=1, cnf_type=name, **(SHARED | attributes)))
-
-
-@pytest.fixture(params=list(FRICTION_LAWS))
-def friction(request):
-    return FRICTION_LAWS[request.param]
 
 
 def states(seed, count=500):
@@ -164,72 +136,3 @@ def test_damping_of_a_restitution_solves_the_relation():
     assert dimensionless_damping(1.0 - 1e-10) == pytest.approx(1.5e-10, rel=1e-6)
     # strong damping: the rebound speed tends to 1/a
     assert dimensionless_damping(0.01) == pytest.approx(100.0, rel=1e-12)
-
-
-def test_friction_opposes_slip_and_is_isotropic(friction):
-    par = friction_parameters(friction)
-    for speed in (1e-12, 1e-4, 0.01, 0.03, 0.05, 1.0):
-        ahead = friction.force(slip(speed, 0.0), *par)
-        assert ahead[0] < 0.0
-        assert ahead[1] == 0.0
-        angle = 0.7
-        turned = friction.force(slip(speed * math.cos(angle), speed * math.sin(angle)), *par)
-        assert turned[0] == pytest.approx(ahead[0] * math.cos(angle), rel=1e-12)
-        assert turned[1] == pytest.approx(ahead[0] * math.sin(angle), rel=1e-12)
-
-
-def test_friction_is_finite_and_zero_at_rest(friction):
-    assert friction.force(slip(0.0, 0.0), *friction_parameters(friction)) == (0, 0, 0, 0, 0)
-
-
-def test_friction_stays_within_the_cone(friction):
-    rng = np.random.default_rng(3)
-    par = friction_parameters(friction)
-    for vx, vy in rng.normal(scale=0.05, size=(300, 2)):
-        force = friction.force(slip(vx, vy, nforce=7.0), *par)
-        assert math.hypot(force[0], force[1]) <= 0.5 * 7.0 * (1 + 1e-12)
-
-
-def test_compiled_friction_equals_plain_python(friction):
-    par = np.array(friction_parameters(friction))
-    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, POINTER, POINTER, POINTER)(
-        abi.friction_address(friction)
-    )
-    out = np.zeros(5)
-    rng = np.random.default_rng(4)
-    for vx, vy in rng.normal(scale=0.05, size=(200, 2)):
-        inputs = slip(vx, vy)
-        given = flat(inputs)
-        assert call(1, given.ctypes.data, par.ctypes.data, out.ctypes.data) == 0
-        np.testing.assert_allclose(out, friction.force(inputs, *par), rtol=1e-14, atol=0)
-
-
-def test_coulomb_on_is_the_step_curve_of_the_manual():
-    from mbsim.core.blend import step
-
-    law = FRICTION_LAWS["COULOMB_ON"]
-    mu_s, mu_d, vs, vd = 0.5, 0.3, 0.01, 0.05
-    for speed in np.linspace(1e-5, 0.08, 400):
-        if speed >= vd:
-            mu = mu_d
-        elif speed > vs:
-            mu = step(speed, vs, mu_s, vd, mu_d)
-        else:
-            mu = step(speed, -vs, -mu_s, vs, mu_s)
-        force = law.force(slip(speed, 0.0, nforce=1.0), mu_s, mu_d, vs, vd)
-        assert force[0] == pytest.approx(-mu, rel=1e-12)
-
-
-def test_coulomb_on_with_equal_transition_velocities():
-    law = FRICTION_LAWS["COULOMB_ON"]
-    below = law.force(slip(0.0099999999, 0.0, nforce=1.0), 0.3, 0.3, 0.01, 0.01)
-    above = law.force(slip(0.0100000001, 0.0, nforce=1.0), 0.3, 0.3, 0.01, 0.01)
-    assert below[0] == pytest.approx(-0.3, rel=1e-9)
-    assert above[0] == pytest.approx(-0.3, rel=1e-9)
-
-
-def test_limit_of_the_ratio_at_rest():
-    # mu(v)/v -> 1.5 mu_s / vs
-    law = FRICTION_LAWS["COULOMB_ON"]
-    force = law.force(slip(1e-200, 0.0, nforce=2.0), 0.4, 0.3, 0.01, 0.02)
-    assert force[0] == pytest.approx(-1.5 * 0.4 / 0.01 * 2.0 * 1e-200, rel=1e-12)

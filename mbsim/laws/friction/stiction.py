@@ -12,9 +12,10 @@ direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
 k is `tangential_stiffness`, or 0.824 times the stiffness of the normal force at its depth:
 Mindlin's 2 (1 - nu)/(2 - nu) for nu = 0.3. Where k grows with the depth the force in the spring
 stays, where it falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`,
-or what is critical for the mass of the bodies that slip: 2 sqrt(k m).
+or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more would let it slip late.
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
-up to mu_s N r.
+up to mu_s N r. With `cff_fnc_name` the size of what that function returns takes the place of
+mu_d N.
 Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
 65 (1991) 153-166; J. C. Simo, T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
 """
@@ -28,6 +29,8 @@ from mbsim.laws.catalog import SLIP, STICK, Parameter, friction_law
 
 #: Tangential over normal stiffness where none is given.
 MINDLIN = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
+#: Damping over the critical one where none is given.
+DAMPING = 0.2
 
 # what is kept: spring x, y, twist; X then; stiffness then; mode
 _X, _STIFFNESS, _MODE = 3, 6, 7
@@ -61,6 +64,12 @@ def _turn(inputs, memory, mode, mu, k, c, radius):
     return torque, twist
 
 
+@jitable
+def _dynamic_limit(inputs, mu_dynamic):
+    """Return the friction of sliding: that of the user's function, where there is one."""
+    return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
+
+
 @friction_law(
     "STICTION",
     "mu_static",
@@ -71,6 +80,7 @@ def _turn(inputs, memory, mode, mu, k, c, radius):
     Parameter("torsion_radius", 0.0),
     memory=8,
     uses_x=True,
+    takes_function=True,
     modes=True,
 )
 def stiction(
@@ -90,7 +100,7 @@ def stiction(
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), still
     c = tangential_damping
     if math.isnan(c):
-        c = 2.0 * math.sqrt(k * inputs.mass)
+        c = 2.0 * DAMPING * math.sqrt(k * inputs.mass)
 
     # the spring as it would be if nothing slipped
     ease = memory[_STIFFNESS] / k if 0.0 < memory[_STIFFNESS] < k else 1.0
@@ -104,7 +114,7 @@ def stiction(
     slips = memory[_MODE] == SLIP and (inputs.frozen == 1.0 or not goes_back)
     if slips:
         mode = STICK if goes_back else SLIP
-        limit = mu_dynamic * inputs.nforce
+        limit = _dynamic_limit(inputs, mu_dynamic)
         ux, uy = _direction(zx, zy, kept, v, k, limit)
         # less where the normal force grew faster than the spring follows; at the slip's begin
         # that is a kink, of which derivatives are to see the side that lies ahead
@@ -115,13 +125,13 @@ def stiction(
         limit = mu_static * inputs.nforce
         mode = STICK if k * length <= limit else SLIP
         if mode == SLIP and (inputs.frozen == 0.0 or memory[_MODE] != STICK):
-            limit = mu_dynamic * inputs.nforce
+            limit = _dynamic_limit(inputs, mu_dynamic)
         fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
         force = math.hypot(fx, fy)
         if force > limit:
             fx, fy = fx * limit / force, fy * limit / force
         if mode == SLIP:
-            rest = mu_dynamic * inputs.nforce / (k * length)
+            rest = _dynamic_limit(inputs, mu_dynamic) / (k * length)
             zx, zy = rest * zx, rest * zy
     torque, twist = 0.0, 0.0
     if rotational_stiffness > 0.0:

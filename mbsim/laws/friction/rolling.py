@@ -1,0 +1,47 @@
+"""COULOMB_ROLLING: COULOMB_ON, and a torque against rolling.
+
+    M = -r_r N STEP(w, 0, 0, w_t, 1) w/|w|     w the relative angular velocity in the contact plane
+
+r_r is `rolling_arm` [L], the lever arm of the normal force (a coefficient of rolling friction times
+the radius), w_t `rolling_trans_vel` [rad/T]. Like COULOMB_ON it creeps in place of holding. It acts
+on rolling only, not on spin about the normal.
+Source: the lever arm is textbook mechanics; smoothing as in COULOMB_ON.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.laws.friction.coulomb import coulomb_on
+
+
+@friction_law(
+    "COULOMB_ROLLING",
+    "mu_static",
+    "mu_dynamic",
+    "stiction_trans_vel",
+    "friction_trans_vel",
+    Parameter("rolling_arm", positive=True),
+    Parameter("rolling_trans_vel", 1e-2, positive=True),
+)
+def coulomb_rolling(
+    inputs,
+    mu_static,
+    mu_dynamic,
+    stiction_trans_vel,
+    friction_trans_vel,
+    rolling_arm,
+    rolling_trans_vel,
+):
+    """Return Fx, Fy, Mx, My, Tz on I."""
+    fx, fy, _, _, _ = coulomb_on(
+        inputs, mu_static, mu_dynamic, stiction_trans_vel, friction_trans_vel
+    )
+    w = inputs.rolling
+    speed = math.hypot(w[0], w[1])
+    u = speed / rolling_trans_vel
+    # STEP over w is u^2 (3 - 2u): its ratio to w needs no division by w
+    ratio = u * (3.0 - 2.0 * u) / rolling_trans_vel if u < 1.0 else 1.0 / speed
+    pull = -rolling_arm * inputs.nforce * ratio
+    return fx, fy, pull * w[0], pull * w[1], 0.0

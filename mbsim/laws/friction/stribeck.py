@@ -1,0 +1,40 @@
+"""STRIBECK: friction that falls from static to dynamic with speed, and a viscous part.
+
+    F = -(N g(v) tanh(v/v_t) + c v) t,   g(v) = mu_d + (mu_s - mu_d) exp(-(v/v_s)^alpha)
+
+It creeps below v_t in place of sticking. The falling branch feeds stick-slip.
+Source: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083-1138.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.laws.curves import against, tanh_ratio
+from mbsim.laws.curves import stribeck as falling
+
+
+@friction_law(
+    "STRIBECK",
+    "mu_static",
+    "mu_dynamic",
+    "stiction_trans_vel",
+    Parameter("stribeck_vel", positive=True),
+    Parameter("stribeck_exponent", 2.0, positive=True),
+    Parameter("viscous_coef", 0.0),
+)
+def stribeck(
+    inputs,
+    mu_static,
+    mu_dynamic,
+    stiction_trans_vel,
+    stribeck_vel,
+    stribeck_exponent,
+    viscous_coef,
+):
+    """Return Fx, Fy, Mx, My, Tz on I."""
+    speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
+    mu = falling(speed, mu_static, mu_dynamic, stribeck_vel, stribeck_exponent)
+    pull = inputs.nforce * mu * tanh_ratio(speed, stiction_trans_vel)
+    return against(inputs.xdot, pull + (viscous_coef if inputs.nforce > 0.0 else 0.0))

@@ -1,0 +1,384 @@
+"""What every friction law has to keep, and the closed forms of each."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+import numpy as np
+import pytest
+
+from mbsim.laws import abi
+from mbsim.laws.catalog import BEGUN, FRICTION_LAWS, SLIP, STICK, FrictionInput
+
+VALUES = {
+    "mu_static": 0.5,
+    "mu_dynamic": 0.3,
+    "stiction_trans_vel": 0.01,
+    "friction_trans_vel": 0.05,
+    "stribeck_vel": 0.02,
+    "bristle_stiffness": 1e4,
+    "tangential_stiffness": 1e4,
+    "tangential_damping": 5.0,
+    "rolling_arm": 0.01,
+    "patch_radius": 0.1,
+}
+#: Laws that know only slip velocities.
+PLAIN = [name for name in FRICTION_LAWS if FRICTION_LAWS[name].memory == 0]
+KEEPING = [name for name in FRICTION_LAWS if FRICTION_LAWS[name].memory > 0]
+POINTER = ctypes.c_void_p
+ZERO = (0.0, 0.0, 0.0)
+
+
+def parameters(law, **values):
+    given = {own.name: own.default for own in law.own} | VALUES | values
+    return [given[name] for name in law.parameters]
+
+
+def slip(x, y, spin=0.0, nforce=10.0, at=ZERO, rolling=(0.0, 0.0), frozen=0.0, stiffness=1e5):
+    return FrictionInput(
+        *(0.0, 0.0, at, (x, y, spin), rolling, nforce, 0.0, 0.0, ZERO, ZERO),
+        *(0.0, frozen, stiffness, 1.0, math.nan),
+    )
+
+
+def flat(inputs):
+    """Return a FrictionInput as the numbers of the internal signature."""
+    values = []
+    for field in inputs:
+        values.extend(field if isinstance(field, tuple) else [field])
+    return np.array(values)
+
+
+class Rub:
+    """A law that is rubbed along a given way under a given load, and the work that it takes."""
+
+    def __init__(self, law, *par):
+        self.law, self.par = law, par
+        self.memory, self.at, self.taken, self.force = (0.0,) * law.memory, np.zeros(3), 0.0, None
+        self.mode = BEGUN
+
+    def ask(self, v, nforce, at, memory):
+        inputs = slip(*v, nforce=nforce, at=tuple(at))
+        if self.law.memory == 0:
+            return np.array(self.law.force(inputs, *self.par)), ()
+        out, new = self.law.force(inputs, memory, *self.par)
+        self.mode = out[6]
+        return np.array(out[:5]), new
+
+    def go(self, dt, v, nforce):
+        """Go on with a slip (x, y, spin) for a time; return the force at its end."""
+        v = np.asarray(v, dtype=float)
+        if self.law.size is not None:
+            z = np.array(self.memory)
+            k1 = np.array(self.ask(v, nforce, self.at, tuple(z))[1])
+            k2 = np.array(self.ask(v, nforce, self.at, tuple(z + dt / 2 * k1))[1])
+            k3 = np.array(self.ask(v, nforce, self.at, tuple(z + dt / 2 * k2))[1])
+            k4 = np.array(self.ask(v, nforce, self.at, tuple(z + dt * k3))[1])
+            self.memory = tuple(z + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+        self.at = self.at + dt * v
+        force, new = self.ask(v, nforce, self.at, self.memory)
+        if self.law.size is None:
+            self.memory = new
+        before = force if self.force is None else self.force
+        mean = 0.5 * (before + force)[[0, 1, 4]]
+        self.taken -= dt * float(mean @ v)
+        self.force = force
+        return force
+
+
+@pytest.fixture(params=PLAIN)
+def plain(request):
+    return FRICTION_LAWS[request.param]
+
+
+@pytest.fixture(params=list(FRICTION_LAWS))
+def friction(request):
+    return FRICTION_LAWS[request.param]
+
+
+def test_plain_friction_opposes_slip_and_is_isotropic(plain):
+    par = parameters(plain)
+    for speed in (1e-12, 1e-4, 0.01, 0.03, 0.05, 1.0):
+        ahead = plain.force(slip(speed, 0.0), *par)
+        assert ahead[0] < 0.0
+        assert ahead[1] == 0.0
+        angle = 0.7
+        turned = plain.force(slip(speed * math.cos(angle), speed * math.sin(angle)), *par)
+        assert turned[0] == pytest.approx(ahead[0] * math.cos(angle), rel=1e-12)
+        assert turned[1] == pytest.approx(ahead[0] * math.sin(angle), rel=1e-12)
+
+
+def test_friction_is_zero_at_rest_from_the_start(friction):
+    force = Rub(friction, *parameters(friction)).go(1.0, ZERO, 10.0)
+    assert not force.any()
+
+
+def test_friction_stays_within_the_cone(friction):
+    rng = np.random.default_rng(3)
+    rub = Rub(friction, *parameters(friction))
+    for vx, vy, vr in rng.normal(scale=0.05, size=(300, 3)):
+        force = rub.go(1e-4, (vx, vy, vr), 7.0)
+        assert math.hypot(force[0], force[1]) <= 0.5 * 7.0 * (1 + 1e-12)
+
+
+def test_friction_is_nothing_without_a_normal_force(friction):
+    assert not Rub(friction, *parameters(friction)).go(1e-3, (0.3, -0.2, 0.1), 0.0).any()
+
+
+def test_compiled_friction_equals_plain_python(friction):
+    par = np.array(parameters(friction))
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, POINTER, POINTER, POINTER)(
+        abi.friction_address(friction)
+    )
+    rng, keeps = np.random.default_rng(4), friction.memory > 0
+    out = np.zeros(abi.MEMORY_OUT + friction.memory if keeps else 5)
+    memory = (0.0,) * friction.memory
+    for vx, vy in rng.normal(scale=0.05, size=(200, 2)):
+        inputs = slip(vx, vy, 0.1, at=(1e-4 * vx, 1e-4 * vy, 0.0), frozen=float(vx > 0.0))
+        given = np.concatenate([flat(inputs), memory])
+        assert call(1, given.ctypes.data, par.ctypes.data, out.ctypes.data) == 0
+        if keeps:
+            found, new = friction.force(inputs, memory, *par)
+            expected = (*found, *new)
+            memory = new if friction.size is None else tuple(1e-3 * np.array(new))
+        else:
+            expected = friction.force(inputs, *par)
+        np.testing.assert_allclose(out, expected, rtol=1e-13, atol=1e-300)
+
+
+def closed_way(rng, steps):
+    """Return slips (steps, 3) that come back to where they began, and loads, at random."""
+    s = np.linspace(0.0, 2.0 * np.pi, steps, endpoint=False)
+    v, load = np.zeros((steps, 3)), np.full(steps, 6.0)
+    for k in range(1, 5):
+        # no constant part: the way is closed
+        a, b = rng.normal(size=(2, 3)) * [1.0, 1.0, 5.0] / k
+        v += np.outer(np.sin(k * s), a) + np.outer(np.cos(k * s), b)
+        load += 1.4 * rng.uniform(-1, 1) * np.sin(k * s + rng.uniform(0, 6))
+    return 10.0 ** rng.uniform(-3, -1) * v, np.maximum(load, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_law_gives_energy_over_closed_ways_under_changing_loads(friction, seed):
+    rng, steps, span = np.random.default_rng(seed), 400, 0.05
+    own = {"bristle_damping": 1.0, "damping_trans_vel": 0.01}
+    for _ in range(250 // (5 if friction.memory else 1)):
+        rub = Rub(friction, *parameters(friction, **own))
+        v, load = closed_way(rng, steps)
+        work = 0.0
+        for each, nforce in zip(v, load, strict=True):
+            force = rub.go(span / steps, each, nforce)
+            work += span / steps * abs(force[[0, 1, 4]] @ each)
+        assert rub.taken >= -1e-3 * work
+
+
+def test_coulomb_on_is_the_step_curve_of_the_manual():
+    from mbsim.core.blend import step
+
+    law = FRICTION_LAWS["COULOMB_ON"]
+    mu_s, mu_d, vs, vd = 0.5, 0.3, 0.01, 0.05
+    for speed in np.linspace(1e-5, 0.08, 400):
+        if speed >= vd:
+            mu = mu_d
+        elif speed > vs:
+            mu = step(speed, vs, mu_s, vd, mu_d)
+        else:
+            mu = step(speed, -vs, -mu_s, vs, mu_s)
+        force = law.force(slip(speed, 0.0, nforce=1.0), mu_s, mu_d, vs, vd)
+        assert force[0] == pytest.approx(-mu, rel=1e-12)
+
+
+def test_coulomb_on_with_equal_transition_velocities():
+    law = FRICTION_LAWS["COULOMB_ON"]
+    below = law.force(slip(0.0099999999, 0.0, nforce=1.0), 0.3, 0.3, 0.01, 0.01)
+    above = law.force(slip(0.0100000001, 0.0, nforce=1.0), 0.3, 0.3, 0.01, 0.01)
+    assert below[0] == pytest.approx(-0.3, rel=1e-9)
+    assert above[0] == pytest.approx(-0.3, rel=1e-9)
+
+
+def test_limit_of_the_ratio_at_rest():
+    # mu(v)/v -> 1.5 mu_s / vs
+    law = FRICTION_LAWS["COULOMB_ON"]
+    force = law.force(slip(1e-200, 0.0, nforce=2.0), 0.4, 0.3, 0.01, 0.02)
+    assert force[0] == pytest.approx(-1.5 * 0.4 / 0.01 * 2.0 * 1e-200, rel=1e-12)
+
+
+def test_smooth_laws_are_their_formulas():
+    g = {"mu_static": 0.5, "mu_dynamic": 0.3}
+    for v in (1e-9, 1e-4, 5e-3, 0.01, 0.03, 0.2, 3.0):
+        tanh = FRICTION_LAWS["TANH"]
+        assert -tanh.force(slip(v, 0.0, nforce=2.0), *parameters(tanh))[0] == pytest.approx(
+            2.0 * 0.3 * math.tanh(v / 0.05), rel=1e-8
+        )
+        law = FRICTION_LAWS["STRIBECK"]
+        par = parameters(law, viscous_coef=0.7, **g)
+        curve = 0.3 + 0.2 * math.exp(-((v / 0.02) ** 2))
+        expected = 2.0 * curve * math.tanh(v / 0.01) + 0.7 * v
+        assert -law.force(slip(0.0, v, nforce=2.0), *par)[1] == pytest.approx(expected, rel=1e-8)
+        law = FRICTION_LAWS["BROWN_MCPHEE"]
+        par = parameters(law, viscous_coef=0.7, **g)
+        u = v / 0.01
+        curve = 0.3 * math.tanh(4 * u) + 0.2 * u / ((u / 2) ** 2 + 0.75) ** 2
+        assert -law.force(slip(v, 0.0, nforce=2.0), *par)[0] == pytest.approx(
+            2.0 * curve + 0.7 * v, rel=1e-8
+        )
+
+
+def test_brown_mcphee_peaks_at_the_transition():
+    law = FRICTION_LAWS["BROWN_MCPHEE"]
+    par = parameters(law, mu_dynamic=0.0)
+    pulls = [-law.force(slip(v, 0.0, nforce=1.0), *par)[0] for v in np.linspace(0.009, 0.011, 21)]
+    assert int(np.argmax(pulls)) == 10
+    assert max(pulls) == pytest.approx(0.5, rel=1e-12)
+
+
+def disc(e):
+    """Return friction and torque of a disc of radius 1 that slides at e and spins at 1."""
+    r, weight = np.polynomial.legendre.leggauss(200)
+    r, weight = (r + 1) / 2, weight / 2
+    angle = (np.arange(400) + 0.5) * 2 * np.pi / 400
+    R, T = np.meshgrid(r, angle)
+    part = weight * r * np.ones_like(R) * 2 / 400
+    x, y = R * np.cos(T), R * np.sin(T)
+    speed = np.hypot(e - y, x)
+    return (part * (e - y) / speed).sum(), (part * (x * x - y * (e - y)) / speed).sum()
+
+
+def test_contensou_is_friction_over_a_disc():
+    law = FRICTION_LAWS["CONTENSOU"]
+    for e in np.geomspace(1e-3, 1e3, 121):
+        force = law.force(slip(e, 0.0, 1.0, nforce=1.0), 1.0, 1e-9, 1.0)
+        f, m = disc(e)
+        assert -force[0] == pytest.approx(f, rel=0.017)
+        assert -force[4] == pytest.approx(m, rel=0.017)
+    # spin alone, slip alone
+    assert -law.force(slip(0.0, 0.0, 2.0, nforce=3.0), 0.4, 1e-9, 0.1)[4] == pytest.approx(
+        2 / 3 * 0.4 * 3.0 * 0.1
+    )
+    assert -law.force(slip(0.5, 0.0, 0.0, nforce=3.0), 0.4, 1e-9, 0.1)[0] == pytest.approx(1.2)
+
+
+def test_rolling_resistance_is_a_lever_arm():
+    law = FRICTION_LAWS["COULOMB_ROLLING"]
+    out = law.force(slip(0.0, 0.0, rolling=(3.0, 4.0), nforce=2.0), *parameters(law))
+    assert out[2:] == pytest.approx((-0.01 * 2.0 * 0.6, -0.01 * 2.0 * 0.8, 0.0))
+    at_rest = law.force(slip(0.0, 0.0, nforce=2.0), *parameters(law))
+    assert not np.any(at_rest)
+
+
+def test_dahl_follows_its_closed_form_and_its_loop():
+    # one way: F = -Fc + (F0 + Fc) exp(-k x/Fc)
+    law, k, limit = FRICTION_LAWS["DAHL"], 1e4, 0.3 * 10.0
+    rub, n = Rub(law, *parameters(law)), 2000
+    length = 5.0 * limit / k
+    for j in range(1, n + 1):
+        force = rub.go(1.0 / n, (length, 0.0, 0.0), 10.0)[0]
+        assert force == pytest.approx(limit * (math.exp(-k * length * j / n / limit) - 1), rel=1e-9)
+    # a settled loop of +- a: the force at its ends is Fc tanh(k a/Fc) (from the closed form both
+    # ways), and it takes 4 Fc a - 4 Fc^2/k tanh(k a/Fc)
+    a = 2.0 * limit / k
+    for _ in range(8):
+        taken = rub.taken
+        for sign in (-1, 1):
+            for _ in range(n):
+                end = rub.go(1.0 / n, (sign * 2 * a, 0.0, 0.0), 10.0)[0]
+                # the trapezoid rule would take the jump at the turn for a slope
+    assert -end == pytest.approx(limit * math.tanh(k * a / limit), rel=1e-9)
+    loop = 4 * limit * a - 4 * limit**2 / k * math.tanh(k * a / limit)
+    assert rub.taken - taken == pytest.approx(loop, rel=1e-6)
+
+
+def test_stiction_loop_takes_what_a_jenkins_element_does():
+    # 4 Fc (X - Fc/k) a cycle of amplitude X
+    law, k, limit = FRICTION_LAWS["STICTION"], 1e4, 0.3 * 10.0
+    rub = Rub(law, *parameters(law, mu_static=0.3, tangential_damping=0.0))
+    X, n = 4.0 * limit / k, 400
+    for _ in range(n):
+        rub.go(1.0, (X / n, 0.0, 0.0), 10.0)
+    for _ in range(3):
+        taken = rub.taken
+        for sign in (-1, 1):
+            for _ in range(n):
+                rub.go(1.0, (sign * 2 * X / n, 0.0, 0.0), 10.0)
+    assert rub.taken - taken == pytest.approx(4 * limit * (X - limit / k), rel=1e-12)
+
+
+def test_stiction_holds_up_to_its_static_limit_and_then_slips():
+    law, k = FRICTION_LAWS["STICTION"], 1e4
+    rub = Rub(law, *parameters(law, tangential_damping=0.0))
+    step = 0.05 * 5.0 / k
+    for j in range(1, 30):
+        force = rub.go(1.0, (0.6 * step, 0.8 * step, 0.0), 10.0)
+        pull = math.hypot(force[0], force[1])
+        if j == 20:
+            # at the limit itself rounding decides
+            continue
+        if j < 20:
+            assert pull == pytest.approx(0.25 * j, rel=1e-12)
+            assert rub.mode == STICK
+        else:
+            assert pull == pytest.approx(3.0, rel=1e-12)
+            assert rub.mode == SLIP
+    # back a little: it holds again, with the spring at its dynamic limit
+    force = rub.go(1.0, (-0.6 * step, -0.8 * step, 0.0), 10.0)
+    assert rub.mode == STICK
+    assert math.hypot(force[0], force[1]) == pytest.approx(3.0 - 0.25, rel=1e-12)
+
+
+def test_stiction_keeps_its_mode_within_a_step():
+    law = FRICTION_LAWS["STICTION"]
+    par, k = parameters(law, tangential_damping=0.0), 1e4
+    out, kept = law.force(slip(1.0, 0.0, at=(1e-5, 0.0, 0.0)), (0.0,) * 8, *par)
+    assert out[6] == STICK
+    # beyond the limit: the force of a step that sticks stays at it, the mode tells
+    beyond = 2.0 * 5.0 / k
+    out, _ = law.force(slip(1.0, 0.0, at=(beyond, 0.0, 0.0), frozen=1.0), kept, *par)
+    assert -out[0] == pytest.approx(5.0)
+    assert out[6] == SLIP
+    out, kept = law.force(slip(1.0, 0.0, at=(beyond, 0.0, 0.0)), kept, *par)
+    assert -out[0] == pytest.approx(3.0)
+    # and that of one that slips goes on where it turns
+    out, _ = law.force(slip(-1.0, 0.0, at=(0.99 * beyond, 0.0, 0.0), frozen=1.0), kept, *par)
+    assert out[6] == STICK
+    assert out[0] < 0.0
+
+
+def test_a_twist_is_held_up_to_its_limit():
+    law = FRICTION_LAWS["STICTION"]
+    par = parameters(law, tangential_damping=0.0, rotational_stiffness=100.0, torsion_radius=0.1)
+    rub = Rub(law, *par)
+    # limit mu_s N r = 0.5
+    assert rub.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.4)
+    assert rub.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.5)
+    assert rub.go(1.0, (0.0, 0.0, -0.004), 10.0)[4] == pytest.approx(-0.1)
+
+
+def test_springs_lose_and_never_win_where_the_normal_stiffness_changes():
+    law = FRICTION_LAWS["STICTION"]
+    par = parameters(law, tangential_stiffness=math.nan, tangential_damping=0.0)
+    out, kept = law.force(slip(0.0, 0.0, at=(1e-6, 0.0, 0.0), stiffness=1e5), (0.0,) * 8, *par)
+    for stiffness in (2e5, 1e6, 3e5, 1e4, 1e5):
+        before = out[5]
+        out, kept = law.force(slip(0.0, 0.0, at=(1e-6, 0.0, 0.0), stiffness=stiffness), kept, *par)
+        assert out[5] <= before * (1 + 1e-12)
+
+
+def test_lugre_slides_at_its_steady_curve():
+    law = FRICTION_LAWS["LUGRE"]
+    par = parameters(law, bristle_damping=10.0, viscous_coef=0.4)
+    for v in (1e-3, 0.02, 0.1):
+        rub = Rub(law, *par)
+        for _ in range(4000):
+            force = rub.go(5e-5 * 1e-3 / v, (v, 0.0, 0.0), 10.0)
+        g = 10.0 * (0.3 + 0.2 * math.exp(-((v / 0.02) ** 2)))
+        assert -force[0] == pytest.approx(g + 0.4 * v, rel=1e-6)
+
+
+def test_a_limit_of_the_users_own_takes_the_place_of_the_dynamic_one():
+    law = FRICTION_LAWS["STICTION"]
+    par = parameters(law, tangential_damping=0.0)
+    given = slip(1.0, 0.0, at=(1.0, 0.0, 0.0))._replace(limit=1.7)
+    out, kept = law.force(given, (0.0,) * 8, *par)
+    assert -out[0] == pytest.approx(1.7)
+    assert 1e4 * kept[0] == pytest.approx(1.7)
