@@ -370,7 +370,7 @@ def test_lugre_slides_at_its_steady_curve():
     for v in (1e-3, 0.02, 0.1):
         rub = Rub(law, *par)
         for _ in range(4000):
-            force = rub.go(5e-5 * 1e-3 / v, (v, 0.0, 0.0), 10.0)
+            force = rub.go(5e-6 / v, (v, 0.0, 0.0), 10.0)
         g = 10.0 * (0.3 + 0.2 * math.exp(-((v / 0.02) ** 2)))
         assert -force[0] == pytest.approx(g + 0.4 * v, rel=1e-6)
 
