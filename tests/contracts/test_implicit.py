@@ -456,10 +456,10 @@ def test_nothing_is_left_of_what_is_fast():
 @BOTH
 def test_steps_do_not_know_how_stiff_an_equation_is(name, given):
     run = Run(RELAX, (1.0,), given=given, name=name)
-    tol = 1e-7 if name == "RADAU5" else 1e-4
+    tol, most = (1e-7, 150) if name == "RADAU5" else (1e-4, 190)
     assert run(10.0, tol) == DONE
-    assert run.state.y[0] == pytest.approx(math.cos(10.0), abs=10.0 * tol)
-    assert run.count(scheme.STEPS) < 150
+    assert run.state.y[0] == pytest.approx(math.cos(10.0), abs=tol)
+    assert run.count(scheme.STEPS) < most
     assert run.count(scheme.JACOBIANS) < 5
 
 
