@@ -84,6 +84,9 @@ ROUGH = 1e-3
 #: Corrections in one step at most: with an old linearisation, which another may better, with one
 #: of this step, and with a linearisation and a line search for each.
 MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
+#: The second correction may be larger than the first by so much: work and losses, which only sum
+#: up what bodies do, are a correction late.
+LATE = 3.0
 #: The least part of a correction that a line search takes.
 LEAST_PART = 1.0 / 128.0
 #: A step's velocities may be off by this part of its error for what f at its end is not.
@@ -351,7 +354,7 @@ def iterate(p, m, t, h, anew):
         if code != 0.0:
             return code
         take(m, h, 1.0, m.k[D])
-        word, rate = judge(m, iteration, most, size, before, rate)
+        word, rate = judge(m, iteration, most, size, before, rate, LATE)
         before = size
     m.memory[RATE] = rate
     return 0.0 if word == SOLVED else -1.0

@@ -109,13 +109,14 @@ def begin(m):
 
 
 @jitable
-def judge(m, iteration, most, size, before, rate_before):
+def judge(m, iteration, most, size, before, rate_before, late):
     """Return the word on correction number `iteration` (from 1) of `size`, and its rate.
 
     Of a rate r = size / before what is left after this correction is r / (1 - r) of it. A method
     that would not be done after `most` corrections ends at once, and says in RETRY what part of
     the step would have been. One that does not get smaller any more, and is small enough for the
-    step's error, is rounding.
+    step's error, is rounding. Only the second correction may be larger than the first, by less than
+    `late`.
     """
     goal = target(m.memory[TOL])
     note(m, size)
@@ -131,8 +132,10 @@ def judge(m, iteration, most, size, before, rate_before):
             if not rate < 0.99:
                 if size <= LEFT * m.memory[TOL]:
                     return SOLVED, rate_before
-                m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
-                return HOPELESS, rate
+                if iteration > 2 or not rate < late:
+                    m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
+                    return HOPELESS, rate
+                return GO_ON, rate
             # what projections undo of the first correction comes back in the second, not again
             left = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration)
             if 2 < iteration < most and left >= goal:

@@ -220,7 +220,7 @@ def iterate(p, m, t, h):
         code, size = correct(p, m, t, h)
         if code != 0.0:
             return code
-        word, rate = judge(m, iteration, MOST, size, before, rate)
+        word, rate = judge(m, iteration, MOST, size, before, rate, 0.0)
         before = size
     m.memory[RATE] = rate
     return 0.0 if word == SOLVED else -1.0

@@ -593,13 +593,13 @@ def test_the_constants_of_galpha_are_those_of_its_order():
     assert galpha.velocity_error(state, 1.0, 0, 0.5, 1.0) == pytest.approx(found)
 
 
-def judged(sizes, most=7, tol=1e-4, rest=1.0):
+def judged(sizes, most=7, tol=1e-4, rest=1.0, late=0.0):
     """Return what `judge` says of corrections of these sizes, and what is kept in memory."""
     state = scheme.make(galpha.SCHEME, np.zeros(1), 0.0)
     state.memory[scheme.TOL], state.memory[scheme.REST] = tol, rest
     words, before, rate = [], 0.0, 0.0
     for iteration, size in enumerate(sizes, 1):
-        word, rate = newton.judge(state, iteration, most, size, before, rate)
+        word, rate = newton.judge(state, iteration, most, size, before, rate, late)
         words.append(word)
         before = size
     return words, state.memory
@@ -623,6 +623,11 @@ def test_newtons_iteration_goes_on_while_it_is_worth_it():
     assert words == [go_on, hopeless]
     assert memory[scheme.RETRY] == newton.QUARTER
     assert judged([math.nan])[0] == [hopeless]
+    # but for what is a correction late, and once
+    assert judged([1.0, 2.0], late=3.0)[0] == [go_on, go_on]
+    assert judged([1.0, 2.0, 1e-9], late=3.0)[0] == [go_on, go_on, solved]
+    assert judged([1.0, 3.0], late=3.0)[0] == [go_on, hopeless]
+    assert judged([1.0, 2.0, 2.0], late=3.0)[0] == [go_on, go_on, hopeless]
     assert judged([1.0] + [1e-3] * 6, most=7, tol=1e9)[0][0] == solved
     # rounding does not fall any more
     assert judged([2e-6, 2.1e-6])[0] == [go_on, solved]
