@@ -14,14 +14,19 @@ step. Iterates are projected onto positions and velocities that joints allow, as
 formulation of index 2: corrections are along joints, and what a has across them is what keeps
 velocities on them. Their forces come from f.
 
-The error of a step is that of the formulas, the second and third derivative of the velocity times
-h^3 and a constant, from the differences of accelerations of this step and the last.
+The error of a step in positions is that of the formulas, the second derivative of the velocity
+times h^3 and a constant. In velocities it is by how much they are off the trapezoidal rule over v'
+at begin and end, and the error of that rule, h^3 v''' / 12: so it holds as well where a does not
+follow v', behind a force that jumped. There a short step after a long one meets a v'' that nothing
+foretold, and the difference counts in full, not as a part of the long step.
 Source: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371; M. Arnold, O. Bruls, Multibody
 Syst. Dyn. 18 (2007) 185; O. Bruls, A. Cardona, M. Arnold, Mech. Mach. Theory 48 (2012) 121;
 damping of Newton's iteration: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -39,6 +44,7 @@ from mbsim.integrators.newton import (
     linearise,
     may_help,
     note,
+    put_along,
     target,
 )
 from mbsim.integrators.rotation import turn
@@ -62,13 +68,15 @@ RHO = 0.8
 AM, AF = (2.0 * RHO - 1.0) / (RHO + 1.0), RHO / (RHO + 1.0)
 GAMMA = 0.5 - AM + AF
 BETA = 0.25 * (GAMMA + 0.5) ** 2
-#: a is v' + SHIFT h v'' + CURVE h^2 v''' + ...
+#: a is v' + SHIFT h v'' + ...
 SHIFT = AM - AF
-CURVE = 0.5 * (1.0 - AF) - (1.0 - AM) * (0.5 + SHIFT)
-#: Errors of a step in x over h^3 v'', and in v over h^3 v'''.
+#: Error of a step in x over h^3 v'', and of the trapezoidal rule in v over h^3 v'''.
 ERROR_X = BETA + 0.5 * SHIFT - 1.0 / 6.0
-ERROR_V = CURVE + GAMMA * (0.5 + SHIFT) - 1.0 / 6.0
+TRAPEZOID = 1.0 / 12.0
 
+#: A step's error is held to this part of tol, for steps of order 2 are many and their errors of
+#: one sign: they add up.
+PART = 0.2
 #: A step's error may change friction by this part of the normal force. What is fast fades slowly,
 #: so friction that saturates on the wrong side would chatter.
 ROUGH = 1e-3
@@ -76,8 +84,13 @@ ROUGH = 1e-3
 #: Corrections in one step at most: with an old linearisation, which another may better, with one
 #: of this step, and with a linearisation and a line search for each.
 MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
+#: The second correction may be larger than the first by so much: work and losses, which only sum
+#: up what bodies do, are a correction late.
+LATE = 3.0
 #: The least part of a correction that a line search takes.
 LEAST_PART = 1.0 / 128.0
+#: A step's velocities may be off by this part of its error for what f at its end is not.
+OFF = 0.2
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
 #: A turn across an angular velocity, over that, which is none but for rounding.
@@ -110,6 +123,47 @@ def factor(p, m, t, h):
 
 
 @jitable
+def carry_on(m, s):
+    """Move m.trial on for a time s with its velocities as they are; A_BEFORE keeps where it was."""
+    w, before = m.trial, m.k[A_BEFORE]
+    for i in range(len(w)):
+        before[i] = w[i]
+    for at in range(0, BODY_SIZE * m.bodies[0], BODY_SIZE):
+        for i in range(at, at + 3):
+            w[i] += s * before[i + 7]
+        turn(before, at, s, before[at + 10], before[at + 11], before[at + 12], w)
+
+
+@jitable
+def probe_on(p, m, t, h, s, ahead, gain):
+    """Take m.trial to t + ahead by a linearly implicit Euler step of length s; return a code.
+
+    It is linearised about where velocities carry the bodies, put on their joints: so motions are
+    followed, of which corrections along joints know nothing. `gain` is what y gains.
+    """
+    n = len(m.y)
+    carry_on(m, s)
+    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    m.counts[EVALUATIONS] += 1
+    code = call_float(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
+    if code != 0.0:
+        return code
+    for i in range(n):
+        m.k[R, i] = m.k[F, i] - (m.trial[i] - m.k[A_BEFORE, i]) / s
+    if m.bodies[0] > 0:
+        put_along(p, m, t + ahead, m.trial, m.k[R], m.error)
+    code = call_float(p.solve, (p.context, t, h, m.k[R], gain))
+    if code != 0.0:
+        return code
+    for i in range(n):
+        m.trial[i] += gain[i]
+    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    for i in range(n):
+        gain[i] = m.trial[i] - m.k[A_BEFORE, i]
+    return 0.0
+
+
+@jitable
 def probe(p, m, t, h):
     """Begin `kept` with v' and v'' at the committed point; return a code, < 0 for no solution.
 
@@ -130,15 +184,9 @@ def probe(p, m, t, h):
     for i in range(n):
         m.trial[i] = m.y[i]
     for j in range(2):
-        m.counts[EVALUATIONS] += 1
-        ahead = (j + 1.0) * s
-        code = call_float(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
-        if code == 0.0:
-            code = call_float(p.solve, (p.context, t, h, m.k[F], m.k[D + j]))
+        code = probe_on(p, m, t, h, s, (j + 1.0) * s, m.k[D + j])
         if code != 0.0:
             return code
-        for i in range(n):
-            m.trial[i] += m.k[D + j, i]
     for i in range(n):
         m.kept[ALGORITHMIC, i] = m.k[0, i]
         m.kept[DOT, i] = m.k[0, i]
@@ -295,7 +343,6 @@ def take(m, h, part, d):
 def iterate(p, m, t, h, anew):
     """Solve for a by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
-    foretell(m, h)
     most = MOST_NEW if anew else MOST_OLD
     before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
@@ -307,7 +354,7 @@ def iterate(p, m, t, h, anew):
         if code != 0.0:
             return code
         take(m, h, 1.0, m.k[D])
-        word, rate = judge(m, iteration, most, size, before, rate)
+        word, rate = judge(m, iteration, most, size, before, rate, LATE)
         before = size
     m.memory[RATE] = rate
     return 0.0 if word == SOLVED else -1.0
@@ -340,7 +387,6 @@ def search(p, m, t, h, size):
 @jitable
 def iterate_damped(p, m, t, h):
     """Solve for a with a linearisation and a line search for each correction; return a code."""
-    foretell(m, h)
     m.memory[RETRY] = QUARTER
     for _ in range(MOST_DAMPED):
         code = evaluate(p, m, t, h, True)
@@ -361,12 +407,54 @@ def iterate_damped(p, m, t, h):
 
 
 @jitable
+def arrive(p, m, t, h):
+    """Write the point that a leads to into m.trial, and f there; return a code."""
+    if settle(p, m, t, h):
+        show_drift(p, m, t, h)
+    m.counts[EVALUATIONS] += 1
+    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+
+
+@jitable
+def is_off(p, m, t, h):
+    """Return whether f where a leads to is so far from what a says that it matters in the step.
+
+    Corrections of a linearisation in touch are small where nothing is touched any more, however
+    large a residual they leave. Of that, what is across joints is none.
+    """
+    e, w, end = m.error, m.k[D], BODY_SIZE * m.bodies[0]
+    for i in range(len(m.y)):
+        e[i] = h * (m.k[LAST, i] - true_rate(m, i)) if is_rate(i, end) else 0.0
+    most = OFF * m.memory[TOL]
+    if call_float(p.norm, (p.context, t, h, e, m.trial)) <= most:
+        return False
+    for i in range(end):
+        w[i] = m.trial[i] + e[i]
+    for i in range(end, len(m.y)):
+        w[i] = m.trial[i]
+    call_float(p.project, (p.context, t + h, h, w, w))
+    for i in range(end):
+        e[i] = w[i] - m.trial[i]
+    return not call_float(p.norm, (p.context, t, h, e, m.trial)) <= most
+
+
+@jitable
 def solve_step(p, m, t, h):
-    """Solve for a: with a linearisation kept if one is good, anew, then damped; return a code."""
+    """Solve for a, with a linearisation kept if one is good, anew, then damped, and f there.
+
+    Returns a code.
+    """
     good = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[RATE] <= KEEP
     code = -1.0
     for level in range(0 if good else 1, 3):
+        foretell(m, h)
         code = iterate_damped(p, m, t, h) if level == 2 else iterate(p, m, t, h, level == 1)
+        if code == 0.0:
+            code = arrive(p, m, t, h)
+        if code == 0.0 and level < 2 and is_off(p, m, t, h):
+            code = iterate_damped(p, m, t, h)
+            if code == 0.0:
+                code = arrive(p, m, t, h)
         if code == 0.0 or not may_help(code):
             return code
     # what fails may still be near a better one
@@ -381,6 +469,17 @@ def position_error(m, h, i):
 
 
 @jitable
+def velocity_error(m, h, i, dot, bend):
+    """Return the error of a step in the velocity y[i], with v' at its end and h^2 v'''.
+
+    Both parts have one sign: of friction that turns from step to step they would cancel.
+    """
+    mean = (1.0 - GAMMA) * m.k[A0, i] + GAMMA * m.k[A1, i]
+    off = abs(mean - 0.5 * (m.kept[DOT, i] + dot))
+    return h * (TRAPEZOID * bend + math.copysign(off, bend))
+
+
+@jitable
 def estimate_error(p, m, t, h):
     """Write the step's error, and what the next needs to know; return its norm over tol."""
     e, w = m.error, m.trial
@@ -389,11 +488,11 @@ def estimate_error(p, m, t, h):
         if is_rate(i, end):
             dot = true_rate(m, i)
             slope = (dot - m.kept[DOT, i]) / h
-            bend = 2.0 * (slope - m.kept[SLOPE, i]) / (h + before)
+            bend = h * max(1.0, 2.0 * h / (h + before)) * (slope - m.kept[SLOPE, i])
             m.ahead[ALGORITHMIC, i] = m.k[A1, i]
             m.ahead[DOT, i] = dot
             m.ahead[SLOPE, i] = slope
-            e[i] = ERROR_V * h * h * h * bend
+            e[i] = velocity_error(m, h, i, dot, bend)
     for at in range(0, end, BODY_SIZE):
         for i in range(at, at + 3):
             e[i] = position_error(m, h, i + 7)
@@ -405,7 +504,7 @@ def estimate_error(p, m, t, h):
         e[at + 4] = qw * a + qy * c - qz * b
         e[at + 5] = qw * b + qz * a - qx * c
         e[at + 6] = qw * c + qx * b - qy * a
-    error = call_float(p.norm, (p.context, t, h, e, w)) / m.memory[TOL]
+    error = call_float(p.norm, (p.context, t, h, e, w)) / (PART * m.memory[TOL])
     return max(error, call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH)
 
 
@@ -418,12 +517,6 @@ def attempt(p, m, t, h):
         if code != 0.0:
             return as_failure(code)
     code = solve_step(p, m, t, h)
-    if code != 0.0:
-        return code
-    if settle(p, m, t, h):
-        show_drift(p, m, t, h)
-    m.counts[EVALUATIONS] += 1
-    code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
     if code != 0.0:
         return code
     m.memory[LAST_ERROR] = estimate_error(p, m, t, h)

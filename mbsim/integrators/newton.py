@@ -9,6 +9,7 @@ import math
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import AT_ONCE, NOT_CONVERGED
 from mbsim.integrators.scheme import (
     CORRECTION,
@@ -57,6 +58,40 @@ def linearise(p, m, t, h, y, f):
 
 
 @jitable
+def put_along(p, m, t, y, r, w):
+    """Leave of what r asks of the bodies' positions what their joints allow at (t, y).
+
+    w is scratch. The rest is the multipliers'. Were it left in, `project` would share it out
+    between velocities, along other lines than those of the forces, and their order would fall
+    to 2.
+    """
+    end = BODY_SIZE * m.bodies[0]
+    for i in range(len(y)):
+        w[i] = y[i]
+    for at in range(0, end, BODY_SIZE):
+        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        ra, rb, rc, rd = r[at + 3], r[at + 4], r[at + 5], r[at + 6]
+        for i in range(3):
+            w[at + 7 + i] += r[at + i]
+        # an angular velocity, 2 conj(q) r
+        w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
+        w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
+        w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
+    call_float(p.project, (p.context, t, 0.0, w, w))
+    for at in range(0, end, BODY_SIZE):
+        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        for i in range(3):
+            r[at + i] = w[at + 7 + i] - y[at + 7 + i]
+        wx = 0.5 * (w[at + 10] - y[at + 10])
+        wy = 0.5 * (w[at + 11] - y[at + 11])
+        wz = 0.5 * (w[at + 12] - y[at + 12])
+        r[at + 3] = -b * wx - c * wy - d * wz
+        r[at + 4] = a * wx + c * wz - d * wy
+        r[at + 5] = a * wy + d * wx - b * wz
+        r[at + 6] = a * wz + b * wy - c * wx
+
+
+@jitable
 def note(m, size):
     """Note the size of a correction, for what is said of an iteration that does not end."""
     m.memory[CORRECTION_BEFORE] = m.memory[CORRECTION]
@@ -74,13 +109,14 @@ def begin(m):
 
 
 @jitable
-def judge(m, iteration, most, size, before, rate_before):
+def judge(m, iteration, most, size, before, rate_before, late):
     """Return the word on correction number `iteration` (from 1) of `size`, and its rate.
 
     Of a rate r = size / before what is left after this correction is r / (1 - r) of it. A method
     that would not be done after `most` corrections ends at once, and says in RETRY what part of
     the step would have been. One that does not get smaller any more, and is small enough for the
-    step's error, is rounding.
+    step's error, is rounding. Only the second correction may be larger than the first, by less than
+    `late`.
     """
     goal = target(m.memory[TOL])
     note(m, size)
@@ -96,8 +132,10 @@ def judge(m, iteration, most, size, before, rate_before):
             if not rate < 0.99:
                 if size <= LEFT * m.memory[TOL]:
                     return SOLVED, rate_before
-                m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
-                return HOPELESS, rate
+                if iteration > 2 or not rate < late:
+                    m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
+                    return HOPELESS, rate
+                return GO_ON, rate
             # what projections undo of the first correction comes back in the second, not again
             left = rate / (1.0 - rate) * size * rate ** (most - 1 - iteration)
             if 2 < iteration < most and left >= goal:

@@ -24,7 +24,6 @@ import numpy as np
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -34,6 +33,7 @@ from mbsim.integrators.newton import (
     judge,
     linearise,
     may_help,
+    put_along,
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
@@ -146,40 +146,6 @@ def project_stage(p, m, t, h, j):
 
 
 @jitable
-def put_along(p, m, t, r, w):
-    """Leave of what r asks of the bodies' positions what their joints allow at the step's begin.
-
-    w is scratch. The rest is the multipliers'. Were it left in, `project` would share it out
-    between velocities, along other lines than those of the forces, and their order would fall
-    to 2.
-    """
-    y, end = m.y, BODY_SIZE * m.bodies[0]
-    for i in range(len(y)):
-        w[i] = y[i]
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        ra, rb, rc, rd = r[at + 3], r[at + 4], r[at + 5], r[at + 6]
-        for i in range(3):
-            w[at + 7 + i] += r[at + i]
-        # an angular velocity, 2 conj(q) r
-        w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
-        w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
-        w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    call_float(p.project, (p.context, t, 0.0, w, w))
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        for i in range(3):
-            r[at + i] = w[at + 7 + i] - y[at + 7 + i]
-        wx = 0.5 * (w[at + 10] - y[at + 10])
-        wy = 0.5 * (w[at + 11] - y[at + 11])
-        wz = 0.5 * (w[at + 12] - y[at + 12])
-        r[at + 3] = -b * wx - c * wy - d * wz
-        r[at + 4] = a * wx + c * wz - d * wy
-        r[at + 5] = a * wy + d * wx - b * wz
-        r[at + 6] = a * wz + b * wy - c * wx
-
-
-@jitable
 def transform(m):
     """Write the transformed stages."""
     k = m.k
@@ -216,7 +182,7 @@ def correct(p, m, t, h):
         pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
     if m.bodies[0] > 0:
         for r in (real, pair[0], pair[1]):
-            put_along(p, m, t, r, m.trial)
+            put_along(p, m, t, m.y, r, m.trial)
     code = call_float(p.solve, (p.context, t, h, real, d))
     if code != 0.0:
         return code, 0.0
@@ -254,7 +220,7 @@ def iterate(p, m, t, h):
         code, size = correct(p, m, t, h)
         if code != 0.0:
             return code
-        word, rate = judge(m, iteration, MOST, size, before, rate)
+        word, rate = judge(m, iteration, MOST, size, before, rate, 0.0)
         before = size
     m.memory[RATE] = rate
     return 0.0 if word == SOLVED else -1.0
@@ -295,7 +261,7 @@ def estimate(p, m, t, h, base):
     for i in range(len(m.y)):
         r[i] = k[base, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
     if m.bodies[0] > 0:
-        put_along(p, m, t, r, m.error)
+        put_along(p, m, t, m.y, r, m.error)
     if call_float(p.solve, (p.context, t, h, r, m.error)) != 0.0:
         return math.inf
     # last, for the norm sees what was put right

@@ -456,10 +456,10 @@ def test_nothing_is_left_of_what_is_fast():
 @BOTH
 def test_steps_do_not_know_how_stiff_an_equation_is(name, given):
     run = Run(RELAX, (1.0,), given=given, name=name)
-    tol = 1e-7 if name == "RADAU5" else 1e-4
+    tol, most = (1e-7, 150) if name == "RADAU5" else (1e-4, 190)
     assert run(10.0, tol) == DONE
-    assert run.state.y[0] == pytest.approx(math.cos(10.0), abs=10.0 * tol)
-    assert run.count(scheme.STEPS) < 150
+    assert run.state.y[0] == pytest.approx(math.cos(10.0), abs=tol)
+    assert run.count(scheme.STEPS) < most
     assert run.count(scheme.JACOBIANS) < 5
 
 
@@ -580,21 +580,26 @@ def test_the_constants_of_galpha_are_those_of_its_order():
     assert af / (1.0 - af) == pytest.approx(galpha.RHO)
     assert (am + 1.0) / (2.0 - am) == pytest.approx(galpha.RHO)
     # one step on x = t^3/6 and on v = t^3/6, with what `a` is there
-    shift, curve = galpha.SHIFT, galpha.CURVE
+    shift = galpha.SHIFT
+    curve = 0.5 * (1.0 - af) - (1.0 - am) * (0.5 + shift)
     found = (0.5 - beta) * shift + beta * (1.0 + shift) - 1.0 / 6.0
     assert found == pytest.approx(galpha.ERROR_X)
     at_end = 0.5 + shift + curve
     assert (1.0 - am) * at_end + am * curve == pytest.approx((1.0 - af) / 2.0)
-    assert (1.0 - gamma) * curve + gamma * at_end - 1.0 / 6.0 == pytest.approx(galpha.ERROR_V)
+    # what it is out of, by the estimate and in truth
+    state = scheme.make(galpha.SCHEME, np.zeros(1), 0.0)
+    state.k[galpha.A0, 0], state.k[galpha.A1, 0] = curve, at_end
+    found = (1.0 - gamma) * curve + gamma * at_end - 1.0 / 6.0
+    assert galpha.velocity_error(state, 1.0, 0, 0.5, 1.0) == pytest.approx(found)
 
 
-def judged(sizes, most=7, tol=1e-4, rest=1.0):
+def judged(sizes, most=7, tol=1e-4, rest=1.0, late=0.0):
     """Return what `judge` says of corrections of these sizes, and what is kept in memory."""
     state = scheme.make(galpha.SCHEME, np.zeros(1), 0.0)
     state.memory[scheme.TOL], state.memory[scheme.REST] = tol, rest
     words, before, rate = [], 0.0, 0.0
     for iteration, size in enumerate(sizes, 1):
-        word, rate = newton.judge(state, iteration, most, size, before, rate)
+        word, rate = newton.judge(state, iteration, most, size, before, rate, late)
         words.append(word)
         before = size
     return words, state.memory
@@ -618,6 +623,11 @@ def test_newtons_iteration_goes_on_while_it_is_worth_it():
     assert words == [go_on, hopeless]
     assert memory[scheme.RETRY] == newton.QUARTER
     assert judged([math.nan])[0] == [hopeless]
+    # but for what is a correction late, and once
+    assert judged([1.0, 2.0], late=3.0)[0] == [go_on, go_on]
+    assert judged([1.0, 2.0, 1e-9], late=3.0)[0] == [go_on, go_on, solved]
+    assert judged([1.0, 3.0], late=3.0)[0] == [go_on, hopeless]
+    assert judged([1.0, 2.0, 2.0], late=3.0)[0] == [go_on, go_on, hopeless]
     assert judged([1.0] + [1e-3] * 6, most=7, tol=1e9)[0][0] == solved
     # rounding does not fall any more
     assert judged([2e-6, 2.1e-6])[0] == [go_on, solved]

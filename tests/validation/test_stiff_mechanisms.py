@@ -58,12 +58,39 @@ def test_galpha_is_of_order_2_in_motion_and_reactions(name, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "tol", "most"),
-    [("stiff_governor", 1e-3, 2e-2), ("stiff_governor", 1e-5, 5e-4), ("torsion_top", 1e-5, 5e-3)],
+    [("stiff_governor", 1e-3, 3e-3), ("stiff_governor", 1e-5, 2e-4), ("torsion_top", 1e-5, 1e-3)],
 )
 def test_galpha_bears_stiff_forces_under_joints(name, tol, most):
     deck = next(deck for deck in stiff.DECKS if deck.name == name)
     found = mbsim.simulate(mbsim.read_model(stiff.deck_path(deck)), integrator="GALPHA", tol=tol)
     assert stiff.error(deck, ours.outcome(found, 0.0)) < most
+
+
+@pytest.mark.parametrize("name", ["rebound", "standing_cylinder"])
+def test_errors_of_galpha_fall_with_tol_where_bodies_land(name):
+    # a touch behind a long flight is seen, and a body that rests is not thrown up by equations
+    # that were solved with the slopes of a touch that it had left
+    deck = next(deck for deck in stiff.DECKS if deck.name == name)
+    model = mbsim.read_model(stiff.deck_path(deck))
+    for tol, most in ((1e-3, 1.5e-2), (1e-5, 1e-3), (1e-7, 5e-5)):
+        found = mbsim.simulate(model, integrator="GALPHA", tol=tol)
+        assert stiff.error(deck, ours.outcome(found, 0.0)) < most, tol
+        assert found.stats["steps"] < 3000
+
+
+@pytest.mark.parametrize(
+    ("name", "end", "most"), [("cam", 0.1, 1e-4), ("cam_roller", 0.1, 1e-4), ("geneva", 1.0, 1e-3)]
+)
+def test_galpha_begins_where_motions_drive_bodies_in_contact(name, end, most):
+    # at the start v'' is asked for where a motion carries the bodies, not where they stood
+    model = mbsim.read_model(MODELS / f"{name}.xml")
+    settings = {"end_time": end, "print_interval": end / 50.0}
+    exact = mbsim.simulate(model, integrator="DOPRI5", tol=1e-8, **settings)
+    found = mbsim.simulate(model, integrator="GALPHA", **settings)
+    for body in (2, 3):
+        for kind in ("position", "quaternion", "velocity"):
+            key = f"bodies/{body}/{kind}"
+            np.testing.assert_allclose(found[key], exact[key], rtol=0, atol=most)
 
 
 def test_what_joints_turn_is_no_news_to_newton():
@@ -76,7 +103,7 @@ def test_what_joints_turn_is_no_news_to_newton():
 
 
 @pytest.mark.parametrize("name", ["incline_creep", "box_stack", "jammed_wedge"])
-@pytest.mark.parametrize(("method", "most"), [("RADAU5", 1e-3), ("GALPHA", 3e-2)])
+@pytest.mark.parametrize(("method", "most"), [("RADAU5", 1e-3), ("GALPHA", 5e-3)])
 def test_steep_friction_does_not_chatter_at_a_loose_tolerance(name, method, most):
     # corrections below the tolerance of velocities are above the slip at which friction turns over
     deck = next(deck for deck in stiff.DECKS if deck.name == name)
