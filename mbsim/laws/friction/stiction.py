@@ -9,8 +9,8 @@ A step of the integrator keeps to one of these and ends where it changes. At the
 slips, z is brought back to what the force needs (return mapping). Within it, z/|z| follows the
 direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
 
-k is `tangential_stiffness`, or 0.824 times the stiffness of the normal force at its depth:
-Mindlin's 2 (1 - nu)/(2 - nu) for nu = 0.3. Where k grows with the depth the force in the spring
+k is `tangential_stiffness`, or 2 (1 - nu)/(2 - nu) times the stiffness of the normal force at its
+depth (Mindlin), with nu `poisson_ratio`. Where k grows with the depth the force in the spring
 stays, where it falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`,
 or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more would let it slip late.
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
@@ -27,8 +27,6 @@ import math
 from mbsim.core.jitable import jitable
 from mbsim.laws.catalog import SLIP, STICK, Parameter, friction_law
 
-#: Tangential over normal stiffness where none is given.
-MINDLIN = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
 #: Damping over the critical one where none is given.
 DAMPING = 0.2
 
@@ -76,6 +74,7 @@ def _dynamic_limit(inputs, mu_dynamic):
     "mu_dynamic",
     Parameter("tangential_stiffness", math.nan, positive=True),
     Parameter("tangential_damping", math.nan),
+    Parameter("poisson_ratio", 0.3),
     Parameter("rotational_stiffness", 0.0),
     Parameter("torsion_radius", 0.0),
     memory=8,
@@ -90,11 +89,14 @@ def stiction(
     mu_dynamic,
     tangential_stiffness,
     tangential_damping,
+    poisson_ratio,
     rotational_stiffness,
     torsion_radius,
 ):
     """Return (Fx, Fy, Mx, My, Tz, energy of the springs, mode) and what is kept."""
-    k = MINDLIN * inputs.stiffness if math.isnan(tangential_stiffness) else tangential_stiffness
+    k = tangential_stiffness
+    if math.isnan(k):
+        k = 2.0 * (1.0 - poisson_ratio) / (2.0 - poisson_ratio) * inputs.stiffness
     if k <= 0.0 or inputs.nforce <= 0.0:
         still = (0.0, 0.0, 0.0, inputs.x[0], inputs.x[1], inputs.x[2], 0.0, SLIP)
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), still

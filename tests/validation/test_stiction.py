@@ -1,0 +1,124 @@
+"""Friction that holds: STICTION and laws with memory against closed forms."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import MODELS
+
+import mbsim
+
+
+def run(name, folder=None, edit=(), **settings):
+    """Run a deck of models/, with parts of its text exchanged."""
+    path = MODELS / name
+    if edit:
+        text = path.read_text()
+        for old, new in edit:
+            assert old in text
+            text = text.replace(old, new)
+        path = folder / name
+        path.write_text(text)
+    return mbsim.simulate(mbsim.read_model(path), **settings)
+
+
+def times_of(results, kind, gap=0.1, last=False):
+    """Return when something of a kind happened for the first (or last) of a contact's points.
+
+    What follows within `gap` belongs to the same.
+    """
+    times = np.array(sorted(float(row[0]) for row in results["events"] if row[1] == kind))
+    ends = np.flatnonzero(np.diff(times) > gap)
+    return times[np.append(ends, len(times) - 1)] if last else times[np.append(0, ends + 1)]
+
+
+def at(results, t, name):
+    return results[name][np.searchsorted(results["time"], t - 1e-9)]
+
+
+def test_sdnd100_turns_and_stops_where_it_should():
+    results = run("sdnd100.xml")
+    x = results["bodies/2/position"][:, 0] * math.sqrt(2.0)
+    for k, turn in enumerate((0.85, -0.65, 0.45, -0.25, 0.05)):
+        # friction turns after pi/100 s, at each of these
+        near = np.abs(results["time"] - k * math.pi / 100) < 2e-3
+        extreme = (x if turn > 0 else -x)[near].max() * 1e3
+        assert extreme == pytest.approx(abs(turn), abs=1e-2 if k < 4 else 1e-3)
+    assert x[-1] == pytest.approx(5e-5, abs=1e-3 * 0.85e-3)
+    still = x[results["time"] > 0.14]
+    assert np.ptp(still) < 1e-6 * 0.85e-3
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA", "DOPRI5"])
+def test_sdnd100_by_every_kind_of_method(method):
+    results = run("sdnd100.xml", integrator=method, tol=1e-6)
+    x = results["bodies/2/position"][:, 0] * math.sqrt(2.0)
+    assert x[-1] == pytest.approx(5e-5, abs=1e-3 * 0.85e-3)
+
+
+def test_sdnd100_nears_the_rigid_solution_with_the_tolerance():
+    # what is left is the give of the spring, mu N/k = 1e-8
+    results = run("sdnd100.xml", tol=1e-8)
+    x = results["bodies/2/position"][:, 0] * math.sqrt(2.0)
+    assert x[-1] == pytest.approx(5e-5, abs=3e-8)
+
+
+def test_a_block_held_on_an_incline_stays():
+    results = run("stiction_incline.xml")
+    x = results["bodies/2/position"][results["time"] >= 10.0]
+    assert np.abs(x - x[0]).max() < 1e-12
+    force = results["contacts/301/force"][-1]
+    assert force[0] == pytest.approx(-9.81 * math.sin(math.radians(20)), rel=1e-9)
+
+
+def test_stick_slip_on_a_belt_has_its_period():
+    results = run("belt_stick_slip.xml")
+    slips = times_of(results, "slip")[1:]
+    assert len(slips) == 4
+    assert np.diff(slips) == pytest.approx(8.902605407814523, rel=1e-3)
+    assert results["bodies/2/position"][:, 0].max() == pytest.approx(1.0385164807, rel=1e-3)
+
+
+def test_a_users_weakening_friction_has_its_period():
+    results = run("belt_weakening.xml")
+    # the block slips when its last point does; what swings once after it stuck is no period
+    slips, sticks = times_of(results, "slip", last=True), times_of(results, "stick")
+    slips = slips[np.diff(slips, prepend=-10.0) > 5.0][1:]
+    assert len(slips) == 3
+    assert np.diff(slips) == pytest.approx(12.001031295, rel=1e-3)
+    assert sticks[sticks > slips[0]][0] - slips[0] == pytest.approx(4.295999525, rel=1e-3)
+    assert results["bodies/2/position"][:, 0].max() == pytest.approx(1.133943658, rel=1e-3)
+
+
+@pytest.mark.parametrize(("tol", "off"), [(1e-5, 2e-5), (1e-7, 1e-6)])
+def test_lugre_sticks_and_slips_as_published(tol, off):
+    results = run("lugre_stick_slip.xml", tol=tol)
+    assert at(results, 10.0, "bodies/2/position")[0] == pytest.approx(0.627583, abs=off)
+    assert at(results, 20.0, "bodies/2/position")[0] == pytest.approx(1.272596, abs=off)
+    t, v = results["time"], results["bodies/2/velocity"][:, 0]
+    assert v.max() == pytest.approx(0.36982, rel=1e-4)
+    # slip begins: where the speed of 0.02 is passed, by interpolation
+    k = np.flatnonzero((v[1:] > 0.02) & (v[:-1] <= 0.02))
+    begins = t[k] + (0.02 - v[k]) / (v[k + 1] - v[k]) * (t[k + 1] - t[k])
+    assert len(begins) == 3
+    assert np.diff(begins) == pytest.approx(6.3628, rel=1e-3)
+
+
+def test_the_balance_of_energy_closes_with_springs_in_friction():
+    results = run("sdnd100.xml", tol=1e-7)
+    kinetic, potential, lost = (
+        results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")
+    )
+    # what the spring's expression gives counts as dissipated too: its energy was .85 mm, is .05 mm
+    given = 0.5 * 1e4 * (0.85e-3**2 - 0.05e-3**2)
+    assert lost[-1] + given == pytest.approx(given, rel=1e-3)
+    total = kinetic + potential + lost
+    assert np.abs(total - total[0]).max() < 1e-4 * given
