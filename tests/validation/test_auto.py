@@ -13,8 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import MODELS
 
 import mbsim
-from mbsim import simulation
-from mbsim.errors import Interrupted, ModelError
+from mbsim.errors import ModelError
 
 STIFF = MODELS / "stiff"
 
@@ -43,33 +42,6 @@ def test_it_changes_back():
     model = mbsim.read_model(MODELS / "slider_crank_clearance.xml")
     auto = mbsim.simulate(model)
     assert auto.stats["method_changes"] >= 2
-
-
-@pytest.mark.parametrize("name", ["incline_creep", "lugre"])
-def test_resumed_after_a_change_it_goes_on_with_the_method_that_ran(tmp_path, name):
-    """The linearisation is not saved, so that rows agree to the tolerance and not to the bit."""
-    model = mbsim.read_model(STIFF / f"{name}.xml")
-    end = model.simulations[0].end_time
-
-    def stop(time, step, until):
-        if time > 0.3 * end:
-            raise Interrupted("enough")
-
-    before = simulation.RETURN_SECONDS, simulation.FIRST_BUDGET
-    simulation.RETURN_SECONDS, simulation.FIRST_BUDGET = 1e-5, 5
-    try:
-        with pytest.raises(Interrupted):
-            mbsim.simulate(model, output=tmp_path, progress=stop, tol=1e-6)
-    finally:
-        simulation.RETURN_SECONDS, simulation.FIRST_BUDGET = before
-    rest = mbsim.simulate(model, output=tmp_path, resume=True, tol=1e-6)
-    whole = mbsim.simulate(model, tol=1e-6)
-    assert whole.stats["method_changes"] >= 1
-    assert abs(rest.stats["steps"] - whole.stats["steps"]) < 0.2 * whole.stats["steps"]
-    for body in model.bodies.values():
-        if not body.is_ground:
-            key = f"bodies/{body.id}/position"
-            np.testing.assert_allclose(rest[key], whole[key], atol=1e-5)
 
 
 def test_motionsolve_names_run_their_kind(tmp_path):
