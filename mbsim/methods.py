@@ -21,11 +21,6 @@ if TYPE_CHECKING:
 MOST_BODIES = 300
 
 
-def holds_displacements(system: System) -> bool:
-    """Return whether all motions give displacements, as implicit methods need it."""
-    return bool((system.scene.equations.level == 2).all())
-
-
 class Methods:
     """The arrays of a run's method, and its functions bound to the mechanism.
 
@@ -48,18 +43,12 @@ class Methods:
         self.problem, self._table = mechanism(system.scene, fixed)
         self._tangent: Any = None
         self.steps: scheme.Steps
-        free = holds_displacements(system)
-        if self.explicit.implicit and not free:
-            raise ModelError(
-                f"{system.model.file}: integrator={name}: the model has a motion of velocities or "
-                "accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
-            )
         if self.explicit.implicit and bodies > MOST_LINEARISED:
             raise ModelError(
                 f"{system.model.file}: integrator={name}: {bodies} bodies are more than the "
                 f"{MOST_LINEARISED} that implicit methods take; take VERLET or DOPRI5"
             )
-        if changing and free and bodies <= MOST_BODIES:
+        if changing and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
             self.arrays.memory[scheme.BEGUN] = start

@@ -25,6 +25,7 @@ import numpy as np
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import ALONG
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -149,7 +150,8 @@ def project_stage(p, m, t, h, j):
 def put_along(p, m, t, r, w):
     """Leave of what r asks of the bodies' positions what their joints allow at the step's begin.
 
-    w is scratch. The rest is the multipliers'. Were it left in, `project` would share it out
+    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
+    multipliers'. Were it left in, `project` would share it out
     between velocities, along other lines than those of the forces, and their order would fall
     to 2.
     """
@@ -165,7 +167,7 @@ def put_along(p, m, t, r, w):
         w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
         w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
         w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    call_float(p.project, (p.context, t, 0.0, w, w))
+    call_float(p.project, (p.context, t, ALONG, w, w))
     for at in range(0, end, BODY_SIZE):
         a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
         for i in range(3):

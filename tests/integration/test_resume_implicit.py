@@ -32,7 +32,7 @@ def impatient(monkeypatch):
 def same(one, other):
     """Compare all signals and counts of two runs, bit for bit."""
     assert sorted(one.keys()) == sorted(other.keys())
-    for name in one.keys():  # noqa: SIM118
+    for name in one.keys():
         np.testing.assert_array_equal(one[name], other[name], err_msg=name)
     for name in COUNTED:
         assert one.stats[name] == other.stats[name], name
