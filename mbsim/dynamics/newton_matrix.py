@@ -221,7 +221,8 @@ def acceleration_row(L, M, row, x):
         force, torque = wrench_at_cg(L, row, b)
         theta = (x[b, 0], x[b, 1], x[b, 2])
         shift = add((x[b, 3], x[b, 4], x[b, 5]), cross(theta, vector(L.r[b])))
-        total += c2 * dot(force, shift) + ratio * dot(torque, rotate(M.B[b], unrotate(L.R[b], theta)))
+        turn = rotate(M.B[b], unrotate(L.R[b], theta))
+        total += c2 * dot(force, shift) + ratio * dot(torque, turn)
     return total
 
 

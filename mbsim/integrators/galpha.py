@@ -39,6 +39,7 @@ from mbsim.integrators.newton import (
     linearise,
     may_help,
     note,
+    put_along,
     target,
 )
 from mbsim.integrators.rotation import turn
@@ -114,6 +115,7 @@ def probe(p, m, t, h):
     """Begin `kept` with v' and v'' at the committed point; return a code, < 0 for no solution.
 
     v'' is from two linearly implicit Euler steps: it is that of the motion, not of what is fast.
+    Each is projected, for only that knows how motions go on.
     """
     n = len(m.y)
     s = PROBE * h
@@ -134,11 +136,19 @@ def probe(p, m, t, h):
         ahead = (j + 1.0) * s
         code = call_float(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
         if code == 0.0:
-            code = call_float(p.solve, (p.context, t, h, m.k[F], m.k[D + j]))
+            for i in range(n):
+                m.k[R, i] = m.k[F, i]
+            if m.bodies[0] > 0:
+                put_along(p, m, t, m.k[R], m.error)
+            code = call_float(p.solve, (p.context, t, h, m.k[R], m.k[D + j]))
         if code != 0.0:
             return code
         for i in range(n):
+            m.k[R, i] = m.trial[i]
             m.trial[i] += m.k[D + j, i]
+        call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+        for i in range(n):
+            m.k[D + j, i] = m.trial[i] - m.k[R, i]
     for i in range(n):
         m.kept[ALGORITHMIC, i] = m.k[0, i]
         m.kept[DOT, i] = m.k[0, i]

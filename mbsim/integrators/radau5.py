@@ -24,8 +24,6 @@ import numpy as np
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import ALONG
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -35,6 +33,7 @@ from mbsim.integrators.newton import (
     judge,
     linearise,
     may_help,
+    put_along,
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
@@ -144,41 +143,6 @@ def project_stage(p, m, t, h, j):
     for i in range(len(m.y)):
         m.error[i] = (m.trial[i] - m.y[i]) - z[i]
         z[i] += m.error[i]
-
-
-@jitable
-def put_along(p, m, t, r, w):
-    """Leave of what r asks of the bodies' positions what their joints allow at the step's begin.
-
-    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
-    multipliers'. Were it left in, `project` would share it out
-    between velocities, along other lines than those of the forces, and their order would fall
-    to 2.
-    """
-    y, end = m.y, BODY_SIZE * m.bodies[0]
-    for i in range(len(y)):
-        w[i] = y[i]
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        ra, rb, rc, rd = r[at + 3], r[at + 4], r[at + 5], r[at + 6]
-        for i in range(3):
-            w[at + 7 + i] += r[at + i]
-        # an angular velocity, 2 conj(q) r
-        w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
-        w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
-        w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    call_float(p.project, (p.context, t, ALONG, w, w))
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        for i in range(3):
-            r[at + i] = w[at + 7 + i] - y[at + 7 + i]
-        wx = 0.5 * (w[at + 10] - y[at + 10])
-        wy = 0.5 * (w[at + 11] - y[at + 11])
-        wz = 0.5 * (w[at + 12] - y[at + 12])
-        r[at + 3] = -b * wx - c * wy - d * wz
-        r[at + 4] = a * wx + c * wz - d * wy
-        r[at + 5] = a * wy + d * wx - b * wz
-        r[at + 6] = a * wz + b * wy - c * wx
 
 
 @jitable

@@ -65,6 +65,8 @@ LOOP = Scene(
     WEIGHT,
 )
 MOTIONS = {
+    # it moves at the start, which only a projection knows
+    "displacement": '<Motion_Joint id="1" joint_id="1" val_type="D" expr="0.75*SIN(2*TIME)"/>',
     "rate": '<Motion_Joint id="1" joint_id="1" val_type="V" expr="1.5*COS(2*TIME)"/>',
     "rising rate": '<Motion_Joint id="1" joint_id="1" val_type="A" expr="3*COS(2*TIME)"/>',
 }
@@ -78,6 +80,7 @@ PULLS = {
 DECKS = {f"chain, {name}": (CHAIN, text) for name, text in MOTIONS.items()}
 DECKS |= {f"loop, {name}": (LOOP, text) for name, text in MOTIONS.items()}
 DECKS |= {f"chain, pulled, {name}": (CHAIN, text) for name, text in PULLS.items()}
+
 
 def run(folder, name, method, tol, rows=10, h_max=None):
     """Return the rows of positions and velocities of a deck's bodies, and its results."""
