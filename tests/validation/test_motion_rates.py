@@ -98,13 +98,12 @@ def run(folder, name, method, tol, rows=10, h_max=None):
 
 @pytest.mark.parametrize("name", DECKS)
 def test_implicit_methods_agree_with_dopri5(name, tmp_path):
-    exact, straight = run(tmp_path, name, "DOPRI5", 1e-10)
+    exact, _ = run(tmp_path, name, "DOPRI5", 1e-10)
     # it moves
     assert np.abs(np.ptp(exact, axis=0)).max() > 0.3
     for method, bound in (("RADAU5", 1e-8), ("GALPHA", 2e-4)):
         tol = 1e-10 if method == "RADAU5" else 1e-7
         found, results = run(tmp_path, name, method, tol)
-        print(name, method, np.abs(found - exact).max(), results.stats)
         assert np.abs(found - exact).max() < bound
         assert results.stats["jacobians"] > 0
         assert results.stats["rejected"] < 0.2 * results.stats["steps"]
