@@ -61,9 +61,9 @@ def linearise(p, m, t, h, y, f):
 def put_along(p, m, t, y, r, w):
     """Leave of what r asks of the bodies' positions what their joints allow at (t, y).
 
-    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the multipliers'. Were it left in, `project` would share it out
-    between velocities, along other lines than those of the forces, and their order would fall
-    to 2.
+    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
+    multipliers'. Were it left in, `project` would share it out between velocities, along other
+    lines than those of the forces, and their order would fall to 2.
     """
     end = BODY_SIZE * m.bodies[0]
     for i in range(len(y)):
