@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import FIRST_PATIENCE
+from mbsim.system import tangent
 from mbsim.system.tangent import MOST_BODIES as MOST_LINEARISED
 
 if TYPE_CHECKING:
@@ -15,11 +19,6 @@ if TYPE_CHECKING:
 
 #: Bodies of the largest model for which AUTO looks whether it is stiff.
 MOST_BODIES = 300
-
-
-def holds_displacements(system: System) -> bool:
-    """Return whether all motions give displacements, as implicit methods need it."""
-    return bool((system.scene.equations.level == 2).all())
 
 
 class Methods:
@@ -44,18 +43,12 @@ class Methods:
         self.problem, self._table = mechanism(system.scene, fixed)
         self._tangent: Any = None
         self.steps: scheme.Steps
-        free = holds_displacements(system)
-        if self.explicit.implicit and not free:
-            raise ModelError(
-                f"{system.model.file}: integrator={name}: the model has a motion of velocities or "
-                "accelerations, which implicit methods do not take; take DOPRI5 or DOP853"
-            )
         if self.explicit.implicit and bodies > MOST_LINEARISED:
             raise ModelError(
                 f"{system.model.file}: integrator={name}: {bodies} bodies are more than the "
                 f"{MOST_LINEARISED} that implicit methods take; take VERLET or DOPRI5"
             )
-        if changing and free and bodies <= MOST_BODIES:
+        if changing and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
             self.arrays.memory[scheme.BEGUN] = start
@@ -68,7 +61,7 @@ class Methods:
         return bool(self.arrays.memory[scheme.STIFF] == 1.0)
 
     def bind(self) -> None:
-        """Bind the method that memory names, as after a checkpoint."""
+        """Bind the method that memory names."""
         running = self.explicit
         if self.other is not None and self.is_stiff:
             running = self.other
@@ -80,6 +73,30 @@ class Methods:
         probe = self.explicit if running is self.other else None
         self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
 
+    def saved(self) -> dict[str, Any]:
+        """Return what a running implicit method keeps beside its arrays, by name."""
+        kept: dict[str, Any] = {"changes": np.array(self.changes)}
+        if self.steps.implicit:
+            kept |= tangent.saved(self._tangent[0])
+            kept["tangent/grip"] = np.array(self.system.scene.work.grip)
+        return kept
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Bind the method that ran, whose arrays are as they were, to what it kept."""
+        self.changes = int(kept["changes"])
+        self.bind()
+        if self.steps.implicit:
+            tangent.restore(self._tangent[0], kept)
+            self.system.scene.work.grip[...] = kept["tangent/grip"]
+
+    def _forget(self) -> None:
+        """Leave nothing of a linearisation to what comes later: only a running one is saved."""
+        self.arrays.memory[scheme.HAVE_JACOBIAN] = 0.0
+        self.system.scene.work.grip[...] = 0.0
+        if self._tangent is not None:
+            # no couplings: they are found anew
+            self._tangent[0].pattern.count[...] = (0, 0, 1)
+
     def change_over(self) -> str:
         """Let AUTO's other method go on from the committed point; return what is to be said."""
         memory = self.arrays.memory
@@ -87,7 +104,6 @@ class Methods:
         bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0
-        memory[scheme.HAVE_JACOBIAN] = 0.0
         memory[scheme.ERROR_BEFORE] = 1.0
         memory[scheme.BEGUN], memory[scheme.PACE] = memory[scheme.TIME], 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
@@ -96,6 +112,7 @@ class Methods:
             # one that goes to and fro waits longer each time
             memory[scheme.PATIENCE] *= 2.0
         self.arrays.dense[...] = 0.0
+        self._forget()
         self.changes += 1
         self.bind()
         now, h = memory[scheme.TIME], memory[scheme.STEP]

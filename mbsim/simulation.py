@@ -282,10 +282,6 @@ class Runner:
 
     def checkpoint(self) -> dict[str, Any]:
         """Return everything a run needs to go on: state, log, method, and where it is."""
-        from mbsim.integrators import scheme
-
-        # what an implicit method linearised is not saved: this run does without it as well
-        self.method.memory[scheme.HAVE_JACOBIAN] = 0.0
         groups = self._saved()
         arrays = {
             f"{name}/{field}": np.array(array)
@@ -294,7 +290,7 @@ class Runner:
         }
         arrays["stage"] = np.array(self.stage)
         arrays["time"] = np.array(self.method.memory[0])
-        return arrays | self.sensing.saved()
+        return arrays | self.methods.saved() | self.sensing.saved()
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
@@ -302,7 +298,7 @@ class Runner:
         for name, group in groups.items():
             for field, array in zip(group._fields, group, strict=True):
                 array[...] = saved[f"{name}/{field}"]
-        self.methods.bind()
+        self.methods.restore(saved)
         self.stage = int(saved["stage"])
         self.sensing.restore(saved)
 

@@ -9,7 +9,9 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | hook   | a, b                        | returns                                              |
 |--------|-----------------------------|------------------------------------------------------|
 | rhs    | y, f (out)                  | code; f = f(t, y), h after the last committed point   |
-| project| y (in and out), -           | code; y back onto its manifold                        |
+| project| y (in and out), -           | code; y back onto its manifold; h = ALONG: velocities |
+|        |                             | in y are displacements a time, and all that counts is |
+|        |                             | what holds positions                                  |
 | norm   | local error, y              | largest error over its scale, dimensionless; h = 0:   |
 |        |                             | of a difference of two states that is no step's error,|
 |        |                             | with what it changes of friction over normal forces;  |
@@ -95,6 +97,9 @@ STABLE_EVERY = 16
 
 #: What `norm` is given for h where only friction counts.
 FRICTION_ALONE = -1.0
+
+#: What `project` is given for h where velocities in y are displacements.
+ALONG = -1.0
 
 # codes of an rhs; a problem may have others of its own
 NOT_FINITE = 3

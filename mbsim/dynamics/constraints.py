@@ -26,6 +26,7 @@ from mbsim.dynamics.seating import carry_all, seat_all
 from mbsim.dynamics.tree import prepare, write_accelerations
 from mbsim.system.arrays import (
     ACCELERATE,
+    ALONG_JOINTS,
     CHOOSE,
     DISPLACE,
     FRICTION_DOOR,
@@ -71,8 +72,8 @@ def serve(scene, what, t, y, dy):
     if what == SEAT:
         seat_all(scene, y)
         carry_all(scene, y)
-    elif what == PROJECT:
-        project(scene, t, y)
+    elif what == PROJECT or what == ALONG_JOINTS:
+        project(scene, t, y, 1 if what == PROJECT else 2)
     elif what == REACT:
         fill_reactions(scene, t, y)
     elif what == KEEP:

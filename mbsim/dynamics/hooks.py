@@ -9,7 +9,7 @@ from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
-from mbsim.core.problem import BY_CHECK, FRICTION_ALONE, HOOK, Problem
+from mbsim.core.problem import ALONG, BY_CHECK, FRICTION_ALONE, HOOK, Problem
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
@@ -17,6 +17,7 @@ from mbsim.dynamics.limits import longest_step
 from mbsim.dynamics.output import blame, friction_left, no_room, scaled_error, write_row
 from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import (
+    ALONG_JOINTS,
     BODY_SIZE,
     EVALUATE_DOOR,
     JOINTS_DOOR,
@@ -49,7 +50,8 @@ def _project(context, t, h, a, b):
         for k in range(4):
             y[at + k] /= length
     if scene.world.doors[JOINTS_DOOR] != 0:
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, PROJECT, t, y, y))
+        what = ALONG_JOINTS if h == ALONG else PROJECT
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, what, t, y, y))
     return 0.0
 
 

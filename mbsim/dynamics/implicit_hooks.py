@@ -16,6 +16,7 @@ from mbsim.core.problem import HOOK, Problem
 from mbsim.dynamics.connection_slopes import add_connection_slopes
 from mbsim.dynamics.doors import open_jets
 from mbsim.dynamics.linearise import add_bends, linearise
+from mbsim.dynamics.motion_slopes import add_motion_rows
 from mbsim.dynamics.newton_matrix import factor, solve
 from mbsim.dynamics.stiffness import add_applied_slopes, fill_state_slopes
 from mbsim.system.arrays import (
@@ -112,10 +113,21 @@ def _bend(context, t, y):
     return 0
 
 
+def _bend_and_drive(context, t, y):
+    """The same, and the rows of motions of velocities and accelerations."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    a = carray(y, (scene.rows.y.shape[1],))
+    add_bends(scene, T, t, a)
+    add_motion_rows(scene, T, t, a)
+    return 0
+
+
 def open_slopes(scene: Scene) -> None:
     """Open the doors of derivatives of forces and equations where there are some."""
     if len(scene.equations.program) > 0:
-        scene.world.doors[BEND_DOOR] = jit.address(_bend, _VALUES)
+        driven = bool((scene.equations.level < 2).any())
+        scene.world.doors[BEND_DOOR] = jit.address(_bend_and_drive if driven else _bend, _VALUES)
     if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
         return
     kinds = set(scene.applied.kind.tolist())

@@ -10,7 +10,7 @@ from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.seating import carry_all, seat_all
 from mbsim.dynamics.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.tree_reactions import add_tree_reactions
-from mbsim.system.arrays import ACCELERATE, MATRIX, PROJECT, REACT
+from mbsim.system.arrays import ACCELERATE, ALONG_JOINTS, MATRIX, PROJECT, REACT
 
 
 @jitable
@@ -29,7 +29,7 @@ def serve_limbs(scene, what, t, y, dy):
     elif what == MATRIX:
         place_bodies(scene, y)
         prepare(scene, y)
-    elif what == PROJECT:
+    elif what == PROJECT or what == ALONG_JOINTS:
         place_bodies(scene, y)
         seat_all(scene, y)
         carry_all(scene, y)

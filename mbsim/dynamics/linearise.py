@@ -213,7 +213,7 @@ def clear(scene, T):
 
 @jitable
 def fill_rows(scene, L):
-    """Fill the gradients of the equations in use."""
+    """Fill the gradients of the equations in use; rows of level 2, others have their own."""
     eq = scene.equations
     for row in range(active_count(scene)):
         e = eq.active[row]
@@ -223,8 +223,9 @@ def fill_rows(scene, L):
                 if k >= 0:
                     for i in range(6):
                         G = scene.sweep.G[term, 6 * side + i]
-                        L.row[row, scene.tree.body[k], i] += G
                         L.column[row, scene.tree.body[k], i] += G
+                        if eq.level[e] == 2:
+                            L.row[row, scene.tree.body[k], i] += G
 
 
 @jitable

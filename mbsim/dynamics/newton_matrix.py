@@ -15,6 +15,11 @@ is left to the projection of the states, which takes the part of the multipliers
 formulation of index 2. With K and D of forces and eta = E xi - e the change of velocities,
 
     (M(c2) - K - D E) xi = M r_a - D e + what joints and equations exert.
+
+An equation that holds velocities, C v = g(t), asks for P xi + C (E xi - e) = 0, P being how C v
+changes with poses; one of accelerations, C a + s(q, v) = g(t), for
+P xi + V (E xi - e) + C da = 0 with the above da and d(alpha), V how s changes with velocities.
+Both are taken over c1 or c2, so that rows of the border have one size.
 """
 
 from __future__ import annotations
@@ -22,7 +27,7 @@ from __future__ import annotations
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import SINGULAR
-from mbsim.core.rotation import cross, rotate, unrotate, vector
+from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.blocks import (
     BLOCKS,
     COUPLINGS,
@@ -212,6 +217,66 @@ def along_row(L, M, row, slope, x):
 
 
 @jitable
+def wrench_at_cg(L, row, b):
+    """Return force and torque, in body axes, of an equation's gradient on body b about its cg."""
+    C, r = L.column[row, b], vector(L.r[b])
+    force = (C[3], C[4], C[5])
+    torque = sub((C[0], C[1], C[2]), cross(r, force))
+    return force, unrotate(L.R[b], torque)
+
+
+@jitable
+def acceleration_row(L, M, row, x):
+    """Return what displacements make of an equation's accelerations: C (c2 dx, c2/c1 B theta)."""
+    total, c2 = 0.0 * x[0, 0], M.c[0, 1]
+    ratio = c2 / M.c[0, 0]
+    for b in range(len(L.w)):
+        force, torque = wrench_at_cg(L, row, b)
+        theta = (x[b, 0], x[b, 1], x[b, 2])
+        shift = add((x[b, 3], x[b, 4], x[b, 5]), cross(theta, vector(L.r[b])))
+        turn = rotate(M.B[b], unrotate(L.R[b], theta))
+        total += c2 * dot(force, shift) + ratio * dot(torque, turn)
+    return total
+
+
+@jitable
+def level_of(scene, row):
+    """Return what an equation in use holds: 2 displacements, 1 velocities, 0 accelerations."""
+    return scene.equations.level[scene.equations.active[row]]
+
+
+@jitable
+def held_row(scene, L, M, row, x):
+    """Return what displacements make of what an equation in use holds, as a displacement."""
+    level = level_of(scene, row)
+    if level == 2:
+        return along_row(L, M, row, 0, x)
+    total = along_row(L, M, row, 1, x)
+    if level == 1:
+        return total / M.c[0, 0]
+    return (total + acceleration_row(L, M, row, x)) / M.c[0, 1]
+
+
+@jitable
+def held_residual(scene, L, M, row, r):
+    """Return what residuals make of the same."""
+    total, level = 0.0 * M.rate[0, 0], level_of(scene, row)
+    if level == 2:
+        return total
+    for b in range(len(L.w)):
+        for i in range(M.rate.shape[1]):
+            # M.rate is -e
+            total -= L.row_rate[row, b, i] * M.rate[b, i]
+    if level == 1:
+        return total / M.c[0, 0]
+    for b in range(len(L.w)):
+        force, torque = wrench_at_cg(L, row, b)
+        shift, turn = asked_of(L, M, b, r)
+        total += dot(force, shift) + dot(torque, turn)
+    return total / M.c[0, 1]
+
+
+@jitable
 def factor_rest(scene, T, M):
     """Factor the border: what equations and states ask of the bodies."""
     P, L = T.pattern, T.linear
@@ -223,13 +288,12 @@ def factor_rest(scene, T, M):
                 y[b, i] = L.column[row, b, i]
         solve_bodies(P, M, L, scene.tree.free, y)
     for k in range(size):
-        row, slope = bordered(scene, k), 1 if k >= held else 0
+        row = bordered(scene, k)
         for other in range(size):
-            along = along_row(L, M, row, slope, M.answer[other])
-            if slope == 0:
-                M.border[k, other] = along
+            if k < held:
+                M.border[k, other] = held_row(scene, L, M, row, M.answer[other])
                 continue
-            M.border[k, other] = -along
+            M.border[k, other] = -along_row(L, M, row, 1, M.answer[other])
             if other >= held:
                 M.border[k, other] -= L.slopes[k - held, other - held]
             if other == k:
@@ -251,24 +315,33 @@ def turn_residual(L, b, r):
 
 
 @jitable
-def ask_body(scene, L, M, b, r):
-    """Fill g of body b with what its residuals ask of inertia, and its rate with -e."""
-    at, m, form = BODY_SIZE * b, scene.bodies.mass[b], M.c[0, 3].real
-    R, arm = L.R[b], vector(L.r[b])
+def asked_of(L, M, b, r):
+    """Return r_a and r_alpha of body b."""
+    at, form = BODY_SIZE * b, M.c[0, 3].real
     first = M.c[0, 0] if form == 0.0 else 0.0 * M.c[0, 0]
     rho = turn_residual(L, b, r)
-    ask = (
+    shift = (
+        first * r[at] + r[at + 7],
+        first * r[at + 1] + r[at + 8],
+        first * r[at + 2] + r[at + 9],
+    )
+    turn = (
         first * rho[0] + r[at + 10],
         first * rho[1] + r[at + 11],
         first * rho[2] + r[at + 12],
     )
+    return shift, turn
+
+
+@jitable
+def ask_body(scene, L, M, b, r):
+    """Fill g of body b with what its residuals ask of inertia, and its rate with -e."""
+    at, m, R, arm = BODY_SIZE * b, scene.bodies.mass[b], L.R[b], vector(L.r[b])
+    rho = turn_residual(L, b, r)
+    shift, ask = asked_of(L, M, b, r)
     spun, gyro = rotate(scene.bodies.inertia[b], ask), gyration(scene, L, b, rho)
     torque = rotate(R, (spun[0] + gyro[0], spun[1] + gyro[1], spun[2] + gyro[2]))
-    force = (
-        m * (first * r[at] + r[at + 7]),
-        m * (first * r[at + 1] + r[at + 8]),
-        m * (first * r[at + 2] + r[at + 9]),
-    )
+    force = (m * shift[0], m * shift[1], m * shift[2])
     moment, slower = cross(arm, force), rotate(R, rho)
     carried = cross(slower, arm)
     for i in range(3):
@@ -300,7 +373,7 @@ def solve_border_part(scene, T, M, r):
     for k in range(size):
         row = bordered(scene, k)
         if k < held:
-            x[k] = -along_row(L, M, row, 0, M.g)
+            x[k] = held_residual(scene, L, M, row, r) - held_row(scene, L, M, row, M.g)
             continue
         place = scene.states.place[k - held]
         x[k] = r[place] + along_row(L, M, row, 1, M.g)

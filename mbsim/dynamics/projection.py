@@ -149,8 +149,12 @@ def close_loops(scene, t, y):
 
 
 @jitable
-def project(scene, t, y):
-    """Bring y back onto all constraints, positions first."""
+def project(scene, t, y, level):
+    """Bring y back onto all constraints, positions first.
+
+    Of velocities, what equations of that level and above hold: with 2, velocities are
+    displacements, which motions of velocities leave free.
+    """
     scene.sweep.quality[DRIFT] = 0.0
     place_bodies(scene, y)
     seat_all(scene, y)
@@ -159,6 +163,7 @@ def project(scene, t, y):
     carry_all(scene, y)
     if active_count(scene) > 0:
         fill_equations(scene, t, y)
-        note_drift(scene, 1, MISMATCH, FORGIVEN * scene.world.scale[0] / scene.world.scale[1])
-        correct(scene, 1, MISMATCH)
+        part = FORGIVEN * scene.world.scale[0] / scene.world.scale[1]
+        note_drift(scene, level, MISMATCH, part)
+        correct(scene, level, MISMATCH)
         speed_up(scene, y)

@@ -168,6 +168,7 @@ def probe(p, m, t, h):
     """Begin `kept` with v' and v'' at the committed point; return a code, < 0 for no solution.
 
     v'' is from two linearly implicit Euler steps: it is that of the motion, not of what is fast.
+    Each is projected, for only that knows how motions go on.
     """
     n = len(m.y)
     s = PROBE * h

@@ -10,7 +10,7 @@ import math
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import AT_ONCE, NOT_CONVERGED
+from mbsim.core.problem import ALONG, AT_ONCE, NOT_CONVERGED
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
@@ -61,9 +61,9 @@ def linearise(p, m, t, h, y, f):
 def put_along(p, m, t, y, r, w):
     """Leave of what r asks of the bodies' positions what their joints allow at (t, y).
 
-    w is scratch. The rest is the multipliers'. Were it left in, `project` would share it out
-    between velocities, along other lines than those of the forces, and their order would fall
-    to 2.
+    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
+    multipliers'. Were it left in, `project` would share it out between velocities, along other
+    lines than those of the forces, and their order would fall to 2.
     """
     end = BODY_SIZE * m.bodies[0]
     for i in range(len(y)):
@@ -77,7 +77,7 @@ def put_along(p, m, t, y, r, w):
         w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
         w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
         w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    call_float(p.project, (p.context, t, 0.0, w, w))
+    call_float(p.project, (p.context, t, ALONG, w, w))
     for at in range(0, end, BODY_SIZE):
         a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
         for i in range(3):

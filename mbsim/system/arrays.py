@@ -86,7 +86,7 @@ LATE = 16  # is added to the kind of forces that need reactions, see dynamics.la
 SCALAR, RUBBING = 6, 7
 
 # what is asked for at JOINTS_DOOR
-ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE = range(9)
+ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)

@@ -7,7 +7,8 @@ that hangs on a joint is not an unknown of its own: xi = xi of its parent + S' d
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,13 @@ from mbsim.system.arrays import MEMORY_DOOR, MEMORY_PAIR_DOOR, TURN_ROOT, Scene
 _ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
 #: Bodies of the largest model that implicit methods take: a table of their pairs is kept.
 MOST_BODIES = 4000
+#: Fields with one entry a block: room is made for more than are in use.
+_BY_BLOCK = {"pair", "neighbour", "K", "D", "A"}
+#: Fields that a run does not change, those that mean nothing from one call to the next, and
+#: `place`, whose entries in use are kept as a list.
+_CONSTANT = {"joint", "parent", "children"}
+_SCRATCH = {"waiting", "degree", "basis", "law", "rise", "rates", "g", "rate", "extra", "work", "r"}
+_LEFT_OUT = _CONSTANT | _SCRATCH | {"place"}
 
 
 class Pattern(NamedTuple):
@@ -228,3 +236,32 @@ def _factor_arrays(
         np.zeros((2, n), dtype=kind),
         np.zeros((slots, wide, wide), dtype=kind),
     )
+
+
+def _in_use(tangent: Tangent) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield names and arrays of all that a linearisation and its factors consist of."""
+    blocks = int(tangent.pattern.count[:2].max())
+    for group in ("pattern", "linear", "real", "pair"):
+        arrays = getattr(tangent, group)
+        for field, array in zip(arrays._fields, arrays, strict=True):
+            # the linearisation needs its r, which a factorisation has for scratch
+            if field not in _LEFT_OUT or (group, field) == ("linear", "r"):
+                yield f"tangent/{group}/{field}", array[:blocks] if field in _BY_BLOCK else array
+
+
+def saved(tangent: Tangent) -> dict[str, Any]:
+    """Return what a run needs to go on with the same linearisation and factors, by name."""
+    place = tangent.pattern.place.ravel()
+    found = {name: np.array(array) for name, array in _in_use(tangent)}
+    found["tangent/where"] = np.flatnonzero(place >= 0)
+    found["tangent/block"] = place[found["tangent/where"]]
+    return found
+
+
+def restore(tangent: Tangent, kept: Mapping[str, Any]) -> None:
+    """Fill the arrays with what `saved` returned."""
+    tangent.pattern.count[...] = kept["tangent/pattern/count"]
+    for name, array in _in_use(tangent):
+        array[...] = kept[name]
+    tangent.pattern.place[...] = -1
+    tangent.pattern.place.ravel()[kept["tangent/where"]] = kept["tangent/block"]

@@ -253,6 +253,41 @@ EQUATIONS = {
         '<Motion_Marker id="1" i_marker_id="1002" j_marker_id="1003" direction="B3" '
         'val_type="D" expr="0.1*TIME"/>',
     ),
+    "turned at a rate": (
+        "REVOLUTE",
+        '<Motion_Joint id="1" joint_id="2" val_type="V" expr="0.6*COS(2*TIME)"/>',
+    ),
+    "turned at a rising rate": (
+        "REVOLUTE",
+        '<Motion_Joint id="1" joint_id="2" val_type="A" expr="2*SIN(2*TIME)"/>',
+    ),
+    "pulled at a rate along an axis": (
+        "SPHERICAL",
+        '<Motion_Marker id="1" i_marker_id="102" j_marker_id="100" direction="Z" '
+        'val_type="V" expr="0.1*TIME - 0.3"/>',
+    ),
+    "pulled at a rising rate along an axis that turns": (
+        "SPHERICAL",
+        '<Motion_Marker id="1" i_marker_id="102" j_marker_id="101" direction="X" '
+        'val_type="A" expr="0.1*TIME"/>',
+    ),
+    "turned at a rate about an axis": (
+        "SPHERICAL",
+        '<Motion_Marker id="1" i_marker_id="1002" j_marker_id="1003" direction="B3" '
+        'val_type="V" expr="0.1*TIME"/>',
+    ),
+    "turned at a rising rate about an axis": (
+        "SPHERICAL",
+        '<Motion_Marker id="1" i_marker_id="1002" j_marker_id="1003" direction="B3" '
+        'val_type="A" expr="0.1*TIME"/>',
+    ),
+    "rates beside a displacement": (
+        "CYLINDRICAL",
+        '<Motion_Joint id="1" joint_id="2" motion_type="T" val_type="V" expr="0.2*TIME"/>'
+        '<Motion_Joint id="2" joint_id="2" motion_type="R" val_type="A" expr="TIME"/>'
+        '<Motion_Marker id="3" i_marker_id="102" j_marker_id="100" direction="Z" '
+        'val_type="D" expr="0.1*TIME - 0.3"/>',
+    ),
     "general": (
         "SPHERICAL",
         '<Constraint_General id="1" expr="DM(102,100) + 0.3*DX(102,100) - 1.1"/>',

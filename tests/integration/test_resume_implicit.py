@@ -1,0 +1,99 @@
+"""What implicit methods linearised goes on after a resume, bit for bit, and through every flush."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import MODELS
+
+import mbsim
+from mbsim import simulation
+from mbsim.errors import Interrupted
+from mbsim.integrators import scheme
+from mbsim.results import recorder
+
+STIFF = MODELS / "stiff"
+COUNTED = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorizations", "method_changes")
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """Let runs come back to Python every few evaluations, and write all each time."""
+    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+
+
+def same(one, other):
+    """Compare all signals and counts of two runs, bit for bit."""
+    assert sorted(one.keys()) == sorted(other.keys())
+    for name in one.keys():
+        np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+    for name in COUNTED:
+        assert one.stats[name] == other.stats[name], name
+
+
+def resumed(model, folder, stops, **settings):
+    """Return a run that is interrupted, and resumed, after each so many returns to Python.
+
+    And at how many of these an implicit method of AUTO's ran.
+    """
+    stiff = 0
+    for k, most in enumerate(stops):
+        returns = 0
+
+        def stop(time, step, until, most=most):
+            nonlocal returns
+            returns += 1
+            if returns == most:
+                raise Interrupted("enough")
+
+        with pytest.raises(Interrupted):
+            mbsim.simulate(model, output=folder, progress=stop, resume=k > 0, **settings)
+        with mbsim.open_results(folder / f"{model.name}.h5") as kept:
+            stiff += kept.tables("checkpoint")["method/memory"][scheme.STIFF] == 1.0
+    return mbsim.simulate(model, output=folder, resume=True, **settings), stiff
+
+
+#: Contact with friction, a loop with a stop, `Control_Diff`; how much of each is run [s].
+DECKS = {"rebound": 0.3, "box_stack": 0.05, "four_bar_stop": 0.3, "lugre": 10.0}
+
+
+@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_resumed_it_is_the_same_run(name, method, tmp_path, impatient):
+    model = mbsim.read_model(STIFF / f"{name}.xml")
+    settings = {"integrator": method, "end_time": DECKS[name], "tol": 1e-5}
+    straight = mbsim.simulate(model, **settings)
+    assert straight.stats["jacobians"] < straight.stats["steps"]
+    quarter = straight.stats["steps"] // 4
+    found, _ = resumed(model, tmp_path, [quarter] * 3, **settings)
+    same(found, straight)
+
+
+#: Steps after which AUTO has found a deck stiff, of those it takes.
+CHANGED = {"incline_creep": 200, "box_stack": 206, "lugre": 800, "four_bar_stop": 841}
+
+
+@pytest.mark.parametrize("name", CHANGED)
+def test_resumed_while_it_is_stiff_auto_is_the_same_run(name, tmp_path, impatient):
+    model = mbsim.read_model(STIFF / f"{name}.xml")
+    straight = mbsim.simulate(model, tol=1e-6)
+    tried = CHANGED[name] * (1.0 + straight.stats["rejected"] / straight.stats["steps"])
+    found, stiff = resumed(model, tmp_path, [int(tried) + 2, 3, 3], tol=1e-6)
+    assert stiff >= 2
+    same(found, straight)
+
+
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_when_results_are_written_changes_nothing(method, tmp_path, impatient, monkeypatch):
+    model = mbsim.read_model(STIFF / "four_bar_stop.xml")
+    settings = {"integrator": method, "end_time": 0.1}
+    straight = mbsim.simulate(model, **settings)
+    monkeypatch.setattr(recorder.Recorder, "due", lambda self: True)
+    same(mbsim.simulate(model, output=tmp_path, **settings), straight)
