@@ -123,7 +123,10 @@ def fill(scene, T, y):
                 return code
         for row in range(5 + n):
             table[row, column] = (upper[row] - lower[row]) / (2.0 * size)
+    for i in range(K.place.shape[1]):
+        K.place[count, i] = place_of(scene, s, i) if i < n else -1
     for side in range(2):
+        K.body[count, side] = scene.graphics.body[gi if side == 0 else gj]
         for way in range(6):
             for i in range(6):
                 K.lever[count, side, way, i] = L.basis[side, way, i]
@@ -158,10 +161,12 @@ def invert(A, Z, n):
 
 
 @jitable
-def bodies_of(scene, s):
-    """Return the bodies of a slot."""
-    gi, gj = sides(scene, s)
-    return scene.graphics.body[gi], scene.graphics.body[gj]
+def count_of(K, k):
+    """Return how many numbers the k-th slot held carries."""
+    n = 0
+    while n < K.place.shape[1] and K.place[k, n] >= 0:
+        n += 1
+    return n
 
 
 @jitable
@@ -179,14 +184,13 @@ def add_to_matrix(scene, T, M):
     """Form Z of every slot, and add C Z B to the matrix."""
     K, P, nb = T.keeps, T.pattern, len(scene.bodies.mass)
     for k in range(K.held[len(K.held) - 1]):
-        s = K.held[k]
-        n, Z, A = carried(scene, s), M.keep[k], M.keep[len(M.keep) - 1]
+        n, Z, A = count_of(K, k), M.keep[k], M.keep[len(M.keep) - 1]
         for i in range(n):
             for j in range(n):
                 A[i, j] = -K.table[k, 5 + i, _GIVEN + j]
             A[i, i] += M.c[0, 2]
         invert(A, Z, n)
-        pair = bodies_of(scene, s)
+        pair = K.body[k]
         for by in range(2):
             b = pair[by]
             if b >= nb:
@@ -222,10 +226,10 @@ def add_to_matrix(scene, T, M):
 @jitable
 def drive(scene, T, M, r, k, e, with_moves):
     """Fill e with B (du, dN) + r of slot k; `with_moves`: by displacements too, else by rates."""
-    K, nb, s = T.keeps, len(scene.bodies.mass), T.keeps.held[k]
-    n, pair = carried(scene, s), bodies_of(scene, s)
+    K, nb, pair = T.keeps, len(scene.bodies.mass), T.keeps.body[k]
+    n = count_of(K, k)
     for i in range(n):
-        e[i] = r[place_of(scene, s, i)]
+        e[i] = r[K.place[k, i]]
     for by in range(2):
         b = pair[by]
         if b >= nb:
@@ -253,8 +257,8 @@ def add_to_right_side(scene, T, M, r):
     """Add what residuals ask of friction: C Z (B (du, dN) + r), du and dN by rates alone."""
     K, nb = T.keeps, len(scene.bodies.mass)
     for k in range(K.held[len(K.held) - 1]):
-        s, Z, e = K.held[k], M.keep[k], M.keep[len(M.keep) - 1, 0]
-        n, pair = carried(scene, s), bodies_of(scene, s)
+        Z, e = M.keep[k], M.keep[len(M.keep) - 1, 0]
+        n, pair = count_of(K, k), K.body[k]
         drive(scene, T, M, r, k, e, False)
         for row in range(5):
             force = 0.0 * M.c[0, 0]
@@ -273,14 +277,13 @@ def recover(scene, T, M, r, d):
     """Write how what slots carry changes; M.g holds the displacements."""
     K = T.keeps
     for k in range(K.held[len(K.held) - 1]):
-        s, Z, e = K.held[k], M.keep[k], M.keep[len(M.keep) - 1, 0]
-        n = carried(scene, s)
+        Z, e, n = M.keep[k], M.keep[len(M.keep) - 1, 0], count_of(K, k)
         drive(scene, T, M, r, k, e, True)
         for i in range(n):
             total = 0.0 * M.c[0, 0]
             for j in range(n):
                 total += Z[i, j] * e[j]
-            d[place_of(scene, s, i)] = total
+            d[K.place[k, i]] = total
 
 
 def _real(context, what, r, d):

@@ -113,6 +113,8 @@ class Keeps(NamedTuple):
     """Friction that looks at X or integrates memory, see `dynamics.memory_slopes`."""
 
     held: I1  # (slots + 1,) slots in contact, their number last
+    body: I2  # (slots, 2) I's and J's, as lists of pairs may have changed since
+    place: I2  # (slots, carried) where what is carried stands in y, -1 behind the last
     table: F3  # (slots, 5 + carried, 6 + carried) forces, then rates of what is carried; by slip,
     # spin and normal force, then by what is carried
     lever: F4  # (slots, 2, 6, 6) wrenches on I's and on J's body of units along n, x, y, and about
@@ -196,6 +198,8 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
     slots, wide = _carried(scene)
     keeps = Keeps(
         whole(slots + 1),
+        whole(slots, 2),
+        whole(slots, wide),
         np.zeros((slots, 5 + wide, 6 + wide)),
         np.zeros((slots, 2, 6, 6)),
         np.zeros((slots, 2)),
@@ -241,7 +245,7 @@ def _factor_arrays(
 def _in_use(tangent: Tangent) -> Iterator[tuple[str, np.ndarray]]:
     """Yield names and arrays of all that a linearisation and its factors consist of."""
     blocks = int(tangent.pattern.count[:2].max())
-    for group in ("pattern", "linear", "real", "pair"):
+    for group in ("pattern", "linear", "keeps", "real", "pair"):
         arrays = getattr(tangent, group)
         for field, array in zip(arrays._fields, arrays, strict=True):
             # the linearisation needs its r, which a factorisation has for scratch

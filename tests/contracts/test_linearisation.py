@@ -592,3 +592,28 @@ def test_what_touched_before_does_not_matter(tmp_path):
     assert np.abs(answers[1] - answers[0]).max() > 1e-6
     for k in (0, 1):
         np.testing.assert_allclose(answers[2 + k], answers[k], rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["sdnd100", "lugre_stick_slip"])
+def test_x_and_memory_of_friction_are_unknowns(name):
+    at = Linearised(MODELS / f"{name}.xml")
+    slots = at.scene.slots
+    x = [p + j for p in slots.x if p >= 0 for j in range(3)]
+    z = [p + j for p in slots.z if p >= 0 for j in range(2)]
+    assert len(x + z) > 0
+    at.rows = np.array([*at.rows, *x, *z])
+    y = at.y.copy()
+    # LuGre's bristles bent, the block on its way: all terms count
+    y[z] = 1e-6
+    y[7:9] = (0.02, -0.01) if z else (0.0, 0.0)
+    changes = at.changes
+    at.changes = lambda y, t: changes(y, t, 1e-9)
+    # depth changes the contact point too, which is frozen: what that misses falls with the step
+    assert (at.misses(y, coefficients=(1e3, 1e5)) < (1e-3, 1e-5)).all()
+    # complex coefficients
+    c1, worst = 1e4 * (1 + 2j), 0.0
+    at.linearise(y, 0.0)
+    for dx, df in at.changes(y, 0.0):
+        miss = at.solve_pair(c1, (c1 * dx - df).astype(complex)) - dx
+        worst = max(worst, np.abs(miss[at.rows]).max() / abs(c1))
+    assert worst < 1e-6

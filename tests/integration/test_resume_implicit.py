@@ -97,3 +97,13 @@ def test_when_results_are_written_changes_nothing(method, tmp_path, impatient, m
     straight = mbsim.simulate(model, **settings)
     monkeypatch.setattr(recorder.Recorder, "due", lambda self: True)
     same(mbsim.simulate(model, output=tmp_path, **settings), straight)
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])
+@pytest.mark.parametrize(("name", "end"), [("sdnd100", 0.1), ("lugre_stick_slip", 9.0)])
+def test_memory_of_friction_goes_on_where_it_was(name, end, method, tmp_path, impatient):
+    model = mbsim.read_model(STIFF.parent / f"{name}.xml")
+    settings = {"integrator": method, "end_time": end}
+    straight = mbsim.simulate(model, **settings)
+    found, _ = resumed(model, tmp_path, [straight.stats["steps"] // 4] * 3, **settings)
+    same(found, straight)
