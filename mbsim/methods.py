@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from mbsim.errors import ModelError
@@ -89,6 +90,7 @@ class Methods:
         memory[scheme.FRESH] = 1.0
         memory[scheme.HAVE_JACOBIAN] = 0.0
         memory[scheme.ERROR_BEFORE] = 1.0
+        memory[scheme.GROWTH] = math.inf
         memory[scheme.BEGUN], memory[scheme.PACE] = memory[scheme.TIME], 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
