@@ -38,7 +38,7 @@ WINDOW = 200
 #: A change is worth it for so many steps that are still to be taken.
 WORTH = 2000
 #: With so many ahead the implicit method is tried after so many steps for each of patience.
-MANY, TRIAL = 20_000, 20
+MANY, TRIAL = 20_000, 2
 #: Implicit steps between trials of an explicit one.
 TRY_EVERY = 20
 
@@ -54,14 +54,15 @@ def is_stiff(m, t_end):
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0
-    t = m.memory[TIME]
-    if m.memory[EXPLICIT_STEPS] % WINDOW == 0.0:
-        m.memory[PACE] = WINDOW / (t - m.memory[BEGUN])
+    t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
+    if steps <= WINDOW or steps % WINDOW == 0.0:
+        m.memory[PACE] = min(steps, WINDOW) / (t - m.memory[BEGUN])
+    if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
     ahead = (t_end - t) * m.memory[PACE]
     if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return ahead > WORTH
-    return ahead > MANY and m.memory[EXPLICIT_STEPS] >= TRIAL * m.memory[PATIENCE]
+    return ahead > MANY and steps >= TRIAL * m.memory[PATIENCE]
 
 
 @jitable
