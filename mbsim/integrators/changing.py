@@ -4,8 +4,11 @@ The explicit method estimates the largest rate of f from its last two stages, wh
 time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
 some 3.3, stability and not the error bounds the steps: the model is stiff. The implicit method
 tries an explicit step now and then; where that is good enough, and stable, at half the length,
-it costs less. Friction that turns sign from step to step within the tolerance hides its rate: a
+it costs less. How many steps are ahead is judged by the pace of the run so far, and of the last
+WINDOW steps once there are so many: an impact after a flight takes little of the run, and is over
+before there are. Friction that turns sign from step to step within the tolerance hides its rate: a
 run with very many steps ahead tries the implicit method now and then all the same.
+Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
 
@@ -24,6 +27,7 @@ from mbsim.integrators.scheme import (
     PACE,
     PATIENCE,
     STEP,
+    STEPS,
     STIFF_STEPS,
     STIFFNESS,
     TIME,
@@ -37,8 +41,8 @@ FIRST_PATIENCE, FORGET = 15, 6
 WINDOW = 200
 #: A change is worth it for so many steps that are still to be taken.
 WORTH = 2000
-#: With so many ahead the implicit method is tried after so many steps for each of patience.
-MANY, TRIAL = 20_000, 2
+#: With so many ahead the implicit method is tried after as many steps as there is patience for.
+MANY = 20_000
 #: Implicit steps between trials of an explicit one.
 TRY_EVERY = 20
 
@@ -55,14 +59,15 @@ def is_stiff(m, t_end):
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0
     t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
-    if steps <= WINDOW or steps % WINDOW == 0.0:
+    # the run so far: after a change back only whole windows count, for that may be in an impact
+    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
         m.memory[PACE] = min(steps, WINDOW) / (t - m.memory[BEGUN])
     if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
     ahead = (t_end - t) * m.memory[PACE]
     if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return ahead > WORTH
-    return ahead > MANY and steps >= TRIAL * m.memory[PATIENCE]
+    return ahead > MANY and steps >= m.memory[PATIENCE]
 
 
 @jitable
