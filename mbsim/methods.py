@@ -39,6 +39,10 @@ class Methods:
         bodies = len(system.body_ids)
         held = scheme.both(self.explicit, self.other) if self.other else self.explicit
         self.arrays = scheme.make(held, system.y0, start, bodies)
+        # where a contact may close or stick, Newton's iteration that fails with what held at the
+        # step's begin is what finds it
+        touches = len(system.scene.contacts.id) > 0
+        self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem

@@ -64,7 +64,8 @@ def is_stiff(m, t_end):
         m.memory[PACE] = min(steps, WINDOW) / (t - m.memory[BEGUN])
     if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
-    ahead = (t_end - t) * m.memory[PACE]
+    # steps that grow, as from a start, are not yet those to come
+    ahead = min((t_end - t) * m.memory[PACE], (t_end - t) / m.memory[STEP])
     if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return ahead > WORTH
     return ahead > MANY and steps >= m.memory[PATIENCE]

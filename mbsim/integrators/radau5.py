@@ -50,6 +50,7 @@ from mbsim.integrators.scheme import (
     RATE,
     RETRY,
     TOL,
+    WHERE,
     Scheme,
     on_bench,
 )
@@ -276,24 +277,25 @@ def iterate(p, m, t, h):
 
 
 @jitable
-def middle(m, t, h):
+def place(m, t, h):
     """Return the time at which a step of length h is linearised."""
-    return t if m.memory[FRESH] == 1.0 else t + 0.5 * h
+    return t if m.memory[FRESH] == 1.0 else t + m.memory[WHERE] * h
 
 
 @jitable
 def linearise_within(p, m, t, h):
-    """Linearise at the step's middle, as the last step's polynomial has it; return a code.
+    """Linearise at the step's begin or, as the last step's polynomial has it, further on.
 
-    What turns or bends in a step is by half as much off there as at the begin.
+    What turns or bends in a step is by half as much off in its middle as at its begin.
     """
-    if m.memory[FRESH] == 1.0:
+    ahead = m.memory[WHERE] * h
+    if m.memory[FRESH] == 1.0 or ahead == 0.0:
         return linearise(p, m, t, 0.0, m.y, m.k[F])
-    s = 1.0 + 0.5 * h / m.memory[LAST_STEP]
+    s = 1.0 + ahead / m.memory[LAST_STEP]
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + carried_on(m, s, i)
-    call_float(p.project, (p.context, t + 0.5 * h, 0.5 * h, m.trial, m.trial))
-    return linearise(p, m, t + 0.5 * h, 0.5 * h, m.trial, m.k[F])
+    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    return linearise(p, m, t + ahead, ahead, m.trial, m.k[F])
 
 
 @jitable
@@ -306,7 +308,7 @@ def is_stale(m, t, h):
     if m.memory[HAVE_JACOBIAN] == 0.0:
         return True
     at = m.memory[JACOBIAN_TIME]
-    within = t < at <= t + h or at == middle(m, t, h)
+    within = t < at <= t + h or at == place(m, t, h)
     return not within and m.memory[RATE] > KEEP
 
 
@@ -331,7 +333,7 @@ def solve_stages(p, m, t, h):
             code = iterate(p, m, t, h)
             if code == 0.0:
                 return 0.0
-        if m.memory[JACOBIAN_TIME] == middle(m, t, h) or not may_help(code):
+        if m.memory[JACOBIAN_TIME] == place(m, t, h) or not may_help(code):
             return as_failure(code)
         stale = True
 
