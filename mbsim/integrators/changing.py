@@ -4,10 +4,12 @@ The explicit method estimates the largest rate of f from its last two stages, wh
 time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
 some 3.3, stability and not the error bounds the steps: the model is stiff. The implicit method
 tries an explicit step now and then; where that is good enough, and stable, at half the length
-twice running, it costs less. How many steps are ahead is judged by the pace of the run so far, and of the last
-WINDOW steps once there are so many: an impact after a flight takes little of the run, and is over
-before there are. Friction that turns sign from step to step within the tolerance hides its rate: a
-run with very many steps ahead tries the implicit method now and then all the same.
+twice running, it costs less.
+
+How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
+there are so many: an impact after a flight takes little of the run, and is over before there are.
+Friction that turns sign from step to step within the tolerance hides its rate: a run with very
+many steps ahead tries the implicit method now and then all the same.
 Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
