@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,10 @@ class Methods:
         bodies = len(system.body_ids)
         held = scheme.both(self.explicit, self.other) if self.other else self.explicit
         self.arrays = scheme.make(held, system.y0, start, bodies)
+        # where a contact may close or stick, Newton's iteration that fails with what held at the
+        # step's begin is what finds it
+        touches = len(system.scene.contacts.id) > 0
+        self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem
@@ -105,6 +110,7 @@ class Methods:
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0
+        memory[scheme.GROWTH] = math.inf
         memory[scheme.BEGUN], memory[scheme.PACE] = memory[scheme.TIME], 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0

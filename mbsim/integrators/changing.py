@@ -3,9 +3,14 @@
 The explicit method estimates the largest rate of f from its last two stages, which are at the same
 time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
 some 3.3, stability and not the error bounds the steps: the model is stiff. The implicit method
-tries an explicit step now and then; where that is good enough, and stable, at half the length,
-it costs less. Friction that turns sign from step to step within the tolerance hides its rate: a
-run with very many steps ahead tries the implicit method now and then all the same.
+tries an explicit step now and then; where that is good enough, and stable, at half the length
+twice running, it costs less.
+
+How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
+there are so many: an impact after a flight takes little of the run, and is over before there are.
+Friction that turns sign from step to step within the tolerance hides its rate: a run with very
+many steps ahead tries the implicit method now and then all the same.
+Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
 
@@ -24,6 +29,7 @@ from mbsim.integrators.scheme import (
     PACE,
     PATIENCE,
     STEP,
+    STEPS,
     STIFF_STEPS,
     STIFFNESS,
     TIME,
@@ -37,10 +43,10 @@ FIRST_PATIENCE, FORGET = 15, 6
 WINDOW = 200
 #: A change is worth it for so many steps that are still to be taken.
 WORTH = 2000
-#: With so many ahead the implicit method is tried after so many steps for each of patience.
-MANY, TRIAL = 20_000, 20
-#: Implicit steps between trials of an explicit one.
-TRY_EVERY = 20
+#: With so many ahead the implicit method is tried after as many steps as there is patience for.
+MANY = 20_000
+#: Implicit steps between trials of an explicit one, and how many good ones change back.
+TRY_EVERY, TRIALS = 20, 2
 
 
 @jitable
@@ -54,14 +60,17 @@ def is_stiff(m, t_end):
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0
-    t = m.memory[TIME]
-    if m.memory[EXPLICIT_STEPS] % WINDOW == 0.0:
-        m.memory[PACE] = WINDOW / (t - m.memory[BEGUN])
+    t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
+    # the run so far: after a change back only whole windows count, for that may be in an impact
+    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
+        m.memory[PACE] = min(steps, WINDOW) / (t - m.memory[BEGUN])
+    if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
-    ahead = (t_end - t) * m.memory[PACE]
+    # steps that grow, as from a start, are not yet those to come
+    ahead = min((t_end - t) * m.memory[PACE], (t_end - t) / m.memory[STEP])
     if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return ahead > WORTH
-    return ahead > MANY and m.memory[EXPLICIT_STEPS] >= TRIAL * m.memory[PATIENCE]
+    return ahead > MANY and steps >= m.memory[PATIENCE]
 
 
 @jitable
@@ -77,12 +86,14 @@ def is_calm(p, m, steps, t_end):
     code = call_float(steps.probe, (steps.context, t, h, m.y, m.trial))
     error = m.memory[LAST_ERROR]
     m.memory[LAST_ERROR] = kept
-    if code != 0.0 or not error < math.inf:
-        return False
-    part = 0.9 * max(error, 1e-4) ** -0.2
-    if m.memory[STIFFNESS] > 0.0:
-        part = min(part, WITHIN / m.memory[STIFFNESS])
-    if part < 0.5:
+    part = 0.0
+    if code == 0.0 and error < math.inf:
+        part = 0.9 * max(error, 1e-4) ** -0.2
+        if m.memory[STIFFNESS] > 0.0:
+            part = min(part, WITHIN / m.memory[STIFFNESS])
+    # a short step, as after a change or a kink, is good for either method
+    m.memory[CALM_STEPS] = m.memory[CALM_STEPS] + 1.0 if part >= 0.5 else 0.0
+    if m.memory[CALM_STEPS] < TRIALS:
         return False
     m.memory[STEP] = min(1.0, part) * h
     return True

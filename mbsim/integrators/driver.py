@@ -32,6 +32,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
+    HOLD,
     foretold_factor,
     next_factor,
     quantised,
@@ -47,6 +48,7 @@ from mbsim.integrators.scheme import (
     FAILURES,
     FIRST_MAX,
     FRESH,
+    GROWTH,
     H_LARGEST,
     H_SMALLEST,
     HAVE_F,
@@ -159,7 +161,11 @@ def length(p, m, steps, t, t_end, h_max, floor):
     """Return the length of the step to try from t."""
     h = min(m.memory[STEP], h_max)
     if steps.order > 0.0:
-        h = min(quantised(h), call_float(p.limit, (p.context, t, h, m.y, m.k[0])))
+        limit = call_float(p.limit, (p.context, t, h, m.y, m.k[0]))
+        if steps.implicit:
+            # in a shorter one velocities are rounding errors of positions over h
+            limit = max(limit, LOCATED * max(1.0, abs(t)))
+        h = min(quantised(h), limit)
     h = max(h, floor)
     # no sliver of a step before the end
     return t_end - t if t + 1.01 * h >= t_end else h
@@ -402,8 +408,12 @@ def choose_next(m, steps, h, h_max):
         return
     error = m.memory[LAST_ERROR]
     if steps.implicit:
-        ratio = 0.0 if m.memory[FRESH] == 1.0 else h / m.memory[LAST_STEP]
+        # nothing is foretold from a step that was cut, for an event or a contact
+        cut = h < 0.5 * m.memory[STEP]
+        ratio = 0.0 if cut or m.memory[FRESH] == 1.0 else h / m.memory[LAST_STEP]
         factor = foretold_factor(error, m.memory[ERROR_BEFORE], steps.order, ratio)
+        if m.memory[GROWTH] < factor:
+            factor = m.memory[GROWTH] if m.memory[GROWTH] > HOLD else 1.0
     else:
         factor = next_factor(error, m.memory[ERROR_BEFORE], steps.order, steps.memory, False)
     m.memory[STEP] = h * (min(factor, 1.0) if m.memory[AFTER_REJECTION] == 1.0 else factor)

@@ -27,6 +27,7 @@ from mbsim.core.jitable import jitable
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
+    HOPELESS,
     SOLVED,
     as_failure,
     begin,
@@ -41,6 +42,7 @@ from mbsim.integrators.scheme import (
     FACTORED_STEP,
     FACTORIZATIONS,
     FRESH,
+    GROWTH,
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     LAST_ERROR,
@@ -48,6 +50,7 @@ from mbsim.integrators.scheme import (
     RATE,
     RETRY,
     TOL,
+    WHERE,
     Scheme,
     on_bench,
 )
@@ -88,6 +91,10 @@ E = np.array((-(13.0 + 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 / 3
 MOST = 7
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.01
+#: The second correction may be so many times the first.
+SECOND = 10.0
+#: The step grows as far as the iteration would still converge at this rate.
+GOOD_RATE = 0.2
 
 # rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
 # and solutions of the real system and of the pair, f at the trial point
@@ -112,22 +119,20 @@ def factor(p, m, t, h):
 
 
 @jitable
+def carried_on(m, s, i):
+    """Return how much y[i] rises from the last step's end to s >= 1 of it, by its polynomial."""
+    inner = m.kept[1, i] + s * m.kept[2, i]
+    return s * (m.kept[0, i] + (1.0 - s) * inner) - m.kept[0, i]
+
+
+@jitable
 def foretell(m, h):
     """Write the stages as the last step's polynomial, carried on, has them."""
-    k = m.k
-    n = len(m.y)
-    if m.memory[FRESH] == 1.0:
-        for j in range(3):
-            for i in range(n):
-                k[Z + j, i] = 0.0
-    else:
-        ratio = h / m.memory[LAST_STEP]
-        for j in range(3):
-            s = 1.0 + C[j] * ratio
-            r = 1.0 - s
-            for i in range(n):
-                inner = m.kept[1, i] + s * m.kept[2, i]
-                k[Z + j, i] = s * (m.kept[0, i] + r * inner) - m.kept[0, i]
+    fresh = m.memory[FRESH] == 1.0
+    for j in range(3):
+        s = 1.0 if fresh else 1.0 + C[j] * h / m.memory[LAST_STEP]
+        for i in range(len(m.y)):
+            m.k[Z + j, i] = 0.0 if fresh else carried_on(m, s, i)
 
 
 @jitable
@@ -203,7 +208,11 @@ def correct(p, m, t, h):
 
 @jitable
 def iterate(p, m, t, h):
-    """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution."""
+    """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution.
+
+    The second correction may be larger than the first, which the foretold stages made small: it
+    holds what projections undid of the first. The third shows whether the iteration converges.
+    """
     begin(m)
     foretell(m, h)
     for j in range(3):
@@ -211,7 +220,7 @@ def iterate(p, m, t, h):
             m.error[i] = 0.0
         project_stage(p, m, t, h, j)
     transform(m)
-    before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
+    before, rate, slowest, word, iteration = 0.0, 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
         code = evaluate_stages(p, m, t, h)
@@ -221,23 +230,64 @@ def iterate(p, m, t, h):
         if code != 0.0:
             return code
         word, rate = judge(m, iteration, MOST, size, before, rate, 0.0)
+        if iteration == 2:
+            slowest = rate
+            if word == HOPELESS and size < SECOND * before:
+                word, rate = GO_ON, 0.0
+        elif iteration > 2:
+            slowest = max(size / before, slowest if iteration > 3 else 0.0)
         before = size
     m.memory[RATE] = rate
+    m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
     return 0.0 if word == SOLVED else -1.0
+
+
+@jitable
+def place(m, t, h):
+    """Return the time at which a step of length h is linearised."""
+    return t if m.memory[FRESH] == 1.0 else t + m.memory[WHERE] * h
+
+
+@jitable
+def linearise_within(p, m, t, h):
+    """Linearise at the step's begin or, as the last step's polynomial has it, further on.
+
+    What turns or bends in a step is by half as much off in its middle as at its begin.
+    """
+    ahead = m.memory[WHERE] * h
+    if m.memory[FRESH] == 1.0 or ahead == 0.0:
+        return linearise(p, m, t, 0.0, m.y, m.k[F])
+    s = 1.0 + ahead / m.memory[LAST_STEP]
+    for i in range(len(m.y)):
+        m.trial[i] = m.y[i] + carried_on(m, s, i)
+    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    return linearise(p, m, t + ahead, ahead, m.trial, m.k[F])
+
+
+@jitable
+def is_stale(m, t, h):
+    """Return whether there is no linearisation that is good enough to begin a step with.
+
+    One of this step, tried longer, is; one of a step before is where the iteration converged so
+    fast with it that it is worth to be tried.
+    """
+    if m.memory[HAVE_JACOBIAN] == 0.0:
+        return True
+    at = m.memory[JACOBIAN_TIME]
+    within = t < at <= t + h or at == place(m, t, h)
+    return not within and m.memory[RATE] > KEEP
 
 
 @jitable
 def solve_stages(p, m, t, h):
     """Solve for the stages, with an old linearisation if there is one; return a code."""
-    here = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[JACOBIAN_TIME] == t
-    stale = not here and (m.memory[HAVE_JACOBIAN] == 0.0 or m.memory[RATE] > KEEP)
-    # at most twice: with the old one, then with one of this step's begin
+    stale = is_stale(m, t, h)
+    # at most twice: with the old one, then with one of this step
     while True:
         if stale:
-            code = linearise(p, m, t, 0.0, m.y, m.k[F])
+            code = linearise_within(p, m, t, h)
             if code != 0.0:
                 return code
-            here = True
         if m.memory[FACTORED_STEP] != h:
             code = factor(p, m, t, h)
             m.memory[RETRY] = HALF
@@ -249,7 +299,7 @@ def solve_stages(p, m, t, h):
             code = iterate(p, m, t, h)
             if code == 0.0:
                 return 0.0
-        if here or not may_help(code):
+        if m.memory[JACOBIAN_TIME] == place(m, t, h) or not may_help(code):
             return as_failure(code)
         stale = True
 

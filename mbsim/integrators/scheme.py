@@ -43,7 +43,9 @@ LAST_TIME, LAST_STEP, FIRST_MAX, TOL, AFTER_REJECTION, STALE, EVENT_DUE = range(
 # of implicit methods: whether the problem keeps a linearisation, and where it was taken;
 # the step that it was factored for; the rate at which Newton's iteration converged last, and
 # what is left after its first step; nothing is known of a step before; part of a step to try
-# after Newton's iteration failed; the last correction's size, and that of the one before
+# after Newton's iteration failed; the last correction's size, and that of the one before; by
+# how much the step may grow for Newton's iteration to converge still; at what part of its step
+# RADAU5 linearises
 HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14, 21)
 # of AUTO (`changing.py`): whether it watches; step times largest rate as the last step found it;
 # steps found stiff, and those not stiff since; how many make it change over; steps of either
@@ -51,8 +53,8 @@ HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14
 # window of them, and when it began
 WATCH, STIFFNESS, STIFF_STEPS, CALM_STEPS, PATIENCE = range(21, 26)
 EXPLICIT_STEPS, IMPLICIT_STEPS, STIFF, PACE, BEGUN = range(26, 31)
-CORRECTION, CORRECTION_BEFORE = range(31, 33)
-MEMORY = 33
+CORRECTION, CORRECTION_BEFORE, GROWTH, WHERE = range(31, 35)
+MEMORY = 35
 # counts
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
 JACOBIANS, FACTORIZATIONS = range(8, 10)
@@ -115,7 +117,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
     memory = np.zeros(MEMORY)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = 1.0
-    memory[H_SMALLEST] = math.inf
+    memory[H_SMALLEST] = memory[GROWTH] = math.inf
     return Method(
         np.array(y0, dtype=np.float64),
         np.zeros((scheme.stages, n)),

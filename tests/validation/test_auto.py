@@ -38,6 +38,27 @@ def test_a_block_that_creeps_is_stiff_from_soon_on(tmp_path):
     assert "RADAU5 from here on" in log
 
 
+@pytest.mark.parametrize("name", ["rolling_sphere", "overdamped", "preloaded_stop"])
+def test_a_run_that_is_stiff_from_its_begin_changes_over_within_some_steps(name):
+    model = mbsim.read_model(STIFF / f"{name}.xml")
+    auto, implicit = (mbsim.simulate(model, integrator=name) for name in ("AUTO", "RADAU5"))
+    assert auto.stats["method_changes"] == 1
+    assert auto.stats["steps"] < implicit.stats["steps"] + 60
+
+
+@pytest.mark.parametrize("name", ["drop_m", "bowling_ball", "incline_slip"])
+def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
+    auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
+    assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
+
+
+@pytest.mark.parametrize(("name", "part"), [("torsion_top", 0.05), ("bushing_chain", 0.4)])
+def test_radau5_takes_steps_for_which_newtons_iteration_converges(name, part):
+    stats = mbsim.simulate(mbsim.read_model(STIFF / f"{name}.xml"), integrator="RADAU5").stats
+    assert stats["rejected"] < part * stats["steps"]
+    assert stats["steps"] < 600
+
+
 def test_it_changes_back():
     model = mbsim.read_model(MODELS / "slider_crank_clearance.xml")
     auto = mbsim.simulate(model)
