@@ -128,6 +128,14 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     if code in (RAISED_COMPILED, USER_NOT_FINITE):
         from mbsim.plugins import reproduce
 
+        user = system.user_friction[element]
+        if user.function is None:
+            out = system.scene.work.law_out
+            force = [float(out[k]) for k in (0, 1, 4)]
+            raise PluginError(
+                f"Force_Contact[{element}]: {user.name} failed at time {t:.12g}: returned {force}, "
+                f"not 3 finite numbers [Fx, Fy, Tz] ({user.source}); nan is also what it left unset"
+            )
         reproduce(system.user_friction[element], system.scene.work.law_in, element)
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
     if code == DETECTOR_FAILED and detector is not None:

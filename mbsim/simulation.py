@@ -563,7 +563,7 @@ def simulate(
     for note in settings.notes:
         tell(note)
     for number, user in system.user_friction.items():
-        how = "compiled" if user.compiled else f"interpreted: {user.reason}"
+        how = f"{user.how}: {user.reason}" if user.reason else user.how
         tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
     for user_subroutine in system.subroutines.values():
         statement, number = user_subroutine.element

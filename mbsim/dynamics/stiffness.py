@@ -24,6 +24,7 @@ from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.laws.abi import DFLAG
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -180,7 +181,9 @@ def add_contact_slopes(scene, T, t, h, y, s):
     if contacts.framed[c] == 1:
         half = scale(0.5 * depth, n)
         around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
+    work.law_in[DFLAG] = 1.0
     code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
+    work.law_in[DFLAG] = 0.0
     if code != 0:
         return code
     for k in range(4):

@@ -2,8 +2,9 @@
 
 Normal law      int64 f(double depth, double rate, const double *par, double out[3])
                 out: force [F], force at rate 0 [F], stored energy [F L]
-Friction law    int64 f(int64 id, const double in[19], const double *par, double out[5])
-                in: the fields of `FrictionInput` in order; out: Fx, Fy, Mx, My, Tz on I
+Friction law    int64 f(int64 id, const double in[20], const double *par, double out[5])
+                in: the fields of `FrictionInput` in order, then in[DFLAG]: 1 where the call is
+                for derivatives, else 0; out: Fx, Fy, Mx, My, Tz on I
 
 `id` is the Force_Contact's. The result is 0, or a code that stops the run: 1 says that an
 interpreted user function raised (the guard in `plugins` holds the exception), 2 that a
@@ -25,7 +26,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
-FRICTION_INPUTS = 19
+FRICTION_INPUTS = 20
+DFLAG = 19
 RAISED_INTERPRETED = 1
 RAISED_COMPILED = 2
 STOPPED_BY_USER = AT_ONCE
@@ -37,7 +39,7 @@ FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
 
 @jitable
 def friction_input(a):
-    """Return the `FrictionInput` that lies in the 19 numbers of array `a`."""
+    """Return the `FrictionInput` that lies in the first 19 numbers of array `a`."""
     return FrictionInput(
         a[0],
         a[1],
@@ -73,7 +75,7 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     def entry(element, inputs, par, out):
         values = to_fixed_tuple(carray(par, (count,)), count)
         result = carray(out, (5,))
-        given = friction_input(carray(inputs, (19,)))
+        given = friction_input(carray(inputs, (FRICTION_INPUTS,)))
         fx, fy, mx, my, tz = force(given, *values)
         result[0] = fx
         result[1] = fy

@@ -112,9 +112,11 @@ class Subroutine:
 
     par: tuple[float, ...] = ()
     fnc_name: str = ""
-    dll_name: str = ""
+    dll_name: str = ""  # absolute path of a shared library, or empty
     script_name: str = ""  # absolute path, or empty where --plugin must give it
     interpreter: str = ""
+    language: str = ""  # of the library's function: C, FORTRAN, or empty where its name tells
+    source: Source = Source()
 
 
 @dataclass(frozen=True)

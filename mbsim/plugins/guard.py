@@ -169,7 +169,7 @@ def callback(
     function: Callable[..., Any], name: str, source: str, par_count: int
 ) -> tuple[int, object]:
     """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive."""
-    from mbsim.laws.abi import FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
     inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
@@ -191,7 +191,7 @@ def callback(
                 given[2:5],
                 given[5:8],
                 given[10],
-                0,
+                int(given[DFLAG]),
                 0,
             )
             force = out_at[out]
@@ -294,8 +294,8 @@ def reproduce(
     ----------
     user : UserFriction
         The compiled function that returned RAISED_COMPILED or a force that is not finite.
-    inputs : sequence of float, shape (19,)
-        The fields of `FrictionInput` in order, as the function was given them.
+    inputs : sequence of float, shape (20,)
+        What the function was given, as `laws.abi` has it.
     element_id : int, optional
         The Force_Contact; `user.element` if left out.
 
@@ -309,8 +309,9 @@ def reproduce(
     name, source = user.name, str(user.source)
     try:
         result = user.call(
-            given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10]
-        )
+            given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10],
+            int(given[19]),
+        )  # fmt: skip
     except BaseException as error:
         failure.clear()
         failure.store(error, f"Force_Contact[{element}]", given[0], name, source)

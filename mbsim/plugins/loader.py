@@ -12,10 +12,10 @@ import re
 import sys
 import traceback
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,9 +25,16 @@ from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
 from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
+from mbsim.plugins.shared_library import (
+    Library,
+    address_of,
+    choose,
+    friction,
+    is_library,
+    read_library,
+)
 
 _ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
-_LIBRARIES = (".so", ".dll", ".dylib", ".sl")
 _numbers = itertools.count(1)
 
 
@@ -44,15 +51,26 @@ class Script:
         """Return whether it may ask for functions of the language; of a .pyc nobody knows."""
         return self.text is None or bool(re.search("py_sysfnc|py_sysary", self.text))
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script has bound a name beside those it was given."""
+        return name in _own(self)
+
+    def listed(self) -> str:
+        """Return the functions that the script defines, for a message."""
+        functions = [name for name, value in _own(self).items() if inspect.isfunction(value)]
+        return ", ".join(functions) or "no function"
+
 
 Scripts = dict[Path, Script]
+Found = TypeVar("Found", Script, Library, Script | Library)
 
 
 @dataclass(frozen=True, eq=False)
 class UserFriction:
     """A user's friction function, ready to be called.
 
-    Keep it alive as long as `address` is in use: an interpreted one owns its callback.
+    Keep it alive as long as `address` is in use: an interpreted one owns its callback, one of
+    a library the memory that `hidden` points to.
 
     Attributes
     ----------
@@ -76,6 +94,10 @@ class UserFriction:
         The user's own function object.
     looks : bool
         Whether it is interpreted and its script may ask for the state by `py_sysfnc`.
+    language : str
+        Python, C or Fortran.
+    hidden : tuple of float
+        What the C function behind `address` reads of its parameters before `par`.
     """
 
     address: int
@@ -86,20 +108,44 @@ class UserFriction:
     source: Path
     name: str
     element: int
-    function: Callable[..., Any] = field(repr=False)
+    function: Callable[..., Any] | None = field(repr=False)
     keep: object = field(default=None, repr=False)
     looks: bool = False
+    language: str = "Python"
+    hidden: tuple[float, ...] = ()
+
+    @property
+    def how(self) -> str:
+        """How it runs, in a word for the user."""
+        if self.language != "Python":
+            return self.language
+        return "compiled" if self.compiled else "interpreted"
+
+    @property
+    def row(self) -> npt.NDArray[np.float64]:
+        """The parameters as the C function behind `address` reads them."""
+        return np.concatenate([self.hidden, self.par])
 
     def call(
-        self, time: float, par: Any, loci: Any, locj: Any, x: Any, xdot: Any, nforce: float
+        self,
+        time: float,
+        par: Any,
+        loci: Any,
+        locj: Any,
+        x: Any,
+        xdot: Any,
+        nforce: float,
+        dflag: int = 0,
     ) -> list[float]:
         """Return [Fx, Fy, Tz] of the interpreted function; what it raises comes through."""
+        assert self.function is not None
         lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
         host.time = float(time)
         values, loci, locj, x, xdot = lists
         result = self.function(
-            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce), 0, 0
-        )
+            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce),
+            dflag, 0,
+        )  # fmt: skip
         return guard.three_numbers(result)
 
 
@@ -138,6 +184,8 @@ def load_friction(
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
+    if isinstance(script, Library):
+        return _from_library(script, contact, name)
     function = user_function(script, name, element)
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
@@ -172,6 +220,49 @@ def load_friction(
     return user(address, reason, keep)
 
 
+def check_libraries(contacts: Iterable[Contact]) -> None:
+    """Look for the functions of the libraries that contacts name; none of them is called.
+
+    Raises
+    ------
+    ModelError
+        With a line for each that is not there, or whose language is not clear.
+    """
+    faults = []
+    for contact in contacts:
+        if contact.cff.dll_name.strip().upper() in ("", "NULL"):
+            continue
+        try:
+            library = find_subroutine(contact)
+            assert isinstance(library, Library)
+            choose(library, contact.cff.fnc_name, "cff", contact.cff.language)
+        except ModelError as error:
+            faults.append(str(error))
+    if faults:
+        raise ModelError("\n".join(faults))
+
+
+def _from_library(library: Library, contact: Contact, name: str) -> UserFriction:
+    """Return the friction function of a shared library."""
+    par = np.array(contact.cff.par, dtype=np.float64)
+    language, symbol = choose(library, name, "cff", contact.cff.language)
+    address, hidden, keep = friction(address_of(library, symbol), language, contact.id, par)
+    return UserFriction(
+        address=address,
+        par=par,
+        compiled=True,
+        reason="",
+        uses_x=True,  # nobody knows what machine code reads
+        source=library.path,
+        name=name,
+        element=contact.id,
+        function=None,
+        keep=keep,
+        language=language,
+        hidden=(hidden,),
+    )
+
+
 def _compiled(
     script: Script,
     name: str,
@@ -191,21 +282,21 @@ def _compiled(
     twin = user(0, "probe")
 
     def call(a: list[float]) -> list[float]:
-        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10])
+        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10], int(a[19] + 0.5))
 
     # a place that the text does not read needs no probe
-    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6)]
+    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6, 9)]
     reason = disagreement(address, call, par, script.text, script.values, twin.element, read)
     return (0, reason) if reason else (address, "")
 
 
 def find_subroutine(
     contact: Contact, plugin_files: Sequence[Path] = (), scripts: Scripts | None = None
-) -> Script:
-    """Return the script that defines the friction function of a contact, run once.
+) -> Script | Library:
+    """Return what defines the friction function of a contact: a script, run once, or a library.
 
-    `script_name` in the deck comes before `plugin_files`; two of these that define the
-    function are an error.
+    `cff_dll_name` and `script_name` in the deck come before `plugin_files`; two of these that
+    define the function are an error.
 
     Raises
     ------
@@ -214,7 +305,42 @@ def find_subroutine(
     """
     element = f"Force_Contact[{contact.id}]"
     name = contact.cff.fnc_name or "CFFSUB"
-    return find_script(contact.cff, name, element, "cff", plugin_files, scripts)
+    return find_source(contact.cff, name, element, "cff", plugin_files, scripts)
+
+
+def find_source(
+    user: Subroutine,
+    name: str,
+    element: str,
+    prefix: str,
+    plugin_files: Sequence[Path] = (),
+    scripts: Scripts | None = None,
+) -> Script | Library:
+    """Return the script or library that defines function `name` of a contact."""
+    scripts = {} if scripts is None else scripts
+    if user.dll_name.strip().upper() not in ("", "NULL"):
+        place = f"{user.source.file}:{user.source.line}: " if user.source.file else ""
+        return read_library(Path(user.dll_name), place + element)
+    files = list(dict.fromkeys(Path(file).absolute() for file in plugin_files))
+    if user.script_name or not any(map(is_library, files)):
+        return find_script(user, name, element, prefix, files, scripts)
+    loaded = [
+        read_library(file, element) if is_library(file) else _load(file, element, scripts)
+        for file in files
+    ]
+    return _only_one(loaded, name, element, f"{prefix}_fnc_name")
+
+
+def _only_one(loaded: Sequence[Found], name: str, element: str, attribute: str) -> Found:
+    """Return the one of several files that defines a function."""
+    found = [source for source in loaded if source.defines(name)]
+    if len(found) > 1:
+        both = ", ".join(str(source.path) for source in found)
+        raise ModelError(f"{element}: {name} is defined twice: {both}")
+    if not found:
+        defined = "; ".join(f"{source.path} defines {source.listed()}" for source in loaded)
+        raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
+    return found[0]
 
 
 def find_script(
@@ -242,28 +368,18 @@ def find_script(
         return script
 
     dll_name = user.dll_name.strip()
-    if not plugin_files:
-        if dll_name.upper() not in ("", "NULL"):
-            raise ModelError(
-                f'{element}: {prefix}_dll_name="{dll_name}": shared libraries are not built yet; '
-                "name a Python twin with --plugin FILE.py"
-            )
+    # shared libraries are for contacts
+    files = [file for file in dict.fromkeys(map(Path.absolute, map(Path, plugin_files)))
+             if not is_library(file)]  # fmt: skip
+    if not files:
         said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
         said = f"no FILE.py::{name}" if prefix == "ROUTINE" else said
         raise ModelError(
             f'{element}: {attribute}="{name}" names no file ({said}); '
             "name one with --plugin FILE.py"
         )
-    files = dict.fromkeys(Path(file).absolute() for file in plugin_files)
     loaded = [_load(file, element, scripts) for file in files]
-    found = [script for script in loaded if name in _own(script)]
-    if len(found) > 1:
-        both = ", ".join(str(script.path) for script in found)
-        raise ModelError(f"{element}: {name} is defined twice: {both}")
-    if not found:
-        defined = "; ".join(f"{script.path} defines {_listed(script)}" for script in loaded)
-        raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
-    return found[0]
+    return _only_one(loaded, name, element, attribute)
 
 
 def _own(script: Script) -> dict[str, Any]:
@@ -276,17 +392,11 @@ def _own(script: Script) -> dict[str, Any]:
     }
 
 
-def _listed(script: Script) -> str:
-    """Return the functions that a script defines, for a message."""
-    functions = [name for name, value in _own(script).items() if inspect.isfunction(value)]
-    return ", ".join(functions) or "no function"
-
-
 def _require(script: Script, name: str, element: str, attribute: str) -> None:
-    if name not in _own(script):
+    if not script.defines(name):
         raise ModelError(
             f'{element}: {script.path} does not define {attribute}="{name}"; '
-            f"it defines {_listed(script)}"
+            f"it defines {script.listed()}"
         )
 
 
@@ -325,8 +435,8 @@ def _load(path: Path, element: str, scripts: Scripts) -> Script:
     path = path.absolute()
     if path in scripts:
         return scripts[path]
-    if path.suffix.lower() in _LIBRARIES:
-        raise ModelError(f"{element}: {path}: shared libraries are not built yet, use Python")
+    if is_library(path):
+        raise ModelError(f"{element}: {path}: a shared library is no script; name it by *_dll_name")
     if path.suffix.lower() in (".m", ".oml"):
         raise ModelError(f"{element}: {path}: MATLAB and Compose are not built yet, use Python")
     try:

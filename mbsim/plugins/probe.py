@@ -30,10 +30,10 @@ def thresholds(text: str, par: list[float], values: dict[str, Any]) -> list[floa
 
 
 def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
-    """Yield the 19 inputs of every probe call; `read`: whether loci, locj and x are read."""
+    """Yield the 20 inputs of every probe call; `read`: whether loci, locj, x, dflag are read."""
     chance = random.Random(20)
     quiet = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0.0, 0.0, 5.0, 0.0, 0.0]
-    quiet += [0.01, 0.02, -0.03, -0.04, 0.05, 0.06]
+    quiet += [0.01, 0.02, -0.03, -0.04, 0.05, 0.06, 0.0]
     values = sorted({s * side for s in (*sizes, 1.0) for side in (_BELOW, _ABOVE, 0.5)})
     values += [1e-12, 1e3, 1e6]
 
@@ -52,7 +52,9 @@ def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
         if read[0]:
             yield [*quiet[:13], *vector, *quiet[16:]]
         if read[1]:
-            yield [*quiet[:16], *vector]
+            yield [*quiet[:16], *vector, *quiet[19:]]
+        if read[3]:
+            yield [*quiet[:5], *vector, *quiet[8:19], 1.0]
     for value in values:
         yield [*quiet[:10], value, *quiet[11:]]
         yield [value, *quiet[1:]]
@@ -64,7 +66,7 @@ def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
             chance.uniform(0, 10) if k == 0 else abs(chance.gauss(0, 100)) if k == 10
             else chance.gauss(0, 1) * (scale if 5 <= k < 8 else 1.0)
             for k in range(19)
-        ]  # fmt: skip
+        ] + [0.0]  # fmt: skip
 
 
 def _near(call: Callable[[list[float]], list[float]], given: list[float]) -> Iterator[list[float]]:
@@ -87,7 +89,7 @@ def disagreement(
 ) -> str:
     """Return '' if the code at `address` does what `call` does at every probe, else where not."""
     entry = guard.C_FUNCTION(address)
-    c_inputs, c_out = (ctypes.c_double * 19)(), (ctypes.c_double * 5)()
+    c_inputs, c_out = (ctypes.c_double * 20)(), (ctypes.c_double * 5)()
     unset = (ctypes.c_double * 5)(*[math.nan] * 5)
     c_par = (ctypes.c_double * max(len(par), 1))(*par)
     log, host.log = host.log, lambda line: None  # what a probe says is no news

@@ -116,6 +116,7 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
         entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
 
 
+LANGUAGE = keyword(spellings(C="", FORTRAN=""))
 _NOT_BUILT = "is documented but not built yet"
 _SEARCH = "steers MotionSolve's own contact search and has no effect here"
 _POST = "contact post-processing subroutines are not called"
@@ -168,7 +169,8 @@ FORCE_CONTACT = Statement(
         "cff_param_string": Spec(USER),
         "cff_fnc_name": Spec(TEXT),
         "cff_dll_name": Spec(TEXT),
-        "cff_language": Spec(TEXT, refused="shared libraries are not built yet"),
+        # ours: what a library's function is written in, where its name does not tell
+        "cff_language": Spec(LANGUAGE),
         "script_name": Spec(TEXT),
         "interpreter": Spec(keyword(spellings(PYTHON=""), spellings(MATLAB=""))),
         "cpost_param_string": Spec(TEXT, note=_POST),

@@ -246,8 +246,7 @@ def _friction_lines(system: System, contact: Contact) -> Iterator[str]:
         built_in = contact.cff_type != "COULOMB_OFF"
         yield fact("friction law", f"{contact.cff_type}, built in" if built_in else "none")
         return
-    how = "compiled" if user.compiled else "interpreted"
-    yield fact("friction law", f"user {user.name}, {how}")
+    yield fact("friction law", f"user {user.name}, {user.how}")
     yield fact("friction file", user.source)
     if not user.compiled:
         yield fact("interpreted because", user.reason)

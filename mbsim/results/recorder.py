@@ -381,6 +381,15 @@ def _said(element: Any) -> str:
     return f"{type(element).__name__} {said}"
 
 
+def _friction_constants(system: System) -> np.ndarray[Any, Any]:
+    """Return the parameters of friction laws without the addresses among them."""
+    par = system.scene.contacts.friction_par.copy()
+    for k, id in enumerate(system.contact_ids):
+        if id in system.user_friction:
+            par[k, : len(system.user_friction[id].hidden)] = 0.0
+    return par
+
+
 def _digests(system: System) -> dict[str, Value]:
     """Return digests of the model as it is run (--set included) and of users' files."""
     scene = system.scene
@@ -389,7 +398,7 @@ def _digests(system: System) -> dict[str, Value]:
         *_without_size(scene.graphics),
         scene.contacts.id,
         scene.contacts.normal_par,
-        scene.contacts.friction_par,
+        _friction_constants(system),
         scene.contacts.ignore_deeper,
         scene.world.gravity,
         scene.world.scale,

@@ -224,7 +224,7 @@ def contacts_table(
         law = NORMAL_LAWS[contact.cnf_type]
         normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
         if contact.id in user:
-            friction.append(user[contact.id].par)
+            friction.append(user[contact.id].row)
             addresses.append(user[contact.id].address)
             uses_x[k] = user[contact.id].uses_x
         elif contact.cff_type == "COULOMB_OFF":

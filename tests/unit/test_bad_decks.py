@@ -302,7 +302,7 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     "shared library": (
         deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" cff_dll_name="friction.so"')),
         FRICTION_LINE,
-        ('cff_dll_name="friction.so"', "not built yet", '"NULL"'),
+        ('cff_dll_name="friction.so"', "no such file", "relative to the deck"),
     ),
     "gravity expression": (
         deck(('grav_z="-9.81"', 'grav_z="-9.81*DZ(20)"')),

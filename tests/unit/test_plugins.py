@@ -22,7 +22,7 @@ from mbsim.plugins import helpers
 ROOT = Path(__file__).resolve().parents[2]
 PAR = (0.05, 0.01, 0.1, 0.5)
 ARGS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
-INPUTS = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0, 0, 5.0, 0, 0, 1, 2, 3, 4, 5, 6]
+INPUTS = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0, 0, 5.0, 0, 0, 1, 2, 3, 4, 5, 6, 0]
 C_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
@@ -34,7 +34,7 @@ def contact(par=PAR, **words):
 
 
 def call(user, inputs=INPUTS):
-    given, out = (ctypes.c_double * 19)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
+    given, out = (ctypes.c_double * 20)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
     code = C_FUNCTION(user.address)(301001, given, user.par.ctypes.data, out)
     return code, list(out)
 
@@ -369,8 +369,8 @@ def test_load_faults_name_file_and_line(tmp_path):
     refused("is a int, not a function", contact(), [write("int.py", "CFFSUB = 3\n")])
     refused(r"few.py:1: CFFSUB\(a, b\) cannot", contact(),
             [write("few.py", "def CFFSUB(a, b):\n    pass\n")])  # fmt: skip
-    refused("not built yet", contact(), [tmp_path / "law.so"])
-    refused("not built yet", contact(dll_name="law"))
+    refused("law.so: No such file", contact(), [tmp_path / "law.so"])
+    refused("law: No such file", contact(dll_name="law"))
     refused("not built yet", contact(interpreter="MATLAB"))
     refused("CFFSUB_STATES", contact(), [write("states.py", "CFFSUB_STATES = 2\n" + good)])
     text = refused("boom.py:2: the script fails", contact(), [write("boom.py", "a = 1\n1/0\n")])
