@@ -40,6 +40,8 @@ class Host:
         self.sysfnc: Look = _nothing
         self.sysary: Look = _nothing
         self.warned: set[str] = set()
+        #: In a call with iflag true: what it asks for, as `plugins.dependence` lists it.
+        self.asked: list[str] | None = None
 
     def forget(self) -> None:
         """Look at nothing, before a new run."""
@@ -92,6 +94,9 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
     errflg is 1 and the value 0 where the function or a marker is not known, forces and
     accelerations among them, and outside subroutines.
     """
+    if host.asked is not None:
+        host.asked.append(_question(name, ids))
+        return [0.0, 0]
     if host.state is None:
         _no_state("py_sysfnc")
         return [0.0, 1]
@@ -100,10 +105,18 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
 
 def py_sysary(name: str, ids: Sequence[float]) -> list[Any]:
     """Return [values, errflg] of DISP, TDISP, RDISP, VEL, TVEL or RVEL at the trial state."""
+    if host.asked is not None:
+        host.asked.append(_question(name, ids))
+        return [[0.0] * (6 if str(name).strip().upper() in ("DISP", "VEL") else 3), 0]
     if host.state is None:
         _no_state("py_sysary")
         return [[], 1]
     return host.sysary(name, ids)
+
+
+def _question(name: str, ids: Sequence[float]) -> str:
+    """Return a function and its ids as `mbsim info` shows them."""
+    return " ".join([str(name).strip().upper(), *(f"{id:g}" for id in ids)])
 
 
 def _no_state(name: str) -> None:

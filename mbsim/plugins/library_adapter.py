@@ -9,7 +9,7 @@ Apart from `shared_library`, so that the cache key of this covers no more than i
 # what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +43,8 @@ def begin_call(call, element, values, dflag):
 
 def call_c(element, inputs, par, out):
     """CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, result)."""
-    call = view(np.int64(carray(par, (1,))[0]), LibraryCall)
+    # mypy sees the typing context that Numba passes to an intrinsic as a first argument
+    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
     a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
     whole, result = call.whole, call.result
     begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))
@@ -60,7 +61,7 @@ def call_c(element, inputs, par, out):
 
 def call_fortran(element, inputs, par, out):
     """CFFSUB(ID, TIME, PAR, NPAR, LOCI, LOCJ, X, XDOT, NFORCE, AREA, DFLAG, IFLAG, RESULTS)."""
-    call = view(np.int64(carray(par, (1,))[0]), LibraryCall)
+    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
     a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
     whole, result = call.whole, call.result
     begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from mbsim.errors import ModelError
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
+from mbsim.plugins.dependence import dependence
 from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
 from mbsim.plugins.shared_library import (
@@ -34,7 +35,8 @@ from mbsim.plugins.shared_library import (
     read_library,
 )
 
-_ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
+#: Names of the arguments of a friction function, in order.
+CFFSUB = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
 _numbers = itertools.count(1)
 
 
@@ -98,6 +100,8 @@ class UserFriction:
         Python, C or Fortran.
     hidden : tuple of float
         What the C function behind `address` reads of its parameters before `par`.
+    asked : tuple of str
+        What an interpreted one asked for by `py_sysfnc` and `py_sysary` under iflag.
     """
 
     address: int
@@ -113,6 +117,7 @@ class UserFriction:
     looks: bool = False
     language: str = "Python"
     hidden: tuple[float, ...] = ()
+    asked: tuple[str, ...] = ()
 
     @property
     def how(self) -> str:
@@ -194,7 +199,9 @@ def load_friction(
         for warning in lint(script.text, name):
             say(f"{element}: {script.path}: warning: {warning}")
 
-    def user(address: int, reason: str, keep: object = None) -> UserFriction:
+    def user(
+        address: int, reason: str, keep: object = None, asked: Sequence[str] = ()
+    ) -> UserFriction:
         return UserFriction(
             address=address,
             par=par,
@@ -207,6 +214,7 @@ def load_friction(
             function=function,
             keep=keep,
             looks=bool(reason) and script.looks,
+            asked=tuple(asked),
         )
 
     address, reason = 0, "--interpret-plugins"
@@ -217,7 +225,17 @@ def load_friction(
     if not reason:
         return user(address, "")
     address, keep = guard.callback(function, name, str(script.path), len(par))
-    return user(address, reason, keep)
+    # compiled functions only compute: whether they are called once more nobody can see
+    asked, why = dependence(function, friction_arguments(contact))
+    if why:
+        say(f"{element}: {name} of {script.path}: note: its call with iflag 1 fails: {why}")
+    return user(address, reason, keep, asked)
+
+
+def friction_arguments(contact: Contact) -> list[Any]:
+    """Return the arguments of the one call of a contact's CFFSUB with iflag true."""
+    par, zeros = [float(value) for value in contact.cff.par], [[0.0] * 3 for _ in range(4)]
+    return [contact.id, 0.0, par, len(par), *zeros, 0.0, 0, 1]
 
 
 def check_libraries(contacts: Iterable[Contact]) -> None:
@@ -401,7 +419,7 @@ def _require(script: Script, name: str, element: str, attribute: str) -> None:
 
 
 def user_function(
-    script: Script, name: str, element: str, arguments: str = _ARGUMENTS
+    script: Script, name: str, element: str, arguments: str = CFFSUB
 ) -> Callable[..., Any]:
     """Return the function of a script after a look at whether its arguments fit."""
     count = len(arguments.split(","))

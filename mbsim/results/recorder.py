@@ -383,7 +383,7 @@ def _said(element: Any) -> str:
 
 def _friction_constants(system: System) -> np.ndarray[Any, Any]:
     """Return the parameters of friction laws without the addresses among them."""
-    par = system.scene.contacts.friction_par.copy()
+    par: np.ndarray[Any, Any] = system.scene.contacts.friction_par.copy()
     for k, id in enumerate(system.contact_ids):
         if id in system.user_friction:
             par[k, : len(system.user_friction[id].hidden)] = 0.0

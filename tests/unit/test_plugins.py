@@ -325,7 +325,7 @@ def test_any_sequence_of_three_numbers_is_a_force(load, result):
 
 
 def test_ctrl_c_inside_a_function_stays_ctrl_c(load):
-    user = load("raise KeyboardInterrupt")
+    user = load("if not iflag:\n        raise KeyboardInterrupt\n    return [0.0, 0.0, 0.0]")
     assert call(user)[0] == 1
     with pytest.raises(KeyboardInterrupt):
         plugins.raise_failure()
@@ -541,7 +541,43 @@ def test_messages_go_to_the_log_of_the_host(load, monkeypatch):
         "py_errmes(0, 'no', id, 'STOP')\npy_errmes(1, 'hm', id, 'CONTINUE')\n"
         "return [py_getstm(), 0, 0]"
     )
+    lines.clear()  # the call with iflag 1 says the same
     assert call(user)[1][0] == 0.7
     assert lines == ["USRMES:USER [301001] INFO: hello", "ERRMES:USER [301001] ERROR: hm"]
     assert load.log
     assert np.isfinite(user.par).all()
+
+
+# -- iflag and dflag
+
+
+def test_an_interpreted_function_is_called_once_with_iflag(load):
+    text = (
+        "calls = []\n"
+        f"def CFFSUB({ARGS}):\n"
+        "    calls.append((iflag, dflag, time, nforce, x, xdot, par, npar))\n"
+        "    d, errflg = py_sysfnc('dx', [20, 10.0])\n"
+        "    v, errflg = py_sysary('TVEL', [par[0]])\n"
+        "    d, errflg = py_sysfnc('DX', [20, 10])\n"
+        "    return [v[0] / errflg, 0.0, 0.0] if errflg else [0.0, 0.0, 0.0]\n"
+    )
+    user = load(text, par=(5.0,))
+    zeros = [0.0, 0.0, 0.0]
+    calls = user.function.__globals__["calls"]
+    assert calls == [(1, 0, 0.0, 0.0, zeros, zeros, [5.0], 1)]
+    assert user.asked == ("DX 20 10", "TVEL 5")
+    call(user, [*INPUTS[:-1], 1.0])
+    assert [(flags[0], flags[1]) for flags in calls] == [(1, 0), (0, 1)]
+
+
+def test_what_fails_under_iflag_is_said_and_is_no_fault(load):
+    user = load("return [1.0 / nforce, 0.0, 0.0]", interpret=True)
+    assert any("iflag 1 fails" in line and "ZeroDivisionError" in line for line in load.log)
+    assert call(user)[1][0] == 1.0 / INPUTS[10]
+
+
+def test_a_compiled_function_sees_dflag(load):
+    user = load("if dflag:\n        return [1.0, 0.0, 0.0]\n    return [2.0, 0.0, 0.0]")
+    assert user.compiled
+    assert call(user)[1][0] == 2.0
+    assert call(user, [*INPUTS[:-1], 1.0])[1][0] == 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -239,3 +240,20 @@ def test_plugin_files_of_both_kinds_are_searched(tmp_path):
     (tmp_path / "twice.py").write_text(EVERY_PY.replace("EVERY", "CFFSUB"))
     with pytest.raises(ModelError, match=r"CFFSUB is defined twice: .*twice.py, .*cffsub_c.so"):
         run_deck(tmp_path, ball_on_plane(**USER), 0.1, plugins=[tmp_path / "twice.py", library])
+
+
+def test_info_shows_what_subroutines_ask_for(tmp_path):
+    (tmp_path / "asks.py").write_text(
+        "def CFFSUB(*given):\n    py_sysfnc('DX', [20, 10])\n    return [0.0, 0.0, 0.0]\n"
+    )
+    deck = write_deck(tmp_path, ball_on_plane(**USER))
+    call = CliRunner().invoke
+
+    def about(plugin):
+        said = json.loads(call(main, ["info", str(deck), "--json", *plugin]).stdout)
+        return said["subroutines"]["Force_Contact[301] cff"]
+
+    assert about([])["file"] == "none; name one with --plugin FILE"
+    assert about(["--plugin", str(tmp_path / "asks.py")])["asks_for"] == ["DX 20 10"]
+    library = compiled(tmp_path, "void cffsub_(void) {}\n")
+    assert about(["--plugin", str(library)])["language"] == "Fortran"
