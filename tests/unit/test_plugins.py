@@ -325,7 +325,7 @@ def test_any_sequence_of_three_numbers_is_a_force(load, result):
 
 
 def test_ctrl_c_inside_a_function_stays_ctrl_c(load):
-    user = load("if not iflag:\n        raise KeyboardInterrupt\n    return [0.0, 0.0, 0.0]")
+    user = load("if not iflag:\n    raise KeyboardInterrupt\nreturn [0.0, 0.0, 0.0]")
     assert call(user)[0] == 1
     with pytest.raises(KeyboardInterrupt):
         plugins.raise_failure()
@@ -577,7 +577,7 @@ def test_what_fails_under_iflag_is_said_and_is_no_fault(load):
 
 
 def test_a_compiled_function_sees_dflag(load):
-    user = load("if dflag:\n        return [1.0, 0.0, 0.0]\n    return [2.0, 0.0, 0.0]")
+    user = load("if dflag:\n    return [1.0, 0.0, 0.0]\nreturn [2.0, 0.0, 0.0]")
     assert user.compiled
     assert call(user)[1][0] == 2.0
     assert call(user, [*INPUTS[:-1], 1.0])[1][0] == 1.0
