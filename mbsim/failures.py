@@ -101,6 +101,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     from mbsim.dynamics.detection import CROWDED
     from mbsim.geometry.fcl_detector import DETECTOR_FAILED
     from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.laws.user_normal import USER_NORMAL_FAILED
 
     if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
         from mbsim.plugins import raise_failure
@@ -125,6 +126,10 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     if code == UNSETTLED:
         raise SolverError(_unsettled(system, contact, t))
     element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
+    if code == USER_NORMAL_FAILED:
+        from mbsim.plugins.normal import reproduce_normal
+
+        reproduce_normal(system.user_normal[element])
     if code in (RAISED_COMPILED, USER_NOT_FINITE):
         from mbsim.plugins import reproduce
 

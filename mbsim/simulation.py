@@ -562,7 +562,7 @@ def simulate(
     changes = _parameters(system, settings)
     for note in settings.notes:
         tell(note)
-    for number, user in system.user_friction.items():
+    for number, user in system.user_laws:
         how = f"{user.how}: {user.reason}" if user.reason else user.how
         tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
     for user_subroutine in system.subroutines.values():
@@ -585,7 +585,7 @@ def simulate(
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
-    if system.user_friction or system.subroutines:
+    if system.user_laws or system.subroutines:
         from mbsim.plugins import host
 
         host.log = log.line

@@ -119,6 +119,7 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     from mbsim.model.names import element_name, is_adams
     from mbsim.plugins.about import about
     from mbsim.plugins.loader import CFFSUB, Scripts, friction_arguments
+    from mbsim.plugins.normal import CNFSUB, normal_arguments
     from mbsim.plugins.subroutine import ARGUMENTS
     from mbsim.system.acting import wanted
 
@@ -128,6 +129,9 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
         if contact.cff_type == "USERCFF":
             name, given = f"Force_Contact[{contact.id}]", friction_arguments(contact)
             found[f"{name} cff"] = about(contact.cff, name, "cff", CFFSUB, given, plugins, scripts)
+        if contact.cnf_type == "USERCNF":
+            name, given = f"Force_Contact[{contact.id}]", normal_arguments(contact)
+            found[f"{name} cnf"] = about(contact.cnf, name, "cnf", CNFSUB, given, plugins, scripts)
     prefix = "ROUTINE" if is_adams(model.file) else "usrsub"
     for _, statement, id, user, _ in wanted(model):
         name, par = element_name(model.file, statement, id), list(user.par)

@@ -151,6 +151,7 @@ class Contact:
     friction_trans_vel: float = 1e-3
     cff: Subroutine = Subroutine()
     source: Source = Source()
+    cnf: Subroutine = Subroutine()
 
     @property
     def with_itself(self) -> bool:

@@ -150,7 +150,7 @@ def one_number(result: Any) -> list[float]:
     return [value]
 
 
-class _Views(dict[int, Any]):
+class Views(dict[int, Any]):
     """Memory of a fixed number of doubles by address; the host's buffers seldom move."""
 
     def __init__(self, count: int) -> None:
@@ -172,7 +172,7 @@ def callback(
     from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
-    inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
+    inputs_at, par_at, out_at = Views(FRICTION_INPUTS), Views(par_count), Views(5)
 
     def guarded(element: int, inputs: int, par: int, out: int) -> int:
         time, outer = 0.0, host.state
@@ -249,7 +249,7 @@ def state_callback(
     """
     from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
 
-    results_at = _Views(count)
+    results_at = Views(count)
     title, id = element
     name, source = place
     values, npar = [float(value) for value in par], len(par)

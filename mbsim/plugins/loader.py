@@ -248,14 +248,16 @@ def check_libraries(contacts: Iterable[Contact]) -> None:
     """
     faults = []
     for contact in contacts:
-        if contact.cff.dll_name.strip().upper() in ("", "NULL"):
-            continue
-        try:
-            library = find_subroutine(contact)
-            assert isinstance(library, Library)
-            choose(library, contact.cff.fnc_name, "cff", contact.cff.language)
-        except ModelError as error:
-            faults.append(str(error))
+        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf)):
+            if not user.dll_name:
+                continue
+            try:
+                element = f"Force_Contact[{contact.id}]"
+                library = find_source(user, user.fnc_name, element, prefix)
+                assert isinstance(library, Library)
+                choose(library, user.fnc_name, prefix, user.language)
+            except ModelError as error:
+                faults.append(str(error))
     if faults:
         raise ModelError("\n".join(faults))
 

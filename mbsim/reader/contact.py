@@ -33,10 +33,7 @@ CFF_USES: dict[str, set[str]] = {
     "COULOMB_ON": {"mu_static", "mu_dynamic", *_SPEEDS},
     "COULOMB_DYNAMICONLY": {"mu_dynamic", "friction_trans_vel"},
     "COULOMB_OFF": set(),
-    "USERCFF": {
-        *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
-        *("script_name", "interpreter"),
-    },
+    "USERCFF": {"cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"},
 }
 CFF_ALL = set().union(*CFF_USES.values())
 
@@ -53,6 +50,8 @@ def _build_contact(entry: Entry) -> None:
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
         check_coulomb(entry, cff_type)
+    if cnf_type != "USERCNF" and cff_type != "USERCFF":
+        note_unused(entry, "no user subroutine", {"script_name", "interpreter"})
 
     contact = el.Contact(
         id=entry.get("id", 0),
@@ -83,6 +82,7 @@ def _build_contact(entry: Entry) -> None:
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
         cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
         source=entry.source,
+        cnf=subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine(),
     )
     entry.register(entry.draft.contacts, contact)
 
@@ -161,6 +161,7 @@ FORCE_CONTACT = Statement(
         "cnf_param_string": Spec(USER),
         "cnf_fnc_name": Spec(TEXT),
         "cnf_dll_name": Spec(TEXT),
+        "cnf_language": Spec(LANGUAGE),
         "cff_type": Spec(keyword(CFF_TYPES)),
         "mu_static": Spec(NOT_NEGATIVE),
         "mu_dynamic": Spec(NOT_NEGATIVE),

@@ -232,6 +232,13 @@ def title(contact: Contact) -> str:
 
 def _normal_lines(system: System, contact: Contact) -> Iterator[str]:
     """Yield a contact's normal law, and the numbers its formula took from the deck."""
+    user = system.user_normal.get(contact.id)
+    if user is not None:
+        yield fact("normal law", f"user {user.name}, {user.how}")
+        yield fact("normal law's file", user.source)
+        if user.reason:
+            yield fact("interpreted because", user.reason)
+        return
     yield fact("normal law", f"{contact.cnf_type}, built in")
     row = system.scene.contacts.normal_par[system.contact_ids.index(contact.id)]
     # a row is as long as the longest law's

@@ -381,12 +381,14 @@ def _said(element: Any) -> str:
     return f"{type(element).__name__} {said}"
 
 
-def _friction_constants(system: System) -> np.ndarray[Any, Any]:
-    """Return the parameters of friction laws without the addresses among them."""
-    par: np.ndarray[Any, Any] = system.scene.contacts.friction_par.copy()
+def _constants(
+    system: System, par: np.ndarray[Any, Any], users: Mapping[int, Any]
+) -> np.ndarray[Any, Any]:
+    """Return the parameters of laws without the addresses among those of users' laws."""
+    par = par.copy()
     for k, id in enumerate(system.contact_ids):
-        if id in system.user_friction:
-            par[k, : len(system.user_friction[id].hidden)] = 0.0
+        if id in users:
+            par[k, : len(users[id].hidden)] = 0.0
     return par
 
 
@@ -397,8 +399,8 @@ def _digests(system: System) -> dict[str, Value]:
         *scene.bodies,
         *_without_size(scene.graphics),
         scene.contacts.id,
-        scene.contacts.normal_par,
-        _friction_constants(system),
+        _constants(system, scene.contacts.normal_par, system.user_normal),
+        _constants(system, scene.contacts.friction_par, system.user_friction),
         scene.contacts.ignore_deeper,
         scene.world.gravity,
         scene.world.scale,
@@ -418,7 +420,7 @@ def _digests(system: System) -> dict[str, Value]:
     for array in arrays:
         model.update(np.ascontiguousarray(array).tobytes())
     users = hashlib.sha256()
-    for contact_id, user in system.user_friction.items():
+    for contact_id, user in system.user_laws:
         users.update(f"{contact_id} {user.name} {user.compiled}\n".encode())
         users.update(Path(user.source).read_bytes())
     for element, subroutine in system.subroutines.items():

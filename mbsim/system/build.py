@@ -40,6 +40,7 @@ from mbsim.system.weight import Pull
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
     from mbsim.plugins.loader import Script
+    from mbsim.plugins.normal import UserNormal
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.system.subroutines import StateReader
 
@@ -75,6 +76,12 @@ class System:
     subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
     pulls: list[Pull] = field(default_factory=list)  # every gravity, that of the start first
     reader: StateReader | None = None  # what py_sysfnc looks at
+    user_normal: dict[int, UserNormal] = field(default_factory=dict)  # by contact id
+
+    @property
+    def user_laws(self) -> list[tuple[int, UserFriction | UserNormal]]:
+        """Users' friction laws, then their normal laws, with the contact's id."""
+        return [*self.user_friction.items(), *self.user_normal.items()]
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
@@ -166,6 +173,24 @@ def _load_user_friction(
     return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
 
 
+def _load_user_normal(
+    model: Model,
+    plugins: Sequence[Path],
+    interpret: bool,
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> dict[int, UserNormal]:
+    """Load the users' CNFSUBs."""
+    wanted = [c for c in model.contacts.values() if c.cnf_type == "USERCNF"]
+    if not wanted:
+        return {}
+    from mbsim.plugins.normal import load_normal
+    from mbsim.plugins.subroutine import begin_run
+
+    begin_run(log)
+    return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
+
+
 def _load_subroutines(
     model: Model,
     plugins: Sequence[Path],
@@ -231,6 +256,7 @@ def build(
     kinds = plans.kinds
     scripts: dict[Path, Script] = {}
     user = _load_user_friction(model, plugins, interpret, log, scripts)
+    normal = _load_user_normal(model, plugins, interpret, log, scripts)
     subroutines = _load_subroutines(model, plugins, log, scripts)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
@@ -247,7 +273,7 @@ def build(
     graphics = graphics_table(model, placement, graphic_ids, row, shapes)
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
     pairs, ns = pairs_table(plans, kinds, graphic_row)
-    contacts, uses_x = contacts_table(contact_list, user)
+    contacts, uses_x = contacts_table(contact_list, user, normal)
 
     # X goes behind the bodies in y, slot by slot, for the laws that look at it
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
@@ -262,7 +288,7 @@ def build(
 
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + 3 * len(carried)
-    rubs = any(friction.looks for friction in user.values())
+    rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
     rows = acting(model, table, first_state, subroutines, looks)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
@@ -346,4 +372,5 @@ def build(
         subroutines,
         pulled,
         rows.reader,
+        normal,
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from mbsim.system.pairing import (
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
+    from mbsim.plugins.normal import UserNormal
 
 #: Places for near pairs of a crowd, for each of its graphics.
 NEAR_EACH = 24
@@ -210,19 +212,27 @@ def _or(value: float | None, default: float) -> float:
 
 def _full_damping_depth(contact: Contact) -> float:
     """Return dmax [L] where the normal law reads it, else 0."""
+    if contact.cnf_type == "USERCNF":
+        return 0.0
     read = "dmax" in NORMAL_LAWS[contact.cnf_type].parameters
     return _or(contact.dmax, 0.0) if read else 0.0
 
 
 def contacts_table(
-    contacts: list[Contact], user: dict[int, UserFriction]
+    contacts: list[Contact],
+    user: dict[int, UserFriction],
+    user_normal: Mapping[int, UserNormal] = MappingProxyType({}),
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
     for k, contact in enumerate(contacts):
-        law = NORMAL_LAWS[contact.cnf_type]
-        normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
+        if contact.id in user_normal:
+            own = user_normal[contact.id]
+            normal.append((own.address, own.row))
+        else:
+            law = NORMAL_LAWS[contact.cnf_type]
+            normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
         if contact.id in user:
             friction.append(user[contact.id].row)
             addresses.append(user[contact.id].address)
@@ -255,5 +265,9 @@ def contacts_table(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
+        user_normal=np.array(
+            [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
+            dtype=np.int64,
+        ),
     )
     return made, uses_x

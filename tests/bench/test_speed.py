@@ -165,3 +165,32 @@ def test_calls_of_user_subroutines():
         body = statistics.median(bodies) if interpret else 0.0
         print(f"{kind}: {1e9 * cost:.0f} ns a call, {1e9 * (cost - body):.0f} ns above its body")
         assert cost > 0
+
+
+@jitable
+def _normal_calls(address, par, out, count):
+    for _ in range(count):
+        call_int(address, (1e-3, 0.1, par, out))
+
+
+@pytest.mark.parametrize("how", ["cnfsub.c", "cnfsub.f90", "compiled", "interpreted"])
+def test_calls_of_users_normal_laws(tmp_path, how):
+    from libraries import example
+
+    from mbsim.core import jit
+    from mbsim.laws import user_normal
+    from mbsim.model.elements import Contact, Subroutine
+    from mbsim.plugins.normal import load_normal
+
+    file = example(tmp_path, how) if "." in how else USERFUNCS / "cnfsub.py"
+    par = Subroutine((1e5, 1.5, 0.4), "CNFSUB")
+    user = load_normal(Contact(1, cnf=par), [file], how == "interpreted", {}, print)
+    user.place[user_normal.MODE] = user_normal.EVALUATE
+    run, out, count = jit.function(_normal_calls), np.zeros(3), 200_000
+    times = []
+    for _ in range(7):
+        began = time.perf_counter()
+        run(user.address, user.row, out, count)
+        times.append(1e9 * (time.perf_counter() - began) / count)
+    print(f"\nCNFSUB {user.how}: {statistics.median(times):.1f} ns a call, its body included")
+    assert out[0] > 0.0
