@@ -118,6 +118,7 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     """Return user subroutines by element: function, file, and what they ask for under iflag."""
     from mbsim.model.names import element_name, is_adams
     from mbsim.plugins.about import about
+    from mbsim.plugins.contact_post import CONTACTPOST
     from mbsim.plugins.loader import CFFSUB, Scripts, friction_arguments
     from mbsim.plugins.normal import CNFSUB, normal_arguments
     from mbsim.plugins.subroutine import ARGUMENTS
@@ -132,6 +133,13 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
         if contact.cnf_type == "USERCNF":
             name, given = f"Force_Contact[{contact.id}]", normal_arguments(contact)
             found[f"{name} cnf"] = about(contact.cnf, name, "cnf", CNFSUB, given, plugins, scripts)
+        if contact.cpost is not None:
+            name, par = f"Force_Contact[{contact.id}]", list(contact.cpost.par)
+            pair = contact.i_graphics_id[0], contact.j_graphics_id[0]
+            given = [contact.id, *pair, 0.0, par, len(par), 1, 0]
+            found[f"{name} cpost"] = about(
+                contact.cpost, name, "cpost", CONTACTPOST, given, plugins, scripts
+            )
     prefix = "ROUTINE" if is_adams(model.file) else "usrsub"
     for _, statement, id, user, _ in wanted(model):
         name, par = element_name(model.file, statement, id), list(user.par)

@@ -152,6 +152,7 @@ class Contact:
     cff: Subroutine = Subroutine()
     source: Source = Source()
     cnf: Subroutine = Subroutine()
+    cpost: Subroutine | None = None
 
     @property
     def with_itself(self) -> bool:

@@ -50,7 +50,8 @@ def _build_contact(entry: Entry) -> None:
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
         check_coulomb(entry, cff_type)
-    if cnf_type != "USERCNF" and cff_type != "USERCFF":
+    posts = any(entry.given(name) for name in _POST)
+    if cnf_type != "USERCNF" and cff_type != "USERCFF" and not posts:
         note_unused(entry, "no user subroutine", {"script_name", "interpreter"})
 
     contact = el.Contact(
@@ -83,6 +84,7 @@ def _build_contact(entry: Entry) -> None:
         cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
         source=entry.source,
         cnf=subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine(),
+        cpost=subroutine(entry, "cpost", "CONTACTPOST") if posts else None,
     )
     entry.register(entry.draft.contacts, contact)
 
@@ -117,9 +119,10 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
 
 
 LANGUAGE = keyword(spellings(C="", FORTRAN=""))
+_POST = ("cpost_param_string", "cpost_fnc_name", "cpost_script_name", "cpost_interpreter")
+_POST_IN_PYTHON = "CONTACTPOST is called in Python alone: name a script by cpost_script_name"
 _NOT_BUILT = "is documented but not built yet"
 _SEARCH = "steers MotionSolve's own contact search and has no effect here"
-_POST = "contact post-processing subroutines are not called"
 FORCE_CONTACT = Statement(
     "Force_Contact",
     {
@@ -174,11 +177,11 @@ FORCE_CONTACT = Statement(
         "cff_language": Spec(LANGUAGE),
         "script_name": Spec(TEXT),
         "interpreter": Spec(keyword(spellings(PYTHON=""), spellings(MATLAB=""))),
-        "cpost_param_string": Spec(TEXT, note=_POST),
-        "cpost_fnc_name": Spec(TEXT, note=_POST),
-        "cpost_dll_name": Spec(TEXT, note=_POST),
-        "cpost_script_name": Spec(TEXT, note=_POST),
-        "cpost_interpreter": Spec(TEXT, note=_POST),
+        "cpost_param_string": Spec(USER),
+        "cpost_fnc_name": Spec(TEXT),
+        "cpost_dll_name": Spec(TEXT, refused=_POST_IN_PYTHON, harmless="NULL"),
+        "cpost_script_name": Spec(TEXT),
+        "cpost_interpreter": Spec(keyword(spellings(PYTHON=""))),
     },
     _build_contact,
 )

@@ -28,18 +28,19 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
     ----------
     entry : Entry
     prefix : str
-        Of its attributes: ``cff``, ``usrsub``.
+        Of its attributes: ``cff``, ``cnf``, ``cpost``, ``usrsub``.
     default : str
         The function, where ``<prefix>_fnc_name`` does not name one.
     """
     dll = _library(entry, prefix)
-    script = entry.get("script_name", "")
+    named = f"{prefix}_script_name" if entry.given(f"{prefix}_script_name") else "script_name"
+    script = entry.get(named, "")
     if script:
         path = Path(script.replace("\\", "/"))
         path = path if path.is_absolute() else entry.draft.directory / path
         script = str(path.resolve())
         if not path.is_file():
-            entry.fault("no such file (the path is relative to the deck)", "script_name")
+            entry.fault("no such file (the path is relative to the deck)", named)
     if not entry.given(f"{prefix}_fnc_name"):
         entry.note(f"not given; taken as {default}", f"{prefix}_fnc_name")
     return el.Subroutine(
@@ -47,7 +48,7 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
         fnc_name=entry.get(f"{prefix}_fnc_name", default),
         dll_name=dll,
         script_name="" if dll else script,
-        interpreter=entry.get("interpreter", "PYTHON"),
+        interpreter=entry.get(f"{prefix}_interpreter", entry.get("interpreter", "PYTHON")),
         language=entry.get(f"{prefix}_language", ""),
         source=entry.source if dll else el.Source(),
     )

@@ -39,6 +39,7 @@ from mbsim.system.weight import Pull
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
+    from mbsim.plugins.contact_post import ContactPost
     from mbsim.plugins.loader import Script
     from mbsim.plugins.normal import UserNormal
     from mbsim.plugins.subroutine import UserSubroutine
@@ -77,6 +78,7 @@ class System:
     pulls: list[Pull] = field(default_factory=list)  # every gravity, that of the start first
     reader: StateReader | None = None  # what py_sysfnc looks at
     user_normal: dict[int, UserNormal] = field(default_factory=dict)  # by contact id
+    posts: list[ContactPost] = field(default_factory=list)  # the users' CONTACTPOSTs
 
     @property
     def user_laws(self) -> list[tuple[int, UserFriction | UserNormal]]:
@@ -191,6 +193,23 @@ def _load_user_normal(
     return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
 
 
+def _load_posts(
+    model: Model,
+    plugins: Sequence[Path],
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> list[ContactPost]:
+    """Load the users' CONTACTPOSTs."""
+    wanted = [c for c in model.contacts.values() if c.cpost is not None]
+    if not wanted:
+        return []
+    from mbsim.plugins.contact_post import load_post
+    from mbsim.plugins.subroutine import begin_run
+
+    begin_run(log)
+    return [load_post(c, plugins, scripts) for c in wanted]
+
+
 def _load_subroutines(
     model: Model,
     plugins: Sequence[Path],
@@ -257,6 +276,7 @@ def build(
     scripts: dict[Path, Script] = {}
     user = _load_user_friction(model, plugins, interpret, log, scripts)
     normal = _load_user_normal(model, plugins, interpret, log, scripts)
+    posts = _load_posts(model, plugins, log, scripts)
     subroutines = _load_subroutines(model, plugins, log, scripts)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
@@ -350,6 +370,9 @@ def build(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
         ),
     )
+    if posts:
+        # one row at a time: CONTACTPOST sees which graphics a slot serves at that time
+        scene = scene._replace(rows=scene.rows._replace(time=np.zeros(1)))
     if rows.reader is not None:
         rows.reader.open(scene)
     needs_fcl = any(not kind.closed_form for kind in kinds)
@@ -373,4 +396,5 @@ def build(
         pulled,
         rows.reader,
         normal,
+        posts,
     )

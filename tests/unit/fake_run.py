@@ -116,6 +116,7 @@ def fake_system_of(model: Model) -> Any:
         user_friction={},
         user_normal={},
         user_laws=[],
+        posts=[],
         subroutines={},
     )
 
