@@ -627,4 +627,8 @@ def simulate(
                 results = recorder.close(status, stats, system.scene.log.contacts)
         finally:
             log.close(status, stats, recorder.watch)
+            if any(user.language == "Octave" for _, user in system.user_laws):
+                from mbsim.plugins.subroutine import end_run
+
+                end_run()
     return results

@@ -9,6 +9,7 @@ from typing import Any
 from mbsim.model.elements import Subroutine
 from mbsim.plugins.dependence import dependence
 from mbsim.plugins.loader import Scripts, find_script, find_source, user_function
+from mbsim.plugins.octave import OctaveFile
 from mbsim.plugins.shared_library import Library, choose
 
 
@@ -52,6 +53,8 @@ def about(
     facts["file"] = str(source.path)
     if isinstance(source, Library):
         return facts | {"language": choose(source, user.fnc_name, prefix, user.language)[0]}
+    if isinstance(source, OctaveFile):
+        return facts | {"language": "MATLAB, by GNU Octave"}
     function = user_function(source, user.fnc_name, element, names)
     asked, why = dependence(function, arguments)
     facts["asks_for"] = asked or "nothing"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mbsim.errors import PluginError
 from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.octave import OctaveError
 
 if TYPE_CHECKING:
     from mbsim.plugins.loader import UserFriction
@@ -90,6 +91,8 @@ def _report(error: BaseException, element: str, time: float, name: str, source: 
     head = f"{element}: {name} failed at time {time:.12g}: "
     if isinstance(error, NotAForce):
         return f"{head}{error} ({source})"
+    if isinstance(error, OctaveError):
+        return f"{head}{' '.join(str(error).split())}\n  at {error.place or source}"
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)

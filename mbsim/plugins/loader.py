@@ -26,6 +26,7 @@ from mbsim.plugins import guard
 from mbsim.plugins.dependence import dependence
 from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
+from mbsim.plugins.octave import SUFFIX, OctaveFile, read_octave, running
 from mbsim.plugins.shared_library import (
     Library,
     address_of,
@@ -64,7 +65,7 @@ class Script:
 
 
 Scripts = dict[Path, Script]
-Found = TypeVar("Found", Script, Library, Script | Library)
+Found = TypeVar("Found", Script, Script | Library | OctaveFile)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +192,8 @@ def load_friction(
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
     if isinstance(script, Library):
         return _from_library(script, contact, name)
+    if isinstance(script, OctaveFile):
+        return _from_octave(script, contact, name, say)
     function = user_function(script, name, element)
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
@@ -283,6 +286,32 @@ def _from_library(library: Library, contact: Contact, name: str) -> UserFriction
     )
 
 
+def _from_octave(
+    file: OctaveFile, contact: Contact, name: str, say: Callable[[str], None]
+) -> UserFriction:
+    """Return a friction function in the MATLAB language."""
+    element, par = f"Force_Contact[{contact.id}]", np.array(contact.cff.par, dtype=np.float64)
+    octave = running(element)
+    function = octave.add(file, CFFSUB, len(par), element)
+    _, why = dependence(function, friction_arguments(contact))
+    if why:
+        say(f"{element}: {name} of {file.path}: note: its call with iflag 1 fails: {why}")
+    address, keep = guard.callback(function, name, str(file.path), len(par))
+    return UserFriction(
+        address=address,
+        par=par,
+        compiled=False,
+        reason="",
+        uses_x=True,
+        source=file.path,
+        name=name,
+        element=contact.id,
+        function=function,
+        keep=(keep, octave),
+        language="Octave",
+    )
+
+
 def _compiled(
     script: Script,
     name: str,
@@ -312,7 +341,7 @@ def _compiled(
 
 def find_subroutine(
     contact: Contact, plugin_files: Sequence[Path] = (), scripts: Scripts | None = None
-) -> Script | Library:
+) -> Script | Library | OctaveFile:
     """Return what defines the friction function of a contact: a script, run once, or a library.
 
     `cff_dll_name` and `script_name` in the deck come before `plugin_files`; two of these that
@@ -335,20 +364,29 @@ def find_source(
     prefix: str,
     plugin_files: Sequence[Path] = (),
     scripts: Scripts | None = None,
-) -> Script | Library:
+) -> Script | Library | OctaveFile:
     """Return the script or library that defines function `name` of a contact."""
     scripts = {} if scripts is None else scripts
+    in_matlab = user.interpreter.upper() in ("MATLAB", "OCTAVE")
+    if user.script_name and (in_matlab or Path(user.script_name).suffix.lower() == SUFFIX):
+        return read_octave(Path(user.script_name), name, element)
     if user.dll_name.strip().upper() not in ("", "NULL"):
         place = f"{user.source.file}:{user.source.line}: " if user.source.file else ""
         return read_library(Path(user.dll_name), place + element)
     files = list(dict.fromkeys(Path(file).absolute() for file in plugin_files))
-    if user.script_name or not any(map(is_library, files)):
+    if user.script_name or not any(is_library(f) or f.suffix.lower() == SUFFIX for f in files):
         return find_script(user, name, element, prefix, files, scripts)
-    loaded = [
-        read_library(file, element) if is_library(file) else _load(file, element, scripts)
-        for file in files
-    ]
+    loaded = [_any_kind(file, element, scripts) for file in files]
     return _only_one(loaded, name, element, f"{prefix}_fnc_name")
+
+
+def _any_kind(file: Path, element: str, scripts: Scripts) -> Script | Library | OctaveFile:
+    """Return a --plugin file."""
+    if is_library(file):
+        return read_library(file, element)
+    if file.suffix.lower() == SUFFIX:
+        return read_octave(file, file.stem, element)
+    return _load(file, element, scripts)
 
 
 def _only_one(loaded: Sequence[Found], name: str, element: str, attribute: str) -> Found:
@@ -380,7 +418,8 @@ def find_script(
     attribute = prefix if prefix == "ROUTINE" else f"{prefix}_fnc_name"
     if user.interpreter and user.interpreter.upper() != "PYTHON":
         raise ModelError(
-            f'{element}: interpreter="{user.interpreter}" is not built yet, use Python'
+            f'{element}: interpreter="{user.interpreter}": only the laws of Force_Contact can be '
+            "in the MATLAB language; use Python"
         )
     if user.script_name:
         script = _load(Path(user.script_name), element, scripts)
@@ -388,9 +427,9 @@ def find_script(
         return script
 
     dll_name = user.dll_name.strip()
-    # shared libraries are for contacts
+    # shared libraries and the MATLAB language are for contacts
     files = [file for file in dict.fromkeys(map(Path.absolute, map(Path, plugin_files)))
-             if not is_library(file)]  # fmt: skip
+             if not is_library(file) and file.suffix.lower() != SUFFIX]  # fmt: skip
     if not files:
         said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
         said = f"no FILE.py::{name}" if prefix == "ROUTINE" else said
@@ -458,7 +497,10 @@ def _load(path: Path, element: str, scripts: Scripts) -> Script:
     if is_library(path):
         raise ModelError(f"{element}: {path}: a shared library is no script; name it by *_dll_name")
     if path.suffix.lower() in (".m", ".oml"):
-        raise ModelError(f"{element}: {path}: MATLAB and Compose are not built yet, use Python")
+        raise ModelError(
+            f"{element}: {path}: only the laws of Force_Contact can be in the MATLAB "
+            "language; use Python"
+        )
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -19,6 +19,7 @@ from mbsim.plugins.dependence import dependence
 from mbsim.plugins.diagnose import reads_parameter
 from mbsim.plugins.helpers import StopRun, host
 from mbsim.plugins.loader import Script, Scripts, find_source, user_function
+from mbsim.plugins.octave import OctaveFile, running
 from mbsim.plugins.shared_library import FORTRAN, Library, address_of, choose
 
 #: Names of the arguments, in order.
@@ -129,19 +130,25 @@ def load_normal(
     )
     if isinstance(source, Library):
         return _from_library(made, source, contact.cnf.language)
-    made = replace(made, function=user_function(source, name, element, CNFSUB))
-    address, reason = (0, "--interpret-plugins") if interpret else _compiled(made, source)
-    if not reason:
-        return replace(made, address=address)
-    say(f"{element}: {name} of {source.path} stays interpreted: {reason}")
+    if isinstance(source, OctaveFile):
+        octave = running(element)
+        function = octave.add(source, CNFSUB, len(made.par), element)
+        made = replace(made, function=function, language="Octave", compiled=False, keep=octave)
+    else:
+        made = replace(made, function=user_function(source, name, element, CNFSUB))
+        address, reason = (0, "--interpret-plugins") if interpret else _compiled(made, source)
+        if not reason:
+            return replace(made, address=address)
+        say(f"{element}: {name} of {source.path} stays interpreted: {reason}")
+        made = replace(made, compiled=False, reason=reason, looks=source.looks)
     assert made.function is not None
     place[at.PYTHON] = 1.0
     asked, why = dependence(made.function, normal_arguments(contact))
     if why:
         say(f"{element}: {name} of {source.path}: note: its call with iflag 1 fails: {why}")
-    made = replace(made, compiled=False, reason=reason, looks=source.looks, asked=tuple(asked))
+    made = replace(made, asked=tuple(asked))
     address, keep = _callback(made)
-    return replace(made, address=address, keep=keep)
+    return replace(made, address=address, keep=(keep, made.keep))
 
 
 def _from_library(made: UserNormal, library: Library, language: str) -> UserNormal:

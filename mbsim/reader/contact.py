@@ -176,7 +176,7 @@ FORCE_CONTACT = Statement(
         # ours: what a library's function is written in, where its name does not tell
         "cff_language": Spec(LANGUAGE),
         "script_name": Spec(TEXT),
-        "interpreter": Spec(keyword(spellings(PYTHON=""), spellings(MATLAB=""))),
+        "interpreter": Spec(keyword(spellings(PYTHON="", MATLAB="", OCTAVE=""))),
         "cpost_param_string": Spec(USER),
         "cpost_fnc_name": Spec(TEXT),
         "cpost_dll_name": Spec(TEXT, refused=_POST_IN_PYTHON, harmless="NULL"),

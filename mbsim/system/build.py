@@ -167,7 +167,9 @@ def _load_user_friction(
     if not wanted:
         return {}
     from mbsim.plugins import failure, host, load_friction
+    from mbsim.plugins.subroutine import end_run
 
+    end_run()  # an earlier one that failed while it was built
     failure.clear()
     host.forget()
     if log is not None:
@@ -187,8 +189,10 @@ def _load_user_normal(
     if not wanted:
         return {}
     from mbsim.plugins.normal import load_normal
-    from mbsim.plugins.subroutine import begin_run
+    from mbsim.plugins.subroutine import begin_run, end_run
 
+    if all(c.cff_type != "USERCFF" for c in model.contacts.values()):
+        end_run()
     begin_run(log)
     return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
 

@@ -295,9 +295,9 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ("Force_Contact[301]", 'i_flexbody_id="5"', "not built yet"),
     ),
     "MATLAB": (
-        deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" interpreter="MATLAB"')),
+        deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" interpreter="COMPOSE"')),
         FRICTION_LINE,
-        ('interpreter="MATLAB"', "not built yet"),
+        ('interpreter="COMPOSE"', "PYTHON, MATLAB, OCTAVE"),
     ),
     "shared library": (
         deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" cff_dll_name="friction.so"')),
