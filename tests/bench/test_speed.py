@@ -167,6 +167,21 @@ def test_calls_of_user_subroutines():
         assert cost > 0
 
 
+def test_calls_by_octave():
+    from libraries import need
+
+    from mbsim.plugins import load_friction
+    from mbsim.plugins.subroutine import end_run
+
+    need("octave-cli")
+    deck = mbsim.read_model(MODELS / "seed_contact.xml")
+    user = load_friction(deck.contacts[301001], [USERFUNCS / "CFFSUB.m"])
+    cost = ns_a_call(user, 2_000)
+    end_run()
+    print(f"\n{user.language}: {1e-3 * cost:.0f} us a call, its body included")
+    assert cost > 0
+
+
 @jitable
 def _normal_calls(address, par, out, count):
     for _ in range(count):
