@@ -108,11 +108,13 @@ def choose(library: Library, name: str, prefix: str, language: str) -> tuple[str
     c_name, fortran_name = name, name.lower() + "_"
     if language:
         wanted = FORTRAN if language.upper() == "FORTRAN" else C
-        if wanted in found:
-            return wanted, found[wanted]
-        symbol = fortran_name if wanted == FORTRAN else c_name
+        # some compilers of Fortran, and bind(C), keep the name as it is written
+        for spoken in (FORTRAN, C) if wanted == FORTRAN else (C,):
+            if spoken in found:
+                return wanted, found[spoken]
+        symbols = f"{fortran_name} or {c_name}" if wanted == FORTRAN else c_name
         raise ModelError(
-            f"{element}: {library.path} does not define {symbol}, which is {attribute} with "
+            f"{element}: {library.path} does not define {symbols}, which is {attribute} with "
             f'{prefix}_language="{language.upper()}"; it defines {library.listed()}'
         )
     if len(found) == 1:

@@ -170,6 +170,26 @@ def test_a_run_goes_on_with_its_library(tmp_path, monkeypatch):
         np.testing.assert_array_equal(resumed["bodies/2/position"], straight["bodies/2/position"])
 
 
+def test_the_language_decides_where_the_name_does_not(tmp_path):
+    # 12 arguments behind one symbol, 13 behind the other: each sees its own
+    text = EVERY_C.replace("EVERY", "BOTH") + EVERY_C.replace("EVERY", "both_").replace(
+        "int *dflag", "double *area, int *dflag"
+    )
+    compiled(tmp_path, text, name="both")
+    bound = EVERY_F.replace("iflag, results)\n", "iflag, results) bind(C, name='EVERY')\n", 1)
+    compiled(tmp_path, bound, "f90", "bound")
+    (tmp_path / "every.py").write_text(EVERY_PY)
+    law = {"cff_type": "USERCFF", "cff_fnc_name": "EVERY", "cff_param_string": "USER(0.2,0.1)"}
+    python = run_deck(tmp_path, ball_on_plane(**law, script_name="every.py"), 0.1)
+    for name, library, language in (
+        ("BOTH", "both", "C"),
+        ("BOTH", "both", "FORTRAN"),
+        ("EVERY", "bound", "fortran"),
+    ):
+        given = {**law, "cff_fnc_name": name, "cff_dll_name": library, "cff_language": language}
+        assert_same(python, run_deck(tmp_path, ball_on_plane(**given), 0.1), 1e-12)
+
+
 # -- what is refused
 
 BOTH = "void CFFSUB(void) {}\nvoid cffsub_(void) {}\nvoid helper(void) {}\nstatic int own;\n"
@@ -197,8 +217,8 @@ def test_symbols_that_fit_twice_or_not_at_all_are_listed(refused):
     said = refused(cff_fnc_name="OTHER")
     assert 'cff_fnc_name="OTHER", neither OTHER (C) nor other_ (Fortran)' in said
     assert "it defines CFFSUB, cffsub_, helper" in said
-    said = refused(cff_fnc_name="helper", cff_language="Fortran")
-    assert "does not define helper_" in said
+    said = refused(cff_fnc_name="Other", cff_language="Fortran")
+    assert "does not define other_ or Other" in said
     assert 'cff_language="FORTRAN"' in said
 
 

@@ -12,12 +12,22 @@ from click.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import COULOMB, GRAVITY, GROUND, USERFUNCS, contact, run_deck, sphere, write_deck
+from decks_io import (
+    COULOMB,
+    GRAVITY,
+    GROUND,
+    ROOT,
+    USERFUNCS,
+    contact,
+    run_deck,
+    sphere,
+    write_deck,
+)
 from libraries import compiled, example
 
 import mbsim
 from mbsim.cli.main import main
-from mbsim.errors import ModelError, PluginError
+from mbsim.errors import Interrupted, ModelError, PluginError
 
 USER = {"cnf_type": "USERCNF", "cnf_param_string": "USER(1e5,1.5,0.4)"}
 BUILT_IN = {"cnf_type": "HUNT_CROSSLEY", "stiffness": 1e5, "exponent": 1.5, "damping": 0.4}
@@ -141,3 +151,30 @@ def test_check_info_and_log_name_it(tmp_path):
     mbsim.simulate(mbsim.read_model(path), output=tmp_path / "out").close()
     log = (tmp_path / "out/deck.log").read_text()
     assert "user CNFSUB, compiled" in log
+
+
+def test_a_run_goes_on_with_it(tmp_path, monkeypatch):
+    law = {**USER, "cnf_dll_name": str(example(tmp_path, "cnfsub.c"))}
+    model = mbsim.read_model(write_deck(tmp_path, dropped(**law), 0.6))
+    straight = mbsim.simulate(model)
+
+    def stop(now, step, end):
+        if now > 0.3:
+            raise Interrupted("enough")
+
+    with monkeypatch.context() as often:
+        often.setattr("mbsim.simulation.RETURN_SECONDS", 1e-5)
+        often.setattr("mbsim.simulation.FIRST_BUDGET", 5)
+        with pytest.raises(Interrupted):
+            mbsim.simulate(model, output=tmp_path / "out", progress=stop)
+    with mbsim.simulate(model, output=tmp_path / "out", resume=True) as resumed:
+        np.testing.assert_array_equal(resumed["bodies/2/position"], straight["bodies/2/position"])
+
+
+def test_the_function_of_the_readme_is_compiled(tmp_path):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    body = text[text.index("def CNFSUB(") :]
+    (tmp_path / "readme.py").write_text(body[: body.index("```")])
+    said = []
+    run_deck(tmp_path, dropped(**USER, script_name="readme.py"), 0.4, notify=said.append)
+    assert "Force_Contact[301]: CNFSUB of readme.py, compiled" in said
