@@ -98,7 +98,7 @@ class UserFriction:
     looks : bool
         Whether it is interpreted and its script may ask for the state by `py_sysfnc`.
     language : str
-        Python, C or Fortran.
+        Python, C, Fortran or Octave.
     hidden : tuple of float
         What the C function behind `address` reads of its parameters before `par`.
     asked : tuple of str
@@ -367,13 +367,18 @@ def find_source(
 ) -> Script | Library | OctaveFile:
     """Return the script or library that defines function `name` of a contact."""
     scripts = {} if scripts is None else scripts
-    in_matlab = user.interpreter.upper() in ("MATLAB", "OCTAVE")
-    if user.script_name and (in_matlab or Path(user.script_name).suffix.lower() == SUFFIX):
-        return read_octave(Path(user.script_name), name, element)
     if user.dll_name.strip().upper() not in ("", "NULL"):
         place = f"{user.source.file}:{user.source.line}: " if user.source.file else ""
         return read_library(Path(user.dll_name), place + element)
+    in_matlab = user.interpreter.upper() in ("MATLAB", "OCTAVE")
+    if user.script_name and (in_matlab or Path(user.script_name).suffix.lower() == SUFFIX):
+        return read_octave(Path(user.script_name), name, element)
     files = list(dict.fromkeys(Path(file).absolute() for file in plugin_files))
+    if in_matlab and not any(file.suffix.lower() == SUFFIX for file in files):
+        raise ModelError(
+            f'{element}: interpreter="{user.interpreter}" names no .m file; name {name}.m by '
+            f"script_name, or with --plugin {name}.m"
+        )
     if user.script_name or not any(is_library(f) or f.suffix.lower() == SUFFIX for f in files):
         return find_script(user, name, element, prefix, files, scripts)
     loaded = [_any_kind(file, element, scripts) for file in files]

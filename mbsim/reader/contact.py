@@ -51,8 +51,12 @@ def _build_contact(entry: Entry) -> None:
     if cff_type in ("COULOMB_ON", "COULOMB_DYNAMICONLY"):
         check_coulomb(entry, cff_type)
     posts = any(entry.given(name) for name in _POST)
-    if cnf_type != "USERCNF" and cff_type != "USERCFF" and not posts:
-        note_unused(entry, "no user subroutine", {"script_name", "interpreter"})
+    cff = subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine()
+    cnf = subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine()
+    cpost = subroutine(entry, "cpost", "CONTACTPOST") if posts else None
+    scripted = (cff_type == "USERCFF" and not cff.dll_name) or posts
+    if not scripted and not (cnf_type == "USERCNF" and not cnf.dll_name):
+        note_unused(entry, "no subroutine in a script", {"script_name", "interpreter"})
 
     contact = el.Contact(
         id=entry.get("id", 0),
@@ -81,10 +85,10 @@ def _build_contact(entry: Entry) -> None:
         mu_dynamic=entry.get("mu_dynamic", 0.0),
         stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
-        cff=subroutine(entry, "cff", "CFFSUB") if cff_type == "USERCFF" else el.Subroutine(),
+        cff=cff,
         source=entry.source,
-        cnf=subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine(),
-        cpost=subroutine(entry, "cpost", "CONTACTPOST") if posts else None,
+        cnf=cnf,
+        cpost=cpost,
     )
     entry.register(entry.draft.contacts, contact)
 

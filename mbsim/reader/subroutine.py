@@ -41,6 +41,8 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
         script = str(path.resolve())
         if not path.is_file():
             entry.fault("no such file (the path is relative to the deck)", named)
+    # a script of its own has an interpreter of its own
+    spoken = "PYTHON" if named != "script_name" else entry.get("interpreter", "PYTHON")
     if not entry.given(f"{prefix}_fnc_name"):
         entry.note(f"not given; taken as {default}", f"{prefix}_fnc_name")
     return el.Subroutine(
@@ -48,7 +50,7 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
         fnc_name=entry.get(f"{prefix}_fnc_name", default),
         dll_name=dll,
         script_name="" if dll else script,
-        interpreter=entry.get(f"{prefix}_interpreter", entry.get("interpreter", "PYTHON")),
+        interpreter=entry.get(f"{prefix}_interpreter", spoken),
         language=entry.get(f"{prefix}_language", ""),
         source=entry.source if dll else el.Source(),
     )

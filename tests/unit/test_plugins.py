@@ -371,7 +371,7 @@ def test_load_faults_name_file_and_line(tmp_path):
             [write("few.py", "def CFFSUB(a, b):\n    pass\n")])  # fmt: skip
     refused("law.so: No such file", contact(), [tmp_path / "law.so"])
     refused("law: No such file", contact(dll_name="law"))
-    refused("MATLAB language", contact(interpreter="MATLAB"))
+    refused(r"names no .m file; name CFFSUB.m by", contact(interpreter="MATLAB"))
     refused("CFFSUB_STATES", contact(), [write("states.py", "CFFSUB_STATES = 2\n" + good)])
     text = refused("boom.py:2: the script fails", contact(), [write("boom.py", "a = 1\n1/0\n")])
     assert "ZeroDivisionError: division by zero" in text

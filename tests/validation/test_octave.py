@@ -144,6 +144,16 @@ def test_files_that_octave_cannot_use_are_refused(octave_cli, tmp_path):
     assert "is in a .m file" in refused(script_name="law.py")
 
 
+def test_a_contact_may_mix_languages(octave_cli, tmp_path):
+    write(tmp_path, "  vector = [-0.3 * nforce * xdot(1), 0, 0];")
+    (tmp_path / "post.py").write_text(
+        "seen = []\ndef POST(*given):\n    seen.append(given)\n    assert len(seen) < 6, 'six'\n"
+    )
+    law = {**USER, "script_name": "CFFSUB.m", "cpost_script_name": "post.py"}
+    with pytest.raises(PluginError, match=r"POST failed at time 0.04: AssertionError: six"):
+        run_deck(tmp_path, ball_on_plane(**law, cpost_fnc_name="POST"), 0.1)
+
+
 def test_two_files_of_one_name_are_refused(octave_cli, tmp_path):
     (tmp_path / "b").mkdir()
     write(tmp_path, "  vector = [0, 0, 0];")
