@@ -34,6 +34,7 @@ from mbsim.plugins.shared_library import (
     friction,
     is_library,
     read_library,
+    sees_x,
 )
 
 #: Names of the arguments of a friction function, in order.
@@ -86,7 +87,9 @@ class UserFriction:
     reason : str
         Why it stays interpreted, empty if compiled.
     uses_x : bool
-        Whether its text reads the deformation `x`, which the host then integrates.
+        Whether its text reads the deformation `x`, or might: the host then integrates X.
+    reads_x : bool
+        Whether an error of X counts; not where a function without text is seen not to read it.
     source : Path
         The user's file.
     name : str
@@ -119,6 +122,7 @@ class UserFriction:
     language: str = "Python"
     hidden: tuple[float, ...] = ()
     asked: tuple[str, ...] = ()
+    reads_x: bool = True
 
     @property
     def how(self) -> str:
@@ -270,6 +274,7 @@ def _from_library(library: Library, contact: Contact, name: str) -> UserFriction
     par = np.array(contact.cff.par, dtype=np.float64)
     language, symbol = choose(library, name, "cff", contact.cff.language)
     address, hidden, keep = friction(address_of(library, symbol), language, contact.id, par)
+    reads_x = sees_x(address, contact.id, np.concatenate([[hidden], par]), contact.cff.par)
     return UserFriction(
         address=address,
         par=par,
@@ -283,6 +288,7 @@ def _from_library(library: Library, contact: Contact, name: str) -> UserFriction
         keep=keep,
         language=language,
         hidden=(hidden,),
+        reads_x=reads_x,
     )
 
 
@@ -297,6 +303,8 @@ def _from_octave(
     if why:
         say(f"{element}: {name} of {file.path}: note: its call with iflag 1 fails: {why}")
     address, keep = guard.callback(function, name, str(file.path), len(par))
+    reads_x = sees_x(address, contact.id, par, contact.cff.par)
+    guard.failure.clear()
     return UserFriction(
         address=address,
         par=par,
@@ -309,6 +317,7 @@ def _from_octave(
         function=function,
         keep=(keep, octave),
         language="Octave",
+        reads_x=reads_x,
     )
 
 

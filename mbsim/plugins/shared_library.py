@@ -7,6 +7,7 @@ Fortran's CFFSUB is, is Fortran. Where both or neither are there nothing is gues
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 SUFFIXES = (".so", ".dll", ".dylib", ".sl")
 C, FORTRAN = "C", "Fortran"
 _SHOWN = 12
+# of a friction law's input
+_X, _XDOT, _NFORCE = slice(2, 5), slice(5, 8), 10
+_MOST_SIZES = 8
 
 
 def is_library(path: Path) -> bool:
@@ -166,6 +170,36 @@ def friction(
     table = pack(call)
     law = jit.address(call_fortran if language == FORTRAN else call_c, FRICTION_SIGNATURE)
     return law, float(table.ctypes.data), (call, table)
+
+
+def sees_x(law: int, element: int, row: npt.NDArray[np.float64], par: Sequence[float]) -> bool:
+    """Return whether a friction law's force is seen to change with X.
+
+    It is called as for derivatives, with slips and deformations about its parameters. X is carried
+    for a law that nobody can look into, whatever this says: this only decides whether an error of
+    X counts in the control of steps.
+    """
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
+
+    signature = (ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 3)
+    entry = ctypes.CFUNCTYPE(*signature)(law)
+    given, out = np.zeros(FRICTION_INPUTS), np.zeros(5)
+    given[_NFORCE], given[DFLAG] = 1.0, 1.0
+    sizes = sorted({abs(float(value)) for value in par if 1e-12 < abs(value) < 1e12})
+    sizes = [*sizes[:_MOST_SIZES], 1e-6, 1e-3, 1.0]
+    for speed in (0.0, *(part * size for size in sizes for part in (0.5, 1.5))):
+        found = set()
+        for x in (0.0, *sizes):
+            given[_X], given[_XDOT] = (
+                (x, -0.5 * x, 0.3 * x),
+                (0.8 * speed, 0.6 * speed, 0.1 * speed),
+            )
+            code = entry(element, given.ctypes.data, row.ctypes.data, out.ctypes.data)
+            if code == 0:
+                found.add(out.tobytes())
+        if len(found) > 1:
+            return True
+    return False
 
 
 def _ask_dependence(call: LibraryCall, language: str) -> None:

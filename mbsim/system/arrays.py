@@ -197,6 +197,7 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
+    reads_x: I1  # (nc,) 1 where an error of X counts
     user_normal: I1  # (nc,) where `laws.user_normal` has its place, 0 for a built-in normal law
 
 

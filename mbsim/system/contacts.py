@@ -265,6 +265,9 @@ def contacts_table(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
+        reads_x=np.array(
+            [c.id not in user or user[c.id].reads_x for c in contacts], dtype=np.int64
+        ),
         user_normal=np.array(
             [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
             dtype=np.int64,

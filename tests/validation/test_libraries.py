@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from libraries import compiled, example
 import mbsim
 from mbsim.cli.main import main
 from mbsim.errors import Interrupted, ModelError, PluginError
+from mbsim.plugins import load_friction
 
 USER = {"cff_type": "USERCFF", "cff_param_string": "USER(0.05,0.01,0.1,0.5)"}
 ARGUMENTS = """int *id, double *time, double *par, int *npar, double *loci, double *locj,
@@ -125,22 +127,58 @@ void COUNTING({ARGUMENTS})
 """,
         name="counting",
     )
-    import ctypes
-
     law = {**USER, "cff_fnc_name": "COUNTING", "cff_dll_name": "counting.so"}
 
-    def counted(integrator):
-        counts = (ctypes.c_int * 4).in_dll(ctypes.CDLL(str(tmp_path / "counting.so")), "counts")
-        counts[:] = [0, 0, 0, 0]
-        stats = run_deck(tmp_path, ball_on_plane(**law), 0.2, integrator=integrator).stats
-        return list(counts), stats
+    model = mbsim.read_model(write_deck(tmp_path, ball_on_plane(**law), 0.2))
+    counts = (ctypes.c_int * 4).in_dll(ctypes.CDLL(str(tmp_path / "counting.so")), "counts")
 
-    (once, derivatives, calls, _), stats = counted("DOPRI5")
-    assert (once, derivatives, calls) == (1, 0, stats["friction_calls"])
-    (once, derivatives, calls, _), stats = counted("RADAU5")
-    assert once == 1
+    # before the run: once with iflag, and as for derivatives to see whether it reads x
+    load_friction(model.contacts[301])
+    once, before, calls, _ = counts
+    assert (once, calls) == (1, 0)
+    assert before > 0
+
+    def counted(integrator):
+        counts[:] = [0, 0, 0, 0]
+        stats = mbsim.simulate(model, integrator=integrator).stats
+        assert counts[0] == 1
+        return counts[1] - before, counts[2], stats["friction_calls"]
+
+    derivatives, calls, together = counted("DOPRI5")
+    assert (derivatives, calls) == (0, together)
+    derivatives, calls, together = counted("RADAU5")
     assert derivatives == 12 * (derivatives // 12) > 0
-    assert calls + derivatives == stats["friction_calls"]
+    assert calls + derivatives == together
+
+
+def test_the_languages_agree_where_contacts_come_and_go(tmp_path):
+    # a box that spins, slides and rocks: X would be part of the error if the law read it
+    box = """<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.01" inertia_yy="0.01"
+      inertia_zz="0.01" v_ic_x="1" v_ic_x_flag="TRUE" w_ic_z="3" w_ic_z_flag="TRUE"/>
+    <Reference_Marker id="20" body_id="2" pos_z="0.15"/>
+    <Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+      length_x="0.2" length_y="0.2" length_z="0.2"/>"""
+    law = {"cff_type": "USERCFF", "cff_param_string": "USER(0.3,0.2,0.01,0.02)"}
+    model = GROUND + box + contact(damping=50, dmax=1e-3, **law) + GRAVITY
+    model = mbsim.read_model(write_deck(tmp_path, model, 0.5))
+    library = example(tmp_path, "cffsub.c")
+    for integrator in ("DOPRI5", "RADAU5"):
+        one, other = (
+            mbsim.simulate(model, plugins=[plugin], integrator=integrator, tol=1e-7)
+            for plugin in (USERFUNCS / "coulomb_stribeck.py", library)
+        )
+        assert one.stats["steps"] == other.stats["steps"]
+        assert_same(one, other, 1e-12)
+
+
+@pytest.mark.parametrize(("force", "reads"), [("xdot[0]", False), ("xdot[0] + x[1]", True),
+                                              ("(xdot[0] < 0.01 ? x[0] : 1.0)", True)])  # fmt: skip
+def test_reading_x_is_seen(tmp_path, force, reads):
+    body = f"result[0] = *nforce * {force}; result[1] = result[2] = 0.0;"
+    compiled(tmp_path, f"void CFFSUB({ARGUMENTS}) {{ {body} }}\n")
+    deck = write_deck(tmp_path, ball_on_plane(**USER, cff_dll_name="user.so"))
+    user = load_friction(mbsim.read_model(deck).contacts[301])
+    assert (user.uses_x, user.reads_x) == (True, reads)
 
 
 def test_results_that_are_no_numbers_stop_the_run(tmp_path):
