@@ -101,6 +101,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     from mbsim.dynamics.detection import CROWDED
     from mbsim.geometry.fcl_detector import DETECTOR_FAILED
     from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.laws.user_normal import USER_NORMAL_FAILED
 
     if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
         from mbsim.plugins import raise_failure
@@ -125,9 +126,21 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     if code == UNSETTLED:
         raise SolverError(_unsettled(system, contact, t))
     element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
+    if code == USER_NORMAL_FAILED:
+        from mbsim.plugins.normal import reproduce_normal
+
+        reproduce_normal(system.user_normal[element])
     if code in (RAISED_COMPILED, USER_NOT_FINITE):
         from mbsim.plugins import reproduce
 
+        user = system.user_friction[element]
+        if user.function is None:
+            out = system.scene.work.law_out
+            force = [float(out[k]) for k in (0, 1, 4)]
+            raise PluginError(
+                f"Force_Contact[{element}]: {user.name} failed at time {t:.12g}: returned {force}, "
+                f"not 3 finite numbers [Fx, Fy, Tz] ({user.source}); nan is also what it left unset"
+            )
         reproduce(system.user_friction[element], system.scene.work.law_in, element)
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
     if code == DETECTOR_FAILED and detector is not None:

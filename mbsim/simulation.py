@@ -558,9 +558,15 @@ def simulate(
     changes = _parameters(system, settings)
     for note in settings.notes:
         tell(note)
-    for number, user in system.user_friction.items():
-        how = "compiled" if user.compiled else f"interpreted: {user.reason}"
+    for number, user in system.user_laws:
+        how = f"{user.how}: {user.reason}" if user.reason else user.how
         tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
+    for post in system.posts:
+        said.append(
+            f"Force_Contact[{post.contact.id}]: {post.user.fnc_name} of "
+            f"{post.source.name}, called at output times"
+        )
+        tell(said[-1])
     for user_subroutine in system.subroutines.values():
         statement, number = user_subroutine.element
         source = user_subroutine.source.name
@@ -581,7 +587,7 @@ def simulate(
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
-    if system.user_friction or system.subroutines:
+    if system.user_laws or system.subroutines or system.posts:
         from mbsim.plugins import host
 
         host.log = log.line
@@ -595,6 +601,7 @@ def simulate(
                 runner.assemble()
                 runner.settle_contacts(allow_overlap)
             runner.run(progress, resume)
+            recorder.end()
         status = "finished"
     except Interrupted as error:
         status = "interrupted"
@@ -616,4 +623,8 @@ def simulate(
                 results = recorder.close(status, stats, system.scene.log.contacts)
         finally:
             log.close(status, stats, recorder.watch)
+            if any(user.language == "Octave" for _, user in system.user_laws):
+                from mbsim.plugins.subroutine import end_run
+
+                end_run()
     return results

@@ -40,6 +40,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     """
     from mbsim.cli.messages import warn
     from mbsim.model.names import is_adams
+    from mbsim.plugins import check_libraries
     from mbsim.reader.xml import read_model
     from mbsim.settings import settle
     from mbsim.system.acting import check_expressions
@@ -48,6 +49,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     deck = read_model(model, overrides)
     plans = plan_pairs(deck)
     check_expressions(deck)
+    check_libraries(deck.contacts.values())
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 

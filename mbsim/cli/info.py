@@ -16,9 +16,20 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 @click.command("info")
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--plugin",
+    "plugins",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File with user subroutines of a model; may be repeated.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(file: Path, as_json: bool) -> None:
-    """Show what is in FILE, a model or a result file: elements, forces, end state, statistics."""
+def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
+    """Show what is in FILE, a model or a result file: elements, forces, end state, statistics.
+
+    Scripts that a model names are run, and each function of theirs is called once with iflag 1.
+    """
     from mbsim.cli.messages import print_json, warn
 
     if _is_result(file):
@@ -32,7 +43,7 @@ def command(file: Path, as_json: bool) -> None:
         from mbsim.reader.xml import read_model
 
         deck = read_model(file)
-        about = _about_model(deck)
+        about = _about_model(deck, plugins)
         warn(deck.warnings)
     if as_json:
         print_json(about)
@@ -49,7 +60,7 @@ def _is_result(file: Path) -> bool:
         return file.suffix.lower() in (".h5", ".hdf5")
 
 
-def _about_model(model: Model) -> dict[str, Any]:
+def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Return what a deck describes."""
     from mbsim.model.placement import place
     from mbsim.results.log import counts, pair_texts, title, units_text
@@ -83,6 +94,7 @@ def _about_model(model: Model) -> dict[str, Any]:
             for contact in model.contacts.values()
         },
         **_between_markers(model),
+        **_subroutines(model, plugins),
         "requests": {
             str(request.id): {"type": request.type, "label": request.label or request.comment}
             for request in model.requests.values()
@@ -100,6 +112,40 @@ def _about_model(model: Model) -> dict[str, Any]:
     }
     plain: dict[str, Any] = finite(about)
     return plain
+
+
+def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
+    """Return user subroutines by element: function, file, and what they ask for under iflag."""
+    from mbsim.model.names import element_name, is_adams
+    from mbsim.plugins.about import about
+    from mbsim.plugins.contact_post import CONTACTPOST
+    from mbsim.plugins.loader import CFFSUB, Scripts, friction_arguments
+    from mbsim.plugins.normal import CNFSUB, normal_arguments
+    from mbsim.plugins.subroutine import ARGUMENTS
+    from mbsim.system.acting import wanted
+
+    scripts: Scripts = {}
+    found: dict[str, Any] = {}
+    for contact in model.contacts.values():
+        if contact.cff_type == "USERCFF":
+            name, given = f"Force_Contact[{contact.id}]", friction_arguments(contact)
+            found[f"{name} cff"] = about(contact.cff, name, "cff", CFFSUB, given, plugins, scripts)
+        if contact.cnf_type == "USERCNF":
+            name, given = f"Force_Contact[{contact.id}]", normal_arguments(contact)
+            found[f"{name} cnf"] = about(contact.cnf, name, "cnf", CNFSUB, given, plugins, scripts)
+        if contact.cpost is not None:
+            name, par = f"Force_Contact[{contact.id}]", list(contact.cpost.par)
+            pair = contact.i_graphics_id[0], contact.j_graphics_id[0]
+            given = [contact.id, *pair, 0.0, par, len(par), 1, 0]
+            found[f"{name} cpost"] = about(
+                contact.cpost, name, "cpost", CONTACTPOST, given, plugins, scripts
+            )
+    prefix = "ROUTINE" if is_adams(model.file) else "usrsub"
+    for _, statement, id, user, _ in wanted(model):
+        name, par = element_name(model.file, statement, id), list(user.par)
+        given = [id, 0.0, par, len(par), 0, 1]
+        found[name] = about(user, name, prefix, ARGUMENTS, given, plugins, scripts)
+    return {"subroutines": found} if found else {}
 
 
 def _between_markers(model: Model) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
 from mbsim.core.rotation import (
     add,
     any_tangent,
@@ -30,7 +31,22 @@ from mbsim.core.rotation import (
 )
 from mbsim.dynamics.kinematics import position
 from mbsim.laws.abi import FRICTION_INPUTS, MEMORY_OUT
-from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, NORMAL_CALLS, PYTHON_CALLS
+from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
+from mbsim.laws.user_normal import (
+    EVALUATE,
+    EXPLORE,
+    LOCI,
+    LOCJ,
+    NI,
+    NJ,
+    PLACE,
+    PYTHON,
+    TIME,
+    USER_NORMAL_FAILED,
+)
+from mbsim.laws.user_normal import MODE as PLACE_MODE
+from mbsim.laws.user_normal import RATE as PLACE_RATE
+from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, HEAT, HOT, NORMAL_CALLS, PYTHON_CALLS
 
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
@@ -99,6 +115,13 @@ def in_marker(scene, y, g, p):
 
 
 @jitable
+def along_marker(scene, g, v):
+    """Return a vector along the axes of graphic g's reference marker."""
+    in_body = unrotate(scene.work.R[scene.graphics.body[g]], v)
+    return unrotate(scene.graphics.marker_R[g], in_body)
+
+
+@jitable
 def sides(scene, s):
     """Return the graphics of a slot in the contact's order: I, J."""
     pair = scene.slots.pair[s]
@@ -140,7 +163,9 @@ def slipping_mass(scene, s):
 def remember(scene, y, s, c, given):
     """Give a friction law what it kept, and what only laws with memory look at."""
     state, at, z = scene.state, FRICTION_INPUTS, scene.slots.z[s]
-    given[20] = 1.0 if scene.world.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+    # where modes change at nearly every step they are left to each evaluation
+    keeps = scene.world.frozen[0] == 1 and state.sides[len(state.sides) - 1, HEAT] <= HOT
+    given[20] = 1.0 if keeps and state.touching[s] == 1 else 0.0
     given[21] = scene.work.slot[s, STIFFNESS]
     given[22] = slipping_mass(scene, s)
     given[23] = math.nan
@@ -166,6 +191,13 @@ def keep(scene, dy, s, c, out):
 
 
 @jitable
+def show_state(scene, y):
+    """Let interpreted laws that ask for it see the trial point."""
+    for k in range(len(scene.users.seen)):
+        scene.users.seen[k] = y[k]
+
+
+@jitable
 def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     """Call the friction law of contact c for slot s into `law_out`; return its code."""
     contacts, work = scene.contacts, scene.work
@@ -187,8 +219,7 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     scene.log.counters[FRICTION_CALLS] += 1
     scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
     if contacts.interpreted[c] == 1:
-        for k in range(len(scene.users.seen)):
-            scene.users.seen[k] = y[k]
+        show_state(scene, y)
     out = work.law_out
     if contacts.sliding_law[c] != 0:
         call = (contacts.id[c], given, contacts.sliding_par[c], out)
@@ -198,6 +229,33 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
         given[23] = math.hypot(out[0], out[1])
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
+
+
+@jitable
+def ask_normal(scene, t, y, c, at, depth, rate, out):
+    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal."""
+    contacts = scene.contacts
+    if contacts.user_normal[c] == 0:
+        return call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    # a user's law looks at more, as if in the middle of a question for forces
+    gi, gj, p, n = at
+    place = floats_at(contacts.user_normal[c], PLACE)
+    place[TIME], place[PLACE_DEPTH], place[PLACE_RATE] = t, depth, rate
+    loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
+    locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
+    ni, nj = along_marker(scene, gi, scale(-1.0, n)), along_marker(scene, gj, n)
+    for k in range(3):
+        place[LOCI + k], place[NI + k] = loci[k], ni[k]
+        place[LOCJ + k], place[NJ + k] = locj[k], nj[k]
+    if place[PYTHON] == 1.0:
+        scene.log.counters[PYTHON_CALLS] += 1
+        show_state(scene, y)
+    place[PLACE_MODE] = EVALUATE
+    code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    place[PLACE_MODE] = EXPLORE
+    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[0]):
+        return USER_NORMAL_FAILED
+    return code
 
 
 @jitable
@@ -249,7 +307,7 @@ def add_contact(scene, t, h, y, dy, s):
     # normal force; out: force, force at rate 0, stored energy
     out = work.law_out
     scene.log.counters[NORMAL_CALLS] += 1
-    code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    code = ask_normal(scene, t, y, c, (gi, gj, p, n), depth, rate, out)
     if code != 0:
         return code
     share = point[7]
@@ -268,7 +326,9 @@ def add_contact(scene, t, h, y, dy, s):
             locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
         else:
             loci, locj = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal)
+        # what a user's law pulls with rubs nothing
+        pressed = max(normal, 0.0)
+        code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, pressed)
         if code != 0:
             return code
         finite = math.isfinite(out[0] + out[1] + out[4])

@@ -193,5 +193,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.kinks import kinks_hook
 
         scene.world.doors[EVALUATE_DOOR] = problem.rhs
+        scene.world.frozen[0] = int(len(scene.work.idle) > 0)
         problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
     return problem, table

@@ -16,11 +16,9 @@ from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import MODE
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import EVALUATE_DOOR, HEAT, SIDE, SLIDE_LIMIT, Scene
+from mbsim.system.arrays import EVALUATE_DOOR, HEAT, HOT, SIDE, SLIDE_LIMIT, Scene
 
-#: Each change of side heats by 1, each step takes a tenth of the heat. What is hotter than this
-#: changes at nearly every step, as the sign of what is at rest does: then steps are not cut.
-HOT = 4.0
+#: Each change of side heats by 1, each step takes a tenth of the heat.
 COOLING = 0.9
 
 
@@ -77,8 +75,6 @@ def watch(scene, context, t, y, what):
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
-    # where modes change at nearly every step they are left to each evaluation
-    scene.world.frozen[0] = 1 if sides[last, HEAT] <= HOT else 0
     return differs
 
 

@@ -220,7 +220,7 @@ def scaled_error(scene, h, e, y):
         hit = scene.work.hit if side == 0 else scene.state.hit
         for k in range(hit[len(hit) - 1]):
             at = scene.slots.x[hit[k]]
-            if at >= 0:
+            if at >= 0 and scene.contacts.reads_x[contact_of(scene, hit[k])] == 1:
                 square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
                 largest = max(largest, max(square, e[at + 2] ** 2))
             at, memory = scene.slots.z[hit[k]], scene.contacts.memory[contact_of(scene, hit[k])]

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
@@ -24,6 +25,8 @@ from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.laws.abi import DFLAG
+from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -105,9 +108,9 @@ def ask_friction(scene, t, h, y, s, c, around, given):
     """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
     loci, locj = around
     slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
-    scene.work.law_in[19] = 1.0
+    scene.work.law_in[DFLAG] = 1.0
     code = friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
-    scene.work.law_in[19] = 0.0
+    scene.work.law_in[DFLAG] = 0.0
     return code
 
 
@@ -150,6 +153,9 @@ def add_contact_slopes(scene, T, t, h, y, s):
     rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
 
     # the normal law by depth and rate
+    user = contacts.user_normal[c]
+    if user != 0:
+        floats_at(user, PLACE)[MODE] = SLOPES
     step = _PART * depth
     call = (depth + step, rate, contacts.normal_par[c], out)
     code = call_int(contacts.normal_law[c], call)
@@ -161,6 +167,8 @@ def add_contact_slopes(scene, T, t, h, y, s):
     upper = out[0]
     code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
     by_rate = share * (upper - out[0]) / (2.0 * step)
+    if user != 0:
+        floats_at(user, PLACE)[MODE] = EXPLORE
     if code != 0:
         return code
 
@@ -181,7 +189,7 @@ def add_contact_slopes(scene, T, t, h, y, s):
     given = L.rise[0:6]
     given[0], given[1] = dot(v_rel, tx), dot(v_rel, ty)
     given[2], given[3], given[4] = dot(w_rel, tx), dot(w_rel, ty), dot(w_rel, n)
-    given[5] = work.slot[s, 2]
+    given[5] = max(work.slot[s, 2], 0.0)
     around = (none, none)
     if contacts.framed[c] == 1:
         half = scale(0.5 * depth, n)

@@ -28,6 +28,7 @@ from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
 FRICTION_INPUTS = 24
+DFLAG = 19
 #: Fields of a law's output before its memory: force, torques, stored energy, mode.
 MEMORY_OUT = 7
 RAISED_INTERPRETED = 1

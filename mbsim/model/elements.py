@@ -112,9 +112,11 @@ class Subroutine:
 
     par: tuple[float, ...] = ()
     fnc_name: str = ""
-    dll_name: str = ""
+    dll_name: str = ""  # absolute path of a shared library, or empty
     script_name: str = ""  # absolute path, or empty where --plugin must give it
     interpreter: str = ""
+    language: str = ""  # of the library's function: C, FORTRAN, or empty where its name tells
+    source: Source = Source()
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,8 @@ class Contact:
     friction: tuple[tuple[str, float], ...] = ()  # attributes that only its friction law has
     cff: Subroutine = Subroutine()
     source: Source = Source()
+    cnf: Subroutine = Subroutine()
+    cpost: Subroutine | None = None
 
     @property
     def asks_user(self) -> bool:

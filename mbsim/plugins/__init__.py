@@ -8,10 +8,11 @@ signature of `laws.abi`; `raise_failure` and `reproduce` turn its failure codes 
 from mbsim.plugins.diagnose import diagnose, lint
 from mbsim.plugins.guard import failure, raise_failure, reproduce
 from mbsim.plugins.helpers import host
-from mbsim.plugins.loader import UserFriction, find_subroutine, load_friction
+from mbsim.plugins.loader import UserFriction, check_libraries, find_subroutine, load_friction
 
 __all__ = [
     "UserFriction",
+    "check_libraries",
     "diagnose",
     "failure",
     "find_subroutine",

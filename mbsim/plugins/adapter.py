@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.laws.abi import FRICTION_INPUTS, FRICTION_SIGNATURE, RAISED_COMPILED
+from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, RAISED_COMPILED
 
 
 def _adapt(function: Callable[..., Any], count: int) -> Any:
@@ -38,7 +38,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
                 (a[2], a[3], a[4]),
                 (a[5], a[6], a[7]),
                 a[10],
-                0,
+                int(a[DFLAG]),
                 0,
                 a[0],
             )

@@ -9,6 +9,7 @@ import re
 import sys
 import types
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,25 @@ def compile_friction(
     `values` is the namespace of the script after it has run: a name that its module binds
     once to a number is a constant.
     """
+    return _compile(text, values, name, par_count, friction_address, 11)
+
+
+def compile_normal(text: str, values: dict[str, Any], name: str, par_count: int) -> tuple[int, str]:
+    """Return the address of a compiled CNFSUB and '', or 0 and the reason: `compile_friction`."""
+    from mbsim.plugins.normal_adapter import normal_address
+
+    return _compile(text, values, name, par_count, normal_address, 13)
+
+
+def _compile(
+    text: str,
+    values: dict[str, Any],
+    name: str,
+    par_count: int,
+    adapted: Callable[[Callable[..., Any], list[Any], int], int],
+    documented: int,
+) -> tuple[int, str]:
+    """Return what `compile_friction` does, of a subroutine of so many documented arguments."""
     if par_count > PAR_MAX:
         return 0, f"more than {PAR_MAX} parameters"
     try:
@@ -37,12 +57,12 @@ def compile_friction(
     except Refused as refused:
         return 0, str(refused)
     try:
-        module = _module(rewritten(order, known))
+        module = _module(rewritten(order, known, documented))
         callees = [getattr(module, each) for each in order[:-1]]
         with warnings.catch_warnings():
             # Numba's hints on speed are not for the user of a script
             warnings.simplefilter("ignore")
-            return friction_address(getattr(module, name), callees, par_count), ""
+            return adapted(getattr(module, name), callees, par_count), ""
     except OSError as error:
         return 0, f"the cache folder {jit.cache_root()} cannot be written ({error})"
     except Exception as error:  # whatever Numba cannot do, Python still can

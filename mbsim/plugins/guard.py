@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mbsim.errors import PluginError
 from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.octave import OctaveError
 
 if TYPE_CHECKING:
     from mbsim.plugins.loader import UserFriction
@@ -90,6 +91,8 @@ def _report(error: BaseException, element: str, time: float, name: str, source: 
     head = f"{element}: {name} failed at time {time:.12g}: "
     if isinstance(error, NotAForce):
         return f"{head}{error} ({source})"
+    if isinstance(error, OctaveError):
+        return f"{head}{' '.join(str(error).split())}\n  at {error.place or source}"
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
@@ -150,7 +153,7 @@ def one_number(result: Any) -> list[float]:
     return [value]
 
 
-class _Views(dict[int, Any]):
+class Views(dict[int, Any]):
     """Memory of a fixed number of doubles by address; the host's buffers seldom move."""
 
     def __init__(self, count: int) -> None:
@@ -169,10 +172,10 @@ def callback(
     function: Callable[..., Any], name: str, source: str, par_count: int
 ) -> tuple[int, object]:
     """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive."""
-    from mbsim.laws.abi import FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
-    inputs_at, par_at, out_at = _Views(FRICTION_INPUTS), _Views(par_count), _Views(5)
+    inputs_at, par_at, out_at = Views(FRICTION_INPUTS), Views(par_count), Views(5)
 
     def guarded(element: int, inputs: int, par: int, out: int) -> int:
         time, outer = 0.0, host.state
@@ -191,7 +194,7 @@ def callback(
                 given[2:5],
                 given[5:8],
                 given[10],
-                0,
+                int(given[DFLAG]),
                 0,
             )
             force = out_at[out]
@@ -249,7 +252,7 @@ def state_callback(
     """
     from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
 
-    results_at = _Views(count)
+    results_at = Views(count)
     title, id = element
     name, source = place
     values, npar = [float(value) for value in par], len(par)
@@ -294,8 +297,8 @@ def reproduce(
     ----------
     user : UserFriction
         The compiled function that returned RAISED_COMPILED or a force that is not finite.
-    inputs : sequence of float, shape (19,)
-        The fields of `FrictionInput` in order, as the function was given them.
+    inputs : sequence of float, shape (20,)
+        What the function was given, as `laws.abi` has it.
     element_id : int, optional
         The Force_Contact; `user.element` if left out.
 
@@ -309,8 +312,9 @@ def reproduce(
     name, source = user.name, str(user.source)
     try:
         result = user.call(
-            given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10]
-        )
+            given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10],
+            int(given[19]),
+        )  # fmt: skip
     except BaseException as error:
         failure.clear()
         failure.store(error, f"Force_Contact[{element}]", given[0], name, source)

@@ -6,9 +6,12 @@ import builtins
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mbsim.plugins import kernels
+
+if TYPE_CHECKING:
+    from mbsim.plugins.contact_post import Shown
 
 
 class StopRun(BaseException):
@@ -40,12 +43,17 @@ class Host:
         self.sysfnc: Look = _nothing
         self.sysary: Look = _nothing
         self.warned: set[str] = set()
+        #: While CONTACTPOST runs: the results of contacts at an output time, by id.
+        self.shown: dict[int, Shown] = {}
+        #: In a call with iflag true: what it asks for, as `plugins.dependence` lists it.
+        self.asked: list[str] | None = None
 
     def forget(self) -> None:
         """Look at nothing, before a new run."""
         self.state, self.sysfnc, self.sysary = None, _nothing, _nothing
         self.seen = None
         self.warned.clear()
+        self.shown.clear()
 
 
 #: The one run of this process. The simulation sets `host.log`; the guard sets `host.time`.
@@ -92,6 +100,9 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
     errflg is 1 and the value 0 where the function or a marker is not known, forces and
     accelerations among them, and outside subroutines.
     """
+    if host.asked is not None:
+        host.asked.append(_question(name, ids))
+        return [0.0, 0]
     if host.state is None:
         _no_state("py_sysfnc")
         return [0.0, 1]
@@ -100,10 +111,18 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
 
 def py_sysary(name: str, ids: Sequence[float]) -> list[Any]:
     """Return [values, errflg] of DISP, TDISP, RDISP, VEL, TVEL or RVEL at the trial state."""
+    if host.asked is not None:
+        host.asked.append(_question(name, ids))
+        return [[0.0] * (6 if str(name).strip().upper() in ("DISP", "VEL") else 3), 0]
     if host.state is None:
         _no_state("py_sysary")
         return [[], 1]
     return host.sysary(name, ids)
+
+
+def _question(name: str, ids: Sequence[float]) -> str:
+    """Return a function and its ids as `mbsim info` shows them."""
+    return " ".join([str(name).strip().upper(), *(f"{id:g}" for id in ids)])
 
 
 def _no_state(name: str) -> None:
@@ -123,6 +142,38 @@ def py_get_contact_area() -> float:
     return 0.0
 
 
+def _incidents(id: int, i_gra_id: int, j_gra_id: int) -> Any:
+    """Return the incidents of two graphics of a contact, in either order, None if not known."""
+    shown = host.shown.get(int(id))
+    if shown is None:
+        return None
+    pair = int(i_gra_id), int(j_gra_id)
+    return shown.incidents.get(pair, shown.incidents.get(pair[::-1]))
+
+
+def py_get_ncontacts(id: int, i_gra_id: int, j_gra_id: int) -> list[Any]:
+    """Return [n, errflg]: how many incidents two graphics of a contact have at an output time.
+
+    errflg is 1 and n 0 outside CONTACTPOST, and for what is not in its contact.
+    """
+    found = _incidents(id, i_gra_id, j_gra_id)
+    return [0, 1] if found is None else [len(found), 0]
+
+
+def py_get_contact_post(id: int, i_gra_id: int, j_gra_id: int, index: int) -> list[Any]:
+    """Return [values, errflg] of an incident, 1 to n, or with index 0 of the whole element.
+
+    Of an incident: depth, contact point (3) and normal (3) in the global frame, X (3). Of the
+    element: force (3) and torque about its cg (3) on I's body, in the global frame, largest
+    depth, largest slip speed.
+    """
+    found = _incidents(id, i_gra_id, j_gra_id)
+    if found is None or not 0 <= int(index) <= len(found):
+        return [[], 1]
+    values = host.shown[int(id)].net if int(index) == 0 else found[int(index) - 1]
+    return [list(values), 0]
+
+
 def print_to_stderr(*args: Any, file: Any = None, **options: Any) -> None:
     """Print as Python does, but on standard error: --json owns standard output."""
     builtins.print(*args, file=sys.stderr if file is None else file, **options)
@@ -133,7 +184,7 @@ def namespace() -> dict[str, Any]:
     names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
     for helper in (
         py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area,
-        py_sysfnc, py_sysary,
+        py_sysfnc, py_sysary, py_get_ncontacts, py_get_contact_post,
     ):  # fmt: skip
         names[helper.__name__] = helper
     names["print"] = print_to_stderr

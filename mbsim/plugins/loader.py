@@ -12,10 +12,10 @@ import re
 import sys
 import traceback
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,11 +23,22 @@ import numpy.typing as npt
 from mbsim.errors import ModelError
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
+from mbsim.plugins.dependence import dependence
 from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
+from mbsim.plugins.octave import SUFFIX, OctaveFile, read_octave, running
+from mbsim.plugins.shared_library import (
+    Library,
+    address_of,
+    choose,
+    friction,
+    is_library,
+    read_library,
+    sees_x,
+)
 
-_ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
-_LIBRARIES = (".so", ".dll", ".dylib", ".sl")
+#: Names of the arguments of a friction function, in order.
+CFFSUB = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
 _numbers = itertools.count(1)
 
 
@@ -44,15 +55,26 @@ class Script:
         """Return whether it may ask for functions of the language; of a .pyc nobody knows."""
         return self.text is None or bool(re.search("py_sysfnc|py_sysary", self.text))
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script has bound a name beside those it was given."""
+        return name in _own(self)
+
+    def listed(self) -> str:
+        """Return the functions that the script defines, for a message."""
+        functions = [name for name, value in _own(self).items() if inspect.isfunction(value)]
+        return ", ".join(functions) or "no function"
+
 
 Scripts = dict[Path, Script]
+Found = TypeVar("Found", Script, Script | Library | OctaveFile)
 
 
 @dataclass(frozen=True, eq=False)
 class UserFriction:
     """A user's friction function, ready to be called.
 
-    Keep it alive as long as `address` is in use: an interpreted one owns its callback.
+    Keep it alive as long as `address` is in use: an interpreted one owns its callback, one of
+    a library the memory that `hidden` points to.
 
     Attributes
     ----------
@@ -65,7 +87,9 @@ class UserFriction:
     reason : str
         Why it stays interpreted, empty if compiled.
     uses_x : bool
-        Whether its text reads the deformation `x`, which the host then integrates.
+        Whether its text reads the deformation `x`, or might: the host then integrates X.
+    reads_x : bool
+        Whether an error of X counts; not where a function without text is seen not to read it.
     source : Path
         The user's file.
     name : str
@@ -76,6 +100,12 @@ class UserFriction:
         The user's own function object.
     looks : bool
         Whether it is interpreted and its script may ask for the state by `py_sysfnc`.
+    language : str
+        Python, C, Fortran or Octave.
+    hidden : tuple of float
+        What the C function behind `address` reads of its parameters before `par`.
+    asked : tuple of str
+        What an interpreted one asked for by `py_sysfnc` and `py_sysary` under iflag.
     """
 
     address: int
@@ -86,20 +116,46 @@ class UserFriction:
     source: Path
     name: str
     element: int
-    function: Callable[..., Any] = field(repr=False)
+    function: Callable[..., Any] | None = field(repr=False)
     keep: object = field(default=None, repr=False)
     looks: bool = False
+    language: str = "Python"
+    hidden: tuple[float, ...] = ()
+    asked: tuple[str, ...] = ()
+    reads_x: bool = True
+
+    @property
+    def how(self) -> str:
+        """How it runs, in a word for the user."""
+        if self.language != "Python":
+            return self.language
+        return "compiled" if self.compiled else "interpreted"
+
+    @property
+    def row(self) -> npt.NDArray[np.float64]:
+        """The parameters as the C function behind `address` reads them."""
+        return np.concatenate([self.hidden, self.par])
 
     def call(
-        self, time: float, par: Any, loci: Any, locj: Any, x: Any, xdot: Any, nforce: float
+        self,
+        time: float,
+        par: Any,
+        loci: Any,
+        locj: Any,
+        x: Any,
+        xdot: Any,
+        nforce: float,
+        dflag: int = 0,
     ) -> list[float]:
         """Return [Fx, Fy, Tz] of the interpreted function; what it raises comes through."""
+        assert self.function is not None
         lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
         host.time = float(time)
         values, loci, locj, x, xdot = lists
         result = self.function(
-            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce), 0, 0
-        )
+            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce),
+            dflag, 0,
+        )  # fmt: skip
         return guard.three_numbers(result)
 
 
@@ -138,6 +194,10 @@ def load_friction(
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
+    if isinstance(script, Library):
+        return _from_library(script, contact, name)
+    if isinstance(script, OctaveFile):
+        return _from_octave(script, contact, name, say)
     function = user_function(script, name, element)
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
@@ -146,7 +206,9 @@ def load_friction(
         for warning in lint(script.text, name):
             say(f"{element}: {script.path}: warning: {warning}")
 
-    def user(address: int, reason: str, keep: object = None) -> UserFriction:
+    def user(
+        address: int, reason: str, keep: object = None, asked: Sequence[str] = ()
+    ) -> UserFriction:
         return UserFriction(
             address=address,
             par=par,
@@ -159,6 +221,7 @@ def load_friction(
             function=function,
             keep=keep,
             looks=bool(reason) and script.looks,
+            asked=tuple(asked),
         )
 
     address, reason = 0, "--interpret-plugins"
@@ -169,7 +232,93 @@ def load_friction(
     if not reason:
         return user(address, "")
     address, keep = guard.callback(function, name, str(script.path), len(par))
-    return user(address, reason, keep)
+    # compiled functions only compute: whether they are called once more nobody can see
+    asked, why = dependence(function, friction_arguments(contact))
+    if why:
+        say(f"{element}: {name} of {script.path}: note: its call with iflag 1 fails: {why}")
+    return user(address, reason, keep, asked)
+
+
+def friction_arguments(contact: Contact) -> list[Any]:
+    """Return the arguments of the one call of a contact's CFFSUB with iflag true."""
+    par, zeros = [float(value) for value in contact.cff.par], [[0.0] * 3 for _ in range(4)]
+    return [contact.id, 0.0, par, len(par), *zeros, 0.0, 0, 1]
+
+
+def check_libraries(contacts: Iterable[Contact]) -> None:
+    """Look for the functions of the libraries that contacts name; none of them is called.
+
+    Raises
+    ------
+    ModelError
+        With a line for each that is not there, or whose language is not clear.
+    """
+    faults = []
+    for contact in contacts:
+        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf)):
+            if not user.dll_name:
+                continue
+            try:
+                element = f"Force_Contact[{contact.id}]"
+                library = find_source(user, user.fnc_name, element, prefix)
+                assert isinstance(library, Library)
+                choose(library, user.fnc_name, prefix, user.language)
+            except ModelError as error:
+                faults.append(str(error))
+    if faults:
+        raise ModelError("\n".join(faults))
+
+
+def _from_library(library: Library, contact: Contact, name: str) -> UserFriction:
+    """Return the friction function of a shared library."""
+    par = np.array(contact.cff.par, dtype=np.float64)
+    language, symbol = choose(library, name, "cff", contact.cff.language)
+    address, hidden, keep = friction(address_of(library, symbol), language, contact.id, par)
+    reads_x = sees_x(address, contact.id, np.concatenate([[hidden], par]), contact.cff.par)
+    return UserFriction(
+        address=address,
+        par=par,
+        compiled=True,
+        reason="",
+        uses_x=True,  # nobody knows what machine code reads
+        source=library.path,
+        name=name,
+        element=contact.id,
+        function=None,
+        keep=keep,
+        language=language,
+        hidden=(hidden,),
+        reads_x=reads_x,
+    )
+
+
+def _from_octave(
+    file: OctaveFile, contact: Contact, name: str, say: Callable[[str], None]
+) -> UserFriction:
+    """Return a friction function in the MATLAB language."""
+    element, par = f"Force_Contact[{contact.id}]", np.array(contact.cff.par, dtype=np.float64)
+    octave = running(element)
+    function = octave.add(file, CFFSUB, len(par), element)
+    _, why = dependence(function, friction_arguments(contact))
+    if why:
+        say(f"{element}: {name} of {file.path}: note: its call with iflag 1 fails: {why}")
+    address, keep = guard.callback(function, name, str(file.path), len(par))
+    reads_x = sees_x(address, contact.id, par, contact.cff.par)
+    guard.failure.clear()
+    return UserFriction(
+        address=address,
+        par=par,
+        compiled=False,
+        reason="",
+        uses_x=True,
+        source=file.path,
+        name=name,
+        element=contact.id,
+        function=function,
+        keep=(keep, octave),
+        language="Octave",
+        reads_x=reads_x,
+    )
 
 
 def _compiled(
@@ -191,21 +340,21 @@ def _compiled(
     twin = user(0, "probe")
 
     def call(a: list[float]) -> list[float]:
-        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10])
+        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10], int(a[19] + 0.5))
 
     # a place that the text does not read needs no probe
-    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6)]
+    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6, 9)]
     reason = disagreement(address, call, par, script.text, script.values, twin.element, read)
     return (0, reason) if reason else (address, "")
 
 
 def find_subroutine(
     contact: Contact, plugin_files: Sequence[Path] = (), scripts: Scripts | None = None
-) -> Script:
-    """Return the script that defines the friction function of a contact, run once.
+) -> Script | Library | OctaveFile:
+    """Return what defines the friction function of a contact: a script, run once, or a library.
 
-    `script_name` in the deck comes before `plugin_files`; two of these that define the
-    function are an error.
+    `cff_dll_name` and `script_name` in the deck come before `plugin_files`; two of these that
+    define the function are an error.
 
     Raises
     ------
@@ -214,7 +363,56 @@ def find_subroutine(
     """
     element = f"Force_Contact[{contact.id}]"
     name = contact.cff.fnc_name or "CFFSUB"
-    return find_script(contact.cff, name, element, "cff", plugin_files, scripts)
+    return find_source(contact.cff, name, element, "cff", plugin_files, scripts)
+
+
+def find_source(
+    user: Subroutine,
+    name: str,
+    element: str,
+    prefix: str,
+    plugin_files: Sequence[Path] = (),
+    scripts: Scripts | None = None,
+) -> Script | Library | OctaveFile:
+    """Return the script or library that defines function `name` of a contact."""
+    scripts = {} if scripts is None else scripts
+    if user.dll_name.strip().upper() not in ("", "NULL"):
+        place = f"{user.source.file}:{user.source.line}: " if user.source.file else ""
+        return read_library(Path(user.dll_name), place + element)
+    in_matlab = user.interpreter.upper() in ("MATLAB", "OCTAVE")
+    if user.script_name and (in_matlab or Path(user.script_name).suffix.lower() == SUFFIX):
+        return read_octave(Path(user.script_name), name, element)
+    files = list(dict.fromkeys(Path(file).absolute() for file in plugin_files))
+    if in_matlab and not any(file.suffix.lower() == SUFFIX for file in files):
+        raise ModelError(
+            f'{element}: interpreter="{user.interpreter}" names no .m file; name {name}.m by '
+            f"script_name, or with --plugin {name}.m"
+        )
+    if user.script_name or not any(is_library(f) or f.suffix.lower() == SUFFIX for f in files):
+        return find_script(user, name, element, prefix, files, scripts)
+    loaded = [_any_kind(file, element, scripts) for file in files]
+    return _only_one(loaded, name, element, f"{prefix}_fnc_name")
+
+
+def _any_kind(file: Path, element: str, scripts: Scripts) -> Script | Library | OctaveFile:
+    """Return a --plugin file."""
+    if is_library(file):
+        return read_library(file, element)
+    if file.suffix.lower() == SUFFIX:
+        return read_octave(file, file.stem, element)
+    return _load(file, element, scripts)
+
+
+def _only_one(loaded: Sequence[Found], name: str, element: str, attribute: str) -> Found:
+    """Return the one of several files that defines a function."""
+    found = [source for source in loaded if source.defines(name)]
+    if len(found) > 1:
+        both = ", ".join(str(source.path) for source in found)
+        raise ModelError(f"{element}: {name} is defined twice: {both}")
+    if not found:
+        defined = "; ".join(f"{source.path} defines {source.listed()}" for source in loaded)
+        raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
+    return found[0]
 
 
 def find_script(
@@ -234,7 +432,8 @@ def find_script(
     attribute = prefix if prefix == "ROUTINE" else f"{prefix}_fnc_name"
     if user.interpreter and user.interpreter.upper() != "PYTHON":
         raise ModelError(
-            f'{element}: interpreter="{user.interpreter}" is not built yet, use Python'
+            f'{element}: interpreter="{user.interpreter}": only the laws of Force_Contact can be '
+            "in the MATLAB language; use Python"
         )
     if user.script_name:
         script = _load(Path(user.script_name), element, scripts)
@@ -242,28 +441,18 @@ def find_script(
         return script
 
     dll_name = user.dll_name.strip()
-    if not plugin_files:
-        if dll_name.upper() not in ("", "NULL"):
-            raise ModelError(
-                f'{element}: {prefix}_dll_name="{dll_name}": shared libraries are not built yet; '
-                "name a Python twin with --plugin FILE.py"
-            )
+    # shared libraries and the MATLAB language are for contacts
+    files = [file for file in dict.fromkeys(map(Path.absolute, map(Path, plugin_files)))
+             if not is_library(file) and file.suffix.lower() != SUFFIX]  # fmt: skip
+    if not files:
         said = f'{prefix}_dll_name="{dll_name}"' if dll_name else "no script_name"
         said = f"no FILE.py::{name}" if prefix == "ROUTINE" else said
         raise ModelError(
             f'{element}: {attribute}="{name}" names no file ({said}); '
             "name one with --plugin FILE.py"
         )
-    files = dict.fromkeys(Path(file).absolute() for file in plugin_files)
     loaded = [_load(file, element, scripts) for file in files]
-    found = [script for script in loaded if name in _own(script)]
-    if len(found) > 1:
-        both = ", ".join(str(script.path) for script in found)
-        raise ModelError(f"{element}: {name} is defined twice: {both}")
-    if not found:
-        defined = "; ".join(f"{script.path} defines {_listed(script)}" for script in loaded)
-        raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
-    return found[0]
+    return _only_one(loaded, name, element, attribute)
 
 
 def _own(script: Script) -> dict[str, Any]:
@@ -276,22 +465,16 @@ def _own(script: Script) -> dict[str, Any]:
     }
 
 
-def _listed(script: Script) -> str:
-    """Return the functions that a script defines, for a message."""
-    functions = [name for name, value in _own(script).items() if inspect.isfunction(value)]
-    return ", ".join(functions) or "no function"
-
-
 def _require(script: Script, name: str, element: str, attribute: str) -> None:
-    if name not in _own(script):
+    if not script.defines(name):
         raise ModelError(
             f'{element}: {script.path} does not define {attribute}="{name}"; '
-            f"it defines {_listed(script)}"
+            f"it defines {script.listed()}"
         )
 
 
 def user_function(
-    script: Script, name: str, element: str, arguments: str = _ARGUMENTS
+    script: Script, name: str, element: str, arguments: str = CFFSUB
 ) -> Callable[..., Any]:
     """Return the function of a script after a look at whether its arguments fit."""
     count = len(arguments.split(","))
@@ -325,10 +508,13 @@ def _load(path: Path, element: str, scripts: Scripts) -> Script:
     path = path.absolute()
     if path in scripts:
         return scripts[path]
-    if path.suffix.lower() in _LIBRARIES:
-        raise ModelError(f"{element}: {path}: shared libraries are not built yet, use Python")
+    if is_library(path):
+        raise ModelError(f"{element}: {path}: a shared library is no script; name it by *_dll_name")
     if path.suffix.lower() in (".m", ".oml"):
-        raise ModelError(f"{element}: {path}: MATLAB and Compose are not built yet, use Python")
+        raise ModelError(
+            f"{element}: {path}: only the laws of Force_Contact can be in the MATLAB "
+            "language; use Python"
+        )
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -15,6 +15,7 @@ from mbsim.model.names import element_name, is_adams
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 from mbsim.plugins.loader import Scripts, find_script, user_function
+from mbsim.plugins.octave import end_all
 
 ARGUMENTS = "id, time, par, npar, dflag, iflag"
 
@@ -80,3 +81,8 @@ def begin_run(log: Callable[[str], None] | None) -> None:
     host.forget()
     if log is not None:
         host.log = log
+
+
+def end_run() -> None:
+    """End what a run started."""
+    end_all()

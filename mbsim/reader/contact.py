@@ -32,7 +32,6 @@ from mbsim.reader.subroutine import subroutine
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 _USERS = {
     *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
-    *("script_name", "interpreter"),
 }
 CFF_USES: dict[str, set[str]] = {
     **{
@@ -60,6 +59,14 @@ def _build_contact(entry: Entry) -> None:
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in FRICTION_LAWS:
         check_coulomb(entry, cff_type)
+    posts = any(entry.given(name) for name in _POST)
+    asks_user = _asks_user(entry, cff_type)
+    cff = subroutine(entry, "cff", "CFFSUB") if asks_user else el.Subroutine()
+    cnf = subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine()
+    cpost = subroutine(entry, "cpost", "CONTACTPOST") if posts else None
+    scripted = (asks_user and not cff.dll_name) or posts
+    if not scripted and not (cnf_type == "USERCNF" and not cnf.dll_name):
+        note_unused(entry, "no subroutine in a script", {"script_name", "interpreter"})
 
     contact = el.Contact(
         id=entry.get("id", 0),
@@ -89,8 +96,10 @@ def _build_contact(entry: Entry) -> None:
         stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
         friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
         friction=_own_attributes(entry, cff_type),
-        cff=subroutine(entry, "cff", "CFFSUB") if _asks_user(entry, cff_type) else el.Subroutine(),
+        cff=cff,
         source=entry.source,
+        cnf=cnf,
+        cpost=cpost,
     )
     entry.register(entry.draft.contacts, contact)
 
@@ -157,9 +166,11 @@ def check_coefficients(entry: Entry) -> None:
         entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
 
 
+LANGUAGE = keyword(spellings(C="", FORTRAN=""))
+_POST = ("cpost_param_string", "cpost_fnc_name", "cpost_script_name", "cpost_interpreter")
+_POST_IN_PYTHON = "CONTACTPOST is called in Python alone: name a script by cpost_script_name"
 _NOT_BUILT = "is documented but not built yet"
 _SEARCH = "steers MotionSolve's own contact search and has no effect here"
-_POST = "contact post-processing subroutines are not called"
 FORCE_CONTACT = Statement(
     "Force_Contact",
     {
@@ -201,6 +212,7 @@ FORCE_CONTACT = Statement(
         "cnf_param_string": Spec(USER),
         "cnf_fnc_name": Spec(TEXT),
         "cnf_dll_name": Spec(TEXT),
+        "cnf_language": Spec(LANGUAGE),
         "cff_type": Spec(keyword(CFF_TYPES)),
         "mu_static": Spec(NOT_NEGATIVE),
         "mu_dynamic": Spec(NOT_NEGATIVE),
@@ -210,14 +222,15 @@ FORCE_CONTACT = Statement(
         "cff_param_string": Spec(USER),
         "cff_fnc_name": Spec(TEXT),
         "cff_dll_name": Spec(TEXT),
-        "cff_language": Spec(TEXT, refused="shared libraries are not built yet"),
+        # ours: what a library's function is written in, where its name does not tell
+        "cff_language": Spec(LANGUAGE),
         "script_name": Spec(TEXT),
-        "interpreter": Spec(keyword(spellings(PYTHON=""), spellings(MATLAB=""))),
-        "cpost_param_string": Spec(TEXT, note=_POST),
-        "cpost_fnc_name": Spec(TEXT, note=_POST),
-        "cpost_dll_name": Spec(TEXT, note=_POST),
-        "cpost_script_name": Spec(TEXT, note=_POST),
-        "cpost_interpreter": Spec(TEXT, note=_POST),
+        "interpreter": Spec(keyword(spellings(PYTHON="", MATLAB="", OCTAVE=""))),
+        "cpost_param_string": Spec(USER),
+        "cpost_fnc_name": Spec(TEXT),
+        "cpost_dll_name": Spec(TEXT, refused=_POST_IN_PYTHON, harmless="NULL"),
+        "cpost_script_name": Spec(TEXT),
+        "cpost_interpreter": Spec(keyword(spellings(PYTHON=""))),
     },
     _build_contact,
 )

@@ -36,10 +36,10 @@ def spellings(**canonical: str) -> dict[str, str]:
 
 
 # one keyword, many documented forms; the canonical one is the key
-CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="")
+CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="", USERCNF="USER")
 #: Laws that need no shapes: those of limits.
 CNF_OF_LIMITS = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="")
-CNF_NOT_BUILT = spellings(VOLUME="", USERCNF="USER")
+CNF_NOT_BUILT = spellings(VOLUME="")
 _OTHER_WORDS = {
     "COULOMB_ON": "ON",
     "COULOMB_OFF": "OFF",

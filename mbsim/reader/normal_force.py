@@ -9,7 +9,7 @@ from mbsim.reader.statement import Entry
 
 DEFAULT_SPEED = 1e-3  # of transition velocities, in model units whatever these are
 
-_USER_LAW = {"cnf_param_string", "cnf_fnc_name", "cnf_dll_name"}
+_USER_LAW = {"cnf_param_string", "cnf_fnc_name", "cnf_dll_name", "cnf_language"}
 _LAYERS = {"i_layer_depth", "j_layer_depth"}
 _MODULI = ("i_elastic_modulus", "j_elastic_modulus")
 
@@ -17,8 +17,10 @@ _MODULI = ("i_elastic_modulus", "j_elastic_modulus")
 def check_normal(entry: Entry, cnf_type: str) -> None:
     """Note the attributes that the law does not read, and check those it does."""
     every = {name for law in NORMAL_LAWS for name in NORMAL_LAWS[law].parameters}
-    unused = (every | _USER_LAW | _LAYERS) - set(NORMAL_LAWS[cnf_type].parameters)
-    note_unused(entry, f"cnf_type {cnf_type}", unused)
+    read = _USER_LAW if cnf_type == "USERCNF" else set(NORMAL_LAWS[cnf_type].parameters)
+    note_unused(entry, f"cnf_type {cnf_type}", (every | _USER_LAW | _LAYERS) - read)
+    if cnf_type == "USERCNF":
+        return
     _CHECKS[cnf_type](entry)
 
 

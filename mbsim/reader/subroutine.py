@@ -28,31 +28,52 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
     ----------
     entry : Entry
     prefix : str
-        Of its attributes: ``cff``, ``usrsub``.
+        Of its attributes: ``cff``, ``cnf``, ``cpost``, ``usrsub``.
     default : str
         The function, where ``<prefix>_fnc_name`` does not name one.
     """
-    dll = entry.get(f"{prefix}_dll_name", "NULL")
-    if dll.upper() not in ("", "NULL"):
-        entry.fault(
-            'shared libraries are not built yet; "NULL" names no file', f"{prefix}_dll_name"
-        )
-    script = entry.get("script_name", "")
+    dll = _library(entry, prefix)
+    named = f"{prefix}_script_name" if entry.given(f"{prefix}_script_name") else "script_name"
+    script = entry.get(named, "")
     if script:
         path = Path(script.replace("\\", "/"))
         path = path if path.is_absolute() else entry.draft.directory / path
         script = str(path.resolve())
         if not path.is_file():
-            entry.fault("no such file (the path is relative to the deck)", "script_name")
+            entry.fault("no such file (the path is relative to the deck)", named)
+    # a script of its own has an interpreter of its own
+    spoken = "PYTHON" if named != "script_name" else entry.get("interpreter", "PYTHON")
     if not entry.given(f"{prefix}_fnc_name"):
         entry.note(f"not given; taken as {default}", f"{prefix}_fnc_name")
     return el.Subroutine(
         par=entry.get(f"{prefix}_param_string", ()),
         fnc_name=entry.get(f"{prefix}_fnc_name", default),
-        dll_name="",
-        script_name=script,
-        interpreter=entry.get("interpreter", "PYTHON"),
+        dll_name=dll,
+        script_name="" if dll else script,
+        interpreter=entry.get(f"{prefix}_interpreter", spoken),
+        language=entry.get(f"{prefix}_language", ""),
+        source=entry.source if dll else el.Source(),
     )
+
+
+def _library(entry: Entry, prefix: str) -> str:
+    """Return the shared library that an element names, empty where it names none."""
+    name = f"{prefix}_dll_name"
+    dll = entry.get(name, "NULL").strip()
+    if dll.upper() in ("", "NULL"):
+        return ""
+    if prefix == "usrsub":
+        entry.fault('shared libraries are for Force_Contact alone; "NULL" names no file', name)
+        return ""
+    path = Path(dll.replace("\\", "/"))
+    path = path if path.is_absolute() else entry.draft.directory / path
+    # decks of several systems leave the suffix out
+    files = [path, *(path.with_name(path.name + suffix) for suffix in (".so", ".dylib", ".dll"))]
+    found = next((file for file in files if file.is_file()), None)
+    if found is None:
+        entry.fault("no such file (the path is relative to the deck)", name)
+        return ""
+    return str(found.resolve())
 
 
 def by_user(entry: Entry, expressions: tuple[str, ...] = ("expr",), type: str = "") -> bool:

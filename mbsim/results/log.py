@@ -232,6 +232,13 @@ def title(contact: Contact) -> str:
 
 def _normal_lines(system: System, contact: Contact) -> Iterator[str]:
     """Yield a contact's normal law, and the numbers its formula took from the deck."""
+    user = system.user_normal.get(contact.id)
+    if user is not None:
+        yield fact("normal law", f"user {user.name}, {user.how}")
+        yield fact("normal law's file", user.source)
+        if user.reason:
+            yield fact("interpreted because", user.reason)
+        return
     yield fact("normal law", f"{contact.cnf_type}, built in")
     row = system.scene.contacts.normal_par[system.contact_ids.index(contact.id)]
     # a row is as long as the longest law's
@@ -246,8 +253,7 @@ def _friction_lines(system: System, contact: Contact) -> Iterator[str]:
         built_in = contact.cff_type != "COULOMB_OFF"
         yield fact("friction law", f"{contact.cff_type}, built in" if built_in else "none")
         return
-    how = "compiled" if user.compiled else "interpreted"
-    yield fact("friction law", f"user {user.name}, {how}")
+    yield fact("friction law", f"user {user.name}, {user.how}")
     yield fact("friction file", user.source)
     if not user.compiled:
         yield fact("interpreted because", user.reason)

@@ -14,6 +14,7 @@ import numpy as np
 from mbsim.errors import ModelError, ResultsError
 from mbsim.expressions import Expression
 from mbsim.model.elements import Model
+from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, acting, elements_of, facts
 from mbsim.results.files import prepare_directory
@@ -136,6 +137,7 @@ class Recorder:
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._target: Path | None = None
+        self._posts = ContactPosts(system, system.posts) if system.posts else None
         check_requests(system.model)
         settings: dict[str, Value] = {**attributes, **_digests(system)}
         if directory is not None:
@@ -199,8 +201,15 @@ class Recorder:
         self._blocks.append(block)
         self._bytes += block.bytes
         self._rows_since_flush += n + events
+        if self._posts is not None:
+            self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
         if self._bytes > self._buffer:
             self._write()
+
+    def end(self) -> None:
+        """Tell the users' CONTACTPOSTs that the run has reached its end."""
+        if self._posts is not None:
+            self._posts.end()
 
     def due(self) -> bool:
         """Return whether it is time for a flush: they cost a twentieth of the run at most."""
@@ -381,6 +390,17 @@ def _said(element: Any) -> str:
     return f"{type(element).__name__} {said}"
 
 
+def _constants(
+    system: System, par: np.ndarray[Any, Any], users: Mapping[int, Any]
+) -> np.ndarray[Any, Any]:
+    """Return the parameters of laws without the addresses among those of users' laws."""
+    par = par.copy()
+    for k, id in enumerate(system.contact_ids):
+        if id in users:
+            par[k, : len(users[id].hidden)] = 0.0
+    return par
+
+
 def _digests(system: System) -> dict[str, Value]:
     """Return digests of the model as it is run (--set included) and of users' files."""
     scene = system.scene
@@ -388,8 +408,8 @@ def _digests(system: System) -> dict[str, Value]:
         *scene.bodies,
         *_without_size(scene.graphics),
         scene.contacts.id,
-        scene.contacts.normal_par,
-        scene.contacts.friction_par,
+        _constants(system, scene.contacts.normal_par, system.user_normal),
+        _constants(system, scene.contacts.friction_par, system.user_friction),
         scene.contacts.ignore_deeper,
         scene.world.gravity,
         scene.world.scale,
@@ -409,9 +429,12 @@ def _digests(system: System) -> dict[str, Value]:
     for array in arrays:
         model.update(np.ascontiguousarray(array).tobytes())
     users = hashlib.sha256()
-    for contact_id, user in system.user_friction.items():
+    for contact_id, user in system.user_laws:
         users.update(f"{contact_id} {user.name} {user.compiled}\n".encode())
         users.update(Path(user.source).read_bytes())
+    for post in system.posts:
+        users.update(f"{post.contact.id} {post.user.fnc_name} {post.user.par}\n".encode())
+        users.update(post.source.read_bytes())
     for element, subroutine in system.subroutines.items():
         users.update(f"{element} {subroutine.name}\n".encode())
         users.update(Path(subroutine.source).read_bytes())

@@ -114,6 +114,9 @@ EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
 
 # columns of `State.sides`: see dynamics.kinks
 SIDE, HEAT = range(2)
+#: What is hotter changes at nearly every step, as the sign of what is at rest does: then steps are
+#: not cut there.
+HOT = 4.0
 
 
 class Bodies(NamedTuple):
@@ -207,6 +210,8 @@ class Contacts(NamedTuple):
     size: F1  # (nc,) a usual size of these where they are part of y, else 0
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
+    reads_x: I1  # (nc,) 1 where an error of X counts
+    user_normal: I1  # (nc,) where `laws.user_normal` has its place, 0 for a built-in normal law
 
 
 class Slots(NamedTuple):

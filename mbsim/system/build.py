@@ -40,7 +40,9 @@ from mbsim.system.weight import Pull
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
+    from mbsim.plugins.contact_post import ContactPost
     from mbsim.plugins.loader import Script
+    from mbsim.plugins.normal import UserNormal
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.system.subroutines import StateReader
 
@@ -76,6 +78,14 @@ class System:
     subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
     pulls: list[Pull] = field(default_factory=list)  # every gravity, that of the start first
     reader: StateReader | None = None  # what py_sysfnc looks at
+    user_normal: dict[int, UserNormal] = field(default_factory=dict)  # by contact id
+    posts: list[ContactPost] = field(default_factory=list)  # the users' CONTACTPOSTs
+    load: float = 0.0  # a usual force, by which friction is judged
+
+    @property
+    def user_laws(self) -> list[tuple[int, UserFriction | UserNormal]]:
+        """Users' friction laws, then their normal laws, with the contact's id."""
+        return [*self.user_friction.items(), *self.user_normal.items()]
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
@@ -166,12 +176,51 @@ def _load_user_friction(
     if not wanted:
         return {}
     from mbsim.plugins import failure, host, load_friction
+    from mbsim.plugins.subroutine import end_run
 
+    end_run()  # an earlier one that failed while it was built
     failure.clear()
     host.forget()
     if log is not None:
         host.log = log
     return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
+
+
+def _load_user_normal(
+    model: Model,
+    plugins: Sequence[Path],
+    interpret: bool,
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> dict[int, UserNormal]:
+    """Load the users' CNFSUBs."""
+    wanted = [c for c in model.contacts.values() if c.cnf_type == "USERCNF"]
+    if not wanted:
+        return {}
+    from mbsim.plugins.normal import load_normal
+    from mbsim.plugins.subroutine import begin_run, end_run
+
+    if all(c.cff_type != "USERCFF" for c in model.contacts.values()):
+        end_run()
+    begin_run(log)
+    return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
+
+
+def _load_posts(
+    model: Model,
+    plugins: Sequence[Path],
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> list[ContactPost]:
+    """Load the users' CONTACTPOSTs."""
+    wanted = [c for c in model.contacts.values() if c.cpost is not None]
+    if not wanted:
+        return []
+    from mbsim.plugins.contact_post import load_post
+    from mbsim.plugins.subroutine import begin_run
+
+    begin_run(log)
+    return [load_post(c, plugins, scripts) for c in wanted]
 
 
 def _load_subroutines(
@@ -239,6 +288,8 @@ def build(
     kinds = plans.kinds
     scripts: dict[Path, Script] = {}
     user = _load_user_friction(model, plugins, interpret, log, scripts)
+    normal = _load_user_normal(model, plugins, interpret, log, scripts)
+    posts = _load_posts(model, plugins, log, scripts)
     subroutines = _load_subroutines(model, plugins, log, scripts)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
@@ -257,7 +308,7 @@ def build(
     pairs, ns = pairs_table(plans, kinds, graphic_row)
     speed = _speed_scale(model, placement, end_time)
     load = _usual_load(placement, speed)
-    contacts, uses_x = contacts_table(contact_list, user, load)
+    contacts, uses_x = contacts_table(contact_list, user, normal, load)
     most = int(contacts.memory.max(initial=0))
 
     # X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them
@@ -275,7 +326,7 @@ def build(
 
     table = MarkerTable(placement, row)
     first_state = a.BODY_SIZE * nb + carried
-    rubs = any(friction.looks for friction in user.values())
+    rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
     rows = acting(model, table, first_state, subroutines, looks)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
@@ -340,6 +391,9 @@ def build(
             len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
         ),
     )
+    if posts:
+        # one row at a time: CONTACTPOST sees which graphics a slot serves at that time
+        scene = scene._replace(rows=scene.rows._replace(time=np.zeros(1)))
     if rows.reader is not None:
         rows.reader.open(scene)
     needs_fcl = any(not kind.closed_form for kind in kinds)
@@ -362,4 +416,7 @@ def build(
         subroutines,
         pulled,
         rows.reader,
+        normal,
+        posts,
+        load=load,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from mbsim.system.pairing import (
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
+    from mbsim.plugins.normal import UserNormal
 
 #: Places for near pairs of a crowd, for each of its graphics.
 NEAR_EACH = 24
@@ -211,22 +212,31 @@ def _or(value: float | None, default: float) -> float:
 
 def _full_damping_depth(contact: Contact) -> float:
     """Return dmax [L] where the normal law reads it, else 0."""
+    if contact.cnf_type == "USERCNF":
+        return 0.0
     read = "dmax" in NORMAL_LAWS[contact.cnf_type].parameters
     return _or(contact.dmax, 0.0) if read else 0.0
 
 
 def contacts_table(
-    contacts: list[Contact], user: dict[int, UserFriction], load: float
+    contacts: list[Contact],
+    user: dict[int, UserFriction],
+    user_normal: Mapping[int, UserNormal],
+    load: float,
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
     """Return the contacts, and for each whether X has to be carried; `load`: a usual force."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
     memory, size = np.zeros(n, dtype=np.int64), np.zeros(n)
     for k, contact in enumerate(contacts):
-        law = NORMAL_LAWS[contact.cnf_type]
-        normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
+        if contact.id in user_normal:
+            own = user_normal[contact.id]
+            normal.append((own.address, own.row))
+        else:
+            law = NORMAL_LAWS[contact.cnf_type]
+            normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
         if contact.cff_type == "USERCFF":
-            friction.append(user[contact.id].par)
+            friction.append(user[contact.id].row)
             addresses.append(user[contact.id].address)
             uses_x[k] = user[contact.id].uses_x
         elif contact.cff_type == "COULOMB_OFF":
@@ -247,7 +257,7 @@ def contacts_table(
         return wide
 
     sliding = [
-        (user[c.id].address, user[c.id].par)
+        (user[c.id].address, user[c.id].row)
         if c.id in user and c.cff_type != "USERCFF"
         else (0, np.zeros(0))
         for c in contacts
@@ -272,5 +282,12 @@ def contacts_table(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
+        reads_x=np.array(
+            [c.cff_type != "USERCFF" or user[c.id].reads_x for c in contacts], dtype=np.int64
+        ),
+        user_normal=np.array(
+            [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
+            dtype=np.int64,
+        ),
     )
     return made, uses_x

@@ -16,6 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import COULOMB, GRAVITY, GROUND, MODELS, USERFUNCS, contact, sphere, write_deck
 
 import mbsim
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
 
 pytestmark = pytest.mark.bench
 CLI = [sys.executable, "-c", "from mbsim.cli.main import main; main()"]
@@ -78,7 +80,6 @@ NORMAL = {
 
 def test_calls_of_normal_laws():
     from mbsim.core import jit
-    from mbsim.core.address import call_int
     from mbsim.laws import abi
     from mbsim.laws.catalog import NORMAL_LAWS
     from mbsim.model.elements import Contact
@@ -106,33 +107,52 @@ def test_calls_of_normal_laws():
         assert total > 0.0
 
 
-def test_calls_of_user_subroutines():
+@jitable
+def _call(address, given, par, out):
+    return call_int(address, (1, given, par, out))
+
+
+def _calls(address, given, par, out, count):
+    for _ in range(count):
+        _call(address, given, par, out)
+
+
+def ns_a_call(user, count):
+    """Return the median time of a call of a friction function from compiled code [ns]."""
     from mbsim.core import jit
-    from mbsim.core.address import call_int
-    from mbsim.core.jitable import jitable
+
+    run, given, out = jit.function(_calls), np.zeros(20), np.zeros(5)
+    given[5], given[10] = 0.3, 50.0
+    run(user.address, given, user.row, out, 10)
+    times = []
+    for _ in range(7):
+        began = time.perf_counter()
+        run(user.address, given, user.row, out, count)
+        times.append(1e9 * (time.perf_counter() - began) / count)
+    return statistics.median(times)
+
+
+@pytest.mark.parametrize("source", ["cffsub.c", "cffsub.f90"])
+def test_calls_of_libraries(tmp_path, source):
+    from libraries import example
+
     from mbsim.plugins import load_friction
 
-    @jitable
-    def call(address, given, par, out):
-        return call_int(address, (1, given, par, out))
+    deck = mbsim.read_model(MODELS / "seed_contact.xml")
+    user = load_friction(deck.contacts[301001], [example(tmp_path, source)])
+    cost = ns_a_call(user, 1_000_000)
+    print(f"\n{user.language}: {cost:.1f} ns a call, its body included")
+    assert cost > 0
 
-    def loop(address, given, par, out, count):
-        for _ in range(count):
-            call(address, given, par, out)
 
-    run = jit.function(loop)
+def test_calls_of_user_subroutines():
+    from mbsim.plugins import load_friction
+
     deck = mbsim.read_model(MODELS / "bowling_ball.xml")
-    given, out = np.zeros(19), np.zeros(5)
-    given[5], given[10] = 0.3, 50.0
     print()
     for interpret, count in ((False, 1_000_000), (True, 100_000)):
         user = load_friction(deck.contacts[301], (), interpret)
-        run(user.address, given, user.par, out, 10)
-        times, bodies = [], []
-        for _ in range(5):
-            began = time.perf_counter()
-            run(user.address, given, user.par, out, count)
-            times.append((time.perf_counter() - began) / count)
+        cost, bodies = 1e-9 * ns_a_call(user, count), []
         zero = [0.0, 0.0, 0.0]
         for _ in range(5):
             began = time.perf_counter()
@@ -143,6 +163,49 @@ def test_calls_of_user_subroutines():
             bodies.append((time.perf_counter() - began) / 20_000)
         kind = "interpreted" if interpret else "compiled"
         body = statistics.median(bodies) if interpret else 0.0
-        cost = statistics.median(times)
         print(f"{kind}: {1e9 * cost:.0f} ns a call, {1e9 * (cost - body):.0f} ns above its body")
         assert cost > 0
+
+
+def test_calls_by_octave():
+    from libraries import need
+
+    from mbsim.plugins import load_friction
+    from mbsim.plugins.subroutine import end_run
+
+    need("octave-cli")
+    deck = mbsim.read_model(MODELS / "seed_contact.xml")
+    user = load_friction(deck.contacts[301001], [USERFUNCS / "CFFSUB.m"])
+    cost = ns_a_call(user, 2_000)
+    end_run()
+    print(f"\n{user.language}: {1e-3 * cost:.0f} us a call, its body included")
+    assert cost > 0
+
+
+@jitable
+def _normal_calls(address, par, out, count):
+    for _ in range(count):
+        call_int(address, (1e-3, 0.1, par, out))
+
+
+@pytest.mark.parametrize("how", ["cnfsub.c", "cnfsub.f90", "compiled", "interpreted"])
+def test_calls_of_users_normal_laws(tmp_path, how):
+    from libraries import example
+
+    from mbsim.core import jit
+    from mbsim.laws import user_normal
+    from mbsim.model.elements import Contact, Subroutine
+    from mbsim.plugins.normal import load_normal
+
+    file = example(tmp_path, how) if "." in how else USERFUNCS / "cnfsub.py"
+    par = Subroutine((1e5, 1.5, 0.4), "CNFSUB")
+    user = load_normal(Contact(1, cnf=par), [file], how == "interpreted", {}, print)
+    user.place[user_normal.MODE] = user_normal.EVALUATE
+    run, out, count = jit.function(_normal_calls), np.zeros(3), 200_000
+    times = []
+    for _ in range(7):
+        began = time.perf_counter()
+        run(user.address, user.row, out, count)
+        times.append(1e9 * (time.perf_counter() - began) / count)
+    print(f"\nCNFSUB {user.how}: {statistics.median(times):.1f} ns a call, its body included")
+    assert out[0] > 0.0

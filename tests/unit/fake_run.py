@@ -114,6 +114,9 @@ def fake_system_of(model: Model) -> Any:
         marker_rows=table.rows,
         values=values,
         user_friction={},
+        user_normal={},
+        user_laws=[],
+        posts=[],
         subroutines={},
     )
 

@@ -295,14 +295,14 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ("Force_Contact[301]", 'i_flexbody_id="5"', "not built yet"),
     ),
     "MATLAB": (
-        deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" interpreter="MATLAB"')),
+        deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" interpreter="COMPOSE"')),
         FRICTION_LINE,
-        ('interpreter="MATLAB"', "not built yet"),
+        ('interpreter="COMPOSE"', "PYTHON, MATLAB, OCTAVE"),
     ),
     "shared library": (
         deck(('cff_type="COULOMB_ON"', 'cff_type="USERCFF" cff_dll_name="friction.so"')),
         FRICTION_LINE,
-        ('cff_dll_name="friction.so"', "not built yet", '"NULL"'),
+        ('cff_dll_name="friction.so"', "no such file", "relative to the deck"),
     ),
     "gravity expression": (
         deck(('grav_z="-9.81"', 'grav_z="-9.81*DZ(20)"')),

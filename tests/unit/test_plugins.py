@@ -22,7 +22,32 @@ from mbsim.plugins import helpers
 ROOT = Path(__file__).resolve().parents[2]
 PAR = (0.05, 0.01, 0.1, 0.5)
 ARGS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
-INPUTS = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0, 0, 5.0, 0, 0, 1, 2, 3, 4, 5, 6]
+INPUTS = [
+    0.7,
+    0.0,
+    0.01,
+    -0.02,
+    0.03,
+    0.3,
+    -0.4,
+    0.2,
+    0,
+    0,
+    5.0,
+    0,
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    0,
+    0,
+    0,
+    0,
+    0,
+]
 C_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
@@ -34,7 +59,7 @@ def contact(par=PAR, **words):
 
 
 def call(user, inputs=INPUTS):
-    given, out = (ctypes.c_double * 19)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
+    given, out = (ctypes.c_double * 20)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
     code = C_FUNCTION(user.address)(301001, given, user.par.ctypes.data, out)
     return code, list(out)
 
@@ -67,7 +92,7 @@ def shipped(request):
 def coulomb_on(inputs):
     groups = FrictionInput(
         inputs[0], inputs[1], inputs[2:5], inputs[5:8], inputs[8:10], *inputs[10:13],
-        inputs[13:16], inputs[16:19],
+        inputs[13:16], inputs[16:19], *5 * [0.0],
     )  # fmt: skip
     return FRICTION_LAWS["COULOMB_ON"].force(groups, *PAR)
 
@@ -325,7 +350,7 @@ def test_any_sequence_of_three_numbers_is_a_force(load, result):
 
 
 def test_ctrl_c_inside_a_function_stays_ctrl_c(load):
-    user = load("raise KeyboardInterrupt")
+    user = load("if not iflag:\n    raise KeyboardInterrupt\nreturn [0.0, 0.0, 0.0]")
     assert call(user)[0] == 1
     with pytest.raises(KeyboardInterrupt):
         plugins.raise_failure()
@@ -369,9 +394,9 @@ def test_load_faults_name_file_and_line(tmp_path):
     refused("is a int, not a function", contact(), [write("int.py", "CFFSUB = 3\n")])
     refused(r"few.py:1: CFFSUB\(a, b\) cannot", contact(),
             [write("few.py", "def CFFSUB(a, b):\n    pass\n")])  # fmt: skip
-    refused("not built yet", contact(), [tmp_path / "law.so"])
-    refused("not built yet", contact(dll_name="law"))
-    refused("not built yet", contact(interpreter="MATLAB"))
+    refused("law.so: No such file", contact(), [tmp_path / "law.so"])
+    refused("law: No such file", contact(dll_name="law"))
+    refused(r"names no .m file; name CFFSUB.m by", contact(interpreter="MATLAB"))
     refused("CFFSUB_STATES", contact(), [write("states.py", "CFFSUB_STATES = 2\n" + good)])
     text = refused("boom.py:2: the script fails", contact(), [write("boom.py", "a = 1\n1/0\n")])
     assert "ZeroDivisionError: division by zero" in text
@@ -541,7 +566,43 @@ def test_messages_go_to_the_log_of_the_host(load, monkeypatch):
         "py_errmes(0, 'no', id, 'STOP')\npy_errmes(1, 'hm', id, 'CONTINUE')\n"
         "return [py_getstm(), 0, 0]"
     )
+    lines.clear()  # the call with iflag 1 says the same
     assert call(user)[1][0] == 0.7
     assert lines == ["USRMES:USER [301001] INFO: hello", "ERRMES:USER [301001] ERROR: hm"]
     assert load.log
     assert np.isfinite(user.par).all()
+
+
+# -- iflag and dflag
+
+
+def test_an_interpreted_function_is_called_once_with_iflag(load):
+    text = (
+        "calls = []\n"
+        f"def CFFSUB({ARGS}):\n"
+        "    calls.append((iflag, dflag, time, nforce, x, xdot, par, npar))\n"
+        "    d, errflg = py_sysfnc('dx', [20, 10.0])\n"
+        "    v, errflg = py_sysary('TVEL', [par[0]])\n"
+        "    d, errflg = py_sysfnc('DX', [20, 10])\n"
+        "    return [v[0] / errflg, 0.0, 0.0] if errflg else [0.0, 0.0, 0.0]\n"
+    )
+    user = load(text, par=(5.0,))
+    zeros = [0.0, 0.0, 0.0]
+    calls = user.function.__globals__["calls"]
+    assert calls == [(1, 0, 0.0, 0.0, zeros, zeros, [5.0], 1)]
+    assert user.asked == ("DX 20 10", "TVEL 5")
+    call(user, [*INPUTS[:-1], 1.0])
+    assert [(flags[0], flags[1]) for flags in calls] == [(1, 0), (0, 1)]
+
+
+def test_what_fails_under_iflag_is_said_and_is_no_fault(load):
+    user = load("return [1.0 / nforce, 0.0, 0.0]", interpret=True)
+    assert any("iflag 1 fails" in line and "ZeroDivisionError" in line for line in load.log)
+    assert call(user)[1][0] == 1.0 / INPUTS[10]
+
+
+def test_a_compiled_function_sees_dflag(load):
+    user = load("if dflag:\n    return [1.0, 0.0, 0.0]\nreturn [2.0, 0.0, 0.0]")
+    assert user.compiled
+    assert call(user)[1][0] == 2.0
+    assert call(user, [*INPUTS[:-1], 1.0])[1][0] == 1.0

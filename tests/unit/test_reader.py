@@ -382,12 +382,12 @@ def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
         ('type="Sphere"', 'type="Sphere" color="1:2:3" hidden="FALSE"'),
         ('type="Plane"', 'type="Plane" color="1:2:3"'),
         ("<Param_Transient", '<Param_Transient dae_index="3" max_order="5"'),
-        ('id="301"', 'id="301" cpost_fnc_name="POST" enable_node_mode="FALSE"'),
+        ('id="301"', 'id="301" enable_node_mode="FALSE"'),
         ("</Command>", '<H3DOutput switch_on="TRUE"/><Stop/></Command>'),
     )
     notes = read(tmp_path, text).notes
-    assert len(notes) == 8
-    for words in ("ResOutput", "color", "hidden", "dae_index", "max_order", "cpost", "H3D", "Stop"):
+    assert len(notes) == 7
+    for words in ("ResOutput", "color", "hidden", "dae_index", "max_order", "H3D", "Stop"):
         assert sum(words in note for note in notes) == 1
     assert any(":7 and 1 more: Post_Graphic color" in note for note in notes)
 

@@ -307,7 +307,10 @@ def test_a_script_may_come_with_plugin(tmp_path):
         ("", "expr: missing; must be an expression, or usrsub_param_string"),
         ('usrsub_fnc_name="F" script_name="sub.py"', "usrsub_param_string: missing"),
         ('usrsub_param_string="USER(1)" script_name="no.py"', "no such file"),
-        ('usrsub_param_string="USER(1)" usrsub_dll_name="a.dll"', "shared libraries are not"),
+        (
+            'usrsub_param_string="USER(1)" usrsub_dll_name="a.dll"',
+            "shared libraries are for Force_Contact alone",
+        ),
     ],
 )
 def test_faults_of_the_deck(tmp_path, attributes, said):

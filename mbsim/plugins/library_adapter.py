@@ -1,0 +1,75 @@
+"""The documented C and Fortran CFFSUB behind the internal signature of friction laws.
+
+Compiled once for all libraries: where the user's function lies differs in every process, so it
+comes as data. The parameters of such a law begin with the address of a packed `LibraryCall`.
+Apart from `shared_library`, so that the cache key of this covers no more than it needs.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# what Numba compiles carries no annotations, as in laws/ and core/blend.py
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import carray  # type: ignore[attr-defined]
+
+from mbsim.core.address import call_int, view
+from mbsim.core.arrays import F1, I1
+from mbsim.core.jitable import jitable
+from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
+
+
+class LibraryCall(NamedTuple):
+    """What a call of a library's function needs beside the law's input; one a contact."""
+
+    address: I1  # (1,) of the user's function
+    whole: Annotated[npt.NDArray[np.int32], "int32", 1]  # id, npar, dflag, iflag
+    par: F1  # (npar,) a copy: what the function writes there is gone at the next call
+    result: F1  # (8,) what it returns, with room for a function that returns too much
+
+
+@jitable
+def begin_call(call, element, values, dflag):
+    """Write down what a call is given; results that it leaves unset are found, as nan."""
+    for k in range(len(call.par)):
+        call.par[k] = values[k]
+    call.whole[0], call.whole[1] = element, len(call.par)
+    call.whole[2], call.whole[3] = dflag, 0
+    for k in range(3):
+        call.result[k] = np.nan
+
+
+def call_c(element, inputs, par, out):
+    """CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, result)."""
+    # mypy sees the typing context that Numba passes to an intrinsic as a first argument
+    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
+    a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
+    whole, result = call.whole, call.result
+    begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))
+    # the function returns nothing, and nobody looks at what `call_int` takes for its result
+    call_int(
+        call.address[0],
+        (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:],
+         whole[2:], whole[3:], result),
+    )  # fmt: skip
+    force = carray(out, (5,))
+    force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]
+    return 0
+
+
+def call_fortran(element, inputs, par, out):
+    """CFFSUB(ID, TIME, PAR, NPAR, LOCI, LOCJ, X, XDOT, NFORCE, AREA, DFLAG, IFLAG, RESULTS)."""
+    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
+    a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
+    whole, result = call.whole, call.result
+    begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))
+    call_int(
+        call.address[0],
+        (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:], a[11:],
+         whole[2:], whole[3:], result),
+    )  # fmt: skip
+    force = carray(out, (5,))
+    force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]
+    return 0

@@ -1,0 +1,50 @@
+"""What functions a shared library defines, read from the file: nothing of it runs."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+_DYNAMIC_SYMBOLS = 11  # SHT_DYNSYM
+_FUNCTION, _INDIRECT_FUNCTION = 2, 10  # STT_FUNC, STT_GNU_IFUNC
+_RUNTIME = {"_init", "_fini"}
+
+
+def functions_of(path: Path) -> set[str] | None:
+    """Return the names of the functions that a library defines for others.
+
+    None where the file is no 64-bit ELF library (System V ABI, chapters 4 and 5), as on
+    Windows and macOS: whoever opens the library can still ask for a name.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    data = path.read_bytes()
+    if data[:4] != b"\x7fELF" or len(data) < 64 or data[4] != 2:
+        return None
+    order = "<" if data[5] == 1 else ">"
+    try:
+        return _defined(data, order)
+    except (struct.error, IndexError, ValueError):
+        return None
+
+
+def _defined(data: bytes, order: str) -> set[str]:
+    """Return the defined functions of an ELF64 file's table of dynamic symbols."""
+    (at,) = struct.unpack_from(f"{order}Q", data, 40)
+    size, count = struct.unpack_from(f"{order}HH", data, 58)
+    # name, type, flags, address, offset, size, link, info, alignment, size of an entry
+    sections = [struct.unpack_from(f"{order}IIQQQQIIQQ", data, at + k * size) for k in range(count)]
+    found: set[str] = set()
+    for section in sections:
+        if section[1] != _DYNAMIC_SYMBOLS:
+            continue
+        names = sections[section[6]][4]
+        for start in range(section[4], section[4] + section[5], 24):
+            name, info, _, home, _, _ = struct.unpack_from(f"{order}IBBHQQ", data, start)
+            if home != 0 and info >> 4 != 0 and info & 15 in (_FUNCTION, _INDIRECT_FUNCTION):
+                first = names + name
+                found.add(data[first : data.index(b"\0", first)].decode())
+    return found - _RUNTIME
