@@ -22,32 +22,8 @@ from mbsim.plugins import helpers
 ROOT = Path(__file__).resolve().parents[2]
 PAR = (0.05, 0.01, 0.1, 0.5)
 ARGS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
-INPUTS = [
-    0.7,
-    0.0,
-    0.01,
-    -0.02,
-    0.03,
-    0.3,
-    -0.4,
-    0.2,
-    0,
-    0,
-    5.0,
-    0,
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    0,
-    0,
-    0,
-    0,
-    0,
-]
+INPUTS = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0, 0, 5.0, 0, 0, 1, 2, 3, 4, 5, 6]
+INPUTS += 5 * [0.0]  # what only derivatives and laws with memory are told
 C_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
