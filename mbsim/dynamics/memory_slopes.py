@@ -123,8 +123,8 @@ def fill(scene, T, y):
                 return code
         for row in range(5 + n):
             table[row, column] = (upper[row] - lower[row]) / (2.0 * size)
-    for i in range(K.place.shape[1]):
-        K.place[count, i] = place_of(scene, s, i) if i < n else -1
+    for i in range(K.carries.shape[1]):
+        K.carries[count, i] = place_of(scene, s, i) if i < n else -1
     for side in range(2):
         K.body[count, side] = scene.graphics.body[gi if side == 0 else gj]
         for way in range(6):
@@ -164,7 +164,7 @@ def invert(A, Z, n):
 def count_of(K, k):
     """Return how many numbers the k-th slot held carries."""
     n = 0
-    while n < K.place.shape[1] and K.place[k, n] >= 0:
+    while n < K.carries.shape[1] and K.carries[k, n] >= 0:
         n += 1
     return n
 
@@ -229,7 +229,7 @@ def drive(scene, T, M, r, k, e, with_moves):
     K, nb, pair = T.keeps, len(scene.bodies.mass), T.keeps.body[k]
     n = count_of(K, k)
     for i in range(n):
-        e[i] = r[K.place[k, i]]
+        e[i] = r[K.carries[k, i]]
     for by in range(2):
         b = pair[by]
         if b >= nb:
@@ -283,7 +283,7 @@ def recover(scene, T, M, r, d):
             total = 0.0 * M.c[0, 0]
             for j in range(n):
                 total += Z[i, j] * e[j]
-            d[K.place[k, i]] = total
+            d[K.carries[k, i]] = total
 
 
 def _real(context, what, r, d):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from mbsim.laws import user_normal as at
+from mbsim.laws.abi import FRICTION_INPUTS
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 
@@ -93,7 +94,7 @@ def disagreement(
 ) -> str:
     """Return '' if the code at `address` does what `call` does at every probe, else where not."""
     entry = guard.C_FUNCTION(address)
-    c_inputs, c_out = (ctypes.c_double * 20)(), (ctypes.c_double * 5)()
+    c_inputs, c_out = (ctypes.c_double * FRICTION_INPUTS)(), (ctypes.c_double * 5)()
     unset = (ctypes.c_double * 5)(*[math.nan] * 5)
     c_par = (ctypes.c_double * max(len(par), 1))(*par)
 

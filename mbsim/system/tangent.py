@@ -114,7 +114,7 @@ class Keeps(NamedTuple):
 
     held: I1  # (slots + 1,) slots in contact, their number last
     body: I2  # (slots, 2) I's and J's, as lists of pairs may have changed since
-    place: I2  # (slots, carried) where what is carried stands in y, -1 behind the last
+    carries: I2  # (slots, carried) where what is carried stands in y, -1 behind the last
     table: F3  # (slots, 5 + carried, 6 + carried) forces, then rates of what is carried; by slip,
     # spin and normal force, then by what is carried
     lever: F4  # (slots, 2, 6, 6) wrenches on I's and on J's body of units along n, x, y, and about

@@ -121,7 +121,7 @@ def ns_a_call(user, count):
     """Return the median time of a call of a friction function from compiled code [ns]."""
     from mbsim.core import jit
 
-    run, given, out = jit.function(_calls), np.zeros(20), np.zeros(5)
+    run, given, out = jit.function(_calls), np.zeros(24), np.zeros(5)
     given[5], given[10] = 0.3, 50.0
     run(user.address, given, user.row, out, 10)
     times = []

@@ -567,7 +567,7 @@ def test_an_interpreted_function_is_called_once_with_iflag(load):
     calls = user.function.__globals__["calls"]
     assert calls == [(1, 0, 0.0, 0.0, zeros, zeros, [5.0], 1)]
     assert user.asked == ("DX 20 10", "TVEL 5")
-    call(user, [*INPUTS[:-1], 1.0])
+    call(user, [*INPUTS[:19], 1.0, *INPUTS[20:]])
     assert [(flags[0], flags[1]) for flags in calls] == [(1, 0), (0, 1)]
 
 
@@ -581,4 +581,4 @@ def test_a_compiled_function_sees_dflag(load):
     user = load("if dflag:\n    return [1.0, 0.0, 0.0]\nreturn [2.0, 0.0, 0.0]")
     assert user.compiled
     assert call(user)[1][0] == 2.0
-    assert call(user, [*INPUTS[:-1], 1.0])[1][0] == 1.0
+    assert call(user, [*INPUTS[:19], 1.0, *INPUTS[20:]])[1][0] == 1.0

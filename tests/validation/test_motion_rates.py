@@ -29,7 +29,11 @@ from mbsim.system import arrays
 END = 1.0
 #: Steps of two runs, and the tol of which only Newton's iteration knows: RADAU5's errors are to be
 #: above what that leaves, some 1e-11, in steps that it solves.
-RADAU5 = {"chain, rising rate": ((32, 64), 1e-9), "pulled": ((128, 256), 1e-10)}
+RADAU5 = {
+    "chain, rising rate": ((32, 64), 1e-9),
+    "pulled, rate": ((256, 512), 1e-11),
+    "pulled": ((128, 256), 1e-11),
+}
 
 
 def axes(x, y, z):
@@ -73,9 +77,9 @@ MOTIONS = {
 #: Of a point along an axis that turns with another body.
 PULLS = {
     "rate": '<Motion_Marker id="1" i_marker_id="102" j_marker_id="101" direction="Y" '
-    'val_type="V" expr="0.2*SIN(3*TIME)"/>',
+    'val_type="V" expr="1.5*SIN(15*TIME)"/>',
     "rising rate": '<Motion_Marker id="1" i_marker_id="102" j_marker_id="101" direction="Y" '
-    'val_type="A" expr="0.2*SIN(3*TIME)"/>',
+    'val_type="A" expr="2*SIN(9*TIME)"/>',
 }
 DECKS = {f"chain, {name}": (CHAIN, text) for name, text in MOTIONS.items()}
 DECKS |= {f"loop, {name}": (LOOP, text) for name, text in MOTIONS.items()}
