@@ -22,12 +22,12 @@ PAR_MAX = 32
 
 
 def compile_friction(
-    text: str, values: dict[str, Any], name: str, par_count: int
+    text: str, values: dict[str, Any], name: str, par_count: int, states: int = 0
 ) -> tuple[int, str]:
     """Return the address of a compiled CFFSUB and '', or 0 and the reason why there is none.
 
     `values` is the namespace of the script after it has run: a name that its module binds
-    once to a number is a constant.
+    once to a number is a constant. With `states` it keeps so many numbers of its own.
     """
     if par_count > PAR_MAX:
         return 0, f"more than {PAR_MAX} parameters"
@@ -37,12 +37,12 @@ def compile_friction(
     except Refused as refused:
         return 0, str(refused)
     try:
-        module = _module(rewritten(order, known))
+        module = _module(rewritten(order, known, 12 if states else 11))
         callees = [getattr(module, each) for each in order[:-1]]
         with warnings.catch_warnings():
             # Numba's hints on speed are not for the user of a script
             warnings.simplefilter("ignore")
-            return friction_address(getattr(module, name), callees, par_count), ""
+            return friction_address(getattr(module, name), callees, par_count, states), ""
     except OSError as error:
         return 0, f"the cache folder {jit.cache_root()} cannot be written ({error})"
     except Exception as error:  # whatever Numba cannot do, Python still can

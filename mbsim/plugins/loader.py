@@ -27,6 +27,8 @@ from mbsim.plugins.diagnose import diagnose, lint, reads_parameter
 from mbsim.plugins.helpers import host, namespace
 
 _ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
+#: Numbers that a friction function of the user may keep at most.
+STATES_MAX = 64
 _LIBRARIES = (".so", ".dll", ".dylib", ".sl")
 _numbers = itertools.count(1)
 
@@ -76,6 +78,8 @@ class UserFriction:
         The user's own function object.
     looks : bool
         Whether it is interpreted and its script may ask for the state by `py_sysfnc`.
+    states : int
+        How many numbers it keeps: CFFSUB_STATES of its script.
     """
 
     address: int
@@ -89,17 +93,33 @@ class UserFriction:
     function: Callable[..., Any] = field(repr=False)
     keep: object = field(default=None, repr=False)
     looks: bool = False
+    states: int = 0
 
     def call(
-        self, time: float, par: Any, loci: Any, locj: Any, x: Any, xdot: Any, nforce: float
+        self,
+        time: float,
+        par: Any,
+        loci: Any,
+        locj: Any,
+        x: Any,
+        xdot: Any,
+        nforce: float,
+        dflag: int = 0,
+        state: Any = (),
     ) -> list[float]:
-        """Return [Fx, Fy, Tz] of the interpreted function; what it raises comes through."""
+        """Return [Fx, Fy, Tz] of the interpreted function, and its new state if it keeps one.
+
+        What it raises comes through. `state` may be longer than what it keeps.
+        """
         lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
         host.time = float(time)
         values, loci, locj, x, xdot = lists
         result = self.function(
-            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce), 0, 0
-        )
+            self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce),
+            dflag, 0, *([[float(value) for value in state][: self.states]] if self.states else ()),
+        )  # fmt: skip
+        if self.states:
+            return guard.force_and_state(result, self.states)
         return guard.three_numbers(result)
 
 
@@ -138,7 +158,8 @@ def load_friction(
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
-    function = user_function(script, name, element)
+    states = _states(script, contact)
+    function = user_function(script, name, element, _ARGUMENTS + ", state" * (states > 0))
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
     if script.text is not None:
@@ -159,6 +180,7 @@ def load_friction(
             function=function,
             keep=keep,
             looks=bool(reason) and script.looks,
+            states=states,
         )
 
     address, reason = 0, "--interpret-plugins"
@@ -168,8 +190,25 @@ def load_friction(
             say(f"{element}: {name} of {script.path} stays interpreted: {reason}")
     if not reason:
         return user(address, "")
-    address, keep = guard.callback(function, name, str(script.path), len(par))
+    address, keep = guard.callback(function, name, str(script.path), len(par), states)
     return user(address, reason, keep)
+
+
+def _states(script: Script, contact: Contact) -> int:
+    """Return how many numbers the friction functions of a script keep, 0 for none."""
+    count = script.values.get("CFFSUB_STATES", 0)
+    element = f"Force_Contact[{contact.id}]"
+    if type(count) is not int or not 0 <= count <= STATES_MAX:
+        raise ModelError(
+            f"{element}: {script.path}: CFFSUB_STATES = {count!r}: a whole number from 0 to "
+            f"{STATES_MAX} is allowed"
+        )
+    if count and contact.cff_type != "USERCFF":
+        raise ModelError(
+            f'{element}: {script.path} sets CFFSUB_STATES, which goes with cff_type="USERCFF" '
+            f"only: {contact.cff_type} has its own memory"
+        )
+    return count
 
 
 def _compiled(
@@ -182,20 +221,24 @@ def _compiled(
     if script.text is None:
         return 0, "a .pyc has no source"
     # here and not above: `import mbsim.plugins` must not load Numba
+    from mbsim.laws.abi import FRICTION_INPUTS
     from mbsim.plugins.compiled import compile_friction
     from mbsim.plugins.probe import disagreement
 
-    address, reason = compile_friction(script.text, script.values, name, len(par))
+    twin = user(0, "probe")
+    address, reason = compile_friction(script.text, script.values, name, len(par), twin.states)
     if reason:
         return 0, reason
-    twin = user(0, "probe")
-
     def call(a: list[float]) -> list[float]:
-        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10])
+        return twin.call(
+            a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10], state=a[FRICTION_INPUTS:]
+        )
 
     # a place that the text does not read needs no probe
     read = [reads_parameter(script.text, name, position) for position in (4, 5, 6)]
-    reason = disagreement(address, call, par, script.text, script.values, twin.element, read)
+    reason = disagreement(
+        address, call, par, script.text, script.values, twin.element, read, twin.states
+    )
     return (0, reason) if reason else (address, "")
 
 
@@ -299,11 +342,6 @@ def user_function(
     if not callable(function):
         kind = type(function).__name__
         raise ModelError(f"{element}: {name} in {script.path} is a {kind}, not a function")
-    if f"{name}_STATES" in script.values or "CFFSUB_STATES" in script.values:
-        raise ModelError(
-            f"{element}: {script.path} sets CFFSUB_STATES; states of user subroutines "
-            "are not built yet"
-        )
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # some functions written in C tell nothing

@@ -9,6 +9,7 @@ import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from mbsim.laws.abi import FRICTION_INPUTS, MEMORY_OUT
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 
@@ -67,6 +68,19 @@ def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
         ]  # fmt: skip
 
 
+def with_states(
+    cases: Iterator[list[float]], sizes: list[float], states: int
+) -> Iterator[list[float]]:
+    """Yield the cases with nothing kept and with numbers of many sizes kept."""
+    chance = random.Random(21)
+    for given in cases:
+        rest = [0.0] * (FRICTION_INPUTS - len(given))
+        size = chance.choice([*sizes, 10.0 ** chance.uniform(-6, 2)])
+        kept = [size * chance.choice([-1.0, 0.5, 1.0, chance.gauss(0, 1)]) for _ in range(states)]
+        yield [*given, *rest, *([0.0] * states)]
+        yield [*given, *rest, *kept]
+
+
 def _near(call: Callable[[list[float]], list[float]], given: list[float]) -> Iterator[list[float]]:
     """Yield the interpreted results one rounding away."""
     for factor in (1.0 - 4e-16, 1.0 + 4e-16):
@@ -84,20 +98,24 @@ def disagreement(
     values: dict[str, Any],
     element: int,
     read: list[bool],
+    states: int = 0,
 ) -> str:
     """Return '' if the code at `address` does what `call` does at every probe, else where not."""
     entry = guard.C_FUNCTION(address)
-    c_inputs, c_out = (ctypes.c_double * 19)(), (ctypes.c_double * 5)()
-    unset = (ctypes.c_double * 5)(*[math.nan] * 5)
+    size = MEMORY_OUT + states
+    c_inputs, c_out = (ctypes.c_double * (FRICTION_INPUTS + states))(), (ctypes.c_double * size)()
+    unset = (ctypes.c_double * size)(*[math.nan] * size)
     c_par = (ctypes.c_double * max(len(par), 1))(*par)
     log, host.log = host.log, lambda line: None  # what a probe says is no news
     try:
-        for given in probes(thresholds(text, list(par), values), read):
+        sizes = thresholds(text, list(par), values)
+        cases = probes(sizes, read)
+        for given in with_states(cases, sizes, states) if states else cases:
             for position, value in enumerate(given):
                 c_inputs[position] = value
             ctypes.memmove(c_out, unset, ctypes.sizeof(c_out))
             signalled = entry(element, c_inputs, c_par, c_out) != 0
-            got = [c_out[0], c_out[1], c_out[4]]
+            got = [c_out[0], c_out[1], c_out[4], *c_out[MEMORY_OUT:size]]
             signalled = signalled or not all(math.isfinite(value) for value in got)
             try:
                 wanted: list[float] | None = call(given)
@@ -119,7 +137,7 @@ def disagreement(
                 # hypot and the like may round otherwise; a difference of two near numbers grows it
                 moved = [[abs(a - b) for a, b in zip(near, wanted, strict=True)]
                          for near in _near(call, given)]  # fmt: skip
-                allowed = [2.0 * max(column) for column in zip(*moved, strict=True)] or [0.0] * 3
+                allowed = [2.0 * max(column) for column in zip(*moved, strict=True)] or [0.0] * len(wanted)
                 if any(w > a for w, a in zip(wrong, allowed, strict=True)):
                     return f"gives {got} when compiled and {wanted} interpreted at {place}"
     finally:

@@ -21,14 +21,17 @@ _HEADER = (
 )
 
 
-def rewritten(order: list[str], known: Globals) -> str:
-    """Return the text of a module with the functions of `order`; the last is the subroutine."""
+def rewritten(order: list[str], known: Globals, count: int = 11) -> str:
+    """Return the text of a module with the functions of `order`; the last is the subroutine.
+
+    `count` is how many arguments the subroutine is called with, as documented.
+    """
     used: set[str] = set()
     parts = []
     for position, name in enumerate(order):
         function = copy.deepcopy(known.functions[name])
         rewrite = _Rewrite(known, local_names(function), used)
-        parts.append(rewrite.function(function, main=position == len(order) - 1))
+        parts.append(rewrite.function(function, count if position == len(order) - 1 else 0))
     lines = [f"{name} = {_literal(known.constants[name])}" for name in sorted(known.constants)]
     names = ", ".join(sorted(used | {"mbsim_sqrt"}))
     return "\n".join([_HEADER.format(names=names), *lines, "", *parts, ""])
@@ -50,24 +53,24 @@ class _Rewrite(ast.NodeTransformer):
     def __init__(self, known: Globals, local: set[str], used: set[str]) -> None:
         self.known, self.local, self.used = known, local, used
 
-    def function(self, node: ast.FunctionDef, main: bool) -> str:
-        """Return the text of the rewritten function."""
+    def function(self, node: ast.FunctionDef, documented: int) -> str:
+        """Return the text of the rewritten function; the subroutine's has documented arguments."""
         args = node.args
         for arg in (*args.posonlyargs, *args.args):
             arg.annotation = None
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
-        if main:
+        if documented:
             # parameters beyond the documented ones keep their defaults; then comes the time
             every = [*args.posonlyargs, *args.args]
             count = len(every) - len(args.defaults)
             extra = [
                 ast.Assign([ast.Name(arg.arg, ast.Store())], args.defaults[position - count])
                 for position, arg in enumerate(every)
-                if position >= 11
+                if position >= documented
             ]
             args.posonlyargs, args.defaults = [], []
-            args.args = [*every[:11], ast.arg("mbsim_now")]
+            args.args = [*every[:documented], ast.arg("mbsim_now")]
             node.body = [*extra, *node.body]
         node.returns = None
         node.body = [self.visit(statement) for statement in node.body] or [ast.Pass()]
@@ -175,6 +178,14 @@ class _Rewrite(ast.NodeTransformer):
         if isinstance(call, ast.Constant):
             return ast.Pass()
         self.generic_visit(node)
+        return node
+
+    def visit_Return(self, node: ast.Return) -> ast.Return:
+        self.generic_visit(node)
+        # force and new state: tuples of numbers of one kind
+        for part in node.value.elts if isinstance(node.value, ast.Tuple) else ():
+            if isinstance(part, ast.Tuple):
+                part.elts = [self.as_float(element) for element in part.elts]
         return node
 
     def visit_Raise(self, node: ast.Raise) -> ast.Raise:
