@@ -67,7 +67,7 @@ def shipped(request):
 def coulomb_on(inputs):
     groups = FrictionInput(
         inputs[0], inputs[1], inputs[2:5], inputs[5:8], inputs[8:10], *inputs[10:13],
-        inputs[13:16], inputs[16:19],
+        inputs[13:16], inputs[16:19], 0.0, 0.0, 0.0, 0.0, math.nan,
     )  # fmt: skip
     return FRICTION_LAWS["COULOMB_ON"].force(groups, *PAR)
 
@@ -372,7 +372,11 @@ def test_load_faults_name_file_and_line(tmp_path):
     refused("not built yet", contact(), [tmp_path / "law.so"])
     refused("not built yet", contact(dll_name="law"))
     refused("not built yet", contact(interpreter="MATLAB"))
-    refused("CFFSUB_STATES", contact(), [write("states.py", "CFFSUB_STATES = 2\n" + good)])
+    states = "CFFSUB_STATES = 2\n" + good
+    refused(r"states.py:2: CFFSUB.*12 arguments", contact(), [write("states.py", states)])
+    for count in ("-1", "65", "2.0", "True", "'2'"):
+        refused(f"CFFSUB_STATES = {count}: a whole number from 0 to 64", contact(),
+                [write("count.py", f"CFFSUB_STATES = {count}\n{good}")])  # fmt: skip
     text = refused("boom.py:2: the script fails", contact(), [write("boom.py", "a = 1\n1/0\n")])
     assert "ZeroDivisionError: division by zero" in text
     assert "\n" not in text
