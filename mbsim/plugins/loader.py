@@ -164,7 +164,7 @@ def load_friction(
     uses_x = True  # a .pyc has no text to look at
     if script.text is not None:
         uses_x = reads_parameter(script.text, name, 6)
-        for warning in lint(script.text, name):
+        for warning in lint(script.text, name, states > 0):
             say(f"{element}: {script.path}: warning: {warning}")
 
     def user(address: int, reason: str, keep: object = None) -> UserFriction:

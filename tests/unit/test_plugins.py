@@ -34,7 +34,7 @@ def contact(par=PAR, **words):
 
 
 def call(user, inputs=INPUTS):
-    given, out = (ctypes.c_double * 19)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
+    given, out = (ctypes.c_double * 24)(*inputs), (ctypes.c_double * 5)(*[math.nan] * 5)
     code = C_FUNCTION(user.address)(301001, given, user.par.ctypes.data, out)
     return code, list(out)
 
