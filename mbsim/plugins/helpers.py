@@ -40,6 +40,8 @@ class Host:
         self.sysfnc: Look = _nothing
         self.sysary: Look = _nothing
         self.warned: set[str] = set()
+        #: While `mbsim request` evaluates a subroutine again: what it names by `espy`.
+        self.signals: dict[str, Any] | None = None
 
     def forget(self) -> None:
         """Look at nothing, before a new run."""
@@ -113,6 +115,15 @@ def _no_state(name: str) -> None:
         host.log(f"warning: {name} is called where there is no state to look at: errflg is 1")
 
 
+def espy(**signals: Any) -> None:
+    """Name signals of a subroutine, espy(mu=mu, mode="stick"), for `mbsim request`.
+
+    While a model is integrated nothing happens.
+    """
+    if host.signals is not None:
+        host.signals.update(signals)
+
+
 def py_getstm() -> float:
     """Return the simulation time of the present call."""
     return host.time
@@ -133,7 +144,7 @@ def namespace() -> dict[str, Any]:
     names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
     for helper in (
         py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area,
-        py_sysfnc, py_sysary,
+        py_sysfnc, py_sysary, espy,
     ):  # fmt: skip
         names[helper.__name__] = helper
     names["print"] = print_to_stderr

@@ -137,7 +137,8 @@ def test_calls_of_friction_laws():
     given = np.zeros(40)
     given[7], given[10], given[21], given[22], given[23] = 0.1, 10.0, 1e4, 1.0, np.nan
     print()
-    for name, law in FRICTION_LAWS.items():
+    for name in FRICTION_LAWS:
+        law = FRICTION_LAWS[name]
         own = {each.name: each.default for each in law.own} | FRICTION
         par = np.array([own[each] for each in law.parameters])
         address, times = abi.friction_address(law), []
