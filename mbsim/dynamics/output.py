@@ -99,8 +99,8 @@ def fill_incidents(scene, h, y):
     rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
     k = first
-    for h in range(work.hit[len(work.hit) - 1]):
-        s = work.hit[h]
+    for place in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[place]
         row = rows.incidents[k]
         at = scene.slots.x[s]
         row[INC_SLOT] = s
