@@ -1,6 +1,7 @@
 """mbsim: multibody contact simulation from MotionSolve-style decks.
 
-The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`, and for scripts `espy`.
+The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`; for users'
+scripts `espy`.
 Names are imported at their first use, so that ``import mbsim`` costs nothing.
 """
 

@@ -293,9 +293,9 @@ def _wanted(name: str, ids: Sequence[int]) -> Wanted:
     """Return what a name stands for, as far as that can be said before rows are known."""
     match = _NAME.fullmatch(name.strip())
     if match is None:
+        such = f"Force_Contact[{ids[0] if ids else 1}]"
         raise ModelError(
-            f"{name}: no name of a signal; such are Force_Contact[{ids[0] if ids else 1}].force and "
-            f"Force_Contact[{ids[0] if ids else 1}].incident[0].mu"
+            f"{name}: no name of a signal; such are {such}.force and {such}.incident[0].mu"
         )
     contact, incident, signal, part = match.groups()
     if int(contact) not in ids:

@@ -127,7 +127,7 @@ def fill_incidents(scene, h, y):
 
 @jitable
 def write_row(scene, t, h, y, f):
-    """Append the row of (t, y), y' = f just evaluated with `h`; return whether the table is full."""
+    """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
     rows, work = scene.rows, scene.work
     k = rows.used[0]
     rows.time[k] = t

@@ -229,6 +229,7 @@ def _compiled(
     address, reason = compile_friction(script.text, script.values, name, len(par), twin.states)
     if reason:
         return 0, reason
+
     def call(a: list[float]) -> list[float]:
         return twin.call(
             a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10], state=a[FRICTION_INPUTS:]

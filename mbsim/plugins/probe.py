@@ -137,7 +137,9 @@ def disagreement(
                 # hypot and the like may round otherwise; a difference of two near numbers grows it
                 moved = [[abs(a - b) for a, b in zip(near, wanted, strict=True)]
                          for near in _near(call, given)]  # fmt: skip
-                allowed = [2.0 * max(column) for column in zip(*moved, strict=True)] or [0.0] * len(wanted)
+                allowed = [2.0 * max(column) for column in zip(*moved, strict=True)] or [0.0] * len(
+                    wanted
+                )
                 if any(w > a for w, a in zip(wrong, allowed, strict=True)):
                     return f"gives {got} when compiled and {wanted} interpreted at {place}"
     finally:

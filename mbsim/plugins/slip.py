@@ -7,9 +7,7 @@ import ast
 _XDOT = 7  # position of the slip velocity among the parameters
 
 
-def wrong_lengths(
-    function: ast.FunctionDef, with_state: bool = False
-) -> list[tuple[int, str]]:
+def wrong_lengths(function: ast.FunctionDef, with_state: bool = False) -> list[tuple[int, str]]:
     """Return where lists of another length than three are returned, or with a state beside."""
     returned = [
         node.value for node in ast.walk(function) if isinstance(node, ast.Return) and node.value

@@ -23,7 +23,8 @@ def plot_law(*arguments):
     return CliRunner().invoke(main, ["plot-law", *map(str, arguments)])
 
 
-def sample(name, at=Conditions(), **values):
+def sample(name, at=None, **values):
+    at = at or Conditions()
     law = FRICTION_LAWS[name]
     own = {each.name: each.default for each in law.own}
     return sample_of(law, own | USUAL | values, at)
@@ -55,7 +56,7 @@ def test_laws_and_a_users_function_in_one_picture(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "arguments, said",
+    ("arguments", "said"),
     [
         (["FOO"], "FOO: no such friction law; there are BROWN_MCPHEE, CONTENSOU"),
         (["FOO", "--plugin", WITH_STATE], "stiction_with_state.py defines CFFSUB"),
@@ -82,7 +83,9 @@ def test_long_slides_end_at_the_laws_own_friction():
     assert steady(sample("LUGRE"), at, speeds) == pytest.approx(wanted, rel=1e-5)
     assert steady(sample("DAHL"), at, speeds) == pytest.approx([0.3] * 3, rel=1e-5)
     assert steady(sample("STICTION"), at, speeds) == pytest.approx([0.3] * 3, rel=1e-9)
-    assert steady(sample("TANH"), at, speeds) == pytest.approx(0.3 * np.tanh(np.array(speeds) / 1e-2))
+    assert steady(sample("TANH"), at, speeds) == pytest.approx(
+        0.3 * np.tanh(np.array(speeds) / 1e-2)
+    )
 
 
 def test_the_loop_of_a_jenkins_element():

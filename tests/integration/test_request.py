@@ -31,8 +31,8 @@ FRICTIONS = {
 }
 DECK = """<Deck><Model>
 <Body_Rigid id="1" isground="TRUE"/>
-<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.0042" inertia_yy="0.0042" inertia_zz="0.0067"
- v_ic_x="{vx}" v_ic_x_flag="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.0042" inertia_yy="0.0042"
+ inertia_zz="0.0067" v_ic_x="{vx}" v_ic_x_flag="TRUE"/>
 <Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="0.01" inertia_yy="0.01" inertia_zz="0.01"
  w_ic_y="{spin}" w_ic_y_flag="TRUE"/>
 <Reference_Marker id="10" body_id="1"/>
@@ -48,7 +48,8 @@ DECK = """<Deck><Model>
 {force}
 <Force_Gravity grav_z="-9.81"/>
 </Model>
-<Command><Simulate analysis_type="Transient" end_time="{end}" print_interval="0.01"/></Command></Deck>
+<Command><Simulate analysis_type="Transient" end_time="{end}" print_interval="0.01"/></Command>
+</Deck>
 """
 FORCE = """<Force_Vector_OneBody id="5" type="ForceOnly" i_marker_id="20"
  fx_expression="6*sin(6*time)" fy_expression="2*sin(4*time)" fz_expression="0"/>"""
@@ -84,7 +85,7 @@ def same(results):
 
 
 @pytest.mark.parametrize(
-    "friction, method",
+    ("friction", "method"),
     [
         *((friction, "DOPRI5") for friction in FRICTIONS),
         ("COULOMB_ON", "VERLET"),
@@ -182,11 +183,13 @@ def test_csv_and_json_have_the_same_numbers(held, tmp_path):
 
 def test_signals_belong_together(held):
     file, _ = held
-    names = [f"Force_Contact[301].incident[0].{each}"
-             for each in ("force", "nforce", "friction", "mu", "slip", "xdot", "depth", "normal")]  # fmt: skip
+    signals = ("force", "nforce", "friction", "mu", "slip", "xdot", "depth", "normal")
+    names = [f"Force_Contact[301].incident[0].{each}" for each in signals]
     with mbsim.open_results(file) as results:
         time, columns = request(results, names)
-    got = {name.partition("].incident[0].")[2]: np.array(column) for name, column in columns.items()}
+    got = {
+        name.partition("].incident[0].")[2]: np.array(column) for name, column in columns.items()
+    }
     there = np.isfinite(got["depth"])
     assert there.sum() > 0.9 * len(time)
     part = {name: column[there] for name, column in got.items()}
@@ -199,10 +202,13 @@ def test_signals_belong_together(held):
 
 
 @pytest.mark.parametrize(
-    "name, said",
+    ("name", "said"),
     [
         ("Force_Contact[301].incident[0].muu", "no such signal; there are mu, force, torque, mode"),
-        ("Force_Contact[301].mu", "there are force, torque, penetration, slip_speed, incidents, inc"),
+        (
+            "Force_Contact[301].mu",
+            "there are force, torque, penetration, slip_speed, incidents, inc",
+        ),
         ("Force_Contact[7].force", "no such contact; there are Force_Contact[301]"),
         ("Force_Contact[301].force/w", "no such part; there are /x, /y, /z, /mag"),
         ("Force_Contact[301].incident[0].mu/x", "no such part; mu is one number"),
@@ -253,7 +259,7 @@ def test_signals_of_the_users_own(tmp_path, given):
         )
         words = np.array(columns[f"{at}mode_of_mine"])
         np.testing.assert_array_equal(words[there], np.where(slip[there] < 0.01, "slow", "fast"))
-        with pytest.raises(ModelError, match="no such signal; there are .*mode_of_mine"):
+        with pytest.raises(ModelError, match=r"no such signal; there are .*mode_of_mine"):
             request(results, [f"{at}mode_of_yours"])
 
 

@@ -171,7 +171,7 @@ def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, state
 
 
 @pytest.mark.parametrize(
-    "body, said",
+    ("body", "said"),
     [
         ("return [0.0, 0.0, 0.0]", r"not \(force, new_state\) as CFFSUB_STATES = 1 asks"),
         ("return [0.0, 0.0, 0.0], [1.0, 2.0]", "not 1 finite numbers"),
