@@ -137,6 +137,8 @@ def normal_constants(law: NormalLaw, contact: Any) -> np.ndarray[Any, Any]:
 
 def friction_parameters(law: FrictionLaw, contact: Any) -> np.ndarray[Any, Any]:
     """Return the law's parameters as the contact element gives them, shape (n,)."""
-    own = {each.name: each.default for each in law.own} | dict(contact.friction)
+    own = {each.name: each.default for each in law.own}
+    if own:
+        own |= dict(contact.friction)
     values = [own[name] if name in own else getattr(contact, name) for name in law.parameters]
     return np.array(values, dtype=np.float64)
