@@ -1,6 +1,7 @@
 """mbsim: multibody contact simulation from MotionSolve-style decks.
 
-The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`.
+The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`; for users'
+scripts `espy`.
 Names are imported at their first use, so that ``import mbsim`` costs nothing.
 """
 
@@ -10,16 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mbsim.errors import MbsimError
+    from mbsim.plugins.helpers import espy
     from mbsim.reader.xml import read_model
     from mbsim.results.reading import open_results
     from mbsim.simulation import simulate
 
 __version__ = "0.1.0"
 
-__all__ = ["MbsimError", "__version__", "open_results", "read_model", "simulate"]
+__all__ = ["MbsimError", "__version__", "espy", "open_results", "read_model", "simulate"]
 
 _HOMES = {
     "MbsimError": "mbsim.errors",
+    "espy": "mbsim.plugins.helpers",
     "open_results": "mbsim.results.reading",
     "read_model": "mbsim.reader.xml",
     "simulate": "mbsim.simulation",

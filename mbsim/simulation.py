@@ -582,6 +582,10 @@ def simulate(
         "end_time": settings.end_time,
         "print_interval": settings.stages[-1].simulation.print_interval,
         "detector": detector,
+        # what `request` needs to make the same forces again
+        "overrides": "\n".join(model.overrides),
+        "plugins": "\n".join(map(str, files)),
+        "interpret_plugins": int(interpret_plugins),
     }
     recorder = Recorder(system, attributes, None if output is None else Path(output), resume)
     log = RunLog(system, attributes, recorder.directory, resume)

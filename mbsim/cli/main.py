@@ -19,6 +19,8 @@ COMMANDS = {
     "info": "mbsim.cli.info",
     "plot": "mbsim.cli.plot",
     "bench": "mbsim.cli.bench",
+    "request": "mbsim.cli.request",
+    "plot-law": "mbsim.cli.plot_law",
 }
 
 

@@ -46,7 +46,16 @@ from mbsim.laws.user_normal import (
 )
 from mbsim.laws.user_normal import MODE as PLACE_MODE
 from mbsim.laws.user_normal import RATE as PLACE_RATE
-from mbsim.system.arrays import BODY_SIZE, FRICTION_CALLS, HEAT, HOT, NORMAL_CALLS, PYTHON_CALLS
+from mbsim.system.arrays import (
+    AGAIN,
+    BODY_SIZE,
+    FRICTION_CALLS,
+    HEAT,
+    HOT,
+    NORMAL_CALLS,
+    NOW,
+    PYTHON_CALLS,
+)
 
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
@@ -100,6 +109,8 @@ def tangent(scene, y, s, c, graphic_i, bi, bj, n):
     if scene.contacts.framed[c] == 0:
         # the law is the same in every tangent frame
         return any_tangent(n)
+    if scene.world.past[0] == AGAIN:
+        return vector(state.t[s])
     if state.touching[s] == 0:
         return birth_tangent(scene, graphic_i, n)
     t = turn_with_normal(vector(state.t[s]), vector(state.n[s]), n)
@@ -172,7 +183,7 @@ def remember(scene, y, s, c, given):
     for k in range(scene.contacts.memory[c]):
         if z >= 0:
             given[at + k] = y[z + k]
-        elif scene.world.past[0] == 1:
+        elif scene.world.past[0] != NOW:
             given[at + k] = state.before[s, k]
         else:
             given[at + k] = state.memory[s, k]

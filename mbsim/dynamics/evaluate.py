@@ -11,7 +11,16 @@ from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import ACCELERATE, APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR, NEAR_FOLD, SEAT
+from mbsim.system.arrays import (
+    ACCELERATE,
+    APPLIED_DOOR,
+    BODY_SIZE,
+    JOINTS_DOOR,
+    NEAR_FOLD,
+    NOW,
+    SEAT,
+    WITHIN,
+)
 
 
 @jitable
@@ -106,7 +115,7 @@ def evaluate(scene, t, h, y, dy):
 @jitable
 def evaluate_past(scene, t, h, y, dy):
     """Do the same at a point within the last step, where friction knows what it did before it."""
-    scene.world.past[0] = 1
+    scene.world.past[0] = WITHIN
     code = evaluate(scene, t, h, y, dy)
-    scene.world.past[0] = 0
+    scene.world.past[0] = NOW
     return code

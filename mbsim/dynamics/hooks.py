@@ -117,7 +117,7 @@ def _output(context, t, h, a, b):
     code = evaluate_past(scene, t, h, carray(a, (n,)), f)
     if code != 0:
         return -float(code)
-    full = write_row(scene, t, carray(a, (n,)), f)
+    full = write_row(scene, t, h, carray(a, (n,)), f)
     if scene.users.failed[0] != 0:
         # a subroutine that only a request asks for
         return -float(scene.users.failed[0])

@@ -23,6 +23,20 @@ from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
+    INC_DEPTH,
+    INC_FROZEN,
+    INC_GRAPHIC_I,
+    INC_GRAPHIC_J,
+    INC_KIND,
+    INC_MEMORY,
+    INC_NORMAL,
+    INC_POINT,
+    INC_SHARE,
+    INC_SLOT,
+    INC_STEP,
+    INC_TANGENT,
+    INC_TOUCHES,
+    INC_X,
     JOINTS_DOOR,
     LIVE,
     REACT,
@@ -80,30 +94,40 @@ def fill_contacts(scene, y, row):
 
 
 @jitable
-def fill_incidents(scene, y):
-    """Append the incident table of this row: slot, p, n, t, X, depth; return their number."""
-    rows, work = scene.rows, scene.work
+def fill_incidents(scene, h, y):
+    """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
+    rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
     k = first
-    for h in range(work.hit[len(work.hit) - 1]):
-        s = work.hit[h]
+    for place in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[place]
         row = rows.incidents[k]
         at = scene.slots.x[s]
-        row[0] = s
+        row[INC_SLOT] = s
         for j in range(3):
-            row[1 + j] = work.points[s, 1 + j]
-            row[4 + j] = work.points[s, 4 + j]
-            row[7 + j] = work.t[s, j]
-            row[10 + j] = y[at + j] if at >= 0 else 0.0
-        row[13] = work.slot[s, DEPTH]
+            row[INC_POINT + j] = work.points[s, 1 + j]
+            row[INC_NORMAL + j] = work.points[s, 4 + j]
+            row[INC_TANGENT + j] = work.t[s, j]
+            row[INC_X + j] = y[at + j] if at >= 0 else 0.0
+        row[INC_DEPTH] = work.slot[s, DEPTH]
+        # what its force followed from besides y: see dynamics.again
+        pair = scene.slots.pair[s]
+        row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
+        row[INC_FROZEN] = 1.0 if scene.world.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+        row[INC_TOUCHES] = scene.pairs.touches[pair]
+        row[INC_KIND] = scene.pairs.kind[pair]
+        row[INC_GRAPHIC_I] = scene.pairs.graphic_i[pair]
+        row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
+        for j in range(state.before.shape[1]):
+            row[INC_MEMORY + j] = state.before[s, j]
         k += 1
     rows.used[1] = k
     return k - first
 
 
 @jitable
-def write_row(scene, t, y, f):
-    """Append the row of (t, y), y' = f evaluated just before; return whether the table is full."""
+def write_row(scene, t, h, y, f):
+    """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
     rows, work = scene.rows, scene.work
     k = rows.used[0]
     rows.time[k] = t
@@ -126,7 +150,7 @@ def write_row(scene, t, y, f):
     if scene.world.doors[VALUES_DOOR] != 0:
         call_int(scene.world.doors[VALUES_DOOR], (scene, t, y))
     fill_energy(scene, y, rows.energy[k])
-    rows.incident_count[k] = fill_incidents(scene, y)
+    rows.incident_count[k] = fill_incidents(scene, h, y)
     rows.used[0] = k + 1
     return k + 1 >= len(rows.time) or no_room(scene)
 

@@ -571,6 +571,7 @@ class Model:
     compatibility: str = ""
     notes: tuple[str, ...] = ()  # statements accepted and not acted on, for the log
     warnings: tuple[str, ...] = ()
+    overrides: tuple[str, ...] = ()  # what was set in the deck before it was read
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""

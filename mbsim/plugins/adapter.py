@@ -7,6 +7,7 @@ Apart from `compiled`, so that the cache key of a user's function covers this an
 # what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,7 @@ from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, RAISED_COMPILED
+from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, MEMORY_OUT, RAISED_COMPILED
 
 
 def _adapt(function: Callable[..., Any], count: int) -> Any:
@@ -56,9 +57,62 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
     return entry
 
 
-def friction_address(function: Callable[..., Any], callees: list[Any], count: int) -> int:
+def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> Any:
+    """Return CFFSUB that keeps so many numbers of its own as a C function."""
+
+    def entry(element, inputs, par, out):
+        a = carray(inputs, (FRICTION_INPUTS + states,))
+        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
+        kept: Any = to_fixed_tuple(a[FRICTION_INPUTS:], states)  # type: ignore[call-arg]
+        result = carray(out, (MEMORY_OUT + states,))
+        code = 0
+        try:
+            force, new = function(
+                element,
+                a[0],
+                values,
+                count,
+                (a[13], a[14], a[15]),
+                (a[16], a[17], a[18]),
+                (a[2], a[3], a[4]),
+                (a[5], a[6], a[7]),
+                a[10],
+                int(a[19]),
+                0,
+                kept,
+                a[0],
+            )
+            if len(force) != 3 or len(new) != states:
+                raise ValueError("not as many")
+            result[0] = force[0]
+            result[1] = force[1]
+            result[2] = 0.0
+            result[3] = 0.0
+            result[4] = force[2]
+            # what it stores, if anything, nobody can tell; nor whether it sticks
+            result[5] = 0.0
+            result[6] = 0.0
+            total = 0.0
+            for k in range(states):
+                result[MEMORY_OUT + k] = new[k]
+                total += abs(new[k])
+            if not math.isfinite(total):
+                # found where forces are looked at
+                result[0] = math.nan
+        except Exception:  # as above
+            code = RAISED_COMPILED
+        return code
+
+    return entry
+
+
+def friction_address(
+    function: Callable[..., Any], callees: list[Any], count: int, states: int = 0
+) -> int:
     """Return the address of a rewritten CFFSUB behind FRICTION_SIGNATURE."""
     # as Python: a division by zero raises, an index beyond the end too
     for each in (*callees, function):
         register_jitable(error_model="python", boundscheck=True)(each)
+    if states:
+        return jit.address(_adapt_with_state(function, count, states), FRICTION_SIGNATURE)
     return jit.address(_adapt(function, count), FRICTION_SIGNATURE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import hashlib
 import os
 import re
@@ -23,14 +24,15 @@ PAR_MAX = 32
 
 
 def compile_friction(
-    text: str, values: dict[str, Any], name: str, par_count: int
+    text: str, values: dict[str, Any], name: str, par_count: int, states: int = 0
 ) -> tuple[int, str]:
     """Return the address of a compiled CFFSUB and '', or 0 and the reason why there is none.
 
     `values` is the namespace of the script after it has run: a name that its module binds
-    once to a number is a constant.
+    once to a number is a constant. With `states` it keeps so many numbers of its own.
     """
-    return _compile(text, values, name, par_count, friction_address, 11)
+    adapted = functools.partial(friction_address, states=states)
+    return _compile(text, values, name, par_count, adapted, 12 if states else 11)
 
 
 def compile_normal(text: str, values: dict[str, Any], name: str, par_count: int) -> tuple[int, str]:

@@ -206,7 +206,7 @@ def _indentation(lines: list[str]) -> tuple[list[str], list[tuple[int, str]]]:
     return mended, faults
 
 
-def lint(text: str, name: str) -> list[str]:
+def lint(text: str, name: str, with_state: bool = False) -> list[str]:
     """Return warnings on a script that Python accepts, each with its line."""
     found: list[tuple[int, str]] = []
     for node in ast.parse(text).body:
@@ -215,7 +215,8 @@ def lint(text: str, name: str) -> list[str]:
             lines = text.splitlines()[node.lineno - 1 : last]
             zeros = [(line + node.lineno - 1, what) for line, what in _zero_lists(lines)]
             known = {line for line, _ in zeros}
-            found += zeros + [item for item in slip.wrong_lengths(node) if item[0] not in known]
+            wrong = slip.wrong_lengths(node, with_state)
+            found += zeros + [item for item in wrong if item[0] not in known]
             found += slip.unguarded_divisions(node)
     return [f"line {line}: {what}" for line, what in sorted(found, key=_line)]
 

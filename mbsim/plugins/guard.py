@@ -115,6 +115,19 @@ def three_numbers(result: Any) -> list[float]:
     return numbers(result, 3, " [Fx, Fy, Tz]")
 
 
+def force_and_state(result: Any, states: int) -> list[float]:
+    """Return Fx, Fy, Tz and the new state as finite floats, or raise `NotAForce`."""
+    try:
+        force, state = result
+    except (TypeError, ValueError):
+        shown = repr(result)
+        shown = shown if len(shown) <= 80 else shown[:77] + "..."
+        raise NotAForce(
+            f"returned {shown}, not (force, new_state) as CFFSUB_STATES = {states} asks"
+        ) from None
+    return three_numbers(force) + numbers(state, states, " of new state")
+
+
 def numbers(result: Any, count: int, names: str = "") -> list[float]:
     """Return a user function's result as `count` finite floats, or raise `NotAForce`."""
     shown = repr(result)
@@ -169,9 +182,14 @@ class Views(dict[int, Any]):
 
 
 def callback(
-    function: Callable[..., Any], name: str, source: str, par_count: int
+    function: Callable[..., Any], name: str, source: str, par_count: int, states: int = 0
 ) -> tuple[int, object]:
-    """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive."""
+    """Return the address of `function` behind FRICTION_SIGNATURE, and what keeps it alive.
+
+    With `states` it keeps so many numbers of its own.
+    """
+    if states:
+        return _callback_with_state(function, name, source, par_count, states)
     from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
@@ -208,6 +226,62 @@ def callback(
             except Exception:  # not three plain numbers: say what it is, or take what converts
                 force[0], force[1], force[4] = three_numbers(result)
             force[2] = force[3] = 0.0
+            return 0
+        except PassedOn:
+            return RAISED_INTERPRETED
+        except BaseException as error:
+            failure.store(error, f"Force_Contact[{element}]", time, name, source)
+            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+        finally:
+            host.state = outer
+
+    entry = C_FUNCTION(guarded)
+    return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
+
+
+def _callback_with_state(
+    function: Callable[..., Any], name: str, source: str, par_count: int, states: int
+) -> tuple[int, object]:
+    """Return what `callback` does, for a function of (..., state) -> (force, new state)."""
+    from mbsim.laws.abi import (
+        DFLAG,
+        FRICTION_INPUTS,
+        MEMORY_OUT,
+        RAISED_INTERPRETED,
+        STOPPED_BY_USER,
+    )
+
+    inputs_at, par_at = Views(FRICTION_INPUTS + states), Views(par_count)
+    out_at = Views(MEMORY_OUT + states)
+
+    def guarded(element: int, inputs: int, par: int, out: int) -> int:
+        time, outer = 0.0, host.state
+        try:
+            given = inputs_at[inputs].tolist()
+            host.time = time = given[0]
+            if host.seen is not None:
+                host.state = (host.seen[0], time, host.seen[1])
+            result = function(
+                element,
+                time,
+                par_at[par].tolist() if par_count else [],
+                par_count,
+                given[13:16],
+                given[16:19],
+                given[2:5],
+                given[5:8],
+                given[10],
+                int(given[DFLAG]),
+                0,
+                given[FRICTION_INPUTS:],
+            )
+            found = force_and_state(result, states)
+            room = out_at[out]
+            room[0], room[1], room[4] = found[:3]
+            # neither torque across, nor what is stored, nor whether it sticks
+            room[2] = room[3] = room[5] = room[6] = 0.0
+            for k in range(states):
+                room[MEMORY_OUT + k] = found[3 + k]
             return 0
         except PassedOn:
             return RAISED_INTERPRETED
@@ -297,7 +371,7 @@ def reproduce(
     ----------
     user : UserFriction
         The compiled function that returned RAISED_COMPILED or a force that is not finite.
-    inputs : sequence of float, shape (20,)
+    inputs : sequence of float, shape (24 + states,)
         What the function was given, as `laws.abi` has it.
     element_id : int, optional
         The Force_Contact; `user.element` if left out.
@@ -314,6 +388,7 @@ def reproduce(
         result = user.call(
             given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10],
             int(given[19]),
+            state=given[24:],
         )  # fmt: skip
     except BaseException as error:
         failure.clear()

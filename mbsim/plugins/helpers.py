@@ -47,6 +47,8 @@ class Host:
         self.shown: dict[int, Shown] = {}
         #: In a call with iflag true: what it asks for, as `plugins.dependence` lists it.
         self.asked: list[str] | None = None
+        #: While `mbsim request` evaluates a subroutine again: what it names by `espy`.
+        self.signals: dict[str, Any] | None = None
 
     def forget(self) -> None:
         """Look at nothing, before a new run."""
@@ -132,6 +134,15 @@ def _no_state(name: str) -> None:
         host.log(f"warning: {name} is called where there is no state to look at: errflg is 1")
 
 
+def espy(**signals: Any) -> None:
+    """Name signals of a subroutine, espy(mu=mu, mode="stick"), for `mbsim request`.
+
+    While a model is integrated nothing happens.
+    """
+    if host.signals is not None:
+        host.signals.update(signals)
+
+
 def py_getstm() -> float:
     """Return the simulation time of the present call."""
     return host.time
@@ -184,7 +195,7 @@ def namespace() -> dict[str, Any]:
     names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
     for helper in (
         py_step, py_step5, py_errmes, py_usrmes, py_getstm, py_get_contact_area,
-        py_sysfnc, py_sysary, py_get_ncontacts, py_get_contact_post,
+        py_sysfnc, py_sysary, py_get_ncontacts, py_get_contact_post, espy,
     ):  # fmt: skip
         names[helper.__name__] = helper
     names["print"] = print_to_stderr

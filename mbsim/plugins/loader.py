@@ -39,6 +39,8 @@ from mbsim.plugins.shared_library import (
 
 #: Names of the arguments of a friction function, in order.
 CFFSUB = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
+#: Numbers that a friction function of the user may keep at most.
+STATES_MAX = 64
 _numbers = itertools.count(1)
 
 
@@ -106,6 +108,8 @@ class UserFriction:
         What the C function behind `address` reads of its parameters before `par`.
     asked : tuple of str
         What an interpreted one asked for by `py_sysfnc` and `py_sysary` under iflag.
+    states : int
+        How many numbers it keeps: CFFSUB_STATES of its script.
     """
 
     address: int
@@ -123,6 +127,7 @@ class UserFriction:
     hidden: tuple[float, ...] = ()
     asked: tuple[str, ...] = ()
     reads_x: bool = True
+    states: int = 0
 
     @property
     def how(self) -> str:
@@ -146,16 +151,22 @@ class UserFriction:
         xdot: Any,
         nforce: float,
         dflag: int = 0,
+        state: Any = (),
     ) -> list[float]:
-        """Return [Fx, Fy, Tz] of the interpreted function; what it raises comes through."""
+        """Return [Fx, Fy, Tz] of the interpreted function, and its new state if it keeps one.
+
+        What it raises comes through. `state` may be longer than what it keeps.
+        """
         assert self.function is not None
         lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
         host.time = float(time)
         values, loci, locj, x, xdot = lists
         result = self.function(
             self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce),
-            dflag, 0,
+            dflag, 0, *([[float(value) for value in state][: self.states]] if self.states else ()),
         )  # fmt: skip
+        if self.states:
+            return guard.force_and_state(result, self.states)
         return guard.three_numbers(result)
 
 
@@ -198,12 +209,13 @@ def load_friction(
         return _from_library(script, contact, name)
     if isinstance(script, OctaveFile):
         return _from_octave(script, contact, name, say)
-    function = user_function(script, name, element)
+    states = _states(script, contact)
+    function = user_function(script, name, element, CFFSUB + ", state" * (states > 0))
     par = np.array(contact.cff.par, dtype=np.float64)
     uses_x = True  # a .pyc has no text to look at
     if script.text is not None:
         uses_x = reads_parameter(script.text, name, 6)
-        for warning in lint(script.text, name):
+        for warning in lint(script.text, name, states > 0):
             say(f"{element}: {script.path}: warning: {warning}")
 
     def user(
@@ -222,6 +234,7 @@ def load_friction(
             keep=keep,
             looks=bool(reason) and script.looks,
             asked=tuple(asked),
+            states=states,
         )
 
     address, reason = 0, "--interpret-plugins"
@@ -231,18 +244,28 @@ def load_friction(
             say(f"{element}: {name} of {script.path} stays interpreted: {reason}")
     if not reason:
         return user(address, "")
-    address, keep = guard.callback(function, name, str(script.path), len(par))
+    address, keep = guard.callback(function, name, str(script.path), len(par), states)
     # compiled functions only compute: whether they are called once more nobody can see
-    asked, why = dependence(function, friction_arguments(contact))
+    asked, why = dependence(function, friction_arguments(contact, states))
     if why:
         say(f"{element}: {name} of {script.path}: note: its call with iflag 1 fails: {why}")
     return user(address, reason, keep, asked)
 
 
-def friction_arguments(contact: Contact) -> list[Any]:
+def friction_arguments(contact: Contact, states: int = 0) -> list[Any]:
     """Return the arguments of the one call of a contact's CFFSUB with iflag true."""
     par, zeros = [float(value) for value in contact.cff.par], [[0.0] * 3 for _ in range(4)]
-    return [contact.id, 0.0, par, len(par), *zeros, 0.0, 0, 1]
+    asked, why = dependence(function, friction_arguments(contact, states))
+        contact.id,
+        0.0,
+        par,
+        len(par),
+        *zeros,
+        0.0,
+        0,
+        1,
+        *([[0.0] * states] if states else []),
+    ]
 
 
 def check_libraries(contacts: Iterable[Contact]) -> None:
@@ -321,6 +344,23 @@ def _from_octave(
     )
 
 
+def _states(script: Script, contact: Contact) -> int:
+    """Return how many numbers the friction functions of a script keep, 0 for none."""
+    count = script.values.get("CFFSUB_STATES", 0)
+    element = f"Force_Contact[{contact.id}]"
+    if type(count) is not int or not 0 <= count <= STATES_MAX:
+        raise ModelError(
+            f"{element}: {script.path}: CFFSUB_STATES = {count!r}: a whole number from 0 to "
+            f"{STATES_MAX} is allowed"
+        )
+    if count and contact.cff_type != "USERCFF":
+        raise ModelError(
+            f'{element}: {script.path} sets CFFSUB_STATES, which goes with cff_type="USERCFF" '
+            f"only: {contact.cff_type} has its own memory"
+        )
+    return count
+
+
 def _compiled(
     script: Script,
     name: str,
@@ -331,20 +371,24 @@ def _compiled(
     if script.text is None:
         return 0, "a .pyc has no source"
     # here and not above: `import mbsim.plugins` must not load Numba
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
     from mbsim.plugins.compiled import compile_friction
     from mbsim.plugins.probe import disagreement
 
-    address, reason = compile_friction(script.text, script.values, name, len(par))
+    twin = user(0, "probe")
+    address, reason = compile_friction(script.text, script.values, name, len(par), twin.states)
     if reason:
         return 0, reason
-    twin = user(0, "probe")
 
     def call(a: list[float]) -> list[float]:
-        return twin.call(a[0], par, a[13:16], a[16:19], a[2:5], a[5:8], a[10], int(a[19] + 0.5))
+        given = a[13:16], a[16:19], a[2:5], a[5:8], a[10], int(a[DFLAG] + 0.5)
+        return twin.call(a[0], par, *given, state=a[FRICTION_INPUTS:])
 
     # a place that the text does not read needs no probe
     read = [reads_parameter(script.text, name, position) for position in (4, 5, 6, 9)]
-    reason = disagreement(address, call, par, script.text, script.values, twin.element, read)
+    reason = disagreement(
+        address, call, par, script.text, script.values, twin.element, read, twin.states
+    )
     return (0, reason) if reason else (address, "")
 
 
@@ -482,11 +526,6 @@ def user_function(
     if not callable(function):
         kind = type(function).__name__
         raise ModelError(f"{element}: {name} in {script.path} is a {kind}, not a function")
-    if f"{name}_STATES" in script.values or "CFFSUB_STATES" in script.values:
-        raise ModelError(
-            f"{element}: {script.path} sets CFFSUB_STATES; states of user subroutines "
-            "are not built yet"
-        )
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # some functions written in C tell nothing

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from mbsim.laws import user_normal as at
-from mbsim.laws.abi import FRICTION_INPUTS
+from mbsim.laws.abi import FRICTION_INPUTS, MEMORY_OUT
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 
@@ -74,6 +74,19 @@ def probes(sizes: list[float], read: list[bool]) -> Iterator[list[float]]:
         ] + [0.0]  # fmt: skip
 
 
+def with_states(
+    cases: Iterator[list[float]], sizes: list[float], states: int
+) -> Iterator[list[float]]:
+    """Yield the cases with nothing kept and with numbers of many sizes kept."""
+    chance = random.Random(21)
+    for given in cases:
+        rest = [0.0] * (FRICTION_INPUTS - len(given))
+        size = chance.choice([*sizes, 10.0 ** chance.uniform(-6, 2)])
+        kept = [size * chance.choice([-1.0, 0.5, 1.0, chance.gauss(0, 1)]) for _ in range(states)]
+        yield [*given, *rest, *([0.0] * states)]
+        yield [*given, *rest, *kept]
+
+
 def _near(call: Callable[[list[float]], list[float]], given: list[float]) -> Iterator[list[float]]:
     """Yield the interpreted results one rounding away."""
     for factor in (1.0 - 4e-16, 1.0 + 4e-16):
@@ -91,11 +104,13 @@ def disagreement(
     values: dict[str, Any],
     element: int,
     read: list[bool],
+    states: int = 0,
 ) -> str:
     """Return '' if the code at `address` does what `call` does at every probe, else where not."""
     entry = guard.C_FUNCTION(address)
-    c_inputs, c_out = (ctypes.c_double * FRICTION_INPUTS)(), (ctypes.c_double * 5)()
-    unset = (ctypes.c_double * 5)(*[math.nan] * 5)
+    size = MEMORY_OUT + states
+    c_inputs, c_out = (ctypes.c_double * (FRICTION_INPUTS + states))(), (ctypes.c_double * size)()
+    unset = (ctypes.c_double * size)(*[math.nan] * size)
     c_par = (ctypes.c_double * max(len(par), 1))(*par)
 
     def run(given: list[float]) -> tuple[bool, list[float]]:
@@ -103,12 +118,14 @@ def disagreement(
             c_inputs[position] = value
         ctypes.memmove(c_out, unset, ctypes.sizeof(c_out))
         failed = entry(element, c_inputs, c_par, c_out) != 0
-        return failed, [c_out[0], c_out[1], c_out[4]]
+        return failed, [c_out[0], c_out[1], c_out[4], *c_out[MEMORY_OUT:size]]
 
     def shown(given: list[float]) -> str:
         return f"xdot={given[5:8]}, nforce={given[10]:g}, x={given[2:5]}, time={given[0]:g}"
 
-    return _compare(run, call, probes(thresholds(text, list(par), values), read), shown)
+    sizes = thresholds(text, list(par), values)
+    cases = probes(sizes, read)
+    return _compare(run, call, with_states(cases, sizes, states) if states else cases, shown)
 
 
 def normal_disagreement(

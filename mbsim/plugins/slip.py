@@ -7,11 +7,13 @@ import ast
 _XDOT = 7  # position of the slip velocity among the parameters
 
 
-def wrong_lengths(function: ast.FunctionDef) -> list[tuple[int, str]]:
-    """Return where lists of another length than three are returned."""
+def wrong_lengths(function: ast.FunctionDef, with_state: bool = False) -> list[tuple[int, str]]:
+    """Return where lists of another length than three are returned, or with a state beside."""
     returned = [
         node.value for node in ast.walk(function) if isinstance(node, ast.Return) and node.value
     ]
+    if with_state:
+        returned = [pair.elts[0] for pair in returned if isinstance(pair, ast.Tuple) and pair.elts]
     names = {value.id for value in returned if isinstance(value, ast.Name)}
     grown = {
         node.func.value.id

@@ -10,6 +10,7 @@ It is a whitelist, not a proof; the probes of `probe` have the last word.
 from __future__ import annotations
 
 import ast
+import copy
 import math
 import re
 from collections import Counter
@@ -42,6 +43,13 @@ _PLAIN_NODES = (
 _REFUSED_OPERATORS = (ast.MatMult, ast.In, ast.NotIn, ast.Is, ast.IsNot)
 
 
+class _WithoutText(ast.NodeTransformer):
+    """Numbers in place of texts, which a signal may be."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
+        return ast.copy_location(ast.Constant(0), node) if isinstance(node.value, str) else node
+
+
 class Refused(Exception):
     """A function stays interpreted; the text is the reason, with its line."""
 
@@ -60,6 +68,12 @@ class Globals:
     math_names: dict[str, str] = field(default_factory=dict)
     math_modules: set[str] = field(default_factory=set)
     others: set[str] = field(default_factory=set)
+    spies: set[str] = field(default_factory=set)
+
+    def is_espy(self, name: str, local: set[str]) -> bool:
+        """Return whether a name is mbsim's `espy`, given or imported."""
+        given = name == "espy" and self.kind(name) == ("other", name) and name not in self.others
+        return name not in local and (given or name in self.spies)
 
     def kind(self, name: str) -> tuple[str, str]:
         """Return what a global name is (constant, function, math, module, helper, builtin)."""
@@ -128,6 +142,10 @@ def module_globals(tree: ast.Module, values: dict[str, Any]) -> Globals:
             for alias in node.names:
                 if alias.name != "*" and bound[alias.asname or alias.name] == 1:
                     known.math_names[alias.asname or alias.name] = alias.name
+        elif isinstance(node, ast.ImportFrom) and node.module == "mbsim" and not node.level:
+            for alias in node.names:
+                if alias.name == "espy" and bound[alias.asname or "espy"] == 1:
+                    known.spies.add(alias.asname or "espy")
     sorted_names = {*known.constants, *known.functions, *known.math_names, *known.math_modules}
     known.others = set(bound) - sorted_names - {"*"}
     if any(
@@ -277,6 +295,9 @@ class _Check:
         if isinstance(value, ast.Constant):
             return known
         if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
+            if self.known.is_espy(value.func.id, self.locals):
+                self.espy(value, known)
+                return known
             if value.func.id == "py_errmes" and self.known.kind("py_errmes")[0] == "helper":
                 self.errmes(value, known)
                 return known
@@ -288,6 +309,13 @@ class _Check:
                     self.expression(value.args[0], known)
                     return known
         raise refuse(value, "a statement that computes and keeps nothing")
+
+    def espy(self, call: ast.Call, known: set[str]) -> None:
+        """Accept signals that only compute: the call is left out, they must not raise unseen."""
+        if call.args or any(keyword.arg is None for keyword in call.keywords):
+            raise refuse(call, "espy without names: espy(mu=mu)")
+        for keyword in call.keywords:
+            self.expression(_WithoutText().visit(copy.deepcopy(keyword.value)), known)
 
     def errmes(self, call: ast.Call, known: set[str]) -> None:
         """Accept py_errmes only where it stops the run: the interpreted twin then says why."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -71,7 +72,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     if draft.faults or faults:
         raise DeckError([*draft.faults, *map(said_so, faults)])
     draft.warnings.extend(warnings)
-    return _to_model(draft, deck, model.sha256)
+    return replace(_to_model(draft, deck, model.sha256), overrides=tuple(overrides))
 
 
 def _as_it_is(fault: Fault) -> Fault:

@@ -72,6 +72,8 @@ class Panel:
     curves: list[Curve] = field(default_factory=list)
     #: The quantity with its unit, as it stands on the axis.
     axis: str = ""
+    #: What this panel is drawn over, where it has an axis of its own.
+    over: str = ""
 
 
 @dataclass

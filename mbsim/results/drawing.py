@@ -102,12 +102,20 @@ def draw(picture: Picture) -> Figure:
         lines = len(foot) + len(heading) + len(shouted)
         figure = Figure(figsize=(_WIDTH, sum(heights) + 0.6 + _LINE * lines), layout="constrained")
         grid = figure.subplots(
-            len(picture.panels), 1, sharex=True, squeeze=False, height_ratios=heights
+            len(picture.panels),
+            1,
+            sharex=not any(panel.over for panel in picture.panels),
+            squeeze=False,
+            height_ratios=heights,
         )
         axes: list[Axes] = list(grid[:, 0])
         for axis, panel in zip(axes, picture.panels, strict=True):
             _fill(axis, picture, panel)
-        axes[-1].set_xlabel(_plain(picture.axis))
+            if panel.over:
+                axis.set_xlabel(_plain(panel.over))
+                axis.margins(x=0.03)
+        if picture.axis:
+            axes[-1].set_xlabel(_plain(picture.axis))
         figure.align_ylabels(axes)
         if picture.span is not None and picture.span[1] > picture.span[0]:
             axes[-1].set_xlim(*picture.span)

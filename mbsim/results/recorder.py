@@ -38,6 +38,8 @@ EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
 
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
+#: Attributes of which digests say whether they matter.
+_SAID_ELSEWHERE = ("model_file", "overrides", "plugins", "interpret_plugins")
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
 #: That size is for each so many bodies (and joints, ...): a write opens every signal, 0.3 ms each,
@@ -441,6 +443,11 @@ def _digests(system: System) -> dict[str, Value]:
     return {"system_sha256": model.hexdigest(), "subroutines_sha256": users.hexdigest()}
 
 
+def made_of(system: System) -> dict[str, Value]:
+    """Return digests of a model and of users' files, as result files have them."""
+    return _digests(system)
+
+
 def _check_same(path: Path, results: Results, settings: Mapping[str, Value]) -> None:
     """Raise `ModelError` unless a run with these settings can go on from a result file."""
     there = results.attributes
@@ -450,7 +457,7 @@ def _check_same(path: Path, results: Results, settings: Mapping[str, Value]) -> 
         raise ModelError(f"--resume: {path}: no checkpoint in it; start without --resume")
     # what explains a difference comes before the digests that only show it
     for name, value in settings.items():
-        if name == "model_file" or (name == "subroutines_sha256" and results.status == "failed"):
+        if name in _SAID_ELSEWHERE or (name == "subroutines_sha256" and results.status == "failed"):
             continue  # a failed user subroutine may be mended
         if name not in there or there[name] != value:
             what = {

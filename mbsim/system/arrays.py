@@ -118,6 +118,22 @@ SIDE, HEAT = range(2)
 #: not cut there.
 HOT = 4.0
 
+# entries of `World.past`
+NOW, WITHIN, AGAIN = range(3)
+
+# columns of `Rows.incidents`: what was found, and what the force on it followed from besides y
+INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10, 13
+(
+    INC_SHARE,  # part of the normal force that this point has
+    INC_STEP,  # `h` of the evaluation
+    INC_FROZEN,  # whether friction kept its mode
+    INC_TOUCHES,  # points of its pair at the committed state
+    INC_KIND,
+    INC_GRAPHIC_I,  # of the pair
+    INC_GRAPHIC_J,
+    INC_MEMORY,  # of friction at the begin of the step, as many as `State.before` has
+) = range(14, 22)
+
 
 class Bodies(NamedTuple):
     """Moving bodies."""
@@ -374,7 +390,7 @@ class World(NamedTuple):
     scale: F1  # (3,) length L, speed V and energy of the error norm
     doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate
-    past: I1  # (1,) 1 while a point within the last step is evaluated
+    past: I1  # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
 
@@ -486,7 +502,7 @@ class Rows(NamedTuple):
     applied: F2  # (rows, 6 nf) the same of `Applied`
     value: F2  # (rows, values) expressions of requests
     incident_count: I1  # (rows,)
-    incidents: F2  # (capacity, 14) slot, p, n, t, X, depth
+    incidents: F2  # (capacity, INC_MEMORY + most) slot, p, n, t, X, depth, ...: see above
     events: F2  # (capacity, 4) time, kind, contact, slot
     used: I1  # (3,) rows, incidents, events
 

@@ -238,7 +238,7 @@ def contacts_table(
         if contact.cff_type == "USERCFF":
             friction.append(user[contact.id].row)
             addresses.append(user[contact.id].address)
-            uses_x[k] = user[contact.id].uses_x
+            uses_x[k], memory[k] = user[contact.id].uses_x, user[contact.id].states
         elif contact.cff_type == "COULOMB_OFF":
             friction.append(np.zeros(0))
             addresses.append(0)

@@ -120,7 +120,15 @@ def scratch(
 
 
 def empty_rows(
-    n: int, nb: int, nc: int, ns: int, nj: int, nf: int, values: int, sensors: int = 0
+    n: int,
+    nb: int,
+    nc: int,
+    ns: int,
+    nj: int,
+    nf: int,
+    values: int,
+    sensors: int = 0,
+    memory: int = 0,
 ) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
     return a.Rows(
@@ -133,7 +141,7 @@ def empty_rows(
         applied=np.zeros((ROWS, 6 * nf)),
         value=np.zeros((ROWS, values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
-        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), 14)),
+        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + memory)),
         events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + sensors, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

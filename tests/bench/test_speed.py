@@ -107,6 +107,50 @@ def test_calls_of_normal_laws():
         assert total > 0.0
 
 
+FRICTION = {
+    "mu_static": 0.5,
+    "mu_dynamic": 0.3,
+    "stiction_trans_vel": 2e-3,
+    "friction_trans_vel": 1e-2,
+    "stribeck_vel": 5e-3,
+    "bristle_stiffness": 1e4,
+    "rolling_arm": 0.01,
+    "patch_radius": 0.1,
+}
+
+
+def test_calls_of_friction_laws():
+    from mbsim.core import jit
+    from mbsim.core.address import call_int
+    from mbsim.laws import abi
+    from mbsim.laws.catalog import FRICTION_LAWS
+
+    def loop(address, speeds, given, par, out):
+        total = 0.0
+        for speed in speeds:
+            given[5] = speed
+            call_int(address, (1, given, par, out))
+            total += out[0]
+        return total
+
+    run = jit.function(loop)
+    speeds, out = np.random.default_rng(1).uniform(0.0, 2e-2, 1_000_000), np.zeros(40)
+    given = np.zeros(40)
+    given[7], given[10], given[21], given[22], given[23] = 0.1, 10.0, 1e4, 1.0, np.nan
+    print()
+    for name in FRICTION_LAWS:
+        law = FRICTION_LAWS[name]
+        own = {each.name: each.default for each in law.own} | FRICTION
+        par = np.array([own[each] for each in law.parameters])
+        address, times = abi.friction_address(law), []
+        for _ in range(6):
+            began = time.perf_counter()
+            total = run(address, speeds, given, par, out)
+            times.append(1e9 * (time.perf_counter() - began) / len(speeds))
+        print(f"{name}: {statistics.median(times[1:]):.1f} ns a call")
+        assert total < 0.0 or law.memory > 0
+
+
 @jitable
 def _call(address, given, par, out):
     return call_int(address, (1, given, par, out))

@@ -373,7 +373,11 @@ def test_load_faults_name_file_and_line(tmp_path):
     refused("law.so: No such file", contact(), [tmp_path / "law.so"])
     refused("law: No such file", contact(dll_name="law"))
     refused(r"names no .m file; name CFFSUB.m by", contact(interpreter="MATLAB"))
-    refused("CFFSUB_STATES", contact(), [write("states.py", "CFFSUB_STATES = 2\n" + good)])
+    states = "CFFSUB_STATES = 2\n" + good
+    refused(r"states.py:2: CFFSUB.*12 arguments", contact(), [write("states.py", states)])
+    for count in ("-1", "65", "2.0", "True", "'2'"):
+        refused(f"CFFSUB_STATES = {count}: a whole number from 0 to 64", contact(),
+                [write("count.py", f"CFFSUB_STATES = {count}\n{good}")])  # fmt: skip
     text = refused("boom.py:2: the script fails", contact(), [write("boom.py", "a = 1\n1/0\n")])
     assert "ZeroDivisionError: division by zero" in text
     assert "\n" not in text

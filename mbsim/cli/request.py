@@ -1,0 +1,66 @@
+"""`mbsim request`: signals that a run did not write, from the states that it did."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("request")
+@click.argument("result", type=click.Path(path_type=Path), metavar="RESULT.h5")
+@click.argument("names", nargs=-1, required=True, metavar="NAME...")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="FILE.csv",
+    help="Instead of standard output.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of CSV.")
+def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: bool) -> None:
+    """Evaluate contact forces again at the output times of RESULT.h5.
+
+    NAME is Force_Contact[ID].force (torque, penetration, slip_speed, incidents) or
+    Force_Contact[ID].incident[K].mu (force, torque, mode, slip, xdot, x, depth, rate, nforce,
+    friction, stored, point, normal, state0, ..., and what a user's function names by espy), K
+    counting the incidents of the row from 0. /x, /y, /z or /mag after a vector takes one number of
+    it. The deck and users' files must be those of the run.
+    """
+    from mbsim.again import request
+    from mbsim.cli.messages import print_json
+    from mbsim.errors import ModelError
+    from mbsim.results.files import replace_text
+    from mbsim.results.reading import finite, open_results
+
+    if output is not None and as_json:
+        raise ModelError("-o goes with CSV: take either -o or --json")
+    with open_results(result) as results:
+        time, columns = request(results, names)
+    if as_json:
+        print_json({"result_file": str(result), "time": time.tolist(), "signals": finite(columns)})
+        return
+    lines = _csv(time.tolist(), columns)
+    if output is None:
+        sys.stdout.writelines(lines)
+        return
+    replace_text(output, "".join(lines))
+    click.echo(f"{output}: {len(columns)} columns, {len(time)} rows")
+
+
+def _csv(time: list[float], columns: dict[str, list[Any]]) -> Iterator[str]:
+    """Yield lines of CSV; what is not there is empty."""
+    yield ",".join(["Time", *columns]) + "\n"
+    for k, t in enumerate(time):
+        yield ",".join([repr(t), *(_cell(values[k]) for values in columns.values())]) + "\n"
+
+
+def _cell(value: Any) -> str:
+    """Return a number such that it reads back exactly, or a text that is one cell."""
+    if isinstance(value, str):
+        plain = not any(character in value for character in ',"\n')
+        return value if plain else '"' + value.replace('"', '""') + '"'
+    return "" if value != value else repr(float(value))

@@ -1,0 +1,271 @@
+"""`mbsim request`: the forces of a run once more, to the last bit, and what lies behind them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import mbsim
+from mbsim.again import Again, request
+from mbsim.cli.main import main
+from mbsim.errors import ModelError, ResultsError
+
+USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
+MODELS = Path(__file__).resolve().parents[2] / "models"
+SLIP = 'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
+USER = 'cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="law.py"'
+FRICTIONS = {
+    "none": "",
+    "COULOMB_ON": f'cff_type="COULOMB_ON" mu_static="0.4" mu_dynamic="0.3" {SLIP}',
+    "STICTION": 'cff_type="STICTION" mu_static="0.4" mu_dynamic="0.3"',
+    "LUGRE": 'cff_type="LUGRE" mu_static="0.4" mu_dynamic="0.3" stribeck_vel="0.01" '
+    'bristle_stiffness="2e4" bristle_damping="30"',
+    "plugin": f'{USER} cff_param_string="USER(0.4,2e4,30)"',
+}
+DECK = """<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.0042" inertia_yy="0.0042"
+ inertia_zz="0.0067" v_ic_x="{vx}" v_ic_x_flag="TRUE"/>
+<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="0.01" inertia_yy="0.01" inertia_zz="0.01"
+ w_ic_y="{spin}" w_ic_y_flag="TRUE"/>
+<Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="20" body_id="2" pos_z="{block}"/>
+<Reference_Marker id="30" body_id="3" pos_x="1" pos_z="{ball}"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+ length_x="0.2" length_y="0.2" length_z="0.1"/>
+<Post_Graphic id="300" type="Sphere" center_marker_id="30" radius="0.1"/>
+<Force_Contact id="301" num_i_graphics="2" i_graphics_id="200 300" num_j_graphics="1"
+ j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="300" dmax="1e-5"
+ {friction}/>
+{force}
+<Force_Gravity grav_z="-9.81"/>
+</Model>
+<Command><Simulate analysis_type="Transient" end_time="{end}" print_interval="0.01"/></Command>
+</Deck>
+"""
+FORCE = """<Force_Vector_OneBody id="5" type="ForceOnly" i_marker_id="20"
+ fx_expression="6*sin(6*time)" fy_expression="2*sin(4*time)" fz_expression="0"/>"""
+USUAL = {"vx": 0, "spin": -20, "block": 0.05001, "ball": 0.15, "force": FORCE, "end": 0.4}
+SPIED = """
+def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
+    v = hypot(xdot[0], xdot[1])
+    ratio = 0.3 / max(v, 0.01)
+    mode = "slow" if v < 0.01 else "fast"
+    espy(mu=ratio * v, mode_of_mine="slow" if v < 0.01 else "fast")
+    return [-ratio * nforce * xdot[0], -ratio * nforce * xdot[1], 0.0]
+"""
+
+
+def run(folder, friction, script=None, deck=None, **settings):
+    """Run the deck in a folder and return its open results."""
+    source = USERFUNCS / "stiction_with_state.py"
+    text = source.read_text() if script is None else script
+    (folder / "law.py").write_text(text)
+    file = folder / "deck.xml"
+    file.write_text(DECK.format(friction=friction, **(USUAL | (deck or {}))))
+    return mbsim.simulate(mbsim.read_model(file), output=folder / "out", **settings)
+
+
+def same(results):
+    """Compare forces evaluated again with those of the run, bit for bit; return the rows."""
+    rows = list(Again(results).rows())
+    assert len(rows) == len(results["time"]) > 10
+    for name in ("force", "torque", "penetration", "slip_speed", "incidents"):
+        again = [row.contacts[301][name] for row in rows]
+        np.testing.assert_array_equal(np.array(again), results[f"contacts/301/{name}"])
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("friction", "method"),
+    [
+        *((friction, "DOPRI5") for friction in FRICTIONS),
+        ("COULOMB_ON", "VERLET"),
+        ("plugin", "VERLET"),
+        ("STICTION", "GALPHA"),
+        ("LUGRE", "RADAU5"),
+    ],
+)
+def test_forces_are_those_of_the_run_to_the_last_bit(tmp_path, friction, method):
+    deck: dict[str, object] = {}
+    if method == "VERLET":
+        deck = {"vx": 1, "force": ""}
+    if friction == "LUGRE":
+        # in touch from the start: bristles that a blow meets at high slip are too stiff
+        deck = {"spin": 0, "block": 0.04999, "ball": 0.09999}
+    with run(tmp_path, FRICTIONS[friction], deck=deck, integrator=method) as results:
+        rows = same(results)
+    # block and sphere both touch, and the forces are no zeros
+    assert max(len(row.incidents[301]) for row in rows) == 5
+    pulls = [abs(row.contacts[301]["force"][0]) for row in rows]
+    assert (max(pulls) > 1.0) == (friction != "none")
+
+
+def test_so_are_those_of_an_interpreted_function(tmp_path):
+    friction = FRICTIONS["plugin"]
+    with run(tmp_path, friction, interpret_plugins=True) as results:
+        assert results.stats["python_calls"] > 0
+        same(results)
+
+
+def test_and_those_of_a_law_that_asks_for_a_users_sliding(tmp_path):
+    friction = f'{FRICTIONS["STICTION"]} cff_fnc_name="CFFSUB" script_name="law.py"'
+    with run(tmp_path, friction, script=SPIED) as results:
+        rows = same(results)
+    assert {row.incidents[301][0]["mode"] for row in rows if row.incidents[301]} == {
+        "stick",
+        "slip",
+    }
+
+
+@pytest.mark.parametrize("name", ["bowling_ball", "belt_stick_slip", "mesh_on_plane"])
+def test_and_those_of_decks_in_models(tmp_path, name):
+    model = mbsim.read_model(MODELS / f"{name}.xml")
+    contact = next(iter(model.contacts))
+    with mbsim.simulate(model, output=tmp_path, end_time=0.6, print_interval=0.02) as results:
+        rows = list(Again(results).rows())
+        again = np.array([row.contacts[contact]["force"] for row in rows])
+        np.testing.assert_array_equal(again, results[f"contacts/{contact}/force"])
+        assert np.abs(again).max() > 0.0
+
+
+def test_what_set_changed_is_changed_again(tmp_path):
+    (tmp_path / "deck.xml").write_text(DECK.format(friction=FRICTIONS["COULOMB_ON"], **USUAL))
+    model = mbsim.read_model(tmp_path / "deck.xml", ["Force_Contact[301].mu_dynamic=0.1"])
+    with mbsim.simulate(model, output=tmp_path / "out") as results:
+        assert results.attributes["overrides"] == "Force_Contact[301].mu_dynamic=0.1"
+        same(results)
+
+
+def ask(*arguments):
+    return CliRunner().invoke(main, ["request", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory):
+    """Return a result file of STICTION, and a copy of its numbers."""
+    folder = tmp_path_factory.mktemp("held")
+    with run(folder, FRICTIONS["STICTION"]) as results:
+        force = np.array(results["contacts/301/force"])
+    return folder / "out" / "deck.h5", force
+
+
+def test_csv_and_json_have_the_same_numbers(held, tmp_path):
+    file, force = held
+    names = ["Force_Contact[301].force", "Force_Contact[301].incident[4].mu"]
+    names += ["Force_Contact[301].incident[0].mode", "Force_Contact[301].incident[0].force/mag"]
+    shown = ask(file, *names)
+    assert shown.exit_code == 0, shown.output
+    table = list(csv.DictReader(io.StringIO(shown.stdout)))
+    for k, axis in enumerate("xyz"):
+        read = [float(row[f"Force_Contact[301].force/{axis}"]) for row in table]
+        np.testing.assert_array_equal(read, force[:, k])
+    said = json.loads(ask(file, *names, "--json").stdout)
+    assert list(said["signals"]) == list(table[0])[1:]
+    # the sphere falls first: there is no fifth incident then
+    mu = said["signals"][names[1]]
+    assert mu[0] is None
+    assert table[0][names[1]] == ""
+    assert max(value for value in mu if value is not None) == pytest.approx(0.3, rel=1e-9)
+    assert set(said["signals"][names[2]]) == {"", "stick", "slip"}
+    target = tmp_path / "asked.csv"
+    assert "5 columns" not in ask(file, *names, "-o", target).stdout
+    assert target.read_text() == shown.stdout
+
+
+def test_signals_belong_together(held):
+    file, _ = held
+    signals = ("force", "nforce", "friction", "mu", "slip", "xdot", "depth", "normal")
+    names = [f"Force_Contact[301].incident[0].{each}" for each in signals]
+    with mbsim.open_results(file) as results:
+        time, columns = request(results, names)
+    got = {
+        name.partition("].incident[0].")[2]: np.array(column) for name, column in columns.items()
+    }
+    there = np.isfinite(got["depth"])
+    assert there.sum() > 0.9 * len(time)
+    part = {name: column[there] for name, column in got.items()}
+    np.testing.assert_allclose(part["normal/z"], 1.0)
+    np.testing.assert_allclose(part["force/z"], part["nforce"], rtol=1e-12)
+    size = np.hypot(part["friction/x"], part["friction/y"])
+    np.testing.assert_allclose(size, np.hypot(part["force/x"], part["force/y"]), atol=1e-9)
+    np.testing.assert_allclose(part["mu"] * part["nforce"], size, atol=1e-12)
+    np.testing.assert_allclose(part["slip"], np.hypot(part["xdot/x"], part["xdot/y"]), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Force_Contact[301].incident[0].muu", "no such signal; there are mu, force, torque, mode"),
+        (
+            "Force_Contact[301].mu",
+            "there are force, torque, penetration, slip_speed, incidents, inc",
+        ),
+        ("Force_Contact[7].force", "no such contact; there are Force_Contact[301]"),
+        ("Force_Contact[301].force/w", "no such part; there are /x, /y, /z, /mag"),
+        ("Force_Contact[301].incident[0].mu/x", "no such part; mu is one number"),
+        ("contacts/301/force", "such are Force_Contact[301].force and"),
+    ],
+)
+def test_unknown_names_list_what_exists(held, name, said):
+    done = ask(held[0], name)
+    assert done.exit_code == 2
+    assert f"{name}: " in done.output
+    assert said in done.output
+    assert done.output.count("\n") == 1
+
+
+def test_a_deck_or_a_script_that_changed_is_refused(tmp_path):
+    run(tmp_path, FRICTIONS["plugin"], deck={"end": 0.1}).close()
+    file, deck, law = tmp_path / "out" / "deck.h5", tmp_path / "deck.xml", tmp_path / "law.py"
+    name = "Force_Contact[301].force"
+    text, script = deck.read_text(), law.read_text()
+    law.write_text(script + "# another\n")
+    assert "a user subroutine has changed since the run" in ask(file, name).output
+    law.write_text(script)
+    deck.write_text(text.replace("9.81", "9.80"))
+    assert "deck.xml has changed since the run" in ask(file, name).output
+    deck.unlink()
+    assert "deck.xml cannot be read: No such file" in ask(file, name).output
+    deck.write_text(text)
+    assert ask(file, name).exit_code == 0
+    shutil.copy(file, tmp_path / "copy.txt")
+    with pytest.raises(ResultsError, match="no such file"):
+        mbsim.open_results(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize("given", ["", "from mbsim import espy\n", "from mbsim import espy as e\n"])
+def test_signals_of_the_users_own(tmp_path, given):
+    script = given + (SPIED.replace("espy(", "e(") if " as e" in given else SPIED)
+    script = script.replace('    mode = "slow" if v < 0.01 else "fast"\n', "")
+    with run(tmp_path, USER, script=script) as results:
+        # it is compiled without the call
+        assert results.stats["python_calls"] == 0
+        same(results)
+        at = "Force_Contact[301].incident[0]."
+        _, columns = request(results, [f"{at}mu", f"{at}slip", f"{at}mode_of_mine"])
+        slip = np.array(columns[f"{at}slip"])
+        there = np.isfinite(slip)
+        np.testing.assert_allclose(
+            np.array(columns[f"{at}mu"])[there], 0.3 * np.minimum(1.0, slip[there] / 0.01)
+        )
+        words = np.array(columns[f"{at}mode_of_mine"])
+        np.testing.assert_array_equal(words[there], np.where(slip[there] < 0.01, "slow", "fast"))
+        with pytest.raises(ModelError, match=r"no such signal; there are .*mode_of_mine"):
+            request(results, [f"{at}mode_of_yours"])
+
+
+def test_espy_with_what_may_fail_keeps_a_function_interpreted(tmp_path):
+    # a name of its own that it may not have set yet, which Python would not forgive
+    script = SPIED.replace("espy(mu=ratio * v", "espy(mu=1.0 / later if v < 0.0 else v")
+    script = script.replace("    return [", "    later = 2.0\n    return [")
+    with run(tmp_path, USER, script=script, deck={"end": 0.02}) as results:
+        assert results.stats["python_calls"] > 0

@@ -1,0 +1,36 @@
+"""CFFSUB with memory: a spring between the surfaces that slips at mu * nforce.
+
+cff_param_string = "USER(mu, stiffness, damping)"
+
+What it keeps is the stretch z of the spring, two numbers, and X at that time. The spring is
+stretched by what X has grown since, and where it would pull harder than mu * nforce the rest of
+the stretch is slip (return mapping):
+
+    z = z_kept + X - X_kept,      z := z mu N / |k z|  where |k z| > mu N
+
+    F = -k z - c v, at most mu N,      c v only while it sticks, so that it comes to rest
+
+Why X alone cannot do it: X says where the surfaces are, not how they came there. A force
+-clip(k X, mu N) is that of a spring of limited strength: after a reversal it goes on pulling
+towards X = 0, along the motion, and gives back all that it took. Friction turns against the new
+motion at once, so that it has to know how far it had slipped. See README, "Friction with memory".
+"""
+
+CFFSUB_STATES = 4  # stretch x, y; X and Y then
+
+
+def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, state):
+    mu, k, c = par[0], par[1], par[2]
+    limit = mu * nforce
+    zx = state[0] + x[0] - state[2]
+    zy = state[1] + x[1] - state[3]
+    pull = k * hypot(zx, zy)
+    if pull > limit:
+        zx, zy = zx * limit / pull, zy * limit / pull
+        fx, fy = -k * zx, -k * zy
+    else:
+        fx, fy = -k * zx - c * xdot[0], -k * zy - c * xdot[1]
+        force = hypot(fx, fy)
+        if force > limit:
+            fx, fy = fx * limit / force, fy * limit / force
+    return [fx, fy, 0.0], [zx, zy, x[0], x[1]]
