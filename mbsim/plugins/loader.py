@@ -255,17 +255,8 @@ def load_friction(
 def friction_arguments(contact: Contact, states: int = 0) -> list[Any]:
     """Return the arguments of the one call of a contact's CFFSUB with iflag true."""
     par, zeros = [float(value) for value in contact.cff.par], [[0.0] * 3 for _ in range(4)]
-    asked, why = dependence(function, friction_arguments(contact, states))
-        contact.id,
-        0.0,
-        par,
-        len(par),
-        *zeros,
-        0.0,
-        0,
-        1,
-        *([[0.0] * states] if states else []),
-    ]
+    state = [[0.0] * states] if states else []
+    return [contact.id, 0.0, par, len(par), *zeros, 0.0, 0, 1, *state]
 
 
 def check_libraries(contacts: Iterable[Contact]) -> None:
