@@ -127,7 +127,7 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     scripts: Scripts = {}
     found: dict[str, Any] = {}
     for contact in model.contacts.values():
-        if contact.cff_type == "USERCFF":
+        if contact.asks_user:
             name, given = f"Force_Contact[{contact.id}]", friction_arguments(contact)
             found[f"{name} cff"] = about(contact.cff, name, "cff", CFFSUB, given, plugins, scripts)
         if contact.cnf_type == "USERCNF":

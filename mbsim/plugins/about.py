@@ -55,6 +55,10 @@ def about(
         return facts | {"language": choose(source, user.fnc_name, prefix, user.language)[0]}
     if isinstance(source, OctaveFile):
         return facts | {"language": "MATLAB, by GNU Octave"}
+    states = source.values.get("CFFSUB_STATES", 0) if prefix == "cff" else 0
+    if isinstance(states, int) and states > 0:
+        names, arguments = f"{names}, state", [*arguments, [0.0] * states]
+        facts["states"] = states
     function = user_function(source, user.fnc_name, element, names)
     asked, why = dependence(function, arguments)
     facts["asks_for"] = asked or "nothing"
