@@ -269,3 +269,15 @@ def test_espy_with_what_may_fail_keeps_a_function_interpreted(tmp_path):
     script = script.replace("    return [", "    later = 2.0\n    return [")
     with run(tmp_path, USER, script=script, deck={"end": 0.02}) as results:
         assert results.stats["python_calls"] > 0
+
+
+def test_rows_after_a_command_have_the_changed_parameters(tmp_path):
+    text = DECK.format(friction=FRICTIONS["COULOMB_ON"], **USUAL)
+    change = '<Force_Contact id="301" mu_dynamic="0.1" stiffness="5e4"/>'
+    later = '<Simulate analysis_type="Transient" end_time="0.8" print_interval="0.01"/>'
+    text = text.replace("</Command>", f"{change}{later}</Command>")
+    (tmp_path / "deck.xml").write_text(text)
+    with mbsim.simulate(mbsim.read_model(tmp_path / "deck.xml"), output=tmp_path / "o") as results:
+        rows = same(results)
+    mu = {round(row.incidents[301][0]["mu"], 3) for row in rows if row.incidents[301]}
+    assert {0.1, 0.3} <= mu
