@@ -148,6 +148,7 @@ def _refuse_verlet(model: Model) -> None:
     constraints: dict[str, Mapping[int, Any]] = {
         "Force_JointFriction": model.joint_frictions,
         "Force_JointLimit": model.joint_limits,
+        "Force_DryFriction": model.dry_frictions,
         "Constraint_Joint": model.joints,
         "Constraint_Jprim": model.primitives,
         "Constraint_Coupler": model.couplers,

@@ -46,6 +46,7 @@ class Active(NamedTuple):
     skyline: Any
     quality: Any
     size: Any
+    frozen: Any  # whether friction keeps its modes within a step
 
 
 class Runner:
@@ -189,6 +190,8 @@ class Runner:
             self.log.line(line)
             self.tell(line)
 
+        # there are no steps here that could end where friction changes
+        scene.world.frozen[0] = 0
         y = self.method.y.copy()
         find(self.system, y, t, hooks, stage.simulation.static, say)
         # turns are counted on the way; all else is as if the bodies had jumped
@@ -275,6 +278,7 @@ class Runner:
                 scene.sweep.skyline,
                 scene.sweep.quality,
                 scene.sweep.size,
+                scene.world.frozen,
             ),
             "log": scene.log,
             "method": self.method,

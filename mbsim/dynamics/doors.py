@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import carray, types
 
 from mbsim.core import jit
@@ -9,6 +10,7 @@ from mbsim.core.address import view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
+from mbsim.dynamics.dry_friction import commit_dry
 from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
@@ -22,6 +24,9 @@ from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
+    DRY_DOOR,
+    DRY_SLIDE,
+    DRY_TURN,
     EXPRESSION_DOOR,
     FRICTION_DOOR,
     SLIDE_LIMIT,
@@ -110,6 +115,12 @@ def _commit_angles(context):
     return commit_angles(view(context, Scene))
 
 
+def _commit_dry(context, t, y):
+    """What dry friction keeps of an accepted step."""
+    scene = view(context, Scene)
+    return commit_dry(scene, t, carray(y, (scene.rows.y.shape[1],)))
+
+
 def limit_turn(context, t, h, a, b):
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
@@ -136,6 +147,8 @@ def open_expressions(scene: Scene) -> None:
     kind = scene.applied.kind
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
         doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
+    if np.isin(kind, (DRY_SLIDE, DRY_TURN)).any():
+        doors[DRY_DOOR] = jit.address(_commit_dry, _VALUES)
     if len(scene.applied.late) > 0:
         # only then: it is compiled with all that it needs
         doors[FRICTION_DOOR] = jit.address(_settle, _APPLY)

@@ -15,6 +15,7 @@ from mbsim.core.problem import ASK, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import MODE
 from mbsim.dynamics.expressions import value
+from mbsim.dynamics.dry_friction import is_dry, side_of_dry
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import EVALUATE_DOOR, HEAT, SIDE, SLIDE_LIMIT, Scene
 
@@ -56,7 +57,8 @@ def side(scene, t, y, k):
         return value(scene, t, y, program)
     if scene.kinks.limit[k] < 0:
         return modes(scene)
-    return side_of_limit(scene, y, scene.kinks.limit[k])
+    f = scene.kinks.limit[k]
+    return side_of_dry(scene, y, f) if is_dry(scene.applied.kind[f]) else side_of_limit(scene, y, f)
 
 
 @jitable
@@ -78,7 +80,12 @@ def watch(scene, context, t, y, what):
         if what != ASK:
             sides[k, SIDE] = now
     # where modes change at nearly every step they are left to each evaluation
-    scene.world.frozen[0] = 1 if sides[last, HEAT] <= HOT else 0
+    hottest = sides[last, HEAT]
+    for k in range(last):
+        f = scene.kinks.limit[k]
+        if f >= 0 and is_dry(scene.applied.kind[f]):
+            hottest = max(hottest, sides[k, HEAT])
+    scene.world.frozen[0] = 1 if hottest <= HOT else 0
     return differs
 
 

@@ -24,6 +24,7 @@ from mbsim.reader.forces import (
     FORCE_VECTOR_TWOBODY,
     REFERENCE_VARIABLE,
 )
+from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest
@@ -64,6 +65,7 @@ STATEMENTS = (
     FORCE_VECTOR_ONEBODY,
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
+    FORCE_DRYFRICTION,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
     REFERENCE_SPLINE,

@@ -63,8 +63,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     EVALUATE_DOOR,  # the whole rhs
     MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
     MEMORY_PAIR_DOOR,  # the same in complex ones
-) = range(16)
-DOORS = 16
+    DRY_DOOR,  # what Force_DryFriction keeps of an accepted step
+) = range(17)
+DOORS = 17
 
 # entries of `Applied.kind`
 (
@@ -75,11 +76,13 @@ DOORS = 16
     BUSHING,
     SLIDE_LIMIT,
     TURN_LIMIT,
+    DRY_SLIDE,  # Force_DryFriction along an axis, then about one: dynamics.dry_friction
+    DRY_TURN,
     SLIDE_FRICTION,  # the kinds from here on are frictions in joints
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(11)
+) = range(13)
 LATE = 16  # is added to the kind of forces that need reactions, see dynamics.late_forces
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
@@ -111,6 +114,10 @@ NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
 # columns of `State.sensed`: expression less value at the committed state, whether it was true,
 # what SENVAL shows, what it will show, whether it became true and Python has not yet acted
 EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
+
+# columns of `State.dry`: where the slider is, 0 or the sign in which it slides, and both at the
+# begin of the last step
+SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 
 # columns of `State.sides`: see dynamics.kinks
 SIDE, HEAT = range(2)
@@ -292,10 +299,11 @@ class Applied(NamedTuple):
     i: I1  # (nf,) markers
     j: I1  # (nf,)
     par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
-    # of bushings six stiffnesses, six dampings, six preloads
+    # of bushings six stiffnesses, six dampings, six preloads; of dry friction its stiffness (0:
+    # rigid) and the force at which it slides on and at which it begins to
     program: I1  # (nf,) -1 for none
     components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
-    axes: I1  # (nf,) marker whose axes those components are along
+    axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
     bounds: F2  # (nf, 2) of limits
@@ -303,6 +311,7 @@ class Applied(NamedTuple):
     law_par: F2  # (nf, widest)
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
+    equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
     late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
 
 
@@ -342,6 +351,7 @@ class Equations(NamedTuple):
     start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
     connection: I1  # (ne,) the element that it belongs to
+    dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for one that holds always
     kind: I1  # (terms,)
     i: I1  # (terms,) markers
     j: I1  # (terms,)
@@ -393,6 +403,7 @@ class State(NamedTuple):
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
+    dry: F2  # (nf, 4) of dry friction, see the names above
 
 
 class Log(NamedTuple):

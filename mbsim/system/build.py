@@ -332,12 +332,14 @@ def build(
             len(rows.sensors.id),
             len(rows.kinks.program),
             most,
+            nf,
         ),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
         sweep=sweep(mechanism),
         rows=empty_rows(
-            len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values), len(rows.sensors.id)
+            len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values),
+            len(rows.sensors.id) + len(model.dry_frictions),
         ),
     )
     if rows.reader is not None:

@@ -90,6 +90,7 @@ class _Sums:
     start: list[tuple[float, float]] = field(default_factory=list)
     unit: list[float] = field(default_factory=list)
     connection: list[int] = field(default_factory=list)
+    dry: list[int] = field(default_factory=list)
     terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -113,6 +114,7 @@ class _Sums:
         self.start.append(tuple(np.nan if value is None else value for value in start))
         self.unit.append(unit)
         self.connection.append(connection)
+        self.dry.append(-1)
         self.names.append(name)
 
     def arrays(self) -> a.Equations:
@@ -131,6 +133,7 @@ class _Sums:
             start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
             unit=np.array(self.unit, dtype=np.float64),
             connection=ints(self.connection),
+            dry=ints(self.dry),
             kind=ints(t[0] for t in self.terms),
             i=ints(t[1] for t in self.terms),
             j=ints(t[2] for t in self.terms),
