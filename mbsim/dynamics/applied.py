@@ -15,7 +15,7 @@ length); its damper loses c x'^2. What an expression's force does, F x', counts 
 with the sign turned, for nothing says what part of it could come back. Where the origins
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
-later (`dynamics.joint_friction`), dry friction is in `dynamics.dry_friction`, and so do forces by expressions of reactions
+later (`dynamics.joint_friction`), and so do forces by expressions of reactions
 (`dynamics.late_forces`); bushings and vector forces are in `dynamics.wrenches`.
 """
 

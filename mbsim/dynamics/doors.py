@@ -10,12 +10,13 @@ from mbsim.core.address import view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
-from mbsim.dynamics.dry_friction import commit_dry
+from mbsim.dynamics.dry_friction import serve_dry
 from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.late_forces import add_late
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.rigid_friction import serve_rigid
 from mbsim.dynamics.states import add_slopes
 from mbsim.dynamics.subroutines import failure_or
 from mbsim.dynamics.values import evaluate_program
@@ -43,6 +44,7 @@ _WRENCH = types.int64(types.int64, types.float64, _POINTER, types.int64)
 _EXPRESS = types.int64(types.int64, types.float64, _POINTER, types.int64, types.int64, types.int64)
 _VALUE = types.float64(types.int64, types.float64, _POINTER, types.int64)
 _VALUES = types.int64(types.int64, types.float64, _POINTER)
+_KEEP = types.int64(types.int64, types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
 
 
@@ -115,10 +117,16 @@ def _commit_angles(context):
     return commit_angles(view(context, Scene))
 
 
-def _commit_dry(context, t, y):
-    """What dry friction keeps of an accepted step."""
+def _serve_dry(context, what, t, y):
+    """What dry friction keeps of an accepted step, and what it holds."""
     scene = view(context, Scene)
-    return commit_dry(scene, t, carray(y, (scene.rows.y.shape[1],)))
+    return serve_dry(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+
+
+def _serve_rigid(context, what, t, y):
+    """The same where some is rigid."""
+    scene = view(context, Scene)
+    return serve_rigid(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
 
 
 def limit_turn(context, t, h, a, b):
@@ -148,7 +156,8 @@ def open_expressions(scene: Scene) -> None:
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
         doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
     if np.isin(kind, (DRY_SLIDE, DRY_TURN)).any():
-        doors[DRY_DOOR] = jit.address(_commit_dry, _VALUES)
+        rigid = bool((scene.applied.equation >= 0).any())
+        doors[DRY_DOOR] = jit.address(_serve_rigid if rigid else _serve_dry, _KEEP)
     if len(scene.applied.late) > 0:
         # only then: it is compiled with all that it needs
         doors[FRICTION_DOOR] = jit.address(_settle, _APPLY)

@@ -7,21 +7,25 @@ With n the axis, P the origin of I, and velocities of both bodies at P:
 | DRY_SLIDE | -f n                              | r . n      | (v_I - v_J) . n   |
 | DRY_TURN  | torque -f n                       | angle      | (w_I - w_J) . n   |
 
-so that -f x' is what f does to the bodies. What it remembers is in `State.dry`; what f is, in
+so that -f x' is what f does to the bodies. Rigid friction that sticks is an equation of velocity 0,
+its multiplier the force (`dynamics.rigid_friction`); what slides is a force as any other. What it remembers is in `State.dry`; what f is, in
 `laws.dry`. Steps end where it begins to slide or to stick (`dynamics.kinks`).
 """
 
 from __future__ import annotations
+
+import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.angles import followed_angle
 from mbsim.dynamics.markers import marker_axis, marker_point
 from mbsim.dynamics.wrenches import push_at, velocity_at
-from mbsim.laws.dry import dry_commit, dry_force, dry_mode
+from mbsim.laws.dry import dry_commit, dry_force, dry_mode, rigid_mode
 from mbsim.system.arrays import (
     DRY_SLIDE,
     DRY_TURN,
+    KEEP_DRY,
     LOST_POWER,
     SLIDER,
     SLIDER_BEFORE,
@@ -34,6 +38,9 @@ from mbsim.system.arrays import (
 
 # entries of `Applied.par`
 STIFFNESS, LIMIT, STATIC = range(3)
+
+#: Part of the model's speed that is rounding.
+ROUNDING = 1e-13
 
 
 @jitable
@@ -70,6 +77,8 @@ def dry_now(scene, f, x):
     """Return the force of dry friction f at x, and whether it gives way to x."""
     par = scene.applied.par[f]
     slider, slides = dry_memory(scene, f)
+    if scene.applied.equation[f] >= 0:
+        return slides * par[LIMIT], 1.0
     return dry_force(
         x, slider, slides, par[STIFFNESS], par[LIMIT], par[STATIC], scene.world.frozen[0]
     )
@@ -91,9 +100,41 @@ def add_dry(scene, y, f):
     for k in range(3):
         row[k] = force[k]
         row[3 + k] = torque[k]
-    row[STORED_ENERGY] = 0.5 * size * size / applied.par[f, STIFFNESS]
+    k = applied.par[f, STIFFNESS]
+    row[STORED_ENERGY] = 0.5 * size * size / k if k > 0.0 else 0.0
     row[LOST_POWER] = gives * size * rate
     return row[LOST_POWER]
+
+
+@jitable
+def rest_of(scene, f):
+    """Return what is no velocity of rigid dry friction f but rounding."""
+    scale = scene.world.scale
+    return ROUNDING * (scale[1] / scale[0] if scene.applied.kind[f] == DRY_TURN else scale[1])
+
+
+@jitable
+def holding_force(scene, f):
+    """Return the force against x that holds rigid dry friction f, 0 where nothing does."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        if active[r] == scene.applied.equation[f]:
+            return -scene.sweep.multiplier[r]
+    return 0.0
+
+
+@jitable
+def show_held(scene):
+    """Fill `Work.applied` of rigid dry frictions that are held; multipliers have been found."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        f = scene.equations.dry[active[r]]
+        if f < 0:
+            continue
+        n, row = marker_axis(scene, scene.applied.axes[f], 2), scene.work.applied[f]
+        first = 3 if scene.applied.kind[f] == DRY_TURN else 0
+        for k in range(3):
+            row[first + k] = scene.sweep.multiplier[r] * n[k]
 
 
 @jitable
@@ -101,6 +142,11 @@ def side_of_dry(scene, y, f):
     """Return what dry friction f does from here on: 0 to stick, or the sign in which it slides."""
     par, kept = scene.applied.par[f], scene.state.dry[f]
     _, x, rate = dry_motion(scene, y, f)
+    if scene.applied.equation[f] >= 0:
+        if math.isnan(kept[SLIDER]):
+            return 0.0
+        force, rest = holding_force(scene, f), rest_of(scene, f)
+        return rigid_mode(force, rate, kept[SLIDES], par[STATIC], rest)
     return dry_mode(x, rate, kept[SLIDER], kept[SLIDES], par[STIFFNESS], par[LIMIT], par[STATIC], 1)
 
 
@@ -117,12 +163,12 @@ def record_dry(scene, t, kind, f):
 
 @jitable
 def commit_dry(scene, t, y):
-    """Keep what all dry frictions make of the point evaluated last; return 0.
+    """Keep what all dry frictions with a spring make of the point evaluated last; return 0.
 
     What the spring loses as it snaps from the force that began to slide is lost by the model.
     """
     for f in range(len(scene.applied.kind)):
-        if not is_dry(scene.applied.kind[f]):
+        if not is_dry(scene.applied.kind[f]) or scene.applied.equation[f] >= 0:
             continue
         par, kept = scene.applied.par[f], scene.state.dry[f]
         k, before = par[STIFFNESS], kept[SLIDES]
@@ -139,3 +185,9 @@ def commit_dry(scene, t, y):
         if slides != before:
             record_dry(scene, t, STICK if slides == 0.0 else SLIP, f)
     return 0
+
+
+@jitable
+def serve_dry(scene, what, t, y):
+    """Do what is asked for at the door of dry friction where none is rigid; return 0."""
+    return commit_dry(scene, t, y) if what == KEEP_DRY else 0

@@ -11,7 +11,16 @@ from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import add_contact, contact_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import ACCELERATE, APPLIED_DOOR, BODY_SIZE, JOINTS_DOOR, NEAR_FOLD, SEAT
+from mbsim.system.arrays import (
+    ACCELERATE,
+    APPLIED_DOOR,
+    BODY_SIZE,
+    DRY_DOOR,
+    HOLD_AGAIN,
+    JOINTS_DOOR,
+    NEAR_FOLD,
+    SEAT,
+)
 
 
 @jitable
@@ -107,6 +116,8 @@ def evaluate(scene, t, h, y, dy):
 def evaluate_past(scene, t, h, y, dy):
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = 1
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, y))
     code = evaluate(scene, t, h, y, dy)
     scene.world.past[0] = 0
     return code

@@ -34,6 +34,7 @@ from mbsim.system.arrays import (
     DRY_DOOR,
     ENERGY_LOST,
     FIRST_TOUCH,
+    KEEP_DRY,
     LEAVE,
     LIVE,
     NEAR_DOOR,
@@ -383,7 +384,7 @@ def commit(scene, t, h, y):
     state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
     changed = commit_incidents(scene, t, h, y)
     if scene.world.doors[DRY_DOOR] != 0:
-        changed = max(changed, call_int(scene.world.doors[DRY_DOOR], (scene, t, y)))
+        changed = max(changed, call_int(scene.world.doors[DRY_DOOR], (scene, KEEP_DRY, t, y)))
     watch_peaks(scene, t)
     contacts = len(scene.contacts.id)
     for c in range(contacts):

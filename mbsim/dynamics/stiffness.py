@@ -607,6 +607,8 @@ def add_dry_slopes(scene, T, y, f):
     n, x, _ = dry_motion(scene, y, f)
     none, turns = (0.0, 0.0, 0.0), scene.applied.kind[f] == DRY_TURN
     _, gives = dry_now(scene, f, x)
+    if gives == 0.0 and scene.applied.equation[f] >= 0:
+        return
     if gives == 0.0:
         u = fill_unit(scene, T, y, f, none if turns else n, n if turns else none, 0)
         bi, bj = sides_of(scene, f)

@@ -69,6 +69,28 @@ def dry_mode(x, rate, slider, slides, k, limit, static, frozen):
 
 
 @jitable
+def rigid_mode(force, rate, slides, static, rest):
+    """Return the mode that a point asks for where k is infinite.
+
+    Parameters
+    ----------
+    force : float
+        f that holds x' at 0; it counts in stick alone.
+    rate, slides, static : float
+        As of `dry_mode`.
+    rest : float
+        What x' may be the other way by rounding alone.
+
+    Returns
+    -------
+    float
+    """
+    if slides != 0.0:
+        return slides if slides * rate >= -rest else 0.0
+    return math.copysign(1.0, force) if abs(force) > static else 0.0
+
+
+@jitable
 def dry_commit(x, rate, slider, slides, k, limit, static, frozen):
     """Return slider, mode and the force that hold from here on; arguments as of `dry_mode`."""
     if math.isnan(slider):

@@ -30,7 +30,6 @@ CHANGEABLE = {
         f"{_FRICTION} pin_radius ball_radius preload bending_reaction_arm",
     ),
     "Force_JointLimit": ("joint_limits", f"lower upper {_NORMAL}"),
-    "Force_DryFriction": ("dry_frictions", "friction friction_static dx"),
     "Motion_Joint": ("motions", "expr"),
     "Reference_Variable": ("variables", "expr"),
 }

@@ -91,6 +91,9 @@ SCALAR, RUBBING = 6, 7
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
 
+# what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
+KEEP_DRY, HOLD_AGAIN = range(2)
+
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
