@@ -16,7 +16,8 @@ with the sign turned, for nothing says what part of it could come back. Where th
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
 later (`dynamics.joint_friction`), and so do forces by expressions of reactions
-(`dynamics.late_forces`); bushings and vector forces are in `dynamics.wrenches`.
+(`dynamics.late_forces`); bushings and vector forces are in `dynamics.wrenches`, dry friction in
+`dynamics.dry_friction`.
 """
 
 from __future__ import annotations

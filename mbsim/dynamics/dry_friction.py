@@ -8,8 +8,9 @@ With n the axis, P the origin of I, and velocities of both bodies at P:
 | DRY_TURN  | torque -f n                       | angle      | (w_I - w_J) . n   |
 
 so that -f x' is what f does to the bodies. Rigid friction that sticks is an equation of velocity 0,
-its multiplier the force (`dynamics.rigid_friction`); what slides is a force as any other. What it remembers is in `State.dry`; what f is, in
-`laws.dry`. Steps end where it begins to slide or to stick (`dynamics.kinks`).
+its multiplier the force (`dynamics.rigid_friction`); what slides is a force as any other. What
+friction remembers is in `State.dry`; what f is, in `laws.dry`. Steps end where it begins to slide
+or to stick (`dynamics.kinks`).
 """
 
 from __future__ import annotations

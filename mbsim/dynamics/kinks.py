@@ -14,8 +14,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import MODE
-from mbsim.dynamics.expressions import value
 from mbsim.dynamics.dry_friction import is_dry, side_of_dry
+from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import EVALUATE_DOOR, HEAT, SIDE, SLIDE_LIMIT, SLIDES, Scene
 

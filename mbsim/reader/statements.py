@@ -16,6 +16,7 @@ from mbsim.reader.constraints import (
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
+from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.forces import (
     FORCE_BUSHING,
     FORCE_SCALAR_TWOBODY,
@@ -24,7 +25,6 @@ from mbsim.reader.forces import (
     FORCE_VECTOR_TWOBODY,
     REFERENCE_VARIABLE,
 )
-from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest

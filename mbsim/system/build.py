@@ -338,7 +338,13 @@ def build(
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
         sweep=sweep(mechanism),
         rows=empty_rows(
-            len(y0), nb, len(contact_ids), ns, nj, nf, len(rows.values),
+            len(y0),
+            nb,
+            len(contact_ids),
+            ns,
+            nj,
+            nf,
+            len(rows.values),
             len(rows.sensors.id) + len(model.dry_frictions),
         ),
     )
