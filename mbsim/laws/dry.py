@@ -43,7 +43,7 @@ def dry_force(x, slider, slides, k, limit, static, frozen):
     float, float
     """
     if math.isnan(slider):
-        return 0.0, 0.0
+        return 0.0, 1.0
     if frozen == 1 and slides != 0.0:
         return slides * limit, 1.0
     force = k * (x - slider)
