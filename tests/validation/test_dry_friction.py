@@ -167,6 +167,26 @@ def test_what_is_at_rest_stays_where_the_force_is_within_the_limit(tmp_path):
     np.testing.assert_allclose(results["dry_frictions/7/force"][:, 0], 0.5, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("more", "rest"),
+    [
+        # held where it is; in series 1000/11 N/m; slid until the limit holds
+        ('friction="1"', 0.05),
+        ('friction="1" dx="0.01"', 0.05 / 1.1),
+        ('friction="0.2"', 0.02),
+        ('friction="0.2" dx="0.01"', 0.02),
+    ],
+)
+def test_a_static_simulate_finds_where_friction_holds(more, rest, tmp_path):
+    path = write_deck(tmp_path, ground() + body(2, 1.0, x=0.05) + spring(10.0) + friction(more))
+    both = path.read_text().replace("<Command>", '<Command><Simulate analysis_type="Static"/>')
+    path.write_text(both, encoding="utf-8")
+    results = mbsim.simulate(mbsim.read_model(path), integrator="RADAU5", tol=1e-8)
+    x = results["bodies/2/position"][:, 0]
+    np.testing.assert_allclose(x, rest, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(results["dry_frictions/7/force"][:, 0], 10.0 * rest, rtol=1e-7)
+
+
 @pytest.mark.parametrize(("dx", "method"), [(0.0, "RADAU5"), (0.0, "GALPHA"), (0.02, "DOPRI5")])
 def test_resumed_it_is_the_same_run(dx, method, tmp_path, monkeypatch):
     monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
