@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.integrators.catalog import EXPLICIT, IMPLICIT, METHODS
+from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
 from mbsim.model.elements import Model, Simulation
 from mbsim.model.names import element_name, is_adams
 
@@ -148,6 +148,7 @@ def _refuse_verlet(model: Model) -> None:
     constraints: dict[str, Mapping[int, Any]] = {
         "Force_JointFriction": model.joint_frictions,
         "Force_JointLimit": model.joint_limits,
+        "Force_DryFriction": model.dry_frictions,
         "Constraint_Joint": model.joints,
         "Constraint_Jprim": model.primitives,
         "Constraint_Coupler": model.couplers,
@@ -173,6 +174,26 @@ def _refuse_verlet(model: Model) -> None:
                 f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
                 "take DOPRI5 or DOP853"
             )
+
+
+def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
+    """Return the method that runs a model, and what is to be said, where dry friction is rigid.
+
+    Raises
+    ------
+    ModelError
+        For an explicit method: it has no unknown for the force that holds.
+    """
+    rigid = next((f for f in model.dry_frictions.values() if f.dx == 0.0), None)
+    if rigid is None or method in IMPLICIT_METHODS:
+        return method, []
+    name = element_name(model.file, "Force_DryFriction", rigid.id)
+    if method == AUTO:
+        return IMPLICIT, [f"integrator AUTO: {IMPLICIT} from the start, for {name} is rigid"]
+    raise ModelError(
+        f"{model.file}:{rigid.source.line}: {name}: dx=0: rigid friction is for implicit methods "
+        f"and integrator {method} is explicit; take {' or '.join(IMPLICIT_METHODS)}, or give dx"
+    )
 
 
 def settle(
@@ -219,6 +240,8 @@ def settle(
     method, said_of_names = _method(asked)
     if method == "VERLET":
         _refuse_verlet(model)
+    method, said_of_friction = _for_rigid_friction(model, method)
+    notes += said_of_friction
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
 
 

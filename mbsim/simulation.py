@@ -189,6 +189,8 @@ class Runner:
             self.log.line(line)
             self.tell(line)
 
+        # there are no steps here that could end where friction changes
+        scene.state.frozen[0] = 0
         y = self.method.y.copy()
         find(self.system, y, t, hooks, stage.simulation.static, say)
         # turns are counted on the way; all else is as if the bodies had jumped

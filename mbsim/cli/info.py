@@ -173,7 +173,7 @@ _SHOWN = (
     *("label", "type", "joint_id", "joint_ids", "direction", "val_type", "motion_types", "scales"),
     *("pitch", "pitch_diameter", "length", "lower", "upper", "cnf_type", "stiffness", "damping"),
     *("cff_type", "mu_static", "mu_dynamic", "pin_radius", "ball_radius", "preload"),
-    *("bending_reaction_arm", "action_only"),
+    *("bending_reaction_arm", "action_only", "friction", "friction_static", "dx"),
 )
 
 

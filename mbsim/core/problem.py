@@ -18,7 +18,8 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 |        |                             | h = FRICTION_ALONE: only that                         |
 | check  | y new, -                    | 1, or the part of the step to take instead            |
 | commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
-|        |                             | rows are full; 4 `stable` must be asked again         |
+|        |                             | rows are full; 4 `stable` must be asked again; 8 the  |
+|        |                             | motion is held otherwise from here on: begin anew     |
 | look   | y at an inner point, -      | code; called where `commit` before asked for it       |
 | inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
 | limit  | y, f                        | longest step that may be tried                        |
@@ -27,7 +28,7 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | arrive | y committed, scratch        | 1 if something happened by this committed point that  |
 |        |                             | the caller of `advance` must act on, else 0           |
 | kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
-|        |                             | point, else 0                                         |
+|        |                             | point, 2 if that shall be found exactly, else 0       |
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
@@ -114,6 +115,8 @@ AT_ONCE = 100
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER = range(7)
 
 # what `kinks` is asked: whether sides differ, to keep them too, and that a step was taken
+#: What `commit` adds where the motion is held otherwise from here on.
+BEGIN_ANEW = 8.0
 ASK, SETTLE, PASS = 0.0, 1.0, 2.0
 
 # reasons given to `reject`

@@ -64,7 +64,7 @@ def evaluate_again(scene, t, y, dy, contacts, table):
     """
     work, rows = scene.work, scene.rows
     place_bodies(scene, y)
-    scene.world.past[0], scene.world.frozen[0] = AGAIN, 1
+    scene.world.past[0], scene.state.frozen[0] = AGAIN, 1
     count, code = rows.used[1], 0
     work.hit[len(work.hit) - 1] = count
     for k in range(count):

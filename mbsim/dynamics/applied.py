@@ -16,7 +16,8 @@ with the sign turned, for nothing says what part of it could come back. Where th
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
 later (`dynamics.joint_friction`), and so do forces by expressions of reactions
-(`dynamics.late_forces`); bushings and vector forces are in `dynamics.wrenches`.
+(`dynamics.late_forces`); bushings and vector forces are in `dynamics.wrenches`, dry friction in
+`dynamics.dry_friction`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.angles import followed_angle
+from mbsim.dynamics.dry_friction import add_dry, is_dry
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.wrenches import wrench
@@ -131,6 +133,11 @@ def add_applied(scene, t, y, dy):
             if code != 0:
                 return code
             lost += work.applied[f, LOST_POWER]
+            continue
+        if is_dry(kind):
+            lost += add_dry(scene, y, f)
+            if not math.isfinite(dot(vector(work.applied[f]), vector(work.applied[f]))):
+                return NOT_FINITE
             continue
         if kind == LINE_FORCE:
             n, x, rate = along_line(scene, y, f)

@@ -92,7 +92,7 @@ def assemble(scene: Scene, y: Array, serve: Serve, given: dict[int, Array]) -> A
         moved,
         sped,
         _lost(scene, y, given),
-        [e for e in range(n) if e not in set(chosen)],
+        [e for e in range(n) if e not in set(chosen) and equations.dry[e] < 0],
         int(scene.tree.free.sum()) - len(chosen),
     )
 
@@ -126,10 +126,11 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
 
 def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
     """Take the residuals of a column away, for the equations that hold at that level."""
-    given = scene.equations.start[:, column]
-    starts = (scene.equations.level < level) & np.isfinite(given)
-    held = (scene.equations.level >= level) | starts
-    n = len(held)
+    # dry friction, whose equations are the last, holds nothing yet
+    n = int((scene.equations.dry < 0).sum())
+    given, levels = scene.equations.start[:n, column], scene.equations.level[:n]
+    starts = (levels < level) & np.isfinite(given)
+    held = (levels >= level) | starts
     if not held.any():
         return
     best, stuck = np.inf, 0
@@ -137,7 +138,7 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
         serve(MATRIX, y)
         residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
         residual[starts] -= given[starts]
-        worst = float(np.max(np.abs(residual) / scene.equations.unit))
+        worst = float(np.max(np.abs(residual) / scene.equations.unit[:n]))
         stuck = stuck + 1 if worst > 0.5 * best else 0
         best = min(best, worst)
         if worst <= _CLOSED or (stuck >= 3 and best < 1e-10) or stuck >= 20:
@@ -147,7 +148,7 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
         solution = np.linalg.lstsq(A, -residual / size, rcond=_RANK)[0]
         scene.sweep.multiplier[:n] = solution / size
         serve(move, y)
-    parts = np.abs(residual) / scene.equations.unit
+    parts = np.abs(residual) / scene.equations.unit[:n]
     if not worst <= _OPEN:
         order = [int(e) for e in np.argsort(-parts) if not parts[e] <= _OPEN]
         raise ContradictionError(order, [float(parts[e]) for e in order], column == _MISMATCH)

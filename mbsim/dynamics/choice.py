@@ -22,7 +22,15 @@ from mbsim.dynamics.equations import (
     is_active,
     side_place,
 )
-from mbsim.system.arrays import CHOSEN, NEAR_FOLD, USUAL
+from mbsim.system.arrays import (
+    CHOSEN,
+    NEAR_FOLD,
+    SLIDER,
+    SLIDER_BEFORE,
+    SLIDES,
+    SLIDES_BEFORE,
+    USUAL,
+)
 
 #: What at most is left of an equation that others imply, as part of its size for free bodies.
 IMPLIED = 1e-12
@@ -83,57 +91,79 @@ def fill_skyline(scene):
 
 
 @jitable
-def use_all(scene):
-    """Take all equations into use."""
-    active = scene.equations.active
+def sticks(scene, e):
+    """Return whether equation e is of dry friction that sticks at the point being evaluated."""
+    f = scene.equations.dry[e]
+    if f < 0:
+        return False
+    kept = scene.state.dry[f]
+    if scene.world.past[0] == 1:
+        return kept[SLIDER_BEFORE] == 0.0 and kept[SLIDES_BEFORE] == 0.0
+    return kept[SLIDER] == 0.0 and kept[SLIDES] == 0.0
+
+
+@jitable
+def use_all(scene, sticking):
+    """Take all equations into use, of dry friction those that stick if that is wanted, or none."""
+    active, count = scene.equations.active, 0
     n = len(active) - 1
     for e in range(n):
-        active[e] = e
-    active[n] = n
+        if scene.equations.dry[e] < 0 or (sticking == 1 and sticks(scene, e)):
+            active[count] = e
+            count += 1
+    active[n] = count
     fill_skyline(scene)
 
 
 @jitable
 def choose(scene, t, y):
-    """Choose equations that are independent at y, where the tree has been prepared."""
+    """Choose equations that are independent at y, where the tree has been prepared.
+
+    Dry friction holds what nothing else does: it is asked last.
+    """
     sweep, active = scene.sweep, scene.equations.active
-    n = len(active) - 1
-    use_all(scene)
+    use_all(scene, 1)
+    n = active_count(scene)
     fill_equations(scene, t, y)
     fill_matrix(scene)
     A = sweep.A
-    for e in range(n):
-        fill_size(scene, e)
-    for e in range(n):
-        for f in range(e + 1):
-            value = A[e, f] / (sweep.size[e] * sweep.size[f]) if f >= sweep.skyline[e] else 0.0
-            A[e, f] = A[f, e] = value
-    least, count = 1.0, 0
-    for e in range(n):
-        active[e] = 0
+    for r in range(n):
+        fill_size(scene, active[r])
+    for r in range(n):
+        for s in range(r + 1):
+            size = sweep.size[active[r]] * sweep.size[active[s]]
+            A[r, s] = A[s, r] = A[r, s] / size if s >= sweep.skyline[r] else 0.0
+    # what is not chosen is below 0
+    for r in range(n):
+        active[r] = -1 - active[r]
+    least, count, friction = 1.0, 0, 0
     while count < n:
         best, pivot = -1, 0.0
-        for e in range(n):
-            if active[e] == 0 and A[e, e] > 1.001 * pivot:
-                best, pivot = e, A[e, e]
+        for r in range(n):
+            waits = active[r] < 0 and (friction == 1 or scene.equations.dry[-1 - active[r]] < 0)
+            if waits and A[r, r] > 1.001 * pivot:
+                best, pivot = r, A[r, r]
         if best < 0 or pivot <= IMPLIED:
-            break
-        active[best] = 1
+            if friction == 1:
+                break
+            friction = 1
+            continue
+        active[best] = -1 - active[best]
         least = min(least, pivot)
         count += 1
-        for e in range(n):
-            if active[e] == 0:
-                part = A[e, best] / pivot
-                for f in range(n):
-                    A[e, f] -= part * A[best, f]
+        for r in range(n):
+            if active[r] < 0:
+                part = A[r, best] / pivot
+                for s in range(n):
+                    A[r, s] -= part * A[best, s]
     sweep.quality[CHOSEN] = least
     sweep.quality[USUAL] = max(sweep.quality[USUAL], least)
     count = 0
-    for e in range(n):
-        if active[e] == 1:
-            active[count] = e
+    for r in range(n):
+        if active[r] >= 0:
+            active[count] = active[r]
             count += 1
-    active[n] = count
+    active[len(active) - 1] = count
     fill_skyline(scene)
 
 

@@ -8,6 +8,7 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.choice import choose, fill_size, keep_choice, use_all
+from mbsim.dynamics.dry_friction import show_held
 from mbsim.dynamics.equations import (
     FLOW,
     active_count,
@@ -49,12 +50,15 @@ def constrain(scene, t, y, dy):
         code = call_int(scene.world.doors[FRICTION_DOOR], (scene, t, y, dy))
         if code != 0:
             return code
+    show_held(scene)
     total = write_accelerations(scene, dy)
     ledger = scene.world.ledger[0]
     if ledger >= 0:
         # the work of what moves with time: multiplier times the rate of its equation's sum
         power, sweep = 0.0, scene.sweep
         for r in range(active_count(scene)):
+            if scene.equations.dry[scene.equations.active[r]] >= 0:
+                continue
             power += sweep.multiplier[r] * sweep.rate[scene.equations.active[r], FLOW]
         dy[ledger] = power
     return 0 if math.isfinite(total) else NOT_FINITE
@@ -79,12 +83,13 @@ def serve(scene, what, t, y, dy):
     elif what == KEEP:
         return keep_choice(scene, t, y)
     elif what == MATRIX:
-        use_all(scene)
+        use_all(scene, 0)
         prepare_equations(scene, t, y)
         fill_matrix(scene)
         for e in range(active_count(scene)):
             fill_size(scene, e)
     elif what == CHOOSE:
+        prepare_equations(scene, t, y)
         choose(scene, t, y)
     elif what == DISPLACE:
         push(scene)

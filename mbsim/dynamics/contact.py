@@ -50,8 +50,6 @@ from mbsim.system.arrays import (
     AGAIN,
     BODY_SIZE,
     FRICTION_CALLS,
-    HEAT,
-    HOT,
     NORMAL_CALLS,
     NOW,
     PYTHON_CALLS,
@@ -174,9 +172,7 @@ def slipping_mass(scene, s):
 def remember(scene, y, s, c, given):
     """Give a friction law what it kept, and what only laws with memory look at."""
     state, at, z = scene.state, FRICTION_INPUTS, scene.slots.z[s]
-    # where modes change at nearly every step they are left to each evaluation
-    keeps = scene.world.frozen[0] == 1 and state.sides[len(state.sides) - 1, HEAT] <= HOT
-    given[20] = 1.0 if keeps and state.touching[s] == 1 else 0.0
+    given[20] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
     given[21] = scene.work.slot[s, STIFFNESS]
     given[22] = slipping_mass(scene, s)
     given[23] = math.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import carray, types
 
 from mbsim.core import jit
@@ -9,11 +10,13 @@ from mbsim.core.address import view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
+from mbsim.dynamics.dry_friction import serve_dry
 from mbsim.dynamics.expressions import fill_values
 from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.late_forces import add_late
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.rigid_friction import serve_rigid
 from mbsim.dynamics.states import add_slopes
 from mbsim.dynamics.subroutines import failure_or
 from mbsim.dynamics.values import evaluate_program
@@ -22,6 +25,9 @@ from mbsim.dynamics.wrenches import add_wrench
 from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPLIED_DOOR,
+    DRY_DOOR,
+    DRY_SLIDE,
+    DRY_TURN,
     EXPRESSION_DOOR,
     FRICTION_DOOR,
     SLIDE_LIMIT,
@@ -38,6 +44,7 @@ _WRENCH = types.int64(types.int64, types.float64, _POINTER, types.int64)
 _EXPRESS = types.int64(types.int64, types.float64, _POINTER, types.int64, types.int64, types.int64)
 _VALUE = types.float64(types.int64, types.float64, _POINTER, types.int64)
 _VALUES = types.int64(types.int64, types.float64, _POINTER)
+_KEEP = types.int64(types.int64, types.int64, types.float64, _POINTER)
 _ANGLES = types.int64(types.int64)
 
 
@@ -110,6 +117,18 @@ def _commit_angles(context):
     return commit_angles(view(context, Scene))
 
 
+def _serve_dry(context, what, t, y):
+    """What dry friction keeps of an accepted step, and what it holds."""
+    scene = view(context, Scene)
+    return serve_dry(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+
+
+def _serve_rigid(context, what, t, y):
+    """The same where some is rigid."""
+    scene = view(context, Scene)
+    return serve_rigid(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+
+
 def limit_turn(context, t, h, a, b):
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
@@ -136,6 +155,9 @@ def open_expressions(scene: Scene) -> None:
     kind = scene.applied.kind
     if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
         doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
+    if np.isin(kind, (DRY_SLIDE, DRY_TURN)).any():
+        rigid = bool((scene.applied.equation >= 0).any())
+        doors[DRY_DOOR] = jit.address(_serve_rigid if rigid else _serve_dry, _KEEP)
     if len(scene.applied.late) > 0:
         # only then: it is compiled with all that it needs
         doors[FRICTION_DOOR] = jit.address(_settle, _APPLY)

@@ -18,7 +18,7 @@ import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.start import equation_rows, tree_map
-from mbsim.system.arrays import CHOOSE, MATRIX, Scene
+from mbsim.system.arrays import CHOOSE, MATRIX, SLIDER, SLIDES, Scene
 
 Array = np.ndarray[Any, Any]
 
@@ -148,16 +148,27 @@ class Search:
         if self.hooks.serve is None:
             return loose
         at = y.copy()
+        if len(scene.equations.program):
+            # what sticks too
+            self.hooks.serve(CHOOSE, at)
         self.hooks.serve(MATRIX, at)
         found = tree_map(scene)
         if len(scene.equations.program):
-            rows = equation_rows(scene, found, np.ones(len(scene.equations.program), bool))
+            rows = equation_rows(scene, found, self.holding())
             found = found @ _null(rows)
             self.hooks.serve(CHOOSE, at)
         held = np.zeros((6 * self.count, found.shape[1]))
         for k, b in enumerate(tree.body):
             held[6 * b : 6 * b + 6] = found[6 * k : 6 * k + 6]
         return np.hstack([loose, held])
+
+    def holding(self) -> Array:
+        """Return which equations hold: those of dry friction only while it sticks, (ne,)."""
+        dry, kept = self.scene.equations.dry, self.scene.state.dry
+        sticks = np.array(
+            [row >= 0 and not kept[row, [SLIDER, SLIDES]].any() for row in dry], dtype=bool
+        )
+        return np.asarray((dry < 0) | sticks)
 
     def stiffness(self, y: Array, P: Array) -> Array | None:
         """Return how the forces along P change with displacements along P, by differences."""

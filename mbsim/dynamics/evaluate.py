@@ -15,6 +15,8 @@ from mbsim.system.arrays import (
     ACCELERATE,
     APPLIED_DOOR,
     BODY_SIZE,
+    DRY_DOOR,
+    HOLD_AGAIN,
     JOINTS_DOOR,
     NEAR_FOLD,
     NOW,
@@ -116,6 +118,8 @@ def evaluate(scene, t, h, y, dy):
 def evaluate_past(scene, t, h, y, dy):
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = WITHIN
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, y))
     code = evaluate(scene, t, h, y, dy)
     scene.world.past[0] = NOW
     return code

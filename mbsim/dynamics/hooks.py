@@ -9,7 +9,7 @@ from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
-from mbsim.core.problem import ALONG, BY_CHECK, FRICTION_ALONE, HOOK, Problem
+from mbsim.core.problem import ALONG, BEGIN_ANEW, BY_CHECK, FRICTION_ALONE, HOOK, Problem
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
@@ -19,7 +19,9 @@ from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import (
     ALONG_JOINTS,
     BODY_SIZE,
+    DRY_DOOR,
     EVALUATE_DOOR,
+    HOLD_AGAIN,
     JOINTS_DOOR,
     KEEP,
     LISTINGS,
@@ -30,6 +32,8 @@ from mbsim.system.arrays import (
 
 PAUSE_FOR_EVENTS = 2.0
 STEP_IS_STALE = 4.0
+#: What `commit` returns where equations were taken into use or out of it.
+HELD_OTHERWISE = 2
 
 
 def _rhs(context, t, h, a, b):
@@ -82,7 +86,9 @@ def _commit(context, t, h, a, b):
         if code != 0:
             return -float(code)
     changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
-    word = float(changed) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    word = (1.0 if changed > 0 else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    if changed == HELD_OTHERWISE:
+        word += BEGIN_ANEW
     # pairs that were not near, and so not counted, are now
     return word + (STEP_IS_STALE if scene.log.counters[LISTINGS] > listings else 0.0)
 
@@ -94,6 +100,8 @@ def _look(context, t, h, a, b):
     code = evaluate_past(scene, t, h, carray(a, (n,)), carray(b, (n,)))
     if code == 0:
         watch_peaks(scene, t)
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
     return float(code)
 
 
@@ -118,6 +126,8 @@ def _output(context, t, h, a, b):
     if code != 0:
         return -float(code)
     full = write_row(scene, t, h, carray(a, (n,)), f)
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
     if scene.users.failed[0] != 0:
         # a subroutine that only a request asks for
         return -float(scene.users.failed[0])
@@ -193,6 +203,6 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.kinks import kinks_hook
 
         scene.world.doors[EVALUATE_DOOR] = problem.rhs
-        scene.world.frozen[0] = int(len(scene.work.idle) > 0)
+        scene.state.frozen[0] = int(len(scene.work.idle) > 0)
         problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
     return problem, table

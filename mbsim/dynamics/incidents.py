@@ -31,8 +31,10 @@ from mbsim.system.arrays import (
     ANGLES_DOOR,
     APPROACH,
     BODY_SIZE,
+    DRY_DOOR,
     ENERGY_LOST,
     FIRST_TOUCH,
+    KEEP_DRY,
     LEAVE,
     LIVE,
     NEAR_DOOR,
@@ -381,6 +383,8 @@ def commit(scene, t, h, y):
     """Take the point evaluated last as accepted; return 1 if y changed so that f did."""
     state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
     changed = commit_incidents(scene, t, h, y)
+    if scene.world.doors[DRY_DOOR] != 0:
+        changed = max(changed, call_int(scene.world.doors[DRY_DOOR], (scene, KEEP_DRY, t, y)))
     watch_peaks(scene, t)
     contacts = len(scene.contacts.id)
     for c in range(contacts):

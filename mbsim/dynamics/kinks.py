@@ -14,9 +14,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import MODE
+from mbsim.dynamics.dry_friction import is_dry, side_of_dry
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import EVALUATE_DOOR, HEAT, HOT, SIDE, SLIDE_LIMIT, Scene
+from mbsim.system.arrays import EVALUATE_DOOR, HEAT, HOT, SIDE, SLIDE_LIMIT, SLIDES, Scene
 
 #: Each change of side heats by 1, each step takes a tenth of the heat.
 COOLING = 0.9
@@ -54,12 +55,16 @@ def side(scene, t, y, k):
         return value(scene, t, y, program)
     if scene.kinks.limit[k] < 0:
         return modes(scene)
-    return side_of_limit(scene, y, scene.kinks.limit[k])
+    f = scene.kinks.limit[k]
+    return side_of_dry(scene, y, f) if is_dry(scene.applied.kind[f]) else side_of_limit(scene, y, f)
 
 
 @jitable
 def watch(scene, context, t, y, what):
-    """Return 1 if a side differs from that kept, else 0; unless it is only asked, keep them."""
+    """Return 1 if a side differs from that kept, 2 for dry friction, else 0.
+
+    Unless it is only asked, the sides are kept.
+    """
     sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
     if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
         # what friction does follows from all the rest
@@ -69,12 +74,23 @@ def watch(scene, context, t, y, what):
     for k in range(len(scene.kinks.program)):
         now = side(scene, t, y, k)
         other = now != sides[k, SIDE]
-        if other and sides[k, HEAT] <= HOT:
-            differs = 1.0
+        f = scene.kinks.limit[k]
+        dry = f >= 0 and is_dry(scene.applied.kind[f])
+        # friction with a memory of its own is on the side that it keeps
+        leaves = now != scene.state.dry[f, SLIDES] if dry else other
+        if leaves and sides[k, HEAT] <= HOT:
+            differs = max(differs, 2.0 if dry else 1.0)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
+    # where modes change at nearly every step they are left to each evaluation
+    hottest = sides[last, HEAT]
+    for k in range(last):
+        f = scene.kinks.limit[k]
+        if f >= 0 and is_dry(scene.applied.kind[f]):
+            hottest = max(hottest, sides[k, HEAT])
+    scene.state.frozen[0] = 1 if hottest <= HOT else 0
     return differs
 
 

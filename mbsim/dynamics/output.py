@@ -113,7 +113,7 @@ def fill_incidents(scene, h, y):
         # what its force followed from besides y: see dynamics.again
         pair = scene.slots.pair[s]
         row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
-        row[INC_FROZEN] = 1.0 if scene.world.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+        row[INC_FROZEN] = 1.0 if scene.state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
         row[INC_TOUCHES] = scene.pairs.touches[pair]
         row[INC_KIND] = scene.pairs.kind[pair]
         row[INC_GRAPHIC_I] = scene.pairs.graphic_i[pair]

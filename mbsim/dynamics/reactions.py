@@ -31,6 +31,9 @@ def add_equation_reaction(scene, y, e, multiplier, out):
     """Add what a multiplier of equation e does to the body of I."""
     eq, sweep = scene.equations, scene.sweep
     c = eq.connection[e]
+    if c < 0:
+        # dry friction shows its force itself
+        return
     body = scene.markers.body[scene.connections.i[c]]
     other = scene.markers.body[scene.connections.j[c]]
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -94,7 +97,7 @@ def fill_stresses(scene, t, y):
     """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
     stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
-        if is_active(scene, e):
+        if is_active(scene, e) or scene.equations.dry[e] >= 0:
             continue
         new = stress[count]
         self_stress(scene, t, y, e, new)

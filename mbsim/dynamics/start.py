@@ -102,6 +102,8 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
         return
     starts = np.where(scene.equations.level < 1, scene.equations.start[:, 1], np.nan)
     held = (scene.equations.level >= 1) | np.isfinite(starts)
+    # what slides at the start may do so
+    held &= scene.equations.dry < 0
     asked, wanted = _flows(scene, found, held, starts)
     size, freedom = float(np.linalg.norm(found, 2)), found.shape[1]
     rate, free = np.zeros(freedom), np.eye(freedom)

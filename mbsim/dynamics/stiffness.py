@@ -20,6 +20,7 @@ from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
 from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
+from mbsim.dynamics.dry_friction import STIFFNESS, dry_motion, dry_now, is_dry
 from mbsim.dynamics.expressions import run, value
 from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
@@ -32,6 +33,7 @@ from mbsim.system.arrays import (
     AXIS_TORQUE,
     BODY_SIZE,
     BUSHING,
+    DRY_TURN,
     LATE,
     LINE_FORCE,
     MEMORY_DOOR,
@@ -608,12 +610,30 @@ def add_scalar_slopes(scene, T, t, y, f):
 
 
 @jitable
+def add_dry_slopes(scene, T, y, f):
+    """Add dry friction: a spring where it sticks, in slip nothing but that its axis turns."""
+    n, x, _ = dry_motion(scene, y, f)
+    none, turns = (0.0, 0.0, 0.0), scene.applied.kind[f] == DRY_TURN
+    _, gives = dry_now(scene, f, x)
+    if gives == 0.0 and scene.applied.equation[f] >= 0:
+        return
+    if gives == 0.0:
+        u = fill_unit(scene, T, y, f, none if turns else n, n if turns else none, 0)
+        bi, bj = sides_of(scene, f)
+        k = scene.applied.par[f, STIFFNESS]
+        add_two_sided(T.pattern, T.linear.K, len(scene.bodies.mass), bi, bj, -k, u, u)
+    add_geometry(scene, T, y, f, scene.applied.j[f], 0)
+
+
+@jitable
 def add_applied_slopes(scene, T, t, y):
     """Add what forces between markers do, but for those of `connection_slopes`."""
     for f in range(len(scene.applied.kind)):
         kind = base_kind(scene, f)
         if kind == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
+        elif is_dry(kind):
+            add_dry_slopes(scene, T, y, f)
         elif kind != BUSHING and kind < SLIDE_FRICTION:
             add_scalar_slopes(scene, T, t, y, f)
     return 0

@@ -17,6 +17,8 @@ SCHEMES = {
     "RADAU5": "implicit, order 5, for stiff equations and accuracy",
 }
 
+#: Those that solve for the end of a step.
+IMPLICIT_METHODS = ("GALPHA", "RADAU5")
 #: The methods between which AUTO changes over, and its name.
 EXPLICIT, IMPLICIT, AUTO = "DOPRI5", "RADAU5", "AUTO"
 #: All names for --integrator, the default first.

@@ -13,6 +13,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     ASK,
     AT_ONCE,
+    BEGIN_ANEW,
     BY_CHECK,
     BY_ERROR,
     BY_NEWTON,
@@ -81,6 +82,8 @@ MOST_RETAKES = 40
 #: Kinks so near to an end of a step, as a part of it, are as good as at the end: what a kink makes
 #: wrong grows with the square of what is left of the step behind it, a jump's with that itself.
 NEAR_KINK = 1e-4
+#: The same where what goes on is another motion, which begins there: friction that sticks or slips.
+NEAR_CHANGE = 1e-9
 #: So often at most a step is taken again to end at a kink.
 MOST_CUTS = 3
 
@@ -254,10 +257,14 @@ def first_kink(p, m, t, h):
 
     The problem is left evaluated at the trial point.
     """
-    low, high = NEAR_KINK, 1.0
+    low, high, near = NEAR_KINK, 1.0, NEAR_KINK
     side_at(p, m, t, h, low, SETTLE)
-    if call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0:
-        while high - low > 0.1 * NEAR_KINK:
+    differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    if differs > 1.0:
+        # it is told from what was committed, however near that is
+        low, near = 0.0, NEAR_CHANGE
+    if differs > 0.0:
+        while high - low > 0.1 * near:
             middle = 0.5 * (low + high)
             if side_at(p, m, t, h, middle, ASK):
                 high = middle
@@ -265,7 +272,7 @@ def first_kink(p, m, t, h):
                 low = middle
     call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
     # a little more, so that the step after it begins on the other side
-    return h if high > 1.0 - NEAR_KINK else (high + 0.5 * NEAR_KINK) * h
+    return h if high > 1.0 - near else (high + 0.5 * near) * h
 
 
 @jitable
@@ -385,6 +392,10 @@ def accept(p, m, steps, t, h, asked):
             for i in range(len(m.y)):
                 m.kept[j, i] = m.ahead[j, i]
     m.memory[FRESH] = 0.0
+    if word >= BEGIN_ANEW:
+        word -= BEGIN_ANEW
+        m.memory[FRESH] = 1.0
+        m.memory[HAVE_JACOBIAN] = 0.0
     if word >= 4.0:
         word -= 4.0
         m.memory[STALE] = 1.0

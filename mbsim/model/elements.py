@@ -433,6 +433,26 @@ class JointLimit:
 
 
 @dataclass(frozen=True)
+class DryFriction:
+    """Force_DryFriction (ours; Muscade's DryFriction): a slider, with a spring in series.
+
+    `type` TX, TY, TZ: along that axis of J [L]; RX, RY, RZ: the angle about it [rad]. `friction`
+    is the force or torque of slip, `friction_static` the one that begins it, and `dx` what the
+    spring gives until it reaches `friction`: its stiffness is friction/dx. 0: there is none.
+    """
+
+    id: int
+    type: str
+    friction: float
+    dx: float = 0.0
+    friction_static: float | None = None
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Variable:
     """Reference_Variable, Adams' VARIABLE: an expression that others use by VARVAL(id)."""
 
@@ -559,6 +579,7 @@ class Model:
     body_forces: dict[int, BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
+    dry_frictions: dict[int, DryFriction] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
     splines: dict[int, Spline] = field(default_factory=dict)

@@ -37,6 +37,7 @@ class Draft:
     body_forces: dict[int, el.BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
+    dry_frictions: dict[int, el.DryFriction] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
     sensors: dict[int, el.Sensor] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from mbsim.reader.constraints import (
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
+from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.forces import (
     FORCE_BUSHING,
     FORCE_SCALAR_TWOBODY,
@@ -64,6 +65,7 @@ STATEMENTS = (
     FORCE_VECTOR_ONEBODY,
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
+    FORCE_DRYFRICTION,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
     REFERENCE_SPLINE,

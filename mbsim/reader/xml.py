@@ -168,6 +168,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         body_forces=draft.body_forces,
         joint_frictions=draft.joint_frictions,
         joint_limits=draft.joint_limits,
+        dry_frictions=draft.dry_frictions,
         variables=draft.variables,
         differentials=draft.differentials,
         splines=draft.splines,

@@ -41,13 +41,14 @@ GROUPS = {
         "joint_frictions", "joint_frictions", "joint friction", "Force_JointFriction"
     ),
     "JOINTLIMIT": Group("joint_limits", "joint_limits", "joint limit", "Force_JointLimit"),
+    "DRYFRICTION": Group("dry_frictions", "dry_frictions", "dry friction", "Force_DryFriction"),
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
 APPLIED = (
     *("SPRINGDAMPER", "SFORCE", "BUSHING", "VECTORFORCE", "BODYFORCE"),
-    *("JOINTFRICTION", "JOINTLIMIT"),
+    *("JOINTFRICTION", "JOINTLIMIT", "DRYFRICTION"),
 )
 
 

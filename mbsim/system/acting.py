@@ -79,6 +79,17 @@ class Acting:
     values: list[tuple[int, int]]
 
 
+def _link_dry(
+    model: Model, mechanism: Mechanism, applied: a.Applied, applied_ids: list[tuple[str, int]]
+) -> None:
+    """Let rigid dry frictions and their equations, which are the last, know each other."""
+    rigid = [id for id, friction in model.dry_frictions.items() if friction.dx == 0.0]
+    first = len(mechanism.equations.program) - len(rigid)
+    for k, id in enumerate(rigid):
+        row = applied_ids.index(("DRYFRICTION", id))
+        applied.equation[row], mechanism.equations.dry[first + k] = first + k, row
+
+
 def acting(
     model: Model,
     table: MarkerTable,
@@ -107,6 +118,7 @@ def acting(
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )
+    _link_dry(model, mechanism, applied, applied_ids)
     states = states_table(model, programs)
     held = (mechanism.connections, mechanism.elements, programs)
     check_states(model, states, applied, applied_ids, *held)

@@ -11,6 +11,7 @@ import numpy as np
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import (
     Bushing,
+    DryFriction,
     JointFriction,
     JointLimit,
     Model,
@@ -59,6 +60,7 @@ def applied_forces(
         law_par=np.zeros((n, max([1, *(len(values) for _, values in found)]))),
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
+        equation=np.full(n, -1, dtype=np.int64),
         late=np.zeros((0, 3), dtype=np.int64),
     )
     for k, (statement, element) in enumerate(given):
@@ -78,6 +80,7 @@ def _tables(model: Model) -> dict[str, dict[int, Any]]:
         "BODYFORCE": model.body_forces,
         "JOINTFRICTION": model.joint_frictions,
         "JOINTLIMIT": model.joint_limits,
+        "DRYFRICTION": model.dry_frictions,
     }
 
 
@@ -201,6 +204,28 @@ def _add_limit(
         made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
 
 
+def _add_dry(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    friction: DryFriction,
+) -> None:
+    """Fill row k with dry friction."""
+    made.i[k], made.j[k] = markers.row(friction.i_marker_id), markers.row(friction.j_marker_id)
+    axis = "XYZ".index(friction.type[1])
+    made.axes[k] = markers.turned(int(made.j[k]), axis)
+    made.kind[k] = a.DRY_SLIDE
+    if friction.type[0] == "R":
+        made.kind[k] = a.DRY_TURN
+        made.angle[k] = markers.angle(markers.turned(int(made.i[k]), axis), int(made.axes[k]))
+    static = friction.friction_static
+    made.par[k, 0] = friction.friction / friction.dx if friction.dx > 0.0 else 0.0
+    made.par[k, 1] = friction.friction
+    made.par[k, 2] = friction.friction if static is None else static
+
+
 #: What fills a row, by statement.
 _FILL: dict[str, Callable[..., None]] = {
     "SPRINGDAMPER": _add_spring,
@@ -210,4 +235,5 @@ _FILL: dict[str, Callable[..., None]] = {
     "BODYFORCE": _add_vector,
     "JOINTFRICTION": _add_friction,
     "JOINTLIMIT": _add_limit,
+    "DRYFRICTION": _add_dry,
 }

@@ -63,8 +63,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     EVALUATE_DOOR,  # the whole rhs
     MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
     MEMORY_PAIR_DOOR,  # the same in complex ones
-) = range(16)
-DOORS = 16
+    DRY_DOOR,  # what Force_DryFriction keeps of an accepted step
+) = range(17)
+DOORS = 17
 
 # entries of `Applied.kind`
 (
@@ -75,11 +76,13 @@ DOORS = 16
     BUSHING,
     SLIDE_LIMIT,
     TURN_LIMIT,
+    DRY_SLIDE,  # Force_DryFriction along an axis, then about one: dynamics.dry_friction
+    DRY_TURN,
     SLIDE_FRICTION,  # the kinds from here on are frictions in joints
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(11)
+) = range(13)
 LATE = 16  # is added to the kind of forces that need reactions, see dynamics.late_forces
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
@@ -87,6 +90,9 @@ SCALAR, RUBBING = 6, 7
 
 # what is asked for at JOINTS_DOOR
 ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
+
+# what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
+KEEP_DRY, HOLD_AGAIN = range(2)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -111,6 +117,10 @@ NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
 # columns of `State.sensed`: expression less value at the committed state, whether it was true,
 # what SENVAL shows, what it will show, whether it became true and Python has not yet acted
 EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
+
+# columns of `State.dry`: where the slider is, 0 or the sign in which it slides, and both at the
+# begin of the last step
+SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 
 # columns of `State.sides`: see dynamics.kinks
 SIDE, HEAT = range(2)
@@ -313,10 +323,11 @@ class Applied(NamedTuple):
     i: I1  # (nf,) markers
     j: I1  # (nf,)
     par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
-    # of bushings six stiffnesses, six dampings, six preloads
+    # of bushings six stiffnesses, six dampings, six preloads; of dry friction its stiffness (0:
+    # rigid) and the force at which it slides on and at which it begins to
     program: I1  # (nf,) -1 for none
     components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
-    axes: I1  # (nf,) marker whose axes those components are along
+    axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
     bounds: F2  # (nf, 2) of limits
@@ -324,6 +335,7 @@ class Applied(NamedTuple):
     law_par: F2  # (nf, widest)
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
+    equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
     late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
 
 
@@ -363,6 +375,7 @@ class Equations(NamedTuple):
     start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
     connection: I1  # (ne,) the element that it belongs to
+    dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for one that holds always
     kind: I1  # (terms,)
     i: I1  # (terms,) markers
     j: I1  # (terms,)
@@ -391,7 +404,6 @@ class World(NamedTuple):
     doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate
     past: I1  # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
-    frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
 
 
@@ -414,6 +426,8 @@ class State(NamedTuple):
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
+    frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
+    dry: F2  # (nf, 4) of dry friction, see the names above
 
 
 class Log(NamedTuple):

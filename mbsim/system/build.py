@@ -372,7 +372,6 @@ def build(
             np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
-            np.zeros(1, dtype=np.int64),
             ledger,
         ),
         state=start_state(
@@ -383,6 +382,7 @@ def build(
             len(rows.sensors.id),
             len(rows.kinks.program),
             most,
+            nf,
         ),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
@@ -395,7 +395,7 @@ def build(
             nj,
             nf,
             len(rows.values),
-            len(rows.sensors.id),
+            len(rows.sensors.id) + len(model.dry_frictions),
             most,
         ),
     )

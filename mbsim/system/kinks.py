@@ -126,13 +126,15 @@ def _acting(model: Model) -> Iterator[Expression]:
 
 
 def has_modes(model: Model) -> bool:
-    """Return whether the friction of some contact is one that sticks or slips."""
+    """Return whether some friction is one that sticks or slips."""
+    if model.dry_frictions:
+        return True
     laws = [contact.cff_type for contact in model.contacts.values()]
     return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
 
 
 def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.Kinks:
-    """Return what is watched for kinks: a program for each expression, limits of joints, modes."""
+    """Return what is watched: a program for each expression, limits, dry friction, modes."""
     variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
     rows, any_found = [], any(s.changes for s in model.simulations)
     still = [Instruction(NUMBER, value=0.0)]
@@ -146,7 +148,8 @@ def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.K
         rows.append(row)
     if not any_found:
         rows = []
-    limits = [f for f, kind in enumerate(applied.kind) if kind in (a.SLIDE_LIMIT, a.TURN_LIMIT)]
+    watched = (a.SLIDE_LIMIT, a.TURN_LIMIT, a.DRY_SLIDE, a.DRY_TURN)
+    limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
     last = [-1] if has_modes(model) else []
     return a.Kinks(
         np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),

@@ -15,7 +15,15 @@ import numpy as np
 
 from mbsim.errors import DeckError, Fault
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
-from mbsim.model.elements import Array, Coupler, GeneralConstraint, Joint, Model, Motion
+from mbsim.model.elements import (
+    Array,
+    Coupler,
+    DryFriction,
+    GeneralConstraint,
+    Joint,
+    Model,
+    Motion,
+)
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
@@ -90,6 +98,7 @@ class _Sums:
     start: list[tuple[float, float]] = field(default_factory=list)
     unit: list[float] = field(default_factory=list)
     connection: list[int] = field(default_factory=list)
+    dry: list[int] = field(default_factory=list)
     terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -113,6 +122,7 @@ class _Sums:
         self.start.append(tuple(np.nan if value is None else value for value in start))
         self.unit.append(unit)
         self.connection.append(connection)
+        self.dry.append(-1)
         self.names.append(name)
 
     def arrays(self) -> a.Equations:
@@ -131,6 +141,7 @@ class _Sums:
             start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
             unit=np.array(self.unit, dtype=np.float64),
             connection=ints(self.connection),
+            dry=ints(self.dry),
             kind=ints(t[0] for t in self.terms),
             i=ints(t[1] for t in self.terms),
             j=ints(t[2] for t in self.terms),
@@ -305,6 +316,18 @@ class _Builder:
             self.sums.terms.append((a.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
+    def add_dry(self, friction: DryFriction) -> None:
+        """Add the velocity that rigid dry friction holds while it sticks; it is no connection."""
+        i, j = self.markers.row(friction.i_marker_id), self.markers.row(friction.j_marker_id)
+        axis = "XYZ".index(friction.type[1])
+        if friction.type[0] == "R":
+            row = angle()
+            i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
+        else:
+            row = offset(_AXES[axis])
+        self.add_term(row, i, j, 1.0)
+        self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
+
     # the tree
 
     def bodies_in_equations(self) -> Iterator[int]:
@@ -314,14 +337,14 @@ class _Builder:
         for i, j in self.pairs:
             yield from (self.markers.frames[row][0] for row in (i, j))
 
-    def grow(self) -> dict[int, tuple[int, Limb | None, bool]]:
+    def grow(self, others: list[int]) -> dict[int, tuple[int, Limb | None, bool]]:
         """Return for each body its parent, the limb it hangs on, and whether I is on the parent.
 
         From ground, and then from each body that is not reached, the limb that holds most is
         taken first; of equals the one nearest to the root.
         """
         ground = self.markers.ground
-        held = set(self.bodies_in_equations()) - {ground}
+        held = {*self.bodies_in_equations(), *(self._body(row) for row in others)} - {ground}
         hung: dict[int, tuple[int, Limb | None, bool]] = {}
         depth = {ground: 0}
         waiting = sorted(held)
@@ -349,10 +372,10 @@ class _Builder:
     def _body(self, row: int) -> int:
         return self.markers.frames[row][0]
 
-    def tree(self) -> tuple[a.Tree, dict[int, tuple[int, bool]]]:
+    def tree(self, others: list[int]) -> tuple[a.Tree, dict[int, tuple[int, bool]]]:
         """Return the tree; for each connection in it its place and whether I is on the parent."""
         ground = self.markers.ground
-        hung = self.grow()
+        hung = self.grow(others)
         children: dict[int, list[int]] = {}
         for child, (parent, limb, _) in hung.items():
             children.setdefault(-1 if limb is None else parent, []).append(child)
@@ -472,8 +495,13 @@ def constrain(model: Model, markers: MarkerTable, programs: ProgramTable) -> Mec
         builder.add_motion(motion)
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
-    tree, places = builder.tree()
+    # dry friction is held by none of the tree, and its equations are the last
+    rigid = [friction for friction in model.dry_frictions.values() if friction.dx == 0.0]
+    held = [marker for f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
+    tree, places = builder.tree([markers.row(marker) for marker in held])
     builder.add_joint_equations(set(places))
+    for friction in rigid:
+        builder.add_dry(friction)
     n = len(builder.pairs)
     pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
     connections = a.Connections(

@@ -23,8 +23,12 @@ def start_state(
     sensors: int = 0,
     kinks: int = 0,
     memory: int = 0,
+    forces: int = 0,
 ) -> a.State:
     """Return the incident table before anything touched."""
+    dry = np.zeros((forces, 4))
+    # dry friction begins without force where the first committed state is
+    dry[:, [a.SLIDER, a.SLIDER_BEFORE]] = np.nan
     sensed = np.zeros((sensors, 5))
     sensed[:, a.EXCESS] = np.nan
     q = np.zeros((nb + 1, 4))
@@ -46,6 +50,8 @@ def start_state(
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
         sides=np.zeros((kinks, 2)),
+        frozen=np.zeros(1, dtype=np.int64),
+        dry=dry,
     )
 
 

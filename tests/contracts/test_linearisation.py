@@ -430,6 +430,26 @@ def test_limits(kind, motion, bounds, tmp_path):
     assert np.abs(it.scene.work.applied[0, :6]).max() > 1.0
 
 
+@pytest.mark.parametrize("far", [0.0, 9.0])
+@pytest.mark.parametrize("type", ["TX", "TY", "RZ"])
+def test_dry_friction(type, far, tmp_path):
+    turns = type == "RZ"
+    i, j = (1002, 1003) if turns else (502, 501)
+    text = (
+        f'<Force_DryFriction id="1" i_marker_id="{i}" j_marker_id="{j}" type="{type}" '
+        'friction="40" dx="2"/>'
+    )
+    it = Linearised(of(two("REVOLUTE" if turns else "SPHERICAL", extra=MARKERS + text), tmp_path))
+    # the slider near, so that the spring holds, or so far that it slides
+    it.scene.state.dry[0, 0] = far
+    for seed in range(2):
+        worst = it.misses(it.moved(0.0, seed))
+        print(worst)
+        assert worst.max() < 2e-7
+    size = np.linalg.norm(it.scene.work.applied[0, :6])
+    assert 0.0 < size < 40.0 if far == 0.0 else abs(size - 40.0) < 1e-9
+
+
 FRICTIONS = {
     "TRANSLATIONAL": "",
     "REVOLUTE": 'pin_radius="0.3"',

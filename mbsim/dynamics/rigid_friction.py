@@ -1,0 +1,129 @@
+"""Rigid Force_DryFriction: what sticks is held, exactly, by an equation; what slides is not.
+
+While it sticks, x' = 0 is an equation in use like that of a motion of velocities, and its
+multiplier is the friction force. Where that passes the limit the step ends, the equation goes out
+of use and f is a force of that size against the slip; where x' comes back to 0 the step ends too,
+the equation is taken into use, and goes out again at once where the force that it would need is
+above the limit. Integrators begin anew there, for accelerations jump.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_float, call_int
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.dry_friction import (
+    STATIC,
+    commit_dry,
+    dry_motion,
+    holding_force,
+    record_dry,
+    rest_of,
+    side_of_dry,
+)
+from mbsim.laws.dry import rigid_mode
+from mbsim.system.arrays import (
+    CHOOSE,
+    EVALUATE_DOOR,
+    JOINTS_DOOR,
+    KEEP_DRY,
+    PROJECT,
+    SLIDER,
+    SLIDER_BEFORE,
+    SLIDES,
+    SLIDES_BEFORE,
+    SLIP,
+    STICK,
+)
+
+#: What `commit_rigid` returns where equations were taken into use or out of it.
+HELD_OTHERWISE = 2
+#: Velocities at the start count as rest below so many times what is rounding: assembly leaves them.
+AT_REST = 1e4
+
+
+@jitable
+def begin_or_go_on(scene, y, f):
+    """Set the mode of friction f that the point evaluated last asks for; return whether it is new.
+
+    What comes to rest is first taken to stick.
+    """
+    kept = scene.state.dry[f]
+    begins = math.isnan(kept[SLIDER])
+    if begins:
+        _, _, rate = dry_motion(scene, y, f)
+        slides = math.copysign(1.0, rate) if abs(rate) > AT_REST * rest_of(scene, f) else 0.0
+    else:
+        slides = side_of_dry(scene, y, f)
+    changed = begins or slides != kept[SLIDES]
+    kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
+    kept[SLIDER], kept[SLIDES] = 0.0, slides
+    return changed
+
+
+@jitable
+def hold_sticking(scene, t, y):
+    """Take the equations of what sticks into use, bring y onto them and evaluate; return a code."""
+    call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
+    call_int(scene.world.doors[JOINTS_DOOR], (scene, PROJECT, t, y, y))
+    return call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+
+
+@jitable
+def release(scene):
+    """Let slide what has just come to rest and needs more than the limit; return how many."""
+    count = 0
+    for f in range(len(scene.applied.kind)):
+        kept = scene.state.dry[f]
+        if scene.applied.equation[f] < 0 or kept[SLIDES] != 0.0:
+            continue
+        force = holding_force(scene, f)
+        kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, STATIC], 0.0)
+        if kept[SLIDES] != 0.0:
+            count += 1
+    return count
+
+
+@jitable
+def commit_rigid(scene, t, y):
+    """Keep what rigid dry frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
+    changed = False
+    for f in range(len(scene.applied.kind)):
+        if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
+            changed = True
+    if not changed:
+        return 0
+    # one more slides each time, so this ends
+    while hold_sticking(scene, t, y) == 0.0 and release(scene) > 0:
+        continue
+    for f in range(len(scene.applied.kind)):
+        kept = scene.state.dry[f]
+        if scene.applied.equation[f] < 0:
+            continue
+        if math.isnan(kept[SLIDER_BEFORE]):
+            # rows at the start show what holds from there on
+            kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
+        elif kept[SLIDES] != kept[SLIDES_BEFORE]:
+            record_dry(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
+    return HELD_OTHERWISE
+
+
+@jitable
+def hold_again(scene, t, y):
+    """Take into use what holds at the point to be evaluated, where the last step changed that."""
+    kept = scene.state.dry
+    for f in range(len(scene.applied.kind)):
+        if scene.applied.equation[f] >= 0 and kept[f, SLIDES] != kept[f, SLIDES_BEFORE]:
+            call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
+            return
+
+
+@jitable
+def serve_rigid(scene, what, t, y):
+    """Do what is asked for at the door of dry friction; return 0 or HELD_OTHERWISE."""
+    if what == KEEP_DRY:
+        commit_dry(scene, t, y)
+        return commit_rigid(scene, t, y)
+    hold_again(scene, t, y)
+    return 0
