@@ -1,0 +1,188 @@
+"""ADMM: a linear solve with fixed factors and a projection on the cones, in turns.
+
+With D the mean diagonal of each contact's block and s = mu |u_T| e_N of the last iterate:
+
+    (W + rho D) x = rho D (z - y) - q - s,   z = P_K(x + y),   y += x - z,
+
+u = W x + q comes from the first equation for nothing. rho follows the balance of |x - z| and the change
+of z, at intervals that widen (each change costs a factorisation). Acceleration is Nesterov's on
+(z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and Baraniuk,
+Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.core.jitable import jitable
+from mbsim.fclib.blocks import product
+from mbsim.fclib.cone import cone_height, relative_errors
+from mbsim.fclib.factor import factorise, solve, transposed_places
+from mbsim.fclib.ordering import analyse
+
+# places in `state`, what a later call needs to go on
+PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL = range(8)
+STATE = 8
+#: First penalty, and the iteration of its first change.
+PENALTY_0, FIRST_CHANGE = 0.1, 10
+
+
+@jitable
+def _project(tangent, rolling, mu, mu_r, x, y, z):
+    """Write z = P_K(x + y)."""
+    nt, nr = len(tangent), len(rolling)
+    d = 1 + nt + nr
+    for a in range(len(mu)):
+        first = d * a
+        slide = 0.0
+        roll = 0.0
+        for k in range(nt):
+            slide += (x[first + 1 + k] + y[first + 1 + k]) ** 2
+        for k in range(nr):
+            roll += (x[first + 1 + nt + k] + y[first + 1 + nt + k]) ** 2
+        slide = math.sqrt(slide)
+        roll = math.sqrt(roll)
+        height = cone_height(x[first] + y[first], slide, roll, mu[a], mu_r[a])
+        z[first] = height
+        turn = min(1.0, mu[a] * height / slide) if slide > 0.0 else 1.0
+        for k in range(nt):
+            at = first + 1 + k
+            z[at] = turn * (x[at] + y[at])
+        turn = min(1.0, mu_r[a] * height / roll) if roll > 0.0 else 1.0
+        for k in range(nr):
+            at = first + 1 + nt + k
+            z[at] = turn * (x[at] + y[at])
+
+
+@jitable
+def admm(
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, lift, state, accelerate,
+    tol, tol_q, limit, every, history, rows,
+):  # fmt: skip
+    """Iterate until the error is small enough or `limit` iterations are done.
+
+    `r` holds the best iterate, in and out. z, y, lift (s, one a contact) and `state` are what a
+    later call goes on from; a first call has state[PENALTY], state[NEXT] and state[BEST] set, z at
+    the start. Returns the number of rows in `history` (iterations so far, error, |F|/|q|).
+    """
+    nt, nr = len(tangent), len(rolling)
+    d = 1 + nt + nr
+    nc = len(mu)
+    m = d * nc
+    weight = np.empty(nc)
+    mean = 0.0
+    for a in range(nc):
+        weight[a] = 0.0
+        for s in range(d):
+            weight[a] += val[diagonal[a], s, s] / d
+        mean += weight[a] / nc
+    if not mean > 0.0:
+        return rows
+    for a in range(nc):
+        # a contact whose block is zero needs some weight too
+        weight[a] = weight[a] if weight[a] > 1e-8 * mean else mean
+    symbolic = analyse(nc, ptr, col, d)
+    back = transposed_places(nc, ptr, col)
+    factors = np.empty(symbolic[5][-1])
+    front = np.empty(symbolic[6][0] ** 2)
+    stack = np.empty(symbolic[6][1])
+    part = np.empty(symbolic[6][0])
+    exchange = np.empty(m, np.int32)
+    shifted = val.copy()
+    x = np.empty(m)
+    u = np.empty(m)
+    old_z = np.empty(m)
+    old_y = np.empty(m)
+    last_z = z.copy()
+    last_y = y.copy()
+    work = np.empty(m)
+    penalty = -1.0
+    for _ in range(limit):
+        if penalty != state[PENALTY]:
+            penalty = state[PENALTY]
+            for a in range(nc):
+                k = diagonal[a]
+                for s in range(d):
+                    shifted[k, s, s] = val[k, s, s] + penalty * weight[a]
+            if not factorise(d, ptr, col, back, shifted, symbolic, factors, exchange, front, stack):
+                return rows
+        for a in range(nc):
+            rho = penalty * weight[a]
+            for s in range(d):
+                at = d * a + s
+                old_z[at] = z[at]
+                old_y[at] = y[at]
+                x[at] = rho * (z[at] - y[at]) - q[at]
+            x[d * a] -= lift[a]
+        solve(d, symbolic, factors, exchange, x, part)
+        for a in range(nc):
+            rho = penalty * weight[a]
+            speed = 0.0
+            spin = 0.0
+            for s in range(1, 1 + nt):
+                at = d * a + s
+                speed += (rho * (z[at] - y[at] - x[at])) ** 2
+            for s in range(1 + nt, d):
+                at = d * a + s
+                spin += (rho * (z[at] - y[at] - x[at])) ** 2
+            lift[a] = mu[a] * math.sqrt(speed) + mu_r[a] * math.sqrt(spin)
+        _project(tangent, rolling, mu, mu_r, x, y, z)
+        apart, moved, size, dual = 0.0, 0.0, 0.0, 0.0
+        for a in range(nc):
+            for s in range(d):
+                at = d * a + s
+                y[at] += x[at] - z[at]
+                apart += weight[a] * (x[at] - z[at]) ** 2
+                moved += weight[a] * (z[at] - old_z[at]) ** 2
+                size += weight[a] * max(z[at] ** 2, x[at] ** 2)
+                dual += weight[a] * y[at] ** 2
+        state[ITERATIONS] += 1.0
+        if state[ITERATIONS] % every == 0.0:
+            product(tangent, rolling, ptr, col, val, q, z, u)
+            error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, z, work)
+            if rows < len(history):
+                history[rows, 0] = state[ITERATIONS]
+                history[rows, 1] = error
+                history[rows, 2] = error_q
+                rows += 1
+            done = error <= tol and error_q <= tol_q
+            if error < state[BEST] or done or (error <= tol and error_q < state[BEST_Q]):
+                state[BEST] = error
+                state[BEST_Q] = error_q
+                for k in range(m):
+                    r[k] = z[k]
+            if done or not math.isfinite(error):
+                return rows
+        if accelerate:
+            residual = apart + moved
+            if residual < 0.999 * state[RESIDUAL] and state[RESIDUAL] > 0.0:
+                momentum = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * state[MOMENTUM] ** 2))
+                factor = (state[MOMENTUM] - 1.0) / momentum
+                state[MOMENTUM] = momentum
+            else:
+                factor = 0.0
+                state[MOMENTUM] = 1.0
+            state[RESIDUAL] = residual
+            for k in range(m):
+                new_z, new_y = z[k], y[k]
+                z[k] += factor * (new_z - last_z[k])
+                y[k] += factor * (new_y - last_y[k])
+                last_z[k] = new_z
+                last_y[k] = new_y
+        if state[ITERATIONS] >= state[NEXT]:
+            state[INTERVAL] *= 1.5
+            state[NEXT] = state[ITERATIONS] + state[INTERVAL]
+            if size > 0.0 and dual > 0.0 and moved > 0.0 and apart > 0.0:
+                ratio = math.sqrt((apart / size) / (moved / dual))
+                if ratio > 3.0 or ratio < 1.0 / 3.0:
+                    change = min(max(math.sqrt(ratio), 0.1), 10.0)
+                    state[PENALTY] = min(max(penalty * change, 1e-8), 1e8)
+                    scale = penalty / state[PENALTY]
+                    for k in range(m):
+                        y[k] *= scale
+                        last_y[k] *= scale
+                    state[MOMENTUM] = 1.0
+                    state[RESIDUAL] = 0.0
+    return rows
