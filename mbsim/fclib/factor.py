@@ -86,7 +86,7 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
                         column = d * local[nodes[clo + j]]
                         for t in range(d):
                             target[column + t] += source[d * j + t]
-        sound = _partial_lu(matrix, own, exchange[piv : piv + own]) and sound
+        sound = partial_lu(matrix, own, exchange[piv : piv + own]) and sound
         _keep(matrix, own, factors[factor_ptr[f] : factor_ptr[f + 1]])
         size = n - own
         for i in range(size):
@@ -115,7 +115,7 @@ def _keep(matrix, own, kept):
 
 
 @jitable
-def _partial_lu(matrix, own, exchange):
+def partial_lu(matrix, own, exchange):
     """Eliminate the first `own` unknowns of a dense matrix in place; rows change among these."""
     n = matrix.shape[0]
     sound = True
@@ -249,6 +249,64 @@ def solve(d, symbolic, factors, exchange, x, part):
         for k in range(pivots[f]):
             for s in range(d):
                 x[d * nodes[lo + k] + s] = part[d * k + s]
+
+
+@jitable
+def solve_many(begin, symbolic, factors, exchange, x, part):
+    """Overwrite the right sides, columns of x (nodes, k), one unknown a node, from front `begin` on.
+
+    Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
+    `part` has room for room[0] rows of x.
+    """
+    front_ptr, nodes, pivots, _, _, factor_ptr, _ = symbolic
+    fronts = len(pivots)
+    piv = 0
+    for f in range(begin):
+        piv += pivots[f]
+    for f in range(begin, fronts):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = hi - lo
+        own = pivots[f]
+        for k in range(n):
+            part[k] = x[nodes[lo + k]]
+        kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
+        upper = kept[: own * n].reshape(own, n)
+        below = kept[own * n :].reshape(own, n - own)
+        for k in range(own):
+            other = exchange[piv + k]
+            if other != k:
+                one, two = part[k], part[other]
+                for j in range(len(one)):
+                    one[j], two[j] = two[j], one[j]
+        for k in range(own):
+            source = part[k]
+            for i in range(k + 1, n):
+                factor = upper[i, k] if i < own else below[k, i - own]
+                target = part[i]
+                for j in range(len(target)):
+                    target[j] -= factor * source[j]
+        for k in range(n):
+            x[nodes[lo + k]] = part[k]
+        piv += own
+    for f in range(fronts - 1, begin - 1, -1):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = hi - lo
+        own = pivots[f]
+        for k in range(n):
+            part[k] = x[nodes[lo + k]]
+        upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
+        for k in range(own - 1, -1, -1):
+            target = part[k]
+            for i in range(k + 1, n):
+                factor = upper[k, i]
+                source = part[i]
+                for j in range(len(target)):
+                    target[j] -= factor * source[j]
+            inverse = 1.0 / upper[k, k]
+            for j in range(len(target)):
+                target[j] *= inverse
+        for k in range(own):
+            x[nodes[lo + k]] = part[k]
 
 
 @jitable

@@ -14,8 +14,11 @@ from mbsim.core.jitable import jitable
 
 
 @jitable
-def twins(size, ptr, col):
-    """Return for every node the first node with the same row of the pattern (columns rising)."""
+def twins(size, ptr, col, late):
+    """Return for every node the first with the same row of the pattern (columns rising) and rank.
+
+    `late` says which nodes are to be eliminated last.
+    """
     keys = np.empty(size, np.int64)
     for a in range(size):
         key = np.int64(ptr[a + 1] - ptr[a])
@@ -34,7 +37,7 @@ def twins(size, ptr, col):
             b = order[j]
             if keys[b] != keys[a]:
                 break
-            if leader[b] >= 0 or ptr[b + 1] - ptr[b] != ptr[a + 1] - ptr[a]:
+            if leader[b] >= 0 or ptr[b + 1] - ptr[b] != ptr[a + 1] - ptr[a] or late[a] != late[b]:
                 continue
             same = True
             for m in range(ptr[a + 1] - ptr[a]):
@@ -57,8 +60,8 @@ def _grown(array, size):
 
 
 @jitable
-def minimum_degree(size, ptr, col, leader):
-    """Eliminate the leaders' graph; every pivot becomes an element.
+def minimum_degree(size, ptr, col, leader, late):
+    """Eliminate the leaders' graph, late nodes last; every pivot becomes an element.
 
     Returns the pivots in order, each element's parent (-1: none), where its members begin and how
     many they are, the members (leaders), and the weight (number of twins) of each leader.
@@ -86,11 +89,12 @@ def minimum_degree(size, ptr, col, leader):
                 degree[a] += weight[b]
         variables[a] = at - start[a]
     # buckets of equal degree, doubly linked
-    first = np.full(size + 1, -1, np.int32)
+    first = np.full(2 * size + 1, -1, np.int32)
     following = np.full(size, -1, np.int32)
     previous = np.full(size, -1, np.int32)
     for a in range(size - 1, -1, -1):
         if leader[a] == a:
+            degree[a] += size if late[a] else 0
             _put(first, following, previous, degree[a], a)
     pivots = np.empty(leaders, np.int32)
     parent = np.full(size, -1, np.int32)
@@ -179,8 +183,9 @@ def minimum_degree(size, ptr, col, leader):
             elements[b] = new_elements
             variables[b] = new - new_elements
             _take(first, following, previous, degree[b], b)
-            degree[b] = min(degree_b, degree[b] + total - weight[b], left - weight[b])
-            degree[b] = max(degree[b], 0)
+            offset = size if late[b] else 0
+            degree_b = min(degree_b, degree[b] - offset + total - weight[b], left - weight[b])
+            degree[b] = max(degree_b, 0) + offset
             _put(first, following, previous, degree[b], b)
             lowest = min(lowest, degree[b])
     return pivots, parent, begin, count, mass, members, weight
@@ -211,6 +216,12 @@ def _take(first, following, previous, bucket, a):
 
 @jitable
 def analyse(size, ptr, col, d):
+    """Return the fronts of a symmetric pattern as `analyse_late` does, no node last."""
+    return analyse_late(size, ptr, col, d, np.zeros(size, np.bool_))
+
+
+@jitable
+def analyse_late(size, ptr, col, d, late):
     """Return the fronts of a symmetric pattern with diagonal, in the order of their elimination.
 
     Parameters
@@ -219,6 +230,8 @@ def analyse(size, ptr, col, d):
         Nodes and compressed rows, columns rising.
     d
         Unknowns of a node.
+    late
+        Nodes to eliminate after all others that they are connected with.
 
     Returns
     -------
@@ -227,15 +240,17 @@ def analyse(size, ptr, col, d):
         `children[f]` fronts that end on the stack before it belong to it; rank[a] is the front of
         node a; its factors begin at factor_ptr[f]. room: largest front, numbers on the stack.
     """
-    leader = twins(size, ptr, col)
-    order, parent, begin, count, mass, members, weight = minimum_degree(size, ptr, col, leader)
+    leader = twins(size, ptr, col, late)
+    order, parent, begin, count, mass, members, weight = minimum_degree(
+        size, ptr, col, leader, late
+    )
     # fronts whose parent's front is hardly larger become part of it
     own = weight.copy()
     joined = np.full(size, -1, np.int32)
     for k in range(len(order)):
         c = order[k]
         p = parent[c]
-        if p >= 0:
+        if p >= 0 and late[c] == late[p]:
             wider = weight[p] + mass[p]
             extra = wider - mass[c]
             if extra <= 1 or own[c] * extra <= 4 + wider // 8:
