@@ -84,6 +84,17 @@ def block_rows(d, contacts, p, i, x):
 
 
 @jitable
+def diagonal_places(ptr, col):
+    """Return where each row's diagonal block is."""
+    places = np.empty(len(ptr) - 1, np.int32)
+    for a in range(len(ptr) - 1):
+        for k in range(ptr[a], ptr[a + 1]):
+            if col[k] == a:
+                places[a] = k
+    return places
+
+
+@jitable
 def transposed_pattern(size, ptr, col):
     """Return the transpose of a pattern, its columns rising."""
     tptr = np.zeros(size + 1, np.int32)

@@ -252,8 +252,8 @@ def solve(d, symbolic, factors, exchange, x, part):
 
 
 @jitable
-def solve_many(begin, symbolic, factors, exchange, x, part):
-    """Overwrite the right sides, columns of x (nodes, k), one unknown a node, from front `begin` on.
+def solve_many(d, begin, symbolic, factors, exchange, x, part):
+    """Overwrite the right sides, columns of x (d * nodes, k), from front `begin` on.
 
     Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
     `part` has room for room[0] rows of x.
@@ -262,13 +262,14 @@ def solve_many(begin, symbolic, factors, exchange, x, part):
     fronts = len(pivots)
     piv = 0
     for f in range(begin):
-        piv += pivots[f]
+        piv += d * pivots[f]
     for f in range(begin, fronts):
         lo, hi = front_ptr[f], front_ptr[f + 1]
-        n = hi - lo
-        own = pivots[f]
-        for k in range(n):
-            part[k] = x[nodes[lo + k]]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
         kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
         upper = kept[: own * n].reshape(own, n)
         below = kept[own * n :].reshape(own, n - own)
@@ -285,15 +286,17 @@ def solve_many(begin, symbolic, factors, exchange, x, part):
                 target = part[i]
                 for j in range(len(target)):
                     target[j] -= factor * source[j]
-        for k in range(n):
-            x[nodes[lo + k]] = part[k]
+        for k in range(hi - lo):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
         piv += own
     for f in range(fronts - 1, begin - 1, -1):
         lo, hi = front_ptr[f], front_ptr[f + 1]
-        n = hi - lo
-        own = pivots[f]
-        for k in range(n):
-            part[k] = x[nodes[lo + k]]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
         upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
         for k in range(own - 1, -1, -1):
             target = part[k]
@@ -305,8 +308,9 @@ def solve_many(begin, symbolic, factors, exchange, x, part):
             inverse = 1.0 / upper[k, k]
             for j in range(len(target)):
                 target[j] *= inverse
-        for k in range(own):
-            x[nodes[lo + k]] = part[k]
+        for k in range(pivots[f]):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
 
 
 @jitable

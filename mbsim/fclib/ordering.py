@@ -350,3 +350,15 @@ def analyse_late(size, ptr, col, d, late):
     room[0] = largest
     room[1] = highest
     return front_ptr, nodes, pivots, children, rank, factor_ptr, room
+
+
+@jitable
+def elimination_flops(symbolic, d):
+    """Return the floating-point operations of a factorisation with these fronts."""
+    front_ptr, _, pivots, _, _, _, _ = symbolic
+    total = 0.0
+    for f in range(len(pivots)):
+        n = float(d * (front_ptr[f + 1] - front_ptr[f]))
+        own = float(d * pivots[f])
+        total += 2.0 * own * n * (n - own) + 2.0 / 3.0 * own**3
+    return total

@@ -19,7 +19,7 @@ import numpy as np
 from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.errors import ModelError
-from mbsim.fclib.blocks import block_rows, compressed_rows, symmetric_pattern
+from mbsim.fclib.blocks import block_rows, compressed_rows, diagonal_places, symmetric_pattern
 from mbsim.fclib.factor import factorise, partial_lu, solve, solve_many, transposed_places
 from mbsim.fclib.ordering import analyse_late
 from mbsim.fclib.problem import Global, Local, Matrix, matrix
@@ -253,17 +253,6 @@ def _unit(size: int) -> Any:
 
 
 @jitable
-def diagonal_places(ptr, col):
-    """Return where each row's diagonal block is."""
-    places = np.empty(len(ptr) - 1, np.int32)
-    for a in range(len(ptr) - 1):
-        for k in range(ptr[a], ptr[a + 1]):
-            if col[k] == a:
-                places[a] = k
-    return places
-
-
-@jitable
 def full(rows, columns, p, i, x):
     """Return compressed rows as a full matrix."""
     made = np.zeros((rows, columns))
@@ -482,6 +471,7 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
         analyse_late(0, np.zeros(1, np.int32), np.zeros(0, np.int32), 1, np.zeros(0, np.bool_))
     ]
     big_factors = [np.empty(0)]
+    big_size = [1]
     big_of = np.full(count, -1, np.int32)
     local = np.empty(nodes, np.int32)
     sound = True
@@ -515,22 +505,31 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
                 _full_solve(lu, swaps, x)
             _full_solve(lu, swaps, y.reshape(size, 1))
         else:
-            symbolic, factors, okay = _sparse_part(
-                c, size, mine, inside, mp, mi, mx, kp, exchange[row_ptr[c] : row_ptr[c + 1]]
+            swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
+            of_node, symbolic, factors, okay = _sparse_part(
+                size, mine, inside, mp, mi, mx, kp, swaps
             )
             sound = okay and sound
-            swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
             big_of[c] = len(big_symbolic)
             big_symbolic.append(symbolic)
             big_factors.append(factors)
+            big_size.append(of_node)
             begin = len(symbolic[2])
             for j in range(size):
                 a = mine[j]
                 if kp[a + 1] > kp[a]:
-                    begin = min(begin, symbolic[4][j])
+                    begin = min(begin, symbolic[4][j // of_node])
             if wide > 0:
-                solve_many(begin, symbolic, factors, swaps, x, np.empty((symbolic[6][0], d * wide)))
-            solve(1, symbolic, factors, swaps, y, np.empty(symbolic[6][0]))
+                solve_many(
+                    of_node,
+                    begin,
+                    symbolic,
+                    factors,
+                    swaps,
+                    x,
+                    np.empty((symbolic[6][0], d * wide)),
+                )
+            solve(of_node, symbolic, factors, swaps, y, np.empty(symbolic[6][0]))
         for j in range(size):
             solved[mine[j]] = y[j]
         if wide > 0:
@@ -552,7 +551,7 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
     for a in range(n):
         for k in range(kp[a], kp[a + 1]):
             free[ki[k]] += kx[k] * solved[a]
-    mass = (row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors)
+    mass = (row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size)
     return (sound, ptr, col, val, free), mass
 
 
@@ -575,47 +574,42 @@ def _parts_of_nodes(nodes, count, node_ptr, touched):
 
 
 @jitable
-def _sparse_part(c, size, mine, inside, mp, mi, mx, kp, exchange):
-    """Factorise one large part of M, the rows that K touches last."""
+def _sparse_part(size, mine, inside, mp, mi, mx, kp, exchange):
+    """Factorise one large part of M, the rows that K touches last; by blocks of 3 where it has them.
+
+    Returns (unknowns of a node, symbolic, factors, soundness).
+    """
     ptr = np.zeros(size + 1, np.int32)
     for j in range(size):
         ptr[j + 1] = ptr[j] + mp[mine[j] + 1] - mp[mine[j]]
     col = np.empty(ptr[size], np.int32)
+    x = np.empty(ptr[size])
     at = 0
-    seen = np.full(size, -1, np.int32)
-    # entries at one place, and a missing diagonal
-    clean = np.zeros(size + 1, np.int32)
-    wide = np.empty(ptr[size] + size, np.int32)
     for j in range(size):
-        seen[j] = j
-        wide[at] = j
-        at += 1
         for k in range(mp[mine[j]], mp[mine[j] + 1]):
-            b = inside[mi[k]]
-            if seen[b] != j:
-                seen[b] = j
-                wide[at] = b
-                at += 1
-        clean[j + 1] = at
-    ptr, col = symmetric_pattern(size, clean, wide[:at])
-    val = np.zeros((len(col), 1, 1))
-    where = np.empty(size, np.int32)
-    late = np.zeros(size, np.bool_)
+            col[at] = inside[mi[k]]
+            x[at] = mx[k]
+            at += 1
+    d = 1
+    if size % 3 == 0:
+        bptr, bcol, val = block_rows(3, size // 3, ptr, col, x)
+        d = 3 if 9 * len(bcol) <= 2 * len(col) else 1
+    if d == 1:
+        bptr, bcol, val = block_rows(1, size, ptr, col, x)
+    nodes = size // d
+    late = np.zeros(nodes, np.bool_)
     for j in range(size):
         a = mine[j]
-        late[j] = kp[a + 1] > kp[a]
-        for k in range(ptr[j], ptr[j + 1]):
-            where[col[k]] = k
-        for k in range(mp[a], mp[a + 1]):
-            val[where[inside[mi[k]]], 0, 0] += mx[k]
-    symbolic = analyse_late(size, ptr, col, 1, late)
+        if kp[a + 1] > kp[a]:
+            late[j // d] = True
+    symbolic = analyse_late(nodes, bptr, bcol, d, late)
     factors = np.empty(symbolic[5][-1])
-    back = transposed_places(size, ptr, col)
+    back = transposed_places(nodes, bptr, bcol)
     sound = factorise(
-        1, ptr, col, back, val, symbolic, factors, exchange,
+        d, bptr, bcol, back, val, symbolic, factors, exchange,
         np.empty(symbolic[6][0] ** 2), np.empty(symbolic[6][1]),
     )  # fmt: skip
-    return symbolic, factors, sound
+    return d, symbolic, factors, sound
 
 
 @jitable
@@ -679,7 +673,7 @@ def _add_part(d, size, mine, wide, touched, kp, ki, kx, local, x, ptr, col, val)
 @jitable
 def mass_solve(mass, forces):
     """Return M^-1 times a vector, with the factors of `condense`."""
-    row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors = mass
+    row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size = mass
     v = np.empty(len(forces))
     for c in range(len(row_ptr) - 1):
         mine = rows[row_ptr[c] : row_ptr[c + 1]]
@@ -692,8 +686,9 @@ def mass_solve(mass, forces):
             lu = dense[sizes[c] : sizes[c + 1]].reshape(size, size)
             _full_solve(lu, swaps, x.reshape(size, 1))
         else:
-            symbolic = big_symbolic[big_of[c]]
-            solve(1, symbolic, big_factors[big_of[c]], swaps, x, np.empty(symbolic[6][0]))
+            k = big_of[c]
+            symbolic = big_symbolic[k]
+            solve(big_size[k], symbolic, big_factors[k], swaps, x, np.empty(symbolic[6][0]))
         for j in range(size):
             v[mine[j]] = x[j]
     return v

@@ -14,14 +14,17 @@ judged on many problems only.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
 from mbsim.fclib.cone import natural_map, norm, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
-from mbsim.fclib.ordering import analyse
+from mbsim.fclib.ordering import analyse, elimination_flops
+from mbsim.fclib.solvers.task import ROWS, Task
 
 #: rho = RHO / (mean diagonal of the contact's block).
 RHO = 30.0
@@ -34,7 +37,7 @@ OVER = 1.6
 SMALLEST_ALPHA = 1e-12
 
 # places in `state`, what a later call needs to go on
-ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, RESTARTS = range(10)
+ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK = range(10)
 STATE = 10
 
 
@@ -236,6 +239,7 @@ def proximal_newton(
     recent = np.empty(MEMORY)
     spent = 0
     bound = norm(q)
+    flops = 0.0
     while spent < limit:
         alpha = state[ALPHA]
         shift = alpha * mean
@@ -248,7 +252,10 @@ def proximal_newton(
             u[k] = plain[k]
         size_f = states(tangent, mu, rho, u, x, slip, work)
         begin = size_f
-        aim = max(0.1 * min(state[ERROR], state[BEST]), 0.2 * tol)
+        final = tol
+        if state[BEST] > 0.0:
+            final = min(tol, tol_q * state[BEST] / state[BEST_Q])
+        aim = max(0.1 * min(state[ERROR], state[BEST]), 0.2 * final)
         recent[:] = size_f
         newtons = 0
         good = False
@@ -265,6 +272,8 @@ def proximal_newton(
                 rptr, rcol = _closed_pattern(ptr, col, slip, number, nodes)
                 back = transposed_places(len(rptr) - 1, rptr, rcol)
                 symbolic = analyse(len(rptr) - 1, rptr, rcol, d)
+                flops = elimination_flops(symbolic, d)
+                state[WORK] += 5e-8 * len(rcol)
                 if symbolic[5][-1] > len(factors):
                     factors = np.empty(symbolic[5][-1] + symbolic[5][-1] // 4)
                 if symbolic[6][0] ** 2 > len(front):
@@ -287,6 +296,8 @@ def proximal_newton(
                 if sound:
                     solve(d, symbolic, factors, exchange, rhs, part)
             newtons += 1
+            # seconds on a usual processor: a measure of work that does not depend on the clock
+            state[WORK] += 2.5e-10 * flops + 1e-9 * symbolic[5][-1] + 3e-8 * len(col) + 1e-7 * nc
             if not sound:
                 break
             for k in range(m):
@@ -377,8 +388,11 @@ def proximal_newton(
             lower = state[ALPHA] * (0.3 if newtons <= 6 else 0.6)
             if state[SINCE] <= 3.0:
                 lower = max(lower, 1.5 * state[FAILED_AT])
-            state[ALPHA] = max(min(lower, state[ALPHA]), SMALLEST_ALPHA)
+            if alpha > 0.0:
+                state[ALPHA] = max(min(lower, alpha), SMALLEST_ALPHA)
         else:
+            if alpha == 0.0 and error >= before:
+                break  # Newton's method alone, and it failed
             state[FAILED_AT] = alpha
             state[SINCE] = 0.0
             state[ALPHA] = min(4.0 * alpha, 1e6)
@@ -387,3 +401,66 @@ def proximal_newton(
                 for k in range(m):
                     centre[k] = x[k]
     return rows
+
+
+class Proximal:
+    """A proximal Newton run that can be continued; `alpha` = 0 is Newton's method alone."""
+
+    def __init__(self, task: Task, alpha: float = 1e-3) -> None:
+        self.task = task
+        self.centre = task.r.copy()
+        if not np.isfinite(task.error):
+            task.offer(task.r, *task.look(task.r))
+        self.state: Any = np.zeros(STATE)
+        self.state[ALPHA] = alpha
+        self.state[BEST] = self.state[ERROR] = task.error
+        self.state[BEST_Q] = task.error_q
+
+    @property
+    def stalled(self) -> float:
+        """Proximal steps since the error fell by a tenth."""
+        return float(self.state[STALLED])
+
+    @property
+    def newton_work(self) -> float:
+        """Estimated seconds of a Newton iteration so far (0 before the first)."""
+        return float(self.state[WORK] / max(self.state[NEWTONS], 1.0))
+
+    def advance(self, limit: int) -> bool:
+        """Spend about `limit` Newton iterations; return whether anything was done."""
+        task, state = self.task, self.state
+        b = task.blocks
+        r = task.r.copy()
+        history = np.empty((ROWS, 3))
+        work, newtons = state[WORK], state[NEWTONS]
+        before = task.iterations - newtons
+        rows = jit.function(proximal_newton)(
+            b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, r, self.centre, state,
+            task.tol, task.tol_q, limit, history, 0,
+        )  # fmt: skip
+        history[:rows, 0] += before
+        task.work += float(state[WORK] - work)
+        task.iterations += int(state[NEWTONS] - newtons)
+        task.offer(r, state[BEST], state[BEST_Q])
+        task.note("NSN" if state[ALPHA] == 0.0 else "PROX", history[:rows])
+        return bool(state[NEWTONS] > newtons)
+
+
+def run(task: Task) -> None:
+    """Take proximal Newton steps until the goal is reached or the time is over (PROX)."""
+    _until(task, Proximal(task))
+
+
+def run_newton(task: Task) -> None:
+    """Newton's method alone, without proximal terms (NSN)."""
+    _until(task, Proximal(task, 0.0))
+
+
+def _until(task: Task, proximal: Proximal) -> None:
+    """Go on until the goal is reached, the time is over or nothing moves any more."""
+    chunk = 50
+    while not task.done and not task.late:
+        if not proximal.advance(chunk) or proximal.stalled > 100:
+            return
+        if proximal.state[ALPHA] == 0.0 and proximal.stalled > 0:
+            return

@@ -13,18 +13,21 @@ Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
 from mbsim.fclib.cone import cone_height, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
-from mbsim.fclib.ordering import analyse
+from mbsim.fclib.ordering import analyse, elimination_flops
+from mbsim.fclib.solvers.task import ROWS, Task
 
 # places in `state`, what a later call needs to go on
-PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL = range(8)
-STATE = 8
+PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK = range(9)
+STATE = 9
 #: First penalty, and the iteration of its first change.
 PENALTY_0, FIRST_CHANGE = 0.1, 10
 
@@ -99,9 +102,13 @@ def admm(
     last_y = y.copy()
     work = np.empty(m)
     penalty = -1.0
+    flops = elimination_flops(symbolic, d)
+    state[WORK] += 5e-8 * len(col)
     for _ in range(limit):
         if penalty != state[PENALTY]:
             penalty = state[PENALTY]
+            # seconds on a usual processor: a measure of work that does not depend on the clock
+            state[WORK] += 2.5e-10 * flops + 3e-8 * len(col)
             for a in range(nc):
                 k = diagonal[a]
                 for s in range(d):
@@ -139,6 +146,7 @@ def admm(
                 size += weight[a] * max(z[at] ** 2, x[at] ** 2)
                 dual += weight[a] * y[at] ** 2
         state[ITERATIONS] += 1.0
+        state[WORK] += 1e-9 * len(factors) + 1e-7 * nc + 1e-8 / every * len(col)
         if state[ITERATIONS] % every == 0.0:
             product(tangent, rolling, ptr, col, val, q, z, u)
             error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, z, work)
@@ -186,3 +194,56 @@ def admm(
                     state[MOMENTUM] = 1.0
                     state[RESIDUAL] = 0.0
     return rows
+
+
+class Splitting:
+    """An ADMM run that can be continued."""
+
+    def __init__(self, task: Task, *, accelerate: bool = True, warm: bool = True) -> None:
+        self.task = task
+        m = len(task.r)
+        self.accelerate = accelerate
+        self.z = task.r.copy() if warm else np.zeros(m)
+        self.y = np.zeros(m)
+        self.lift = np.zeros(task.blocks.contacts)
+        self.state: Any = np.zeros(STATE)
+        self.state[PENALTY] = PENALTY_0
+        self.state[NEXT] = self.state[INTERVAL] = FIRST_CHANGE
+        self.state[BEST] = self.state[BEST_Q] = np.inf
+        self.state[MOMENTUM] = 1.0
+
+    @property
+    def error(self) -> float:
+        """Best error of this run."""
+        return float(self.state[BEST])
+
+    def advance(self, limit: int, every: float = 2.0) -> bool:
+        """Iterate at most `limit` times; return whether anything was done."""
+        task, state = self.task, self.state
+        b = task.blocks
+        r = task.r.copy()
+        history = np.empty((min(ROWS, limit), 3))
+        work, before = state[WORK], state[ITERATIONS]
+        rows = jit.function(admm)(
+            b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
+            self.z, self.y, self.lift, state, self.accelerate,
+            task.tol, task.tol_q, limit, every, history, 0,
+        )  # fmt: skip
+        history[:rows, 0] += task.iterations - before
+        task.work += float(state[WORK] - work)
+        task.iterations += int(state[ITERATIONS] - before)
+        if np.isfinite(state[BEST]):
+            task.offer(r, state[BEST], state[BEST_Q])
+        task.note("ADMM", history[:rows])
+        return bool(state[ITERATIONS] > before)
+
+
+def run(task: Task) -> None:
+    """Iterate until the goal is reached or the time is over (ADMM)."""
+    splitting = Splitting(task, warm=bool(task.r.any()))
+    best, since = np.inf, 0
+    while not task.done and not task.late and splitting.advance(500):
+        since = 0 if splitting.error < 0.99 * best else since + 1
+        best = min(best, splitting.error)
+        if since > 100:
+            return  # at rounding, or it does not converge

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from mbsim.core import jit
 from mbsim.core.jitable import jitable
-from mbsim.fclib.blocks import product
+from mbsim.fclib.blocks import (
+    block_rows,
+    compressed_rows,
+    diagonal_places,
+    product,
+    product_of_stored,
+)
 from mbsim.fclib.cone import relative_errors
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
+from mbsim.fclib.solvers.task import ROWS, Task
+
+if TYPE_CHECKING:
+    from mbsim.fclib.reduction import Blocks
+
+
+#: Sweeps that |F|/|q| gets at least once the error is small.
+GRACE = 20
 
 
 @jitable
@@ -50,22 +67,35 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
 
 
 @jitable
-def diagonal_places(ptr, col):
-    """Return where each row's diagonal block is."""
-    places = np.empty(len(ptr) - 1, np.int32)
-    for a in range(len(ptr) - 1):
-        for k in range(ptr[a], ptr[a + 1]):
-            if col[k] == a:
-                places[a] = k
-    return places
+def local_sweeps(
+    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, history, check
+):
+    """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
+
+    `check` gets the errors with the stored W. Returns the blocks and what `gauss_seidel` does.
+    """
+    d = 1 + len(tangent)
+    ptr, col, val = block_rows(d, len(mu), *compressed_rows(m, m, nz, p, i, x))
+    diagonal = diagonal_places(ptr, col)
+    # without rolling directions the numbers of mu_r do not matter
+    done, error, error_q, rows = gauss_seidel(
+        tangent, (), ptr, col, val, diagonal, q, mu, mu, r, tol, tol_q, sweeps, every, grace,
+        history,
+    )  # fmt: skip
+    u = q.copy()
+    product_of_stored(m, nz, p, i, x, r, u)
+    check[0], check[1] = relative_errors(tangent, (), mu, mu, q, u, r, np.empty(m))
+    return ptr, col, val, diagonal, u, done, error, error_q, rows
 
 
 @jitable
 def gauss_seidel(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, tol, tol_q, sweeps, every, history
-):
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, tol, tol_q, sweeps, every, grace,
+    history,
+):  # fmt: skip
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
+    With the first reached, the second gets as many sweeps again, and `grace` more, at most.
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
@@ -78,7 +108,8 @@ def gauss_seidel(
     error, error_q = np.inf, np.inf
     done = 0
     looked = -1
-    while done < sweeps:
+    most = sweeps
+    while done < most:
         change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
         done += 1
         small = False
@@ -87,7 +118,7 @@ def gauss_seidel(
             for k in range(len(r)):
                 size += r[k] * r[k]
             small = change <= tol * tol * size
-        if done % every == 0 or small or done == sweeps:
+        if done % every == 0 or small or done == most:
             looked = done
             product(tangent, rolling, ptr, col, val, q, r, u)
             error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, r, missing)
@@ -96,6 +127,41 @@ def gauss_seidel(
                 history[rows, 1] = error
                 history[rows, 2] = error_q
                 rows += 1
-            if error <= tol and error_q <= tol_q:
-                break
+            if error <= tol:
+                if error_q <= tol_q:
+                    break
+                if most == sweeps:
+                    most = min(sweeps - 1, 2 * done + grace)
     return done, error, error_q, rows
+
+
+def nsgs(task: Task, sweeps: int, every: int = 5) -> None:
+    """Sweep at most `sweeps` times from the best iterate."""
+    b = task.blocks
+    r = task.r.copy()
+    history = np.empty((min(ROWS, sweeps // every + 2), 3))
+    done, error, error_q, rows = jit.function(gauss_seidel)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
+        task.tol, task.tol_q, sweeps, every, GRACE, history,
+    )  # fmt: skip
+    history[:rows, 0] += task.iterations
+    task.iterations += done
+    task.work += done * sweep_work(b)
+    task.offer(r, error, error_q)
+    task.note("NSGS", history[:rows])
+
+
+def sweep_work(b: Blocks) -> float:
+    """Return the estimated seconds of a sweep."""
+    return 9e-8 * b.contacts + 7e-9 * len(b.col)
+
+
+def run(task: Task) -> None:
+    """Sweep until the goal is reached or the time is over (NSGS)."""
+    every = 1 if task.blocks.contacts <= 10 else 5
+    chunk = 1000
+    while not task.done and not task.late:
+        before = task.error
+        nsgs(task, chunk, every)
+        if task.error >= before * (1.0 - 1e-12) and task.iterations >= 20 * chunk:
+            return  # at rounding, or it does not converge

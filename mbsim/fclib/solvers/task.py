@@ -1,0 +1,95 @@
+"""What every solver gets and fills: the problem in blocks, the goal, the best iterate, the history."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.fclib.blocks import product
+from mbsim.fclib.cone import relative_errors
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.reduction import Blocks
+
+#: Rows of a history that one call of a kernel may add.
+ROWS = 400
+
+
+@dataclass(eq=False)
+class Task:
+    """One problem on its way to a solution.
+
+    Parameters
+    ----------
+    blocks
+        u = W r + q in blocks.
+    r
+        (m,) the start; then the best iterate so far.
+    tol, tol_q
+        Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
+    strict
+        Whether the second must be reached; else it gets as much work again as the first took.
+    deadline
+        Value of `time.perf_counter` at which to give up.
+    """
+
+    blocks: Blocks
+    r: Vector
+    tol: float
+    tol_q: float
+    strict: bool = False
+    deadline: float = np.inf
+    error: float = np.inf
+    error_q: float = np.inf
+    #: Estimated seconds, and iterations: what the methods have done so far.
+    work: float = 0.0
+    grace: float = np.inf
+    iterations: int = 0
+    #: (method, rows of iteration, error, |F|/|q|) in the order in which the methods ran.
+    history: list[tuple[str, Any]] = field(default_factory=list)
+    #: Size of r where |F|/|q| was looked at, to see impulses that grow without bound.
+    sizes: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal is reached."""
+        if self.error > self.tol:
+            return False
+        return self.error_q <= self.tol_q or (not self.strict and self.work >= self.grace)
+
+    @property
+    def late(self) -> bool:
+        """Whether the time is over."""
+        return time.perf_counter() > self.deadline
+
+    def look(self, r: Vector) -> tuple[float, float]:
+        """Return the errors of an iterate."""
+        b = self.blocks
+        u = np.empty_like(r)
+        jit.function(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
+        errors: tuple[float, float] = jit.function(relative_errors)(
+            b.tangent, b.rolling, b.mu, b.mu_r, b.q, u, r, np.empty_like(r)
+        )
+        return errors
+
+    def offer(self, r: Vector, error: float, error_q: float) -> bool:
+        """Take an iterate if it is better, and return whether it was."""
+        better = error < self.error
+        if error <= self.tol and self.error <= self.tol:
+            better = error_q < self.error_q  # within the tolerance the other figure decides
+        if better:
+            self.r, self.error, self.error_q = r, float(error), float(error_q)
+        if error <= self.tol and self.grace == np.inf:
+            self.grace = 2.0 * self.work + 2e-5
+        return better
+
+    def note(self, name: str, rows: Any) -> None:
+        """Add rows to the history."""
+        if len(rows):
+            self.history.append((name, rows.copy()))
+        self.sizes.append((self.error_q, float(np.linalg.norm(self.r))))
