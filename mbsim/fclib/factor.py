@@ -40,6 +40,9 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
     front_ptr, nodes, pivots, children, rank, factor_ptr, room = symbolic
     fronts = len(pivots)
     local = np.empty(len(rank), np.int32)
+    run_from = np.empty(len(rank) + 1, np.int64)
+    run_to = np.empty(len(rank) + 1, np.int64)
+    run_length = np.empty(len(rank) + 1, np.int64)
     # sizes and places of what waits on the stack
     waiting = np.empty(fronts + 1, np.int32)
     depth = 0
@@ -77,15 +80,26 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
             size = d * many
             top -= size * size
             update = stack[top : top + size * size].reshape(size, size)
+            # runs of the child's unknowns that are neighbours here, too
+            runs = 0
+            for j in range(many):
+                place = d * local[nodes[clo + j]]
+                if j > 0 and place == run_to[runs - 1] + d * j - run_from[runs - 1]:
+                    run_length[runs - 1] += d
+                else:
+                    run_from[runs] = d * j
+                    run_to[runs] = place
+                    run_length[runs] = d
+                    runs += 1
             for i in range(many):
                 row = d * local[nodes[clo + i]]
                 for s in range(d):
-                    source = update[d * i + s]
-                    target = matrix[row + s]
-                    for j in range(many):
-                        column = d * local[nodes[clo + j]]
-                        for t in range(d):
-                            target[column + t] += source[d * j + t]
+                    for k in range(runs):
+                        length = run_length[k]
+                        source = update[d * i + s, run_from[k] : run_from[k] + length]
+                        target = matrix[row + s, run_to[k] : run_to[k] + length]
+                        for t in range(length):
+                            target[t] += source[t]
         sound = partial_lu(matrix, own, exchange[piv : piv + own]) and sound
         _keep(matrix, own, factors[factor_ptr[f] : factor_ptr[f + 1]])
         size = n - own

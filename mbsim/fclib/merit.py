@@ -21,7 +21,7 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -160,9 +160,9 @@ def _velocities(
         if problem.V is not None and problem.R is not None and problem.s is not None:
             assert l is not None
             u = u + problem.V.apply(l)
-            terms = (problem.V.apply_transposed(r), problem.R.apply(l), problem.s)
-            left = _norm(terms[0] + terms[1] + terms[2])
-            equalities = _over(left, max(_norm(term) for term in terms))
+            parts = (problem.V.apply_transposed(r), problem.R.apply(l), problem.s)
+            left = _norm(parts[0] + parts[1] + parts[2])
+            equalities = _over(left, max(_norm(part) for part in parts))
             absolute = left / (1.0 + _norm(problem.s))
         return u, (_norm(problem.q), _norm(r), _norm(u)), 0.0, equalities, absolute
     v = solution.v
@@ -172,9 +172,10 @@ def _velocities(
     if problem.G is not None and problem.b is not None:
         assert l is not None
         forces.append(-problem.G.apply(l))
-        moved = problem.G.apply_transposed(v)
-        left = _norm(moved + problem.b)
-        equalities = _over(left, max(_norm(moved), _norm(problem.b)))
+        left = _norm(problem.G.apply_transposed(v) + problem.b)
+        # G' v may cancel to nothing: its terms are the scale
+        terms = replace(problem.G, x=np.abs(problem.G.x)).apply_transposed(np.abs(v))
+        equalities = _over(left, max(_norm(terms), _norm(problem.b)))
         absolute = left / (1.0 + _norm(problem.b))
     dynamics = _over(_norm(np.sum(forces, axis=0)), max(_norm(force) for force in forces))
     return u, (_norm(u), _norm(r)), dynamics, equalities, absolute

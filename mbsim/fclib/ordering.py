@@ -346,6 +346,23 @@ def analyse_late(size, ptr, col, d, late):
                 freed[way[depth - 1]] += update
             done += 1
         root = following[root]
+    # members of a front in the order of their elimination: children then fit in long runs
+    position = np.empty(size, np.int32)
+    count_ = 0
+    for f in range(fronts):
+        for k in range(front_ptr[f], front_ptr[f] + pivots[f]):
+            position[nodes[k]] = count_
+            count_ += 1
+    by_position = np.empty(size, np.int32)
+    for a in range(size):
+        by_position[position[a]] = a
+    for f in range(fronts):
+        lo, hi = front_ptr[f] + pivots[f], front_ptr[f + 1]
+        for k in range(lo, hi):
+            nodes[k] = position[nodes[k]]
+        nodes[lo:hi].sort()
+        for k in range(lo, hi):
+            nodes[k] = by_position[nodes[k]]
     room = np.empty(2, np.int64)
     room[0] = largest
     room[1] = highest
