@@ -19,6 +19,7 @@ COMMANDS = {
     "info": "mbsim.cli.info",
     "plot": "mbsim.cli.plot",
     "bench": "mbsim.cli.bench",
+    "fclib": "mbsim.cli.fclib",
 }
 
 

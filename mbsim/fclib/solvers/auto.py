@@ -10,60 +10,84 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from mbsim.core import jit
+from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers import newton, splitting, sweeps
 from mbsim.fclib.solvers.task import Task
 
-#: Sweeps before the rate is trusted, and the predicted number at which a switch pays.
-FIRST, SWITCH = 100, 600
-#: ADMM is tried from this number of contacts on.
-STACKS = 50
+#: Sweeps before anything is predicted: with few contacts, else.
+FIRST_SMALL, FIRST = 100, 20
+#: Up to so many contacts count as few.
+FEW = 10
+#: ADMM is tried from this number of contacts on, with so many iterations.
+STACKS, TRIAL = 50, 30
+#: Newton iterations that a proximal finish takes, roughly.
+FINISH = 40
+#: Error from which the proximal method is started, unless sweeps do not get there.
+NEAR = 1.5e-4
 #: Values of alpha that restarts of the proximal method go through.
-ALPHAS = (1e-3, 1e-2, 1e-1, 1e-4)
+ALPHAS = (1e-3, 1e-2, 1e-4, 1e-1)
+#: Restarts without any gain after which there is nothing more to hope for.
+HOPELESS = 8
+
+
+def first_sweeps(contacts: int) -> tuple[int, int]:
+    """Return how many sweeps to begin with, and after how many to look at the error."""
+    return (FIRST_SMALL, 1) if contacts <= FEW else (FIRST, 5)
 
 
 def run(task: Task) -> None:
     """Solve with whatever works (AUTO)."""
-    small = task.blocks.contacts <= 10
     if not task.history:
-        sweeps.nsgs(task, FIRST, 1 if small else 5)
+        sweeps.nsgs(task, *first_sweeps(task.blocks.contacts))
+    if task.over:
+        return
     if task.blocks.rolling:
         _rolling(task)
         return
-    _sweep_while_fast(task)
-    if task.blocks.contacts >= STACKS and not task.done and not task.late:
-        _try_splitting(task)
-    budget = max(6.0 * task.work, 2e-4)
-    restart = 0
-    while not task.done and not task.late:
-        if not _proximal(task, budget, ALPHAS[restart % len(ALPHAS)]) and restart >= 12:
-            return
-        restart += 1
-        if not task.done and not task.late:
-            before = task.work
-            sweeps.nsgs(task, FIRST)
-            while task.work - before < 0.2 * budget and _remaining(task.history[-1][1], task) > 0:
-                if task.done or task.late:
-                    break
-                sweeps.nsgs(task, FIRST)
-            budget *= 2.0
+    newton_work, splitting_work, factor_work = _costs(task)
+    finish = FINISH * newton_work
+    if task.blocks.contacts >= STACKS:
+        trial = factor_work + TRIAL * splitting_work
+        _sweep(task, trial)
+        if not task.over:
+            _try_splitting(task, splitting_work, finish)
+    _sweep(task, finish, near=True)
+    _finish(task, finish)
+
+
+def _costs(task: Task) -> tuple[float, float, float]:
+    """Return the estimated seconds of a Newton iteration, an ADMM iteration and its factors."""
+    b = task.blocks
+    d = 1 + len(b.tangent) + len(b.rolling)
+    symbolic = jit.function(analyse)(b.contacts, b.ptr, b.col, d)
+    flops = jit.function(elimination_flops)(symbolic, d)
+    entries = float(symbolic[5][-1])
+    factor = 2.5e-10 * flops + 3e-8 * len(b.col)
+    once = 1e-9 * entries + 1e-7 * b.contacts
+    return factor + once, once + 5e-9 * len(b.col), factor
 
 
 def _rolling(task: Task) -> None:
     """Go on with sweeps; rolling friction has no Newton's method here, but ADMM."""
-    _sweep_while_fast(task)
-    if not task.done and not task.late:
-        _try_splitting(task)
-    if not task.done and not task.late:
+    _, splitting_work, factor_work = _costs(task)
+    _sweep(task, factor_work + TRIAL * splitting_work)
+    if not task.over:
+        _try_splitting(task, splitting_work, 20.0 * TRIAL * splitting_work)
+    if not task.over:
         sweeps.run(task)
 
 
-def _remaining(rows: Any, task: Task) -> float:
-    """Return the predicted number of iterations, by the rate of the last 40 % of `rows`."""
+def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
+    """Return the predicted number of iterations, by the rate of the last 40 % of `rows`.
+
+    `aim` is an error to reach in place of the goal.
+    """
     if len(rows) < 2:
         return math.inf
     last = rows[-1]
     then = rows[int(0.6 * (len(rows) - 1))]
-    wanted = max(last[1] / task.tol, last[2] / task.tol_q)
+    wanted = last[1] / aim if aim else max(last[1] / task.tol, last[2] / task.tol_q)
     if wanted <= 1.0:
         return 0.0
     if last[0] <= then[0] or not 0.0 < last[1] < then[1]:
@@ -72,37 +96,67 @@ def _remaining(rows: Any, task: Task) -> float:
     return float(math.log(wanted) / rate)
 
 
-def _sweep_while_fast(task: Task) -> None:
-    """Sweep on while it is predicted to end soon."""
-    while not task.done and not task.late:
-        if _remaining(task.history[-1][1], task) > SWITCH:
+def _sweep(task: Task, work: float, *, near: bool = False) -> None:
+    """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
+
+    `near`: sweep as well to get near enough for the proximal method.
+    """
+    cost = sweeps.sweep_work(task.blocks)
+    spent = task.work
+    while not task.over and task.work - spent < 2.0 * work:
+        rows = task.history[-1][1]
+        left = _remaining(rows, task)
+        if near and left * cost > work and task.error > NEAR:
+            left = _remaining(rows, task, NEAR)
+            if task.history[-1][0] != "NSGS":
+                left = 0.0  # nothing known yet
+        if left * cost > work:
             return
-        sweeps.nsgs(task, FIRST)
+        chunk = 25 if task.iterations < 100 else 100
+        sweeps.nsgs(task, chunk)
 
 
-def _try_splitting(task: Task) -> None:
-    """Give ADMM 40 iterations, and more while it is predicted to end soon."""
+def _try_splitting(task: Task, cost: float, finish: float) -> None:
+    """Give ADMM a trial, and more while it is predicted to end before another would."""
     run = splitting.Splitting(task, warm=False)
-    limit = 40
-    while run.advance(limit) and not task.done and not task.late:
-        if _remaining(task.history[-1][1], task) > 4 * limit:
+    limit = TRIAL
+    spent = task.work
+    while run.advance(limit) and not task.over:
+        left = _remaining(task.history[-1][1], task)
+        if left * cost > finish or task.work - spent > 2.0 * finish:
             return
         limit = 20
 
 
-def _proximal(task: Task, budget: float, alpha: float) -> bool:
-    """Take proximal Newton steps while they gain; return whether the error fell at all."""
+def _finish(task: Task, finish: float) -> None:
+    """Alternate proximal Newton and sweeps, with budgets that grow, until the goal or no hope."""
+    budget = max(6.0 * task.work, 2.0 * finish)
+    restart = 0
+    vain = 0
+    while not task.over:
+        begin = task.error
+        _proximal(task, budget, ALPHAS[restart % len(ALPHAS)])
+        vain = 0 if task.error < 0.9 * begin else vain + 1
+        if task.over or vain >= HOPELESS:
+            return
+        restart += 1
+        _sweep(task, 0.1 * budget)
+        if task.history[-1][0] != "NSGS" and not task.over:
+            sweeps.nsgs(task, 50)
+        budget *= 1.5
+
+
+def _proximal(task: Task, budget: float, alpha: float) -> None:
+    """Take proximal Newton steps while they gain."""
     run = newton.Proximal(task, alpha)
-    begin, start = task.error, task.work
     mark, mark_work = task.error, task.work
-    while not task.done and not task.late:
+    while not task.over:
         cost = run.newton_work
         limit = 10 if cost == 0.0 else max(10, min(100, int(0.25 * budget / cost)))
         if not run.advance(limit):
-            break
+            return
         if task.error < mark / 3.0:
             mark, mark_work = task.error, task.work
-        patience = budget if task.error > 1e-5 else 4.0 * max(budget, task.work - start)
-        if task.work - mark_work > patience or run.stalled > 40:
-            break
-    return task.error < begin
+        patience = budget if task.error > 1e-5 else 4.0 * budget
+        if task.work - mark_work > patience or run.stalled > 30:
+            return

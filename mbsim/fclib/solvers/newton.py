@@ -24,7 +24,7 @@ from mbsim.fclib.blocks import product
 from mbsim.fclib.cone import natural_map, norm, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import ROWS, Task
+from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
 
 #: rho = RHO / (mean diagonal of the contact's block).
 RHO = 30.0
@@ -368,8 +368,10 @@ def proximal_newton(
         before = state[ERROR]
         better = error < state[BEST]
         done = error <= tol and error_q <= tol_q
-        # within the tolerance already: the other figure decides
-        if better or done or (error <= tol and error_q < state[BEST_Q]):
+        if error <= tol and state[BEST] <= tol:
+            # the other figure decides, and impulses must not run away for it
+            better = error_q < state[BEST_Q] and norm(x) <= GROWTH * norm(r)
+        if better:
             state[STALLED] = 0.0 if error < 0.9 * state[BEST] else state[STALLED] + 1.0
             state[BEST] = error
             state[BEST_Q] = error_q

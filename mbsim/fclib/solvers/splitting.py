@@ -20,10 +20,10 @@ import numpy as np
 from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
-from mbsim.fclib.cone import cone_height, relative_errors
+from mbsim.fclib.cone import cone_height, norm, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import ROWS, Task
+from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
 
 # places in `state`, what a later call needs to go on
 PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK = range(9)
@@ -156,7 +156,11 @@ def admm(
                 history[rows, 2] = error_q
                 rows += 1
             done = error <= tol and error_q <= tol_q
-            if error < state[BEST] or done or (error <= tol and error_q < state[BEST_Q]):
+            better = error < state[BEST]
+            if error <= tol and state[BEST] <= tol:
+                # the other figure decides, and impulses must not run away for it
+                better = error_q < state[BEST_Q] and norm(z) <= GROWTH * norm(r)
+            if better:
                 state[BEST] = error
                 state[BEST_Q] = error_q
                 for k in range(m):
