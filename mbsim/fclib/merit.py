@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
     from mbsim.fclib.reduction import Blocks
 
+#: A contact at the edge of its cone that is slower than this share of |q| or |u| sticks.
+AT_REST = 1e-7
 #: States of a contact.
 OPEN, STICK, SLIP = 0, 1, 2
 STATES = ("open", "stick", "slip")
@@ -199,12 +201,12 @@ def _figures(problem: Local | Global, u: Vector, r: Vector, q: Vector) -> tuple[
     held = rs[:, 0].clip(min=0.0)
     outside = np.maximum(np.maximum(grip - mu * held, twist - mu_r * held), -rs[:, 0])
     penetration = max(0.0, float(-us[:, 0].min()))
-    # both on their own scale, so that units do not matter
-    normal_r, normal_u = _each(rs[:, 0], largest_r), _each(us[:, 0], largest_u)
-    room = _each(mu * held - grip, largest_r)
-    states = np.where(
-        normal_r <= normal_u, OPEN, np.where(room <= _each(speed, largest_u), SLIP, STICK)
-    )
+    # each on its own scale, so that units do not matter
+    scale = max(largest_u, float(_lengths(qs).max()))
+    normal_r, normal_u = _each(rs[:, 0], largest_r), _each(us[:, 0], scale)
+    room, moving = _each(mu * held - grip, largest_r), _each(speed, scale)
+    slips = (room <= moving) & (moving > AT_REST)
+    states = np.where(normal_r <= normal_u, OPEN, np.where(slips, SLIP, STICK))
     return (
         _over(max(0.0, float(outside.max())), largest_r),
         penetration,

@@ -42,7 +42,8 @@ def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
     Slip is one scalar unknown s > 0: with S = A_TT - A_TN A_NT / A_NN and c = b_T - A_TN b_N / A_NN,
     (S + s I) r_T = -c, r_N = -(b_N + A_NT r_T) / A_NN, |r_T| = mu r_N. Once stick has failed,
     |r_T| - mu r_N is positive at s = 0 and negative at infinity, so that a root is bracketed.
-    Newton runs on mu r_N / |r_T| - 1, which is nearly linear in s.
+    Newton runs on mu r_N / |r_T| - 1, which is nearly linear in s. The impulse given is kept where
+    A has no normal part to solve with or admits no solution.
     """
     if bn >= 0.0:
         return 0.0, 0.0, 0.0
@@ -104,7 +105,9 @@ def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
     # exactly on the cone, the normal equation kept
     e1, e2 = x1 / length, x2 / length
     slope = 1.0 + mu * (w1 * e1 + w2 * e2)
-    n = height / slope if slope > 0.0 else max(n, 0.0)
+    if not slope > 1e-9:
+        return rn, r1, r2  # A is not positive, and no impulse of this contact alone will do
+    n = height / slope
     return n, mu * n * e1, mu * n * e2
 
 

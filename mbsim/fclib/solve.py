@@ -208,10 +208,10 @@ def _reason(task: Task, tol: float, error: float, error_q: float) -> str:
 
 
 def _looks_jammed(task: Task) -> bool:
-    """Return whether |r| grew tenfold since |F|/|q| was last three times as large."""
-    if len(task.sizes) < 4:
+    """Return whether |r| grew tenfold while |F|/|q| did not fall to a third."""
+    if not task.sizes:
         return False
     last_q, last_r = task.sizes[-1]
-    half = task.sizes[len(task.sizes) // 4 :]
-    stalled = all(last_q > 0.33 * error_q for error_q, _ in half)
-    return stalled and last_r > 10.0 * min(size for _, size in half)
+    return any(
+        size < 0.1 * last_r and last_q > 0.33 * error_q for error_q, size in task.sizes[:-1]
+    )
