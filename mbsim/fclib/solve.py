@@ -212,6 +212,4 @@ def _looks_jammed(task: Task) -> bool:
     if not task.sizes:
         return False
     last_q, last_r = task.sizes[-1]
-    return any(
-        size < 0.1 * last_r and last_q > 0.33 * error_q for error_q, size in task.sizes[:-1]
-    )
+    return any(size < 0.1 * last_r and last_q > 0.33 * error_q for error_q, size in task.sizes[:-1])

@@ -21,6 +21,8 @@ FIRST_SMALL, FIRST = 100, 20
 FEW = 10
 #: ADMM is tried from this number of contacts on, with so many iterations.
 STACKS, TRIAL = 50, 30
+#: Iterations of ADMM that show whether all bodies rest.
+RESTED = 5
 #: Newton iterations that a proximal finish takes, roughly.
 FINISH = 40
 #: Error from which the proximal method is started, unless sweeps do not get there.
@@ -85,14 +87,15 @@ def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
     """
     if len(rows) < 2:
         return math.inf
-    last = rows[-1]
-    then = rows[int(0.6 * (len(rows) - 1))]
-    wanted = last[1] / aim if aim else max(last[1] / task.tol, last[2] / task.tol_q)
+    middle = int(0.6 * (len(rows) - 1))
+    then, last = rows[: middle + 1, 1].min(), rows[:, 1].min()
+    wanted = last / aim if aim else max(last / task.tol, rows[:, 2].min() / task.tol_q)
     if wanted <= 1.0:
         return 0.0
-    if last[0] <= then[0] or not 0.0 < last[1] < then[1]:
+    steps = rows[-1, 0] - rows[middle, 0]
+    if steps <= 0.0 or not 0.0 < last < then:
         return math.inf
-    rate = math.log(then[1] / last[1]) / (last[0] - then[0])
+    rate = math.log(then / last) / steps
     return float(math.log(wanted) / rate)
 
 
@@ -117,15 +120,22 @@ def _sweep(task: Task, work: float, *, near: bool = False) -> None:
 
 
 def _try_splitting(task: Task, cost: float, finish: float) -> None:
-    """Give ADMM a trial, and more while it is predicted to end before another would."""
+    """Give ADMM a trial, and more while it is predicted to end before another method would."""
     run = splitting.Splitting(task, warm=False)
-    limit = TRIAL
+    run.penalise(splitting.RESTING)
     spent = task.work
+    run.advance(RESTED, 1.0)
+    while not task.over and _remaining(task.history[-1][1], task) <= RESTED:
+        run.advance(RESTED, 1.0)
+    if task.over:
+        return
+    run.penalise(splitting.PENALTY_0)
+    limit = TRIAL
     while run.advance(limit) and not task.over:
         left = _remaining(task.history[-1][1], task)
         if left * cost > finish or task.work - spent > 2.0 * finish:
             return
-        limit = 20
+        limit = 30
 
 
 def _finish(task: Task, finish: float) -> None:

@@ -28,8 +28,10 @@ from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
 # places in `state`, what a later call needs to go on
 PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK = range(9)
 STATE = 9
-#: First penalty, and the iteration of its first change.
-PENALTY_0, FIRST_CHANGE = 0.1, 10
+#: First penalty, the iteration of its first change, and the range in which it moves.
+PENALTY_0, FIRST_CHANGE, LEAST, MOST = 0.1, 10, 0.03, 30.0
+#: A penalty with which bodies that all stick need a handful of iterations.
+RESTING = 1e-3
 
 
 @jitable
@@ -136,7 +138,7 @@ def admm(
                 spin += (rho * (z[at] - y[at] - x[at])) ** 2
             lift[a] = mu[a] * math.sqrt(speed) + mu_r[a] * math.sqrt(spin)
         _project(tangent, rolling, mu, mu_r, x, y, z)
-        apart, moved, size, dual = 0.0, 0.0, 0.0, 0.0
+        apart, moved, size, dual, given = 0.0, 0.0, 0.0, 0.0, 0.0
         for a in range(nc):
             for s in range(d):
                 at = d * a + s
@@ -145,6 +147,7 @@ def admm(
                 moved += weight[a] * (z[at] - old_z[at]) ** 2
                 size += weight[a] * max(z[at] ** 2, x[at] ** 2)
                 dual += weight[a] * y[at] ** 2
+                given += q[at] ** 2 / weight[a]
         state[ITERATIONS] += 1.0
         state[WORK] += 1e-9 * len(factors) + 1e-7 * nc + 1e-8 / every * len(col)
         if state[ITERATIONS] % every == 0.0:
@@ -186,11 +189,13 @@ def admm(
         if state[ITERATIONS] >= state[NEXT]:
             state[INTERVAL] *= 1.5
             state[NEXT] = state[ITERATIONS] + state[INTERVAL]
+            # the dual scale is that of q where bodies rest, for there u is nothing
+            dual = max(dual, given / penalty**2)
             if size > 0.0 and dual > 0.0 and moved > 0.0 and apart > 0.0:
                 ratio = math.sqrt((apart / size) / (moved / dual))
                 if ratio > 3.0 or ratio < 1.0 / 3.0:
                     change = min(max(math.sqrt(ratio), 0.1), 10.0)
-                    state[PENALTY] = min(max(penalty * change, 1e-8), 1e8)
+                    state[PENALTY] = min(max(penalty * change, LEAST), MOST)
                     scale = penalty / state[PENALTY]
                     for k in range(m):
                         y[k] *= scale
@@ -215,6 +220,14 @@ class Splitting:
         self.state[NEXT] = self.state[INTERVAL] = FIRST_CHANGE
         self.state[BEST] = self.state[BEST_Q] = np.inf
         self.state[MOMENTUM] = 1.0
+
+    def penalise(self, penalty: float) -> None:
+        """Go on with another penalty."""
+        self.y *= self.state[PENALTY] / penalty
+        self.state[PENALTY] = penalty
+        self.state[NEXT] = self.state[ITERATIONS] + FIRST_CHANGE
+        self.state[INTERVAL] = FIRST_CHANGE
+        self.state[MOMENTUM], self.state[RESIDUAL] = 1.0, 0.0
 
     @property
     def error(self) -> float:
