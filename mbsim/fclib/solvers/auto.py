@@ -8,6 +8,7 @@ Work is counted in estimated seconds, not measured, so that a run does the same 
 from __future__ import annotations
 
 import math
+from itertools import count
 from typing import Any
 
 from mbsim.core import jit
@@ -27,10 +28,15 @@ RESTED = 5
 FINISH = 40
 #: Error from which the proximal method is started, unless sweeps do not get there.
 NEAR = 1.5e-4
-#: Values of alpha that restarts of the proximal method go through.
-ALPHAS = (1e-3, 1e-2, 1e-4, 1e-1)
+#: Values of alpha and rho that restarts of the proximal method go through.
+STARTS = ((1e-3, 30.0), (1e-2, 30.0), (1e-3, 10.0), (1e-4, 100.0), (1e-1, 30.0))
+#: Proximal steps without gain that end a run.
+STALL, STALL_NEAR = 30, 15
+#: Error from which a run goes on from its best point, and with which alpha and reach.
+NEARBY = 1e-5
+NEARER = ((1e-4, 1.0), (1e-6, 1.0), (1e-2, 1.0), (1e-5, 1.3), (1e-3, 1.6))
 #: Restarts without any gain after which there is nothing more to hope for.
-HOPELESS = 8
+HOPELESS = 20
 
 
 def first_sweeps(contacts: int) -> tuple[int, int]:
@@ -139,34 +145,49 @@ def _try_splitting(task: Task, cost: float, finish: float) -> None:
 
 
 def _finish(task: Task, finish: float) -> None:
-    """Alternate proximal Newton and sweeps, with budgets that grow, until the goal or no hope."""
+    """Alternate proximal Newton and sweeps until the goal is reached or there is no hope.
+
+    The problem is not convex, so a run may end on a branch without a solution: the next one starts
+    from where the sweeps have got to meanwhile, on their own way, and with other numbers.
+    """
     budget = max(6.0 * task.work, 2.0 * finish)
-    restart = 0
+    chain = task.r
     vain = 0
-    while not task.over:
-        begin = task.error
-        _proximal(task, budget, ALPHAS[restart % len(ALPHAS)])
+    for restart in count():
+        alpha, rho = STARTS[restart % len(STARTS)]
+        begin, spent = task.error, task.work
+        run = newton.Proximal(task, alpha, rho, chain)
+        _proximal(task, run, budget, STALL)
+        # it may have been near and left again: from its best point, with shorter steps
+        for alpha, reach in NEARER:
+            if task.over or not run.error < NEARBY:
+                break
+            before = run.error
+            run = newton.Proximal(task, alpha, rho, run.r, reach)
+            _proximal(task, run, budget, STALL_NEAR)
+            if run.error > 0.5 * before and before > 0.1 * NEARBY:
+                break
         vain = 0 if task.error < 0.9 * begin else vain + 1
         if task.over or vain >= HOPELESS:
             return
-        restart += 1
-        _sweep(task, 0.1 * budget)
-        if task.history[-1][0] != "NSGS" and not task.over:
-            sweeps.nsgs(task, 50)
-        budget *= 1.5
+        spent, before = 0.2 * (task.work - spent), task.work
+        while not task.over and task.work - before < spent:
+            chain = sweeps.nsgs(task, FIRST_SMALL * (restart + 1), start=chain)
+        if task.over:
+            return
+        budget *= 1.3
 
 
-def _proximal(task: Task, budget: float, alpha: float) -> None:
+def _proximal(task: Task, run: newton.Proximal, budget: float, stall: int) -> None:
     """Take proximal Newton steps while they gain."""
-    run = newton.Proximal(task, alpha)
-    mark, mark_work = task.error, task.work
+    mark, mark_work = run.error, task.work
     while not task.over:
         cost = run.newton_work
-        limit = 10 if cost == 0.0 else max(10, min(100, int(0.25 * budget / cost)))
+        limit = 10 if cost == 0.0 else max(10, min(50, int(0.25 * budget / cost)))
         if not run.advance(limit):
             return
-        if task.error < mark / 3.0:
-            mark, mark_work = task.error, task.work
-        patience = budget if task.error > 1e-5 else 4.0 * budget
-        if task.work - mark_work > patience or run.stalled > 30:
+        if run.error < mark / 3.0:
+            mark, mark_work = run.error, task.work
+        patience = budget if run.error > 1e-5 else 4.0 * budget
+        if task.work - mark_work > patience or run.stalled > stall:
             return

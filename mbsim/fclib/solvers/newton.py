@@ -14,7 +14,7 @@ judged on many problems only.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,19 +26,24 @@ from mbsim.fclib.factor import factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
 
-#: rho = RHO / (mean diagonal of the contact's block).
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
+
+#: rho = RHO / (mean diagonal of the contact's block); 10 to 100 is good (state[SHARP]).
 RHO = 30.0
 #: Newton iterations of one proximal step, and when a hopeless one is given up.
 MOST, EARLY, HOPELESS = 15, 8, 0.3
 #: Trial steps of the line search, and how many earlier norms it compares with.
 HALVINGS, MEMORY = 8, 5
-#: The proximal centre goes this far towards the new point.
+#: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
 
 # places in `state`, what a later call needs to go on
-ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK = range(10)
-STATE = 10
+ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH = range(
+    12
+)
+STATE = 12
 
 
 @jitable
@@ -244,7 +249,7 @@ def proximal_newton(
         alpha = state[ALPHA]
         shift = alpha * mean
         for a in range(nc):
-            rho[a] = RHO / (trace[a] + shift)
+            rho[a] = state[SHARP] / (trace[a] + shift)
         for k in range(m):
             x[k] = centre[k]
         product(tangent, (), ptr, col, val, q, x, plain)
@@ -384,9 +389,8 @@ def proximal_newton(
         if good:
             state[ERROR] = error
             state[SINCE] += 1
-            over = OVER
             for k in range(m):
-                centre[k] += over * (x[k] - centre[k])
+                centre[k] += state[REACH] * (x[k] - centre[k])
             lower = state[ALPHA] * (0.3 if newtons <= 6 else 0.6)
             if state[SINCE] <= 3.0:
                 lower = max(lower, 1.5 * state[FAILED_AT])
@@ -406,17 +410,33 @@ def proximal_newton(
 
 
 class Proximal:
-    """A proximal Newton run that can be continued; `alpha` = 0 is Newton's method alone."""
+    """A proximal Newton run that can be continued; `alpha` = 0 is Newton's method alone.
 
-    def __init__(self, task: Task, alpha: float = 1e-3) -> None:
+    It starts from `start`, by default the best iterate, and keeps a best one of its own.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        alpha: float = 1e-3,
+        rho: float = RHO,
+        start: Vector | None = None,
+        reach: float = OVER,
+    ) -> None:
         self.task = task
-        self.centre = task.r.copy()
-        if not np.isfinite(task.error):
-            task.offer(task.r, *task.look(task.r))
+        self.r = (task.r if start is None else start).copy()
+        self.centre = self.r.copy()
         self.state: Any = np.zeros(STATE)
-        self.state[ALPHA] = alpha
-        self.state[BEST] = self.state[ERROR] = task.error
-        self.state[BEST_Q] = task.error_q
+        self.state[ALPHA], self.state[SHARP], self.state[REACH] = alpha, rho, reach
+        error, error_q = task.look(self.r)
+        self.state[BEST] = self.state[ERROR] = error
+        self.state[BEST_Q] = error_q
+        task.offer(self.r, error, error_q)
+
+    @property
+    def error(self) -> float:
+        """Best error of this run."""
+        return float(self.state[BEST])
 
     @property
     def stalled(self) -> float:
@@ -432,7 +452,7 @@ class Proximal:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
         b = task.blocks
-        r = task.r.copy()
+        r = self.r.copy()
         history = np.empty((ROWS, 3))
         work, newtons = state[WORK], state[NEWTONS]
         before = task.iterations - newtons
@@ -443,6 +463,7 @@ class Proximal:
         history[:rows, 0] += before
         task.work += float(state[WORK] - work)
         task.iterations += int(state[NEWTONS] - newtons)
+        self.r = r
         task.offer(r, state[BEST], state[BEST_Q])
         task.note("NSN" if state[ALPHA] == 0.0 else "PROX", history[:rows])
         return bool(state[NEWTONS] > newtons)

@@ -20,6 +20,7 @@ from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import ROWS, Task
 
 if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
     from mbsim.fclib.reduction import Blocks
 
 
@@ -135,10 +136,10 @@ def gauss_seidel(
     return done, error, error_q, rows
 
 
-def nsgs(task: Task, sweeps: int, every: int = 5) -> None:
-    """Sweep at most `sweeps` times from the best iterate."""
+def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -> Vector:
+    """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
     b = task.blocks
-    r = task.r.copy()
+    r = (task.r if start is None else start).copy()
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
     done, error, error_q, rows = jit.function(gauss_seidel)(
         b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
@@ -149,6 +150,7 @@ def nsgs(task: Task, sweeps: int, every: int = 5) -> None:
     task.work += done * sweep_work(b)
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
+    return r
 
 
 def sweep_work(b: Blocks) -> float:
