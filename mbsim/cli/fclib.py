@@ -21,9 +21,9 @@ _FILES = click.argument(
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
 
 
-def _positive(ctx: click.Context, parameter: click.Parameter, value: float) -> float:
+def _positive(ctx: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
     """Refuse numbers that are not above 0."""
-    if not value > 0.0 or not math.isfinite(value):
+    if value is not None and (not value > 0.0 or not math.isfinite(value)):
         raise click.BadParameter(f"{value}: a number above 0 is allowed")
     return value
 
@@ -180,6 +180,13 @@ def solve(
     help="Ours; may be repeated.  [default: AUTO NSGS PROX ADMM NSN]",
 )
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True)
+@click.option(
+    "--siconos-time",
+    type=float,
+    callback=_positive,
+    metavar="SECONDS",
+    help="Stop each of Siconos' solvers after this long.  [default: --max-time]",
+)
 @click.option("--no-siconos", is_flag=True, help="Run only ours, whatever is installed.")
 @click.option(
     "-o",
@@ -197,6 +204,7 @@ def compare(
     max_time: float,
     solvers: tuple[str, ...],
     repeats: int,
+    siconos_time: float | None,
     no_siconos: bool,
     output: Path,
     as_json: bool,
@@ -219,7 +227,13 @@ def compare(
     comparing.write_csv([], output / "compare.csv")  # now, not after minutes
     _tell_compiling()
     rows = comparing.compare(
-        chosen, tol, names, repeats=repeats, max_seconds=max_time, siconos=siconos, say=_say
+        chosen,
+        tol,
+        names,
+        repeats=repeats,
+        max_seconds=max_time,
+        siconos_seconds=(siconos_time or max_time) if siconos else 0.0,
+        say=_say,
     )
     comparing.write_csv(rows, output / "compare.csv")
     if comparing.can_draw():

@@ -118,6 +118,19 @@ def symmetric_pattern(size, ptr, col):
     tptr, tcol = transposed_pattern(size, ptr, col)
     seen = np.full(size, -1, np.int32)
     total = 0
+    same = True
+    for a in range(size):
+        if tptr[a + 1] != ptr[a + 1]:
+            same = False
+            break
+        for k in range(ptr[a], ptr[a + 1]):
+            seen[col[k]] = a
+        for k in range(tptr[a], tptr[a + 1]):
+            if seen[tcol[k]] != a:
+                same = False
+    if same:
+        return tptr, tcol
+    seen[:] = -1
     for a in range(size):
         for k in range(ptr[a], ptr[a + 1]):
             seen[col[k]] = a

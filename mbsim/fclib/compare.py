@@ -61,10 +61,13 @@ def compare(
     *,
     repeats: int,
     max_seconds: float,
-    siconos: bool,
+    siconos_seconds: float,
     say: Callable[[str], None],
 ) -> list[Row]:
-    """Run every solver on every file; a file that cannot be read is told and left out."""
+    """Run every solver on every file; a file that cannot be read is told and left out.
+
+    `siconos_seconds`: for each of Siconos' solvers; 0 leaves them out.
+    """
     rows: list[Row] = []
     for file in files:
         try:
@@ -76,8 +79,8 @@ def compare(
         for name in solvers:
             if problem.mu_r is None or SOLVERS[name.upper()][2]:
                 rows.append(_ours(file.stem, problem, tol, name, repeats, max_seconds))
-        if siconos:
-            rows += _siconos(file.stem, problem, tol, repeats, max_seconds)
+        if siconos_seconds:
+            rows += _siconos(file.stem, problem, tol, repeats, siconos_seconds)
     return rows
 
 

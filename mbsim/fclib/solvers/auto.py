@@ -22,6 +22,8 @@ FIRST_SMALL, FIRST = 100, 20
 FEW = 10
 #: ADMM is tried from this number of contacts on, with so many iterations.
 STACKS, TRIAL = 50, 30
+#: Seconds that beginning another method takes, whatever the size.
+BEGIN = 4e-4
 #: Iterations of ADMM that show whether all bodies rest.
 RESTED = 5
 #: Newton iterations that a proximal finish takes, roughly.
@@ -31,7 +33,7 @@ NEAR = 1.5e-4
 #: Values of alpha and rho that restarts of the proximal method go through.
 STARTS = ((1e-3, 30.0), (1e-2, 30.0), (1e-3, 10.0), (1e-4, 100.0), (1e-1, 30.0))
 #: Proximal steps without gain that end a run.
-STALL, STALL_NEAR = 30, 15
+STALL, STALL_NEAR = 60, 15
 #: Error from which a run goes on from its best point, and with which alpha and reach.
 NEARBY = 1e-5
 NEARER = ((1e-4, 1.0), (1e-6, 1.0), (1e-2, 1.0), (1e-5, 1.3), (1e-3, 1.6))
@@ -56,7 +58,7 @@ def run(task: Task) -> None:
     newton_work, splitting_work, factor_work = _costs(task)
     finish = FINISH * newton_work
     if task.blocks.contacts >= STACKS:
-        trial = factor_work + TRIAL * splitting_work
+        trial = BEGIN + factor_work + 2.0 * RESTED * splitting_work
         _sweep(task, trial)
         if not task.over:
             _try_splitting(task, splitting_work, finish)
@@ -72,7 +74,7 @@ def _costs(task: Task) -> tuple[float, float, float]:
     flops = jit.function(elimination_flops)(symbolic, d)
     entries = float(symbolic[5][-1])
     factor = 2.5e-10 * flops + 3e-8 * len(b.col)
-    once = 1e-9 * entries + 1e-7 * b.contacts
+    once = 1.2e-9 * entries + 2.5e-7 * b.contacts
     return factor + once, once + 5e-9 * len(b.col), factor
 
 
@@ -156,7 +158,7 @@ def _finish(task: Task, finish: float) -> None:
     for restart in count():
         alpha, rho = STARTS[restart % len(STARTS)]
         begin, spent = task.error, task.work
-        run = newton.Proximal(task, alpha, rho, chain)
+        run = newton.Proximal(task, alpha, rho, task.r if restart % 2 else chain)
         _proximal(task, run, budget, STALL)
         # it may have been near and left again: from its best point, with shorter steps
         for alpha, reach in NEARER:
@@ -188,6 +190,6 @@ def _proximal(task: Task, run: newton.Proximal, budget: float, stall: int) -> No
             return
         if run.error < mark / 3.0:
             mark, mark_work = run.error, task.work
-        patience = budget if run.error > 1e-5 else 4.0 * budget
+        patience = budget if run.error > NEAR else 4.0 * budget
         if task.work - mark_work > patience or run.stalled > stall:
             return

@@ -38,6 +38,8 @@ HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
+#: The error may rise, and comes back, but not from this far above the best.
+ASTRAY = 50.0
 
 # places in `state`, what a later call needs to go on
 ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH = range(
@@ -386,7 +388,15 @@ def proximal_newton(
             state[STALLED] += 1.0
         if done:
             break
-        if good:
+        if good and error > ASTRAY * state[BEST] and state[BEST] < 1e-4:
+            # another branch, and most of these have no solution: back, with shorter steps
+            state[FAILED_AT] = alpha
+            state[SINCE] = 0.0
+            state[ALPHA] = min(4.0 * alpha, 1e6)
+            state[ERROR] = state[BEST]
+            for k in range(m):
+                centre[k] = r[k]
+        elif good:
             state[ERROR] = error
             state[SINCE] += 1
             for k in range(m):

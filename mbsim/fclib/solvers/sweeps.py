@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Sweeps that |F|/|q| gets at least once the error is small.
 GRACE = 20
+#: With few contacts, sweeps between leaps ahead.
+LEAP = 8
 
 
 @jitable
@@ -90,6 +92,28 @@ def local_sweeps(
 
 
 @jitable
+def _leap(r, old, older, trial):
+    """Write where three iterates lead if one slow direction is left; return whether they do.
+
+    The change shrinks by a factor c each sweep, so that c / (1 - c) of the last one is to come
+    (Aitken's extrapolation of vectors).
+    """
+    product_, square = 0.0, 0.0
+    for k in range(len(r)):
+        change = old[k] - older[k]
+        product_ += (r[k] - old[k]) * change
+        square += change * change
+    if not square > 0.0:
+        return False
+    shrink = product_ / square
+    if shrink < 0.3 or shrink > 0.99999:
+        return False
+    for k in range(len(r)):
+        trial[k] = r[k] + shrink / (1.0 - shrink) * (r[k] - old[k])
+    return True
+
+
+@jitable
 def gauss_seidel(
     tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, tol, tol_q, sweeps, every, grace,
     history,
@@ -105,6 +129,8 @@ def gauss_seidel(
     work = np.empty(5 * d)
     u = np.empty(len(q))
     missing = np.empty(len(q))
+    few = len(q) if every == 1 else 0
+    old, older, trial = np.empty(few), np.empty(few), np.empty(few)
     rows = 0
     error, error_q = np.inf, np.inf
     done = 0
@@ -133,6 +159,25 @@ def gauss_seidel(
                     break
                 if most == sweeps:
                     most = min(sweeps - 1, 2 * done + grace)
+            elif every == 1 and done >= LEAP:
+                # few contacts: one slow direction is often all that is left
+                phase = done % LEAP
+                if phase == LEAP - 2:
+                    older[:] = r
+                elif phase == LEAP - 1:
+                    old[:] = r
+                elif phase == 0 and _leap(r, old, older, trial):
+                    sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, work)
+                    product(tangent, rolling, ptr, col, val, q, trial, u)
+                    leapt, leapt_q = relative_errors(
+                        tangent, rolling, mu, mu_r, q, u, trial, missing
+                    )
+                    done += 1
+                    if leapt < error:
+                        r[:] = trial
+                        error, error_q = leapt, leapt_q
+                        if error <= tol and error_q <= tol_q:
+                            break
     return done, error, error_q, rows
 
 
@@ -155,6 +200,10 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
 
 def sweep_work(b: Blocks) -> float:
     """Return the estimated seconds of a sweep."""
+    if b.rolling:
+        return 1e-5 * b.contacts + 2e-8 * len(b.col)
+    if len(b.tangent) == 1:
+        return 2e-8 * b.contacts + 2.5e-9 * len(b.col)
     return 9e-8 * b.contacts + 7e-9 * len(b.col)
 
 
