@@ -49,7 +49,7 @@ _TIME = click.option(
 
 @click.group("fclib")
 def command() -> None:
-    """Frictional contact problems in FCLIB files: what they are, how good solutions are, solving."""
+    """Frictional contact problems in FCLIB files: show, judge, solve, compare."""
 
 
 @command.command("info")

@@ -210,9 +210,9 @@ def can_draw() -> bool:
 def profile(rows: Sequence[Row]) -> dict[str, list[float]]:
     """Return for every solver its time over the best on each problem it solved, sorted.
 
-    This is Dolan and More's performance profile: a solver's curve at t is the share of problems that
-    it solves within t times the best time (Benchmarking optimization software with performance
-    profiles, Math. Program. 91, 2002).
+    This is Dolan and More's performance profile: a solver's curve at t is the share of problems
+    that it solves within t times the best time (Benchmarking optimization software with
+    performance profiles, Math. Program. 91, 2002).
     """
     ratios: dict[str, list[float]] = {row.solver: [] for row in rows}
     for name in dict.fromkeys(row.problem for row in rows):

@@ -37,7 +37,7 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
     `symbolic` is what `ordering.analyse` returned; `factors` has room for factor_ptr[-1] numbers,
     `exchange` for d * nodes, `front` for room[0]^2 and `stack` for room[1].
     """
-    front_ptr, nodes, pivots, children, rank, factor_ptr, room = symbolic
+    front_ptr, nodes, pivots, children, rank, factor_ptr, _ = symbolic
     fronts = len(pivots)
     local = np.empty(len(rank), np.int32)
     run_from = np.empty(len(rank) + 1, np.int64)

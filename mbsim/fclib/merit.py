@@ -4,8 +4,8 @@ The natural map of a contact is F = r - P_K(r - (u + mu |u_T| e_N)), P_K the pro
 K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 
 * `error` (Siconos 4.4). Local: |F| / max(|q|, |r|, |u|), u = W r + V l + q. Global: |F| / max(|u|,
-  |r|) + |M v - H r - G l - f| / max(|f|, |M v|, |H r|, |G l|), u = H' v + w. A scale of 0 does not
-  divide. With equality constraints, their residual over its largest term is added (Siconos takes
+  |r|) + |M v - H r - G l - f| / max(|f|, |M v|, |H r|, |G l|), u = H' v + w. A scale of 0 does
+  not divide. With equality constraints, their residual over its largest term is added (Siconos takes
   none). With r much larger than q a small error says little of penetration: look at `error_q` too.
 * `error_q`: |F| / |q|, the same with the scale of the data alone (of the condensed q in a global
   problem).

@@ -39,7 +39,7 @@ def contact_2d(a, k, bn, bt, mu, rn, rt):
 def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
     """Return (r_N, r_T1, r_T2); A is a[k].
 
-    Slip is one scalar unknown s > 0: with S = A_TT - A_TN A_NT / A_NN and c = b_T - A_TN b_N / A_NN,
+    Slip is one scalar unknown s > 0: with S = A_TT - A_TN A_NT / A_NN, c = b_T - A_TN b_N / A_NN,
     (S + s I) r_T = -c, r_N = -(b_N + A_NT r_T) / A_NN, |r_T| = mu r_N. Once stick has failed,
     |r_T| - mu r_N is positive at s = 0 and negative at infinity, so that a root is bracketed.
     Newton runs on mu r_N / |r_T| - 1, which is nearly linear in s. The impulse given is kept where

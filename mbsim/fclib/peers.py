@@ -1,7 +1,8 @@
 """Debian's python3-siconos beside ours: the same problem, the same clock, our error.
 
-Siconos gets the problem as our condensation leaves it (it takes no equality constraints), so its time
-is that of its solver and of our condensation. Its Python need not be ours: it is asked through files.
+Siconos gets the problem as our condensation leaves it (it takes no equality constraints), so its
+time is that of its solver and of our condensation. Its Python need not be ours: it is asked
+through files.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """From global problems and equality constraints to u = W r + q in blocks, and back to v and l.
 
 Global to local: v = M^-1 (H r + G l + f), so that W = H'M^-1 H, V = H'M^-1 G, R = G'M^-1 G,
-q = H'M^-1 f + w, s = G'M^-1 f + b. M falls into parts that share no entry (a rigid body, an elastic
-one); each is factorised for itself, a large one as a sparse matrix with the touched unknowns last, so
-that only the Schur complement on these is solved with.
+q = H'M^-1 f + w, s = G'M^-1 f + b. M falls into parts that share no entry (a rigid body, an
+elastic one); each is factorised for itself, a large one as a sparse matrix with the touched
+unknowns last, so that only the Schur complement on these is solved with.
 
-Equality constraints: l = -R^-1 (V' r + s), so W - V R^-1 V' and q - V R^-1 s take the place of W and
-q. Where R is singular, l is the shortest of the multipliers that fit, and there must be one.
+Equality constraints: l = -R^-1 (V' r + s), so W - V R^-1 V' and q - V R^-1 s take the place of W
+and q. Where R is singular, l is the shortest of the multipliers that fit, and there must be one.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def _blocks(
     tangent, rolling = directions(problem)
     diagonal = jit.function(diagonal_places)(rows[0], rows[1])
     mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
-    return Blocks(tangent, rolling, *rows, diagonal, q, problem.mu, mu_r, equality)
+    ptr, col, val = rows
+    return Blocks(tangent, rolling, ptr, col, val, diagonal, q, problem.mu, mu_r, equality)
 
 
 def _rows(stored: Matrix) -> tuple[Any, ...]:
@@ -575,7 +576,7 @@ def _parts_of_nodes(nodes, count, node_ptr, touched):
 
 @jitable
 def _sparse_part(size, mine, inside, mp, mi, mx, kp, exchange):
-    """Factorise one large part of M, the rows that K touches last; by blocks of 3 where it has them.
+    """Factorise one large part of M, rows that K touches last; by blocks of 3 where it has them.
 
     Returns (unknowns of a node, symbolic, factors, soundness).
     """

@@ -1,8 +1,8 @@
 """AUTO: the method that suits, found by what each one gains for its work.
 
-Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets a
-trial (stacks need few iterations of it), then proximal Newton, which needs a good start but finishes.
-Work is counted in estimated seconds, not measured, so that a run does the same on every machine.
+Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets
+a trial (stacks need few iterations of it), then proximal Newton, which needs a good start but
+finishes. Work is counted in estimated seconds, not measured, so that a run does the same on every machine.
 """
 
 from __future__ import annotations

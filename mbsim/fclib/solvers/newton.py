@@ -1,8 +1,8 @@
 """Semismooth Newton on Alart and Curnier's function, inside a proximal point method.
 
-The outer method solves problems with W + alpha w I and q - alpha w c (w the mean diagonal of W, c the
-centre), whose solution is the next centre; alpha is only a path to the solution: the error is always
-that of the problem itself. The inner one is Newton on
+The outer method solves problems with W + alpha w I and q - alpha w c (w the mean diagonal of W, c
+the centre), whose solution is the next centre; alpha is only a path to the solution: the error is
+always that of the problem itself. The inner one is Newton on
 
     F_N = r_N - max(0, x_N),  F_T = r_T - P(x_T; |.| <= mu max(0, x_N)),  x = r - rho u,
 

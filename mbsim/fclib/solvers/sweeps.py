@@ -184,7 +184,7 @@ def gauss_seidel(
 def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -> Vector:
     """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
     b = task.blocks
-    r = (task.r if start is None else start).copy()
+    r: Vector = (task.r if start is None else start).copy()
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
     done, error, error_q, rows = jit.function(gauss_seidel)(
         b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
