@@ -5,12 +5,13 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 
 * `error` (Siconos 4.4). Local: |F| / max(|q|, |r|, |u|), u = W r + V l + q. Global: |F| / max(|u|,
   |r|) + |M v - H r - G l - f| / max(|f|, |M v|, |H r|, |G l|), u = H' v + w. A scale of 0 does
-  not divide. With equality constraints, their residual over its largest term is added (Siconos takes
-  none). With r much larger than q a small error says little of penetration: look at `error_q` too.
+  not divide. With equality constraints, their residual over its largest term is added (Siconos
+  takes none). With r much larger than q a small error says little of penetration: look at
+  `error_q` too.
 * `error_q`: |F| / |q|, the same with the scale of the data alone (of the condensed q in a global
   problem).
-* `merit1`: FCLIB's MERIT_1 as its code has it, |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|).
-  The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
+* `merit1`: FCLIB's MERIT_1 as its code has it,
+  |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|). The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
   libfclib's own function has three more faults, which are not reproduced: W, V and R in compressed
   rows or triplets are silently left out (`cs_gaxpy` takes columns only and its return value is not
   looked at), so that it judges u = q; with V and R its newer versions crash (`cs_transpose(V, 0)`);
@@ -105,11 +106,8 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
     Multipliers and velocities that the solution does not have are computed from r.
     """
     r = np.ascontiguousarray(solution.r)
-    if (
-        solution.l is None
-        and problem.equalities
-        or (solution.v is None and isinstance(problem, Global))
-    ):
+    without_l = solution.l is None and problem.equalities > 0
+    if without_l or (solution.v is None and isinstance(problem, Global)):
         solution = completed(problem, r, blocks)
     u, scales, dynamics, equalities, absolute = _velocities(problem, solution)
     tangent, rolling = directions(problem)

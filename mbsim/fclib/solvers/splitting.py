@@ -5,8 +5,8 @@ With D the mean diagonal of each contact's block and s = mu |u_T| e_N of the las
     (W + rho D) x = rho D (z - y) - q - s,   z = P_K(x + y),   y += x - z,
 
 u = W x + q comes from the first equation for nothing. rho follows the balance of |x - z| and the
-change of z, at intervals that widen (each change costs a factorisation). Acceleration is Nesterov's on
-(z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and Baraniuk,
+change of z, at intervals that widen (each change costs a factorisation). Acceleration is Nesterov's
+on (z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and Baraniuk,
 Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
 """
 
