@@ -11,7 +11,8 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 * `error_q`: |F| / |q|, the same with the scale of the data alone (of the condensed q in a global
   problem).
 * `merit1`: FCLIB's MERIT_1 as its code has it,
-  |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|). The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
+  |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|).
+  The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
   libfclib's own function has three more faults, which are not reproduced: W, V and R in compressed
   rows or triplets are silently left out (`cs_gaxpy` takes columns only and its return value is not
   looked at), so that it judges u = q; with V and R its newer versions crash (`cs_transpose(V, 0)`);
@@ -105,19 +106,11 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
 
     Multipliers and velocities that the solution does not have are computed from r.
     """
-    r = np.ascontiguousarray(solution.r)
-    without_l = solution.l is None and problem.equalities > 0
-    if without_l or (solution.v is None and isinstance(problem, Global)):
-        solution = completed(problem, r, blocks)
-    u, scales, dynamics, equalities, absolute = _velocities(problem, solution)
-    tangent, rolling = directions(problem)
-    mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
-    missing = float(
-        jit.function(residual)(tangent, rolling, problem.mu, mu_r, u, r, np.empty_like(r))
-    )
-    q = problem.q if isinstance(problem, Local) else _condensed_q(problem, blocks)
+    blocks = reduce(problem) if blocks is None and isinstance(problem, Global) else blocks
+    found = _whole(problem, solution, blocks)
+    error, missing, u, dynamics, equalities, absolute = _error(problem, found)
+    q = problem.q if isinstance(problem, Local) else blocks.q  # type: ignore[union-attr]
     bound = _norm(q)
-    error = _over(missing, max(scales)) + dynamics + equalities
     return Figures(
         error,
         _over(missing, bound),
@@ -125,8 +118,39 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
         missing / (1.0 + bound) + absolute,
         dynamics,
         equalities,
-        *_figures(problem, u, r, q),
+        *_figures(problem, u, found.r, q),
     )
+
+
+def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> tuple[float, float]:
+    """Return `error` and `error_q` alone, which is quicker."""
+    error, missing, *_ = _error(problem, solution)
+    return error, _over(missing, _norm(problem.q if isinstance(problem, Local) else blocks.q))
+
+
+def _whole(problem: Local | Global, solution: Solution, blocks: Blocks | None) -> Solution:
+    """Return a solution with the multipliers and velocities that go with its r, where missing."""
+    r = np.ascontiguousarray(solution.r)
+    without_l = solution.l is None and problem.equalities > 0
+    if without_l or (solution.v is None and isinstance(problem, Global)):
+        return completed(problem, r, blocks)
+    return Solution(solution.u, r, solution.v, solution.l)
+
+
+def _error(
+    problem: Local | Global, solution: Solution
+) -> tuple[float, float, Vector, float, float, float]:
+    """Return error, |F|, u and the residuals that `_velocities` gives."""
+    u, scales, dynamics, equalities, absolute = _velocities(problem, solution)
+    tangent, rolling = directions(problem)
+    mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
+    missing = float(
+        jit.function(residual)(
+            tangent, rolling, problem.mu, mu_r, u, solution.r, np.empty_like(solution.r)
+        )
+    )
+    error = _over(missing, max(scales)) + dynamics + equalities
+    return error, missing, u, dynamics, equalities, absolute
 
 
 def _norm(vector: Vector) -> float:
@@ -137,12 +161,6 @@ def _norm(vector: Vector) -> float:
 def _over(value: float, scale: float) -> float:
     """Return a quotient; a scale of 0 does not divide."""
     return value / scale if scale > 0.0 else value
-
-
-def _condensed_q(problem: Global, blocks: Blocks | None) -> Vector:
-    """Return q of the condensed problem."""
-    blocks = reduce(problem) if blocks is None else blocks
-    return blocks.q
 
 
 def _velocities(

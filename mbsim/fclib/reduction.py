@@ -191,7 +191,13 @@ def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> 
     forces = problem.f + problem.H.apply(r)
     if problem.G is not None and l is not None:
         forces = forces + problem.G.apply(l)
-    v: Vector = jit.function(mass_solve)(blocks.mass, forces)
+    assert blocks.mass is not None
+    v = np.empty(len(forces))
+    # lists of sparse factors are slow to hand over, and most problems have none
+    if len(blocks.mass[6]) == 1:
+        jit.function(full_mass_solve)(*blocks.mass[:6], forces, v)
+    else:
+        jit.function(mass_solve)(*blocks.mass, forces, v)
     return v
 
 
@@ -672,24 +678,39 @@ def _add_part(d, size, mine, wide, touched, kp, ki, kx, local, x, ptr, col, val)
 
 
 @jitable
-def mass_solve(mass, forces):
-    """Return M^-1 times a vector, with the factors of `condense`."""
-    row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size = mass
-    v = np.empty(len(forces))
+def full_mass_solve(row_ptr, rows, sizes, dense, exchange, big_of, forces, v):
+    """Write M^-1 times a vector at the rows of small parts, with the factors of `condense`."""
     for c in range(len(row_ptr) - 1):
+        if big_of[c] >= 0:
+            continue
         mine = rows[row_ptr[c] : row_ptr[c + 1]]
         size = len(mine)
-        swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
         x = np.empty(size)
         for j in range(size):
             x[j] = forces[mine[j]]
-        if big_of[c] < 0:
-            lu = dense[sizes[c] : sizes[c + 1]].reshape(size, size)
-            _full_solve(lu, swaps, x.reshape(size, 1))
-        else:
-            k = big_of[c]
-            symbolic = big_symbolic[k]
-            solve(big_size[k], symbolic, big_factors[k], swaps, x, np.empty(symbolic[6][0]))
+        lu = dense[sizes[c] : sizes[c + 1]].reshape(size, size)
+        _full_solve(lu, exchange[row_ptr[c] : row_ptr[c + 1]], x.reshape(size, 1))
         for j in range(size):
             v[mine[j]] = x[j]
-    return v
+
+
+@jitable
+def mass_solve(
+    row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size, forces, v
+):
+    """Write M^-1 times a vector, with the factors of `condense`."""
+    full_mass_solve(row_ptr, rows, sizes, dense, exchange, big_of, forces, v)
+    for c in range(len(row_ptr) - 1):
+        if big_of[c] < 0:
+            continue
+        mine = rows[row_ptr[c] : row_ptr[c + 1]]
+        size = len(mine)
+        x = np.empty(size)
+        for j in range(size):
+            x[j] = forces[mine[j]]
+        k = big_of[c]
+        symbolic = big_symbolic[k]
+        swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
+        solve(big_size[k], symbolic, big_factors[k], swaps, x, np.empty(symbolic[6][0]))
+        for j in range(size):
+            v[mine[j]] = x[j]

@@ -14,7 +14,7 @@ import numpy as np
 
 from mbsim.core import jit
 from mbsim.errors import ModelError
-from mbsim.fclib.merit import Figures, completed, judge
+from mbsim.fclib.merit import Figures, completed, errors, judge
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
@@ -166,7 +166,7 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
         if not task.done:
             method(task)
         found = completed(problem, task.r, task.blocks)
-        error, error_q = _errors(problem, found, task.blocks)
+        error, error_q = errors(problem, found, task.blocks)
         met = error <= tol and (error_q <= tol or not task.strict)
         if met or task.late or not task.done or task.tol < 1e-3 * tol:
             break
@@ -180,12 +180,6 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
     result.__dict__["solution"] = found
     result.reason = _reason(task, tol, error, error_q)
     return result
-
-
-def _errors(problem: Local | Global, found: Solution, blocks: Blocks) -> tuple[float, float]:
-    """Return error and |F|/|q| of the problem as given."""
-    figures = judge(problem, found, blocks)
-    return figures.error, figures.error_q
 
 
 def _reason(task: Task, tol: float, error: float, error_q: float) -> str:

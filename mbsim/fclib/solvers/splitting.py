@@ -6,8 +6,8 @@ With D the mean diagonal of each contact's block and s = mu |u_T| e_N of the las
 
 u = W x + q comes from the first equation for nothing. rho follows the balance of |x - z| and the
 change of z, at intervals that widen (each change costs a factorisation). Acceleration is Nesterov's
-on (z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and Baraniuk,
-Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
+on (z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and
+Baraniuk, Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
 """
 
 from __future__ import annotations
