@@ -29,12 +29,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.core import jit
+from mbsim.fclib.blocks import product_of_stored, transposed_product_of_stored
 from mbsim.fclib.cone import residual
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import directions, multipliers, reduce, velocities
 
 if TYPE_CHECKING:
-    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.problem import Matrix, Vector
     from mbsim.fclib.reduction import Blocks
 
 #: A contact at the edge of its cone that is slower than this share of |q| or |u| sticks.
@@ -91,14 +92,14 @@ class Figures:
 def completed(problem: Local | Global, r: Vector, blocks: Blocks | None = None) -> Solution:
     """Return u, v and l that go with impulses r."""
     if isinstance(problem, Local) and problem.V is None:
-        return Solution(problem.W.apply(r) + problem.q, r)
+        return Solution(_times(problem.W, r) + problem.q, r)
     blocks = reduce(problem) if blocks is None else blocks
     l = multipliers(blocks, r)  # noqa: E741
     if isinstance(problem, Local):
-        u = problem.W.apply(r) + problem.q
-        return Solution(u if l is None or problem.V is None else u + problem.V.apply(l), r, l=l)
+        u = _times(problem.W, r) + problem.q
+        return Solution(u if l is None or problem.V is None else u + _times(problem.V, l), r, l=l)
     v = velocities(problem, blocks, r, l)
-    return Solution(problem.H.apply_transposed(v) + problem.w, r, v, l)
+    return Solution(_transposed_times(problem.H, v) + problem.w, r, v, l)
 
 
 def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = None) -> Figures:
@@ -153,6 +154,20 @@ def _error(
     return error, missing, u, dynamics, equalities, absolute
 
 
+def _times(a: Matrix, vector: Vector) -> Vector:
+    """Return A times a vector, from the entries as they are stored."""
+    found = np.zeros(a.m)
+    jit.function(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
+def _transposed_times(a: Matrix, vector: Vector) -> Vector:
+    """Return the transpose of A times a vector."""
+    found = np.zeros(a.n)
+    jit.function(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
 def _norm(vector: Vector) -> float:
     """Return the Euclidean norm."""
     return float(np.linalg.norm(vector))
@@ -174,25 +189,25 @@ def _velocities(
     r, l = solution.r, solution.l  # noqa: E741
     equalities, absolute = 0.0, 0.0
     if isinstance(problem, Local):
-        u = problem.W.apply(r) + problem.q
+        u = _times(problem.W, r) + problem.q
         if problem.V is not None and problem.R is not None and problem.s is not None:
             assert l is not None
-            u = u + problem.V.apply(l)
-            parts = (problem.V.apply_transposed(r), problem.R.apply(l), problem.s)
+            u = u + _times(problem.V, l)
+            parts = (_transposed_times(problem.V, r), _times(problem.R, l), problem.s)
             left = _norm(parts[0] + parts[1] + parts[2])
             equalities = _over(left, max(_norm(part) for part in parts))
             absolute = left / (1.0 + _norm(problem.s))
         return u, (_norm(problem.q), _norm(r), _norm(u)), 0.0, equalities, absolute
     v = solution.v
     assert v is not None
-    u = problem.H.apply_transposed(v) + problem.w
-    forces = [problem.M.apply(v), -problem.H.apply(r), -problem.f]
+    u = _transposed_times(problem.H, v) + problem.w
+    forces = [_times(problem.M, v), -_times(problem.H, r), -problem.f]
     if problem.G is not None and problem.b is not None:
         assert l is not None
-        forces.append(-problem.G.apply(l))
-        left = _norm(problem.G.apply_transposed(v) + problem.b)
+        forces.append(-_times(problem.G, l))
+        left = _norm(_transposed_times(problem.G, v) + problem.b)
         # G' v may cancel to nothing: its terms are the scale
-        terms = replace(problem.G, x=np.abs(problem.G.x)).apply_transposed(np.abs(v))
+        terms = _transposed_times(replace(problem.G, x=np.abs(problem.G.x)), np.abs(v))
         equalities = _over(left, max(_norm(terms), _norm(problem.b)))
         absolute = left / (1.0 + _norm(problem.b))
     dynamics = _over(_norm(np.sum(forces, axis=0)), max(_norm(force) for force in forces))

@@ -23,6 +23,8 @@ FIRST_SMALL, FIRST = 100, 20
 FEW = 10
 #: ADMM is tried from this number of contacts on, with so many iterations.
 STACKS, TRIAL = 50, 30
+#: Error after the first sweeps below which bodies do not stack: ADMM gains nothing there.
+SETTLED = 1e-3
 #: Seconds that beginning another method takes, whatever the size.
 BEGIN = 4e-4
 #: Iterations of ADMM that show whether all bodies rest.
@@ -56,9 +58,12 @@ def run(task: Task) -> None:
     if task.blocks.rolling:
         _rolling(task)
         return
+    _sweep(task, BEGIN)
+    if task.over:
+        return
     newton_work, splitting_work, factor_work = _costs(task)
     finish = FINISH * newton_work
-    if task.blocks.contacts >= STACKS:
+    if task.blocks.contacts >= STACKS and task.error > SETTLED:
         trial = BEGIN + factor_work + 2.0 * RESTED * splitting_work
         _sweep(task, trial)
         if not task.over:
