@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -122,7 +123,7 @@ def solve(
     method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
     condensed = clock()
-    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
+    task = Task(blocks, r, tol, _second(blocks.q, tol), strict, began + max_seconds)
     task.offer(r, *task.look(r))
     result = _rounds(problem, solver, method, task)
     result.solve_s = clock() - began
@@ -140,23 +141,30 @@ def _solve_plain(
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
     check = np.empty(2)
+    tol_q = _second(problem.q, tol)
     ptr, col, val, diagonal, u, done, error, error_q, rows = jit.function(local_sweeps)(
-        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol, sweeps, every, GRACE,
+        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol_q, sweeps, every, GRACE,
         history, check,
     )  # fmt: skip
-    if check[0] <= tol and (check[1] <= tol or (not strict and done < sweeps)):
+    if check[0] <= tol and (check[1] <= tol_q or (not strict and done < sweeps)):
         return Result(
             problem, "AUTO", tol, strict, r, u, float(check[0]), float(check[1]),
             clock() - began, 0.0, done, [("NSGS", history[:rows])],
         )  # fmt: skip
     blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc))
-    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
+    task = Task(blocks, r, tol, tol_q, strict, began + max_seconds)
     task.work, task.iterations = done * sweep_work(blocks), done
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     result = _rounds(problem, "AUTO", named("AUTO"), task)
     result.solve_s = clock() - began
     return result
+
+
+def _second(q: Vector, tol: float) -> float:
+    """Return the |F|/|q| with which MERIT_1, |F| / (1 + sqrt(|q|)), is at most `tol` as well."""
+    size = math.sqrt(float(q @ q))
+    return tol * min(1.0, (1.0 + math.sqrt(size)) / size) if size > 0.0 else tol
 
 
 def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Result:

@@ -40,7 +40,7 @@ class Task:
     tol, tol_q
         Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
     strict
-        Whether the second must be reached; else it gets some more work, at most as much again.
+        Whether the second must be reached; else it gets some more work, at most four times as much.
     deadline
         Value of `clock` at which to give up.
     """
@@ -102,7 +102,7 @@ class Task:
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
         if error <= self.tol and self.grace == np.inf:
-            self.grace = self.work + min(self.work + 2e-5, 0.02 + 0.1 * self.work)
+            self.grace = self.work + min(4.0 * self.work + 2e-5, 0.02 + 0.1 * self.work)
         return better
 
     def note(self, name: str, rows: Any) -> None:
