@@ -24,7 +24,7 @@ FEW = 10
 #: ADMM is tried from this number of contacts on, with so many iterations.
 STACKS, TRIAL = 50, 30
 #: Error after the first sweeps below which bodies do not stack: ADMM gains nothing there.
-SETTLED = 1e-3
+SETTLED = 3e-4
 #: Seconds that beginning another method takes, whatever the size.
 BEGIN = 4e-4
 #: Iterations of ADMM that show whether all bodies rest.
