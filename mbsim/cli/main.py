@@ -21,6 +21,7 @@ COMMANDS = {
     "bench": "mbsim.cli.bench",
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",
+    "fclib": "mbsim.cli.fclib",
 }
 
 

@@ -1,0 +1,209 @@
+"""W as square blocks, one for each pair of contacts that share a body; the form solvers work on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.jitable import jitable
+
+
+@jitable
+def compressed_rows(rows, columns, nz, p, i, x):
+    """Return a matrix of any FCLIB storage as compressed rows (pointers, columns, values)."""
+    if nz == -2:
+        return p, i, x
+    count = nz if nz >= 0 else p[columns]
+    ptr = np.zeros(rows + 1, np.int32)
+    for k in range(count):
+        ptr[i[k] + 1] += 1
+    for k in range(rows):
+        ptr[k + 1] += ptr[k]
+    place = ptr[:rows].copy()
+    col = np.empty(count, np.int32)
+    val = np.empty(count)
+    if nz >= 0:
+        for k in range(count):
+            at = place[i[k]]
+            place[i[k]] += 1
+            col[at] = p[k]
+            val[at] = x[k]
+    else:
+        for c in range(columns):
+            for k in range(p[c], p[c + 1]):
+                at = place[i[k]]
+                place[i[k]] += 1
+                col[at] = c
+                val[at] = x[k]
+    return ptr, col, val
+
+
+@jitable
+def block_rows(d, contacts, p, i, x):
+    """Return compressed rows as blocks: pointers, columns (rising), values (blocks, d, d).
+
+    The pattern is made symmetric and every diagonal block is there, zeros included.
+    """
+    seen = np.full(contacts, -1, np.int32)
+    counts = np.zeros(contacts + 1, np.int32)
+    total = 0
+    for a in range(contacts):
+        seen[a] = a
+        total += 1
+        for row in range(d * a, d * a + d):
+            for k in range(p[row], p[row + 1]):
+                b = i[k] // d
+                if seen[b] != a:
+                    seen[b] = a
+                    total += 1
+        counts[a + 1] = total
+    upper = np.empty(total, np.int32)
+    seen[:] = -1
+    at = 0
+    for a in range(contacts):
+        seen[a] = a
+        upper[at] = a
+        at += 1
+        for row in range(d * a, d * a + d):
+            for k in range(p[row], p[row + 1]):
+                b = i[k] // d
+                if seen[b] != a:
+                    seen[b] = a
+                    upper[at] = b
+                    at += 1
+    ptr, col = symmetric_pattern(contacts, counts, upper)
+    val = np.zeros((len(col), d, d))
+    where = np.empty(contacts, np.int32)
+    for a in range(contacts):
+        for k in range(ptr[a], ptr[a + 1]):
+            where[col[k]] = k
+        for row in range(d):
+            for k in range(p[d * a + row], p[d * a + row + 1]):
+                b = i[k] // d
+                val[where[b], row, i[k] - d * b] += x[k]
+    return ptr, col, val
+
+
+@jitable
+def diagonal_places(ptr, col):
+    """Return where each row's diagonal block is."""
+    places = np.empty(len(ptr) - 1, np.int32)
+    for a in range(len(ptr) - 1):
+        for k in range(ptr[a], ptr[a + 1]):
+            if col[k] == a:
+                places[a] = k
+    return places
+
+
+@jitable
+def transposed_pattern(size, ptr, col):
+    """Return the transpose of a pattern, its columns rising."""
+    tptr = np.zeros(size + 1, np.int32)
+    for k in range(ptr[size]):
+        tptr[col[k] + 1] += 1
+    for a in range(size):
+        tptr[a + 1] += tptr[a]
+    place = tptr[:size].copy()
+    tcol = np.empty(ptr[size], np.int32)
+    for a in range(size):
+        for k in range(ptr[a], ptr[a + 1]):
+            b = col[k]
+            tcol[place[b]] = a
+            place[b] += 1
+    return tptr, tcol
+
+
+@jitable
+def symmetric_pattern(size, ptr, col):
+    """Return the union of a pattern and its transpose, columns rising."""
+    tptr, tcol = transposed_pattern(size, ptr, col)
+    seen = np.full(size, -1, np.int32)
+    total = 0
+    same = True
+    for a in range(size):
+        if tptr[a + 1] != ptr[a + 1]:
+            same = False
+            break
+        for k in range(ptr[a], ptr[a + 1]):
+            seen[col[k]] = a
+        for k in range(tptr[a], tptr[a + 1]):
+            if seen[tcol[k]] != a:
+                same = False
+    if same:
+        return tptr, tcol
+    seen[:] = -1
+    for a in range(size):
+        for k in range(ptr[a], ptr[a + 1]):
+            seen[col[k]] = a
+        total += ptr[a + 1] - ptr[a]
+        for k in range(tptr[a], tptr[a + 1]):
+            if seen[tcol[k]] != a:
+                total += 1
+    sptr = np.zeros(size + 1, np.int32)
+    scol = np.empty(total, np.int32)
+    seen[:] = -1
+    at = 0
+    for a in range(size):
+        for k in range(ptr[a], ptr[a + 1]):
+            seen[col[k]] = a
+            scol[at] = col[k]
+            at += 1
+        for k in range(tptr[a], tptr[a + 1]):
+            if seen[tcol[k]] != a:
+                scol[at] = tcol[k]
+                at += 1
+        sptr[a + 1] = at
+    # a symmetric pattern is its own transpose, and that comes out sorted
+    return transposed_pattern(size, sptr, scol)
+
+
+@jitable
+def product(tangent, rolling, ptr, col, val, q, r, u):
+    """Write u = W r + q."""
+    d = 1 + len(tangent) + len(rolling)
+    for a in range(len(ptr) - 1):
+        for row in range(d):
+            u[d * a + row] = q[d * a + row]
+        for k in range(ptr[a], ptr[a + 1]):
+            b = d * col[k]
+            for row in range(d):
+                total = 0.0
+                for c in range(d):
+                    total += val[k, row, c] * r[b + c]
+                u[d * a + row] += total
+
+
+@jitable
+def product_of_stored(rows, nz, p, i, x, r, u):
+    """Add A r to u, A of any FCLIB storage."""
+    if nz == -2:
+        for a in range(rows):
+            total = 0.0
+            for k in range(p[a], p[a + 1]):
+                total += x[k] * r[i[k]]
+            u[a] += total
+    elif nz == -1:
+        for c in range(len(p) - 1):
+            value = r[c]
+            for k in range(p[c], p[c + 1]):
+                u[i[k]] += x[k] * value
+    else:
+        for k in range(nz):
+            u[i[k]] += x[k] * r[p[k]]
+
+
+@jitable
+def transposed_product_of_stored(rows, nz, p, i, x, r, u):
+    """Add A' r to u, A of any FCLIB storage."""
+    if nz == -2:
+        for a in range(rows):
+            for k in range(p[a], p[a + 1]):
+                u[i[k]] += x[k] * r[a]
+    elif nz == -1:
+        for c in range(len(p) - 1):
+            total = 0.0
+            for k in range(p[c], p[c + 1]):
+                total += x[k] * r[i[k]]
+            u[c] += total
+    else:
+        for k in range(nz):
+            u[p[k]] += x[k] * r[i[k]]

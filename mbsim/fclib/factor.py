@@ -1,0 +1,343 @@
+"""LU factors of a sparse block matrix, front by front, and solving with them.
+
+A front is a dense matrix of the unknowns that one step of elimination touches; what is left of it
+after its own unknowns are eliminated is added to its parent's (Duff and Reid, The multifrontal
+solution of unsymmetric sets of linear equations, SIAM J. Sci. Stat. Comput. 5, 1984). Rows are
+exchanged only among a front's own unknowns. `ordering.analyse` gives the fronts; they hold for
+every matrix of the same pattern.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.jitable import jitable
+
+#: Columns eliminated before the rest of a front is touched.
+PANEL = 8
+
+
+@jitable
+def transposed_places(size, ptr, col):
+    """Return for every block (a, b) of a symmetric pattern, columns rising, where (b, a) is."""
+    place = ptr[:size].copy()
+    back = np.empty(ptr[size], np.int32)
+    for a in range(size):
+        for k in range(ptr[a], ptr[a + 1]):
+            b = col[k]
+            back[k] = place[b]  # rows come in rising order, as b's columns do
+            place[b] += 1
+    return back
+
+
+@jitable
+def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack):
+    """Write the factors of the matrix (val: blocks, d, d); return whether every pivot was sound.
+
+    `symbolic` is what `ordering.analyse` returned; `factors` has room for factor_ptr[-1] numbers,
+    `exchange` for d * nodes, `front` for room[0]^2 and `stack` for room[1].
+    """
+    front_ptr, nodes, pivots, children, rank, factor_ptr, _ = symbolic
+    fronts = len(pivots)
+    local = np.empty(len(rank), np.int32)
+    run_from = np.empty(len(rank) + 1, np.int64)
+    run_to = np.empty(len(rank) + 1, np.int64)
+    run_length = np.empty(len(rank) + 1, np.int64)
+    # sizes and places of what waits on the stack
+    waiting = np.empty(fronts + 1, np.int32)
+    depth = 0
+    top = 0
+    piv = 0
+    sound = True
+    for f in range(fronts):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        matrix = front[: n * n].reshape(n, n)
+        matrix[:] = 0.0
+        for k in range(lo, hi):
+            local[nodes[k]] = k - lo
+        for k in range(lo, lo + pivots[f]):
+            a = nodes[k]
+            row = d * (k - lo)
+            for j in range(ptr[a], ptr[a + 1]):
+                b = col[j]
+                if rank[b] < f:
+                    continue
+                column = d * local[b]
+                for s in range(d):
+                    for t in range(d):
+                        matrix[row + s, column + t] = val[j, s, t]
+                if rank[b] > f:
+                    for s in range(d):
+                        for t in range(d):
+                            matrix[column + s, row + t] = val[back[j], s, t]
+        for _ in range(children[f]):
+            depth -= 1
+            child = waiting[depth]
+            clo = front_ptr[child] + pivots[child]
+            many = front_ptr[child + 1] - clo
+            size = d * many
+            top -= size * size
+            update = stack[top : top + size * size].reshape(size, size)
+            # runs of the child's unknowns that are neighbours here, too
+            runs = 0
+            for j in range(many):
+                place = d * local[nodes[clo + j]]
+                if j > 0 and place == run_to[runs - 1] + d * j - run_from[runs - 1]:
+                    run_length[runs - 1] += d
+                else:
+                    run_from[runs] = d * j
+                    run_to[runs] = place
+                    run_length[runs] = d
+                    runs += 1
+            for i in range(many):
+                row = d * local[nodes[clo + i]]
+                for s in range(d):
+                    for k in range(runs):
+                        length = run_length[k]
+                        source = update[d * i + s, run_from[k] : run_from[k] + length]
+                        target = matrix[row + s, run_to[k] : run_to[k] + length]
+                        for t in range(length):
+                            target[t] += source[t]
+        sound = partial_lu(matrix, own, exchange[piv : piv + own]) and sound
+        _keep(matrix, own, factors[factor_ptr[f] : factor_ptr[f + 1]])
+        size = n - own
+        for i in range(size):
+            target = stack[top + i * size : top + (i + 1) * size]
+            target[:] = matrix[own + i, own:]
+        top += size * size
+        waiting[depth] = f
+        depth += 1
+        piv += own
+    return sound
+
+
+@jitable
+def _keep(matrix, own, kept):
+    """Store a front's factors: its own rows, then the multipliers of the others, transposed."""
+    n = matrix.shape[0]
+    at = 0
+    for k in range(own):
+        kept[at : at + n] = matrix[k]
+        at += n
+    rest = n - own
+    below = kept[at:].reshape(own, rest)
+    for i in range(rest):
+        for k in range(own):
+            below[k, i] = matrix[own + i, k]
+
+
+@jitable
+def partial_lu(matrix, own, exchange):
+    """Eliminate the first `own` unknowns of a dense matrix in place; rows change among these."""
+    n = matrix.shape[0]
+    sound = True
+    for begin in range(0, own, PANEL):
+        end = min(begin + PANEL, own)
+        for k in range(begin, end):
+            best = k
+            for i in range(k + 1, own):
+                if abs(matrix[i, k]) > abs(matrix[best, k]):
+                    best = i
+            exchange[k] = best
+            if best != k:
+                one, other = matrix[k], matrix[best]
+                for j in range(n):
+                    one[j], other[j] = other[j], one[j]
+            pivot = matrix[k, k]
+            if not abs(pivot) > 0.0:
+                sound = False
+                continue
+            inverse = 1.0 / pivot
+            source = matrix[k]
+            for i in range(k + 1, n):
+                factor = matrix[i, k] * inverse
+                matrix[i, k] = factor
+                for j in range(k + 1, end):
+                    matrix[i, j] -= factor * source[j]
+        for k in range(begin, end):
+            source = matrix[k, end:]
+            for i in range(k + 1, end):
+                factor = matrix[i, k]
+                target = matrix[i, end:]
+                for j in range(len(target)):
+                    target[j] -= factor * source[j]
+        _subtract(matrix, begin, end)
+    return sound
+
+
+@jitable
+def _subtract(matrix, begin, end):
+    """Subtract the product of the panel's columns and rows from all that follows."""
+    n = matrix.shape[0]
+    if end - begin == 8:
+        s0, s1, s2, s3 = (
+            matrix[begin, end:],
+            matrix[begin + 1, end:],
+            matrix[begin + 2, end:],
+            matrix[begin + 3, end:],
+        )
+        s4, s5, s6, s7 = (
+            matrix[begin + 4, end:],
+            matrix[begin + 5, end:],
+            matrix[begin + 6, end:],
+            matrix[begin + 7, end:],
+        )
+        for i in range(end, n):
+            target = matrix[i, end:]
+            row = matrix[i, begin:end]
+            f0, f1, f2, f3 = row[0], row[1], row[2], row[3]
+            f4, f5, f6, f7 = row[4], row[5], row[6], row[7]
+            for j in range(len(target)):
+                target[j] -= (
+                    (f0 * s0[j] + f1 * s1[j])
+                    + (f2 * s2[j] + f3 * s3[j])
+                    + (f4 * s4[j] + f5 * s5[j])
+                    + (f6 * s6[j] + f7 * s7[j])
+                )
+        return
+    k = begin
+    while k + 1 < end:
+        s0, s1 = matrix[k, end:], matrix[k + 1, end:]
+        for i in range(end, n):
+            target = matrix[i, end:]
+            f0, f1 = matrix[i, k], matrix[i, k + 1]
+            for j in range(len(target)):
+                target[j] -= f0 * s0[j] + f1 * s1[j]
+        k += 2
+    if k < end:
+        s0 = matrix[k, end:]
+        for i in range(end, n):
+            target = matrix[i, end:]
+            f0 = matrix[i, k]
+            for j in range(len(target)):
+                target[j] -= f0 * s0[j]
+
+
+@jitable
+def solve(d, symbolic, factors, exchange, x, part):
+    """Overwrite the right side x by the solution; `part` has room for room[0] numbers."""
+    front_ptr, nodes, pivots, _, _, factor_ptr, _ = symbolic
+    fronts = len(pivots)
+    piv = 0
+    for f in range(fronts):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
+        kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
+        upper = kept[: own * n].reshape(own, n)
+        below = kept[own * n :].reshape(own, n - own)
+        for k in range(own):
+            other = exchange[piv + k]
+            if other != k:
+                part[k], part[other] = part[other], part[k]
+        rest = part[own:n]
+        for k in range(own):
+            for j in range(k):
+                part[k] -= upper[k, j] * part[j]
+        for k in range(own):
+            value = part[k]
+            if value != 0.0:
+                row = below[k]
+                for i in range(len(row)):
+                    rest[i] -= value * row[i]
+        for k in range(hi - lo):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
+        piv += own
+    for f in range(fronts - 1, -1, -1):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        piv -= own
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
+        upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
+        for k in range(own - 1, -1, -1):
+            part[k] = (part[k] - _dot(upper[k, k + 1 :], part[k + 1 : n])) / upper[k, k]
+        for k in range(pivots[f]):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
+
+
+@jitable
+def solve_many(d, begin, symbolic, factors, exchange, x, part):
+    """Overwrite the right sides, columns of x (d * nodes, k), from front `begin` on.
+
+    Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
+    `part` has room for room[0] rows of x.
+    """
+    front_ptr, nodes, pivots, _, _, factor_ptr, _ = symbolic
+    fronts = len(pivots)
+    piv = 0
+    for f in range(begin):
+        piv += d * pivots[f]
+    for f in range(begin, fronts):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
+        kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
+        upper = kept[: own * n].reshape(own, n)
+        below = kept[own * n :].reshape(own, n - own)
+        for k in range(own):
+            other = exchange[piv + k]
+            if other != k:
+                one, two = part[k], part[other]
+                for j in range(len(one)):
+                    one[j], two[j] = two[j], one[j]
+        for k in range(own):
+            source = part[k]
+            for i in range(k + 1, n):
+                factor = upper[i, k] if i < own else below[k, i - own]
+                target = part[i]
+                for j in range(len(target)):
+                    target[j] -= factor * source[j]
+        for k in range(hi - lo):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
+        piv += own
+    for f in range(fronts - 1, begin - 1, -1):
+        lo, hi = front_ptr[f], front_ptr[f + 1]
+        n = d * (hi - lo)
+        own = d * pivots[f]
+        for k in range(hi - lo):
+            for s in range(d):
+                part[d * k + s] = x[d * nodes[lo + k] + s]
+        upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
+        for k in range(own - 1, -1, -1):
+            target = part[k]
+            for i in range(k + 1, n):
+                factor = upper[k, i]
+                source = part[i]
+                for j in range(len(target)):
+                    target[j] -= factor * source[j]
+            inverse = 1.0 / upper[k, k]
+            for j in range(len(target)):
+                target[j] *= inverse
+        for k in range(pivots[f]):
+            for s in range(d):
+                x[d * nodes[lo + k] + s] = part[d * k + s]
+
+
+@jitable
+def _dot(a, b):
+    """Return the product of two vectors, summed in four parts."""
+    n = len(a)
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    quarter = n - n % 4
+    for k in range(0, quarter, 4):
+        s0 += a[k] * b[k]
+        s1 += a[k + 1] * b[k + 1]
+        s2 += a[k + 2] * b[k + 2]
+        s3 += a[k + 3] * b[k + 3]
+    for k in range(quarter, n):
+        s0 += a[k] * b[k]
+    return (s0 + s1) + (s2 + s3)

@@ -1,0 +1,259 @@
+"""How good a pair u, r is: the one definition of the error, MERIT_1, and figures without scales.
+
+The natural map of a contact is F = r - P_K(r - (u + mu |u_T| e_N)), P_K the projection on
+K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
+
+* `error` (Siconos 4.4). Local: |F| / max(|q|, |r|, |u|), u = W r + V l + q. Global: |F| / max(|u|,
+  |r|) + |M v - H r - G l - f| / max(|f|, |M v|, |H r|, |G l|), u = H' v + w. A scale of 0 does
+  not divide. With equality constraints, their residual over its largest term is added (Siconos
+  takes none). With r much larger than q a small error says little of penetration: look at
+  `error_q` too.
+* `error_q`: |F| / |q|, the same with the scale of the data alone (of the condensed q in a global
+  problem).
+* `merit1`: FCLIB's MERIT_1 as its code has it,
+  |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|).
+  The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
+  libfclib's own function has three more faults, which are not reproduced: W, V and R in compressed
+  rows or triplets are silently left out (`cs_gaxpy` takes columns only and its return value is not
+  looked at), so that it judges u = q; with V and R its newer versions crash (`cs_transpose(V, 0)`);
+  in the plane and for global problems it returns 0.
+* `merit1_corrected`: the same with |q| in place of its square root.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.fclib.blocks import product_of_stored, transposed_product_of_stored
+from mbsim.fclib.cone import residual
+from mbsim.fclib.problem import Global, Local, Solution
+from mbsim.fclib.reduction import directions, multipliers, reduce, velocities
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Matrix, Vector
+    from mbsim.fclib.reduction import Blocks
+
+#: A contact at the edge of its cone that is slower than this share of |q| or |u| sticks.
+AT_REST = 1e-7
+#: States of a contact.
+OPEN, STICK, SLIP = 0, 1, 2
+STATES = ("open", "stick", "slip")
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """What can be said of a pair u, r.
+
+    Parameters
+    ----------
+    error, error_q, merit1, merit1_corrected
+        As the module says.
+    dynamics, equalities
+        Relative residuals of M v = H r + G l + f and of the equality constraints (0 without).
+    max_cone_violation
+        Largest distance of an impulse outside K, over the largest impulse.
+    max_penetration_velocity
+        Largest -u_N, in the problem's units.
+    relative_penetration
+        The same over the largest |q| of a contact.
+    complementarity
+        Largest |(u + mu |u_T| e_N) . r| of a contact, over the largest |u| and the largest |r|.
+    max_impulse, impulse_norm
+        Largest |r| of a contact, and |r|.
+    states
+        (nc,) 0 open, 1 stick, 2 slip: which of the law's conditions holds best.
+    """
+
+    error: float
+    error_q: float
+    merit1: float
+    merit1_corrected: float
+    dynamics: float
+    equalities: float
+    max_cone_violation: float
+    max_penetration_velocity: float
+    relative_penetration: float
+    complementarity: float
+    max_impulse: float
+    impulse_norm: float
+    states: Any
+
+    def counts(self) -> dict[str, int]:
+        """Return how many contacts are in each state."""
+        found = np.bincount(self.states, minlength=len(STATES))
+        return {name: int(count) for name, count in zip(STATES, found, strict=True)}
+
+
+def completed(problem: Local | Global, r: Vector, blocks: Blocks | None = None) -> Solution:
+    """Return u, v and l that go with impulses r."""
+    if isinstance(problem, Local) and problem.V is None:
+        return Solution(_times(problem.W, r) + problem.q, r)
+    blocks = reduce(problem) if blocks is None else blocks
+    l = multipliers(blocks, r)  # noqa: E741
+    if isinstance(problem, Local):
+        u = _times(problem.W, r) + problem.q
+        return Solution(u if l is None or problem.V is None else u + _times(problem.V, l), r, l=l)
+    v = velocities(problem, blocks, r, l)
+    return Solution(_transposed_times(problem.H, v) + problem.w, r, v, l)
+
+
+def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = None) -> Figures:
+    """Return all figures of a solution; u is recomputed, as in FCLIB, not believed.
+
+    Multipliers and velocities that the solution does not have are computed from r.
+    """
+    blocks = reduce(problem) if blocks is None and isinstance(problem, Global) else blocks
+    found = _whole(problem, solution, blocks)
+    error, missing, u, dynamics, equalities, absolute = _error(problem, found)
+    q = problem.q if isinstance(problem, Local) else blocks.q  # type: ignore[union-attr]
+    bound = _norm(q)
+    return Figures(
+        error,
+        _over(missing, bound),
+        missing / (1.0 + math.sqrt(bound)) + absolute,
+        missing / (1.0 + bound) + absolute,
+        dynamics,
+        equalities,
+        *_figures(problem, u, found.r, q),
+    )
+
+
+def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> tuple[float, float]:
+    """Return `error` and `error_q` alone, which is quicker."""
+    error, missing, *_ = _error(problem, solution)
+    return error, _over(missing, _norm(problem.q if isinstance(problem, Local) else blocks.q))
+
+
+def _whole(problem: Local | Global, solution: Solution, blocks: Blocks | None) -> Solution:
+    """Return a solution with the multipliers and velocities that go with its r, where missing."""
+    r = np.ascontiguousarray(solution.r)
+    without_l = solution.l is None and problem.equalities > 0
+    if without_l or (solution.v is None and isinstance(problem, Global)):
+        return completed(problem, r, blocks)
+    return Solution(solution.u, r, solution.v, solution.l)
+
+
+def _error(
+    problem: Local | Global, solution: Solution
+) -> tuple[float, float, Vector, float, float, float]:
+    """Return error, |F|, u and the residuals that `_velocities` gives."""
+    u, scales, dynamics, equalities, absolute = _velocities(problem, solution)
+    tangent, rolling = directions(problem)
+    mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
+    missing = float(
+        jit.function(residual)(
+            tangent, rolling, problem.mu, mu_r, u, solution.r, np.empty_like(solution.r)
+        )
+    )
+    error = _over(missing, max(scales)) + dynamics + equalities
+    return error, missing, u, dynamics, equalities, absolute
+
+
+def _times(a: Matrix, vector: Vector) -> Vector:
+    """Return A times a vector, from the entries as they are stored."""
+    found = np.zeros(a.m)
+    jit.function(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
+def _transposed_times(a: Matrix, vector: Vector) -> Vector:
+    """Return the transpose of A times a vector."""
+    found = np.zeros(a.n)
+    jit.function(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
+def _norm(vector: Vector) -> float:
+    """Return the Euclidean norm."""
+    return float(np.linalg.norm(vector))
+
+
+def _over(value: float, scale: float) -> float:
+    """Return a quotient; a scale of 0 does not divide."""
+    return value / scale if scale > 0.0 else value
+
+
+def _velocities(
+    problem: Local | Global, solution: Solution
+) -> tuple[Vector, tuple[float, ...], float, float, float]:
+    """Return u, the scales of F, and the residuals of the linear equations.
+
+    These are: relative ones of the dynamics and of the equality constraints, and MERIT_1's of the
+    latter.
+    """
+    r, l = solution.r, solution.l  # noqa: E741
+    equalities, absolute = 0.0, 0.0
+    if isinstance(problem, Local):
+        u = _times(problem.W, r) + problem.q
+        if problem.V is not None and problem.R is not None and problem.s is not None:
+            assert l is not None
+            u = u + _times(problem.V, l)
+            parts = (_transposed_times(problem.V, r), _times(problem.R, l), problem.s)
+            left = _norm(parts[0] + parts[1] + parts[2])
+            equalities = _over(left, max(_norm(part) for part in parts))
+            absolute = left / (1.0 + _norm(problem.s))
+        return u, (_norm(problem.q), _norm(r), _norm(u)), 0.0, equalities, absolute
+    v = solution.v
+    assert v is not None
+    u = _transposed_times(problem.H, v) + problem.w
+    forces = [_times(problem.M, v), -_times(problem.H, r), -problem.f]
+    if problem.G is not None and problem.b is not None:
+        assert l is not None
+        forces.append(-_times(problem.G, l))
+        left = _norm(_transposed_times(problem.G, v) + problem.b)
+        # G' v may cancel to nothing: its terms are the scale
+        terms = _transposed_times(replace(problem.G, x=np.abs(problem.G.x)), np.abs(v))
+        equalities = _over(left, max(_norm(terms), _norm(problem.b)))
+        absolute = left / (1.0 + _norm(problem.b))
+    dynamics = _over(_norm(np.sum(forces, axis=0)), max(_norm(force) for force in forces))
+    return u, (_norm(u), _norm(r)), dynamics, equalities, absolute
+
+
+def _figures(problem: Local | Global, u: Vector, r: Vector, q: Vector) -> tuple[Any, ...]:
+    """Return the figures from `max_cone_violation` on."""
+    nc, d = problem.contacts, problem.spacedim
+    if nc == 0:
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(0, np.int64))
+    tangent, _ = directions(problem)
+    nt = len(tangent)
+    us, rs, qs = (vector.reshape(nc, d) for vector in (u, r, q))
+    speed, grip = _lengths(us[:, 1 : 1 + nt]), _lengths(rs[:, 1 : 1 + nt])
+    spin, twist = _lengths(us[:, 1 + nt :]), _lengths(rs[:, 1 + nt :])
+    mu = problem.mu
+    mu_r = np.zeros(nc) if problem.mu_r is None else problem.mu_r
+    lifted = us[:, 0] + mu * speed + mu_r * spin
+    power = np.abs(lifted * rs[:, 0] + np.einsum("ij,ij->i", us[:, 1:], rs[:, 1:]))
+    largest_r, largest_u = float(_lengths(rs).max()), float(_lengths(us).max())
+    held = rs[:, 0].clip(min=0.0)
+    outside = np.maximum(np.maximum(grip - mu * held, twist - mu_r * held), -rs[:, 0])
+    penetration = max(0.0, float(-us[:, 0].min()))
+    # each on its own scale, so that units do not matter
+    scale = max(largest_u, float(_lengths(qs).max()))
+    normal_r, normal_u = _each(rs[:, 0], largest_r), _each(us[:, 0], scale)
+    room, moving = _each(mu * held - grip, largest_r), _each(speed, scale)
+    slips = (room <= moving) & (moving > AT_REST)
+    states = np.where(normal_r <= normal_u, OPEN, np.where(slips, SLIP, STICK))
+    return (
+        _over(max(0.0, float(outside.max())), largest_r),
+        penetration,
+        _over(penetration, float(_lengths(qs).max())),
+        _over(float(power.max()), largest_r * largest_u),
+        largest_r,
+        _norm(r),
+        states,
+    )
+
+
+def _lengths(rows: Any) -> Any:
+    """Return the length of every row."""
+    return np.sqrt(np.einsum("ij,ij->i", rows, rows))
+
+
+def _each(values: Any, scale: float) -> Any:
+    """Return values over a scale; a scale of 0 does not divide."""
+    return values / scale if scale > 0.0 else values

@@ -1,0 +1,217 @@
+"""One call for every solver: from arrays in memory to a solution that has been checked.
+
+"Solved" is said only of an error recomputed from the problem as it was given, by the definition in
+`merit`; what a solver believes does not count.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.errors import ModelError
+from mbsim.fclib.merit import Figures, completed, errors, judge
+from mbsim.fclib.problem import Global, Local, Solution
+from mbsim.fclib.reduction import Blocks, reduce
+from mbsim.fclib.solvers.auto import first_sweeps
+from mbsim.fclib.solvers.catalog import solver as named
+from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, sweep_work
+from mbsim.fclib.solvers.task import Task, clock
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
+
+#: Rounds in which a solver's goal is tightened where the error of the given problem is larger.
+ROUNDS = 4
+
+
+@dataclass(eq=False)
+class Result:
+    """What `solve` found.
+
+    Parameters
+    ----------
+    problem, solver, tol, strict
+        What was asked.
+    r, u
+        (m,) impulses and velocities: the solution, or the best iterate.
+    error, error_q
+        Of `r`, recomputed from the problem as given (`merit`).
+    solve_s, condense_s
+        Seconds from arrays in memory to the checked solution, and how many of them went into
+        condensation and elimination; compiling, once a machine, is left out.
+    iterations
+        Of all methods together.
+    history
+        (method, rows of iteration, error, |F|/|q|) in order.
+    reason
+        Empty if solved; else why not.
+    """
+
+    problem: Local | Global
+    solver: str
+    tol: float
+    strict: bool
+    r: Vector
+    u: Vector
+    error: float
+    error_q: float
+    solve_s: float = 0.0
+    condense_s: float = 0.0
+    iterations: int = 0
+    history: list[tuple[str, Any]] | tuple[()] = ()
+    reason: str = ""
+    blocks: Blocks | None = None
+
+    @property
+    def status(self) -> str:
+        """`solved` or `not_solved`."""
+        return "not_solved" if self.reason else "solved"
+
+    @cached_property
+    def solution(self) -> Solution:
+        """u, r and, where the problem has them, v and l."""
+        return completed(self.problem, self.r, self.blocks)
+
+    @cached_property
+    def figures(self) -> Figures:
+        """All figures of the solution."""
+        return judge(self.problem, self.solution, self.blocks)
+
+
+def solve(
+    problem: Local | Global,
+    tol: float = 1e-8,
+    solver: str = "AUTO",
+    *,
+    guess: Solution | None = None,
+    strict: bool = False,
+    max_seconds: float = 20.0,
+) -> Result:
+    """Solve a problem of any kind.
+
+    Parameters
+    ----------
+    problem
+        Local or global, with or without equality constraints or rolling friction.
+    tol
+        Largest `merit` error of a solution.
+    solver
+        A name of `solvers.catalog.SOLVERS`.
+    guess
+        Where to start; its r is enough. Default: r = 0.
+    strict
+        |F| / |q| must be at most `tol`, too.
+    max_seconds
+        Give up after this long.
+    """
+    began = clock()
+    if not tol > 0.0:
+        raise ModelError(f"tol {tol}: a number above 0 is allowed")
+    m = problem.spacedim * len(problem.mu)
+    if guess is not None and guess.r.shape != (m,):
+        raise ModelError(f"the guess has {len(guess.r)} impulses, the problem {m}")
+    r = np.zeros(m) if guess is None else np.array(guess.r, dtype=np.float64)
+    plain = type(problem) is Local and problem.V is None and problem.mu_r is None
+    if plain and solver == "AUTO" and m:
+        return _solve_plain(problem, tol, r, strict, began, max_seconds)  # type: ignore[arg-type]
+    method = named(solver, rolling=problem.mu_r is not None)
+    blocks = reduce(problem)
+    condensed = clock()
+    task = Task(blocks, r, tol, _second(blocks.q, tol), strict, began + max_seconds)
+    task.offer(r, *task.look(r))
+    result = _rounds(problem, solver, method, task)
+    result.solve_s = clock() - began
+    result.condense_s = condensed - began if not plain else 0.0
+    return result
+
+
+def _solve_plain(
+    problem: Local, tol: float, r: Vector, strict: bool, began: float, max_seconds: float
+) -> Result:
+    """Solve a local problem without more to it; one compiled call is often all."""
+    w, mu = problem.W, problem.mu
+    nc = len(mu)
+    sweeps, every = first_sweeps(nc)
+    tangent = (0,) if problem.spacedim == 2 else (0, 0)
+    history = np.empty((100, 3))
+    check = np.empty(2)
+    tol_q = _second(problem.q, tol)
+    ptr, col, val, diagonal, u, done, error, error_q, rows = jit.function(local_sweeps)(
+        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol_q, sweeps, every, GRACE,
+        history, check,
+    )  # fmt: skip
+    if check[0] <= tol and (check[1] <= tol_q or (not strict and done < sweeps)):
+        return Result(
+            problem, "AUTO", tol, strict, r, u, float(check[0]), float(check[1]),
+            clock() - began, 0.0, done, [("NSGS", history[:rows])],
+        )  # fmt: skip
+    blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc))
+    task = Task(blocks, r, tol, tol_q, strict, began + max_seconds)
+    task.work, task.iterations = done * sweep_work(blocks), done
+    task.offer(r, error, error_q)
+    task.note("NSGS", history[:rows])
+    result = _rounds(problem, "AUTO", named("AUTO"), task)
+    result.solve_s = clock() - began
+    return result
+
+
+def _second(q: Vector, tol: float) -> float:
+    """Return the |F|/|q| with which MERIT_1, |F| / (1 + sqrt(|q|)), is at most `tol` as well."""
+    size = math.sqrt(float(q @ q))
+    return tol * min(1.0, (1.0 + math.sqrt(size)) / size) if size > 0.0 else tol
+
+
+def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Result:
+    """Run a solver until the error of the problem as given is small enough."""
+    tol = task.tol
+    for _ in range(ROUNDS):
+        if not task.done:
+            method(task)
+        found = completed(problem, task.r, task.blocks)
+        error, error_q = errors(problem, found, task.blocks)
+        met = error <= tol and (error_q <= tol or not task.strict)
+        if met or task.late or not task.done or task.tol < 1e-3 * tol:
+            break
+        task.tol *= 0.5 * tol / error if error > tol else 1.0
+        task.tol_q *= 0.5 * tol / error_q if error_q > tol else 1.0
+        task.grace = np.inf
+    result = Result(
+        problem, solver.upper(), tol, task.strict, task.r, found.u, error, error_q,
+        iterations=task.iterations, history=task.history, blocks=task.blocks,
+    )  # fmt: skip
+    result.__dict__["solution"] = found
+    result.reason = _reason(task, tol, error, error_q)
+    return result
+
+
+def _reason(task: Task, tol: float, error: float, error_q: float) -> str:
+    """Return why a problem counts as not solved, or nothing."""
+    jammed = _looks_jammed(task)
+    if error <= tol and (error_q <= tol or not task.strict):
+        if jammed and error_q > 100.0 * tol:
+            return (
+                "jammed or infeasible: impulses grow without bound, and the error is small "
+                "only against them"
+            )
+        return ""
+    if jammed:
+        return "jammed or infeasible: impulses grow without bound while |F|/|q| stalls"
+    if error < 1e-13 or task.error < 1e-13:
+        return "stagnates at rounding"
+    if task.late:
+        return "out of time"
+    return "stagnates"
+
+
+def _looks_jammed(task: Task) -> bool:
+    """Return whether |r| grew tenfold while |F|/|q| did not fall to a third."""
+    if not task.sizes:
+        return False
+    last_q, last_r = task.sizes[-1]
+    return any(size < 0.1 * last_r and last_q > 0.33 * error_q for error_q, size in task.sizes[:-1])

@@ -1,0 +1,201 @@
+"""AUTO: the method that suits, found by what each one gains for its work.
+
+Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets
+a trial (stacks need few iterations of it), then proximal Newton, which needs a good start but
+finishes. Work is counted in estimated seconds, not measured, so that a run does the same on every
+machine.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import count
+from typing import Any
+
+from mbsim.core import jit
+from mbsim.fclib.ordering import analyse, elimination_flops
+from mbsim.fclib.solvers import newton, splitting, sweeps
+from mbsim.fclib.solvers.task import Task
+
+#: Sweeps before anything is predicted: with few contacts, else.
+FIRST_SMALL, FIRST = 100, 20
+#: Up to so many contacts count as few.
+FEW = 10
+#: ADMM is tried from this number of contacts on, with so many iterations.
+STACKS, TRIAL = 50, 30
+#: Error after the first sweeps below which bodies do not stack: ADMM gains nothing there.
+SETTLED = 3e-4
+#: Seconds that beginning another method takes, whatever the size.
+BEGIN = 4e-4
+#: Iterations of ADMM that show whether all bodies rest.
+RESTED = 5
+#: Newton iterations that a proximal finish takes, roughly.
+FINISH = 40
+#: Error from which the proximal method is started, unless sweeps do not get there.
+NEAR = 1.5e-4
+#: Values of alpha and rho that restarts of the proximal method go through.
+STARTS = ((1e-3, 30.0), (1e-2, 30.0), (1e-3, 10.0), (1e-4, 100.0), (1e-1, 30.0))
+#: Proximal steps without gain that end a run.
+STALL, STALL_NEAR = 60, 15
+#: Error from which a run goes on from its best point, and with which alpha and reach.
+NEARBY = 1e-5
+NEARER = ((1e-4, 1.0), (1e-6, 1.0), (1e-2, 1.0), (1e-5, 1.3), (1e-3, 1.6))
+#: Restarts without any gain after which there is nothing more to hope for.
+HOPELESS = 20
+
+
+def first_sweeps(contacts: int) -> tuple[int, int]:
+    """Return how many sweeps to begin with, and after how many to look at the error."""
+    return (FIRST_SMALL, 1) if contacts <= FEW else (FIRST, 5)
+
+
+def run(task: Task) -> None:
+    """Solve with whatever works (AUTO)."""
+    if not task.history:
+        sweeps.nsgs(task, *first_sweeps(task.blocks.contacts))
+    if task.over:
+        return
+    if task.blocks.rolling:
+        _rolling(task)
+        return
+    _sweep(task, BEGIN)
+    if task.over:
+        return
+    newton_work, splitting_work, factor_work = _costs(task)
+    finish = FINISH * newton_work
+    if task.blocks.contacts >= STACKS and task.error > SETTLED:
+        trial = BEGIN + factor_work + 2.0 * RESTED * splitting_work
+        _sweep(task, trial)
+        if not task.over:
+            _try_splitting(task, splitting_work, finish)
+    _sweep(task, finish, near=True)
+    _finish(task, finish)
+
+
+def _costs(task: Task) -> tuple[float, float, float]:
+    """Return the estimated seconds of a Newton iteration, an ADMM iteration and its factors."""
+    b = task.blocks
+    d = 1 + len(b.tangent) + len(b.rolling)
+    symbolic = jit.function(analyse)(b.contacts, b.ptr, b.col, d)
+    flops = jit.function(elimination_flops)(symbolic, d)
+    entries = float(symbolic[5][-1])
+    factor = 2.5e-10 * flops + 3e-8 * len(b.col)
+    once = 1.2e-9 * entries + 2.5e-7 * b.contacts
+    return factor + once, once + 5e-9 * len(b.col), factor
+
+
+def _rolling(task: Task) -> None:
+    """Go on with sweeps; rolling friction has no Newton's method here, but ADMM."""
+    _, splitting_work, factor_work = _costs(task)
+    _sweep(task, factor_work + TRIAL * splitting_work)
+    if not task.over:
+        _try_splitting(task, splitting_work, 20.0 * TRIAL * splitting_work)
+    if not task.over:
+        sweeps.run(task)
+
+
+def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
+    """Return the predicted number of iterations, by the rate of the last 40 % of `rows`.
+
+    `aim` is an error to reach in place of the goal.
+    """
+    if len(rows) < 2:
+        return math.inf
+    middle = int(0.6 * (len(rows) - 1))
+    then, last = rows[: middle + 1, 1].min(), rows[:, 1].min()
+    wanted = last / aim if aim else max(last / task.tol, rows[:, 2].min() / task.tol_q)
+    if wanted <= 1.0:
+        return 0.0
+    steps = rows[-1, 0] - rows[middle, 0]
+    if steps <= 0.0 or not 0.0 < last < then:
+        return math.inf
+    rate = math.log(then / last) / steps
+    return float(math.log(wanted) / rate)
+
+
+def _sweep(task: Task, work: float, *, near: bool = False) -> None:
+    """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
+
+    `near`: sweep as well to get near enough for the proximal method.
+    """
+    cost = sweeps.sweep_work(task.blocks)
+    spent = task.work
+    while not task.over and task.work - spent < 2.0 * work:
+        rows = task.history[-1][1]
+        left = _remaining(rows, task)
+        if near and left * cost > work and task.error > NEAR:
+            left = _remaining(rows, task, NEAR)
+            if task.history[-1][0] != "NSGS":
+                left = 0.0  # nothing known yet
+        if left * cost > work:
+            return
+        chunk = 25 if task.iterations < 100 else 100
+        sweeps.nsgs(task, chunk)
+
+
+def _try_splitting(task: Task, cost: float, finish: float) -> None:
+    """Give ADMM a trial, and more while it is predicted to end before another method would."""
+    run = splitting.Splitting(task, warm=False)
+    run.penalise(splitting.RESTING)
+    spent = task.work
+    run.advance(RESTED, 1.0)
+    while not task.over and _remaining(task.history[-1][1], task) <= RESTED:
+        run.advance(RESTED, 1.0)
+    if task.over:
+        return
+    run.penalise(splitting.PENALTY_0)
+    limit = TRIAL
+    while run.advance(limit) and not task.over:
+        left = _remaining(task.history[-1][1], task)
+        if left * cost > finish or task.work - spent > 2.0 * finish:
+            return
+        limit = 30
+
+
+def _finish(task: Task, finish: float) -> None:
+    """Alternate proximal Newton and sweeps until the goal is reached or there is no hope.
+
+    The problem is not convex, so a run may end on a branch without a solution: the next one starts
+    from where the sweeps have got to meanwhile, on their own way, and with other numbers.
+    """
+    budget = max(6.0 * task.work, 2.0 * finish)
+    chain = task.r
+    vain = 0
+    for restart in count():
+        alpha, rho = STARTS[restart % len(STARTS)]
+        begin, spent = task.error, task.work
+        run = newton.Proximal(task, alpha, rho, task.r if restart % 2 else chain)
+        _proximal(task, run, budget, STALL)
+        # it may have been near and left again: from its best point, with shorter steps
+        for alpha, reach in NEARER:
+            if task.over or not run.error < NEARBY:
+                break
+            before = run.error
+            run = newton.Proximal(task, alpha, rho, run.r, reach)
+            _proximal(task, run, budget, STALL_NEAR)
+            if run.error > 0.5 * before and before > 0.1 * NEARBY:
+                break
+        vain = 0 if task.error < 0.9 * begin else vain + 1
+        if task.over or vain >= HOPELESS:
+            return
+        spent, before = 0.2 * (task.work - spent), task.work
+        while not task.over and task.work - before < spent:
+            chain = sweeps.nsgs(task, FIRST_SMALL * (restart + 1), start=chain)
+        if task.over:
+            return
+        budget *= 1.3
+
+
+def _proximal(task: Task, run: newton.Proximal, budget: float, stall: int) -> None:
+    """Take proximal Newton steps while they gain."""
+    mark, mark_work = run.error, task.work
+    while not task.over:
+        cost = run.newton_work
+        limit = 10 if cost == 0.0 else max(10, min(50, int(0.25 * budget / cost)))
+        if not run.advance(limit):
+            return
+        if run.error < mark / 3.0:
+            mark, mark_work = run.error, task.work
+        patience = budget if run.error > NEAR else 4.0 * budget
+        if task.work - mark_work > patience or run.stalled > stall:
+            return

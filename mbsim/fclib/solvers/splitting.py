@@ -1,0 +1,266 @@
+"""ADMM: a linear solve with fixed factors and a projection on the cones, in turns.
+
+With D the mean diagonal of each contact's block and s = mu |u_T| e_N of the last iterate:
+
+    (W + rho D) x = rho D (z - y) - q - s,   z = P_K(x + y),   y += x - z,
+
+u = W x + q comes from the first equation for nothing. rho follows the balance of |x - z| and the
+change of z, at intervals that widen (each change costs a factorisation). Acceleration is Nesterov's
+on (z, y), given up (restart) whenever the residual rises: Goldstein, O'Donoghue, Setzer and
+Baraniuk, Fast alternating direction optimization methods, SIAM J. Imaging Sci. 7, 2014.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.core.jitable import jitable
+from mbsim.fclib.blocks import product
+from mbsim.fclib.cone import cone_height, norm, relative_errors
+from mbsim.fclib.factor import factorise, solve, transposed_places
+from mbsim.fclib.ordering import analyse, elimination_flops
+from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
+
+# places in `state`, what a later call needs to go on
+PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK = range(9)
+STATE = 9
+#: First penalty, the iteration of its first change, and the range in which it moves.
+PENALTY_0, FIRST_CHANGE, LEAST, MOST = 0.1, 10, 0.03, 30.0
+#: A penalty with which bodies that all stick need a handful of iterations.
+RESTING = 1e-3
+
+
+@jitable
+def _project(tangent, rolling, mu, mu_r, x, y, z):
+    """Write z = P_K(x + y)."""
+    nt, nr = len(tangent), len(rolling)
+    d = 1 + nt + nr
+    for a in range(len(mu)):
+        first = d * a
+        slide = 0.0
+        roll = 0.0
+        for k in range(nt):
+            slide += (x[first + 1 + k] + y[first + 1 + k]) ** 2
+        for k in range(nr):
+            roll += (x[first + 1 + nt + k] + y[first + 1 + nt + k]) ** 2
+        slide = math.sqrt(slide)
+        roll = math.sqrt(roll)
+        height = cone_height(x[first] + y[first], slide, roll, mu[a], mu_r[a])
+        z[first] = height
+        turn = min(1.0, mu[a] * height / slide) if slide > 0.0 else 1.0
+        for k in range(nt):
+            at = first + 1 + k
+            z[at] = turn * (x[at] + y[at])
+        turn = min(1.0, mu_r[a] * height / roll) if roll > 0.0 else 1.0
+        for k in range(nr):
+            at = first + 1 + nt + k
+            z[at] = turn * (x[at] + y[at])
+
+
+@jitable
+def admm(
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, lift, state, accelerate,
+    tol, tol_q, limit, every, history, rows,
+):  # fmt: skip
+    """Iterate until the error is small enough or `limit` iterations are done.
+
+    `r` holds the best iterate, in and out. z, y, lift (s, one a contact) and `state` are what a
+    later call goes on from; a first call has state[PENALTY], state[NEXT] and state[BEST] set, z at
+    the start. Returns the number of rows in `history` (iterations so far, error, |F|/|q|).
+    """
+    nt, nr = len(tangent), len(rolling)
+    d = 1 + nt + nr
+    nc = len(mu)
+    m = d * nc
+    weight = np.empty(nc)
+    mean = 0.0
+    for a in range(nc):
+        weight[a] = 0.0
+        for s in range(d):
+            weight[a] += val[diagonal[a], s, s] / d
+        mean += weight[a] / nc
+    if not mean > 0.0:
+        return rows
+    for a in range(nc):
+        # a contact whose block is zero needs some weight too
+        weight[a] = weight[a] if weight[a] > 1e-8 * mean else mean
+    symbolic = analyse(nc, ptr, col, d)
+    back = transposed_places(nc, ptr, col)
+    factors = np.empty(symbolic[5][-1])
+    front = np.empty(symbolic[6][0] ** 2)
+    stack = np.empty(symbolic[6][1])
+    part = np.empty(symbolic[6][0])
+    exchange = np.empty(m, np.int32)
+    shifted = val.copy()
+    x = np.empty(m)
+    u = np.empty(m)
+    old_z = np.empty(m)
+    old_y = np.empty(m)
+    last_z = z.copy()
+    last_y = y.copy()
+    work = np.empty(m)
+    penalty = -1.0
+    flops = elimination_flops(symbolic, d)
+    state[WORK] += 5e-8 * len(col)
+    for _ in range(limit):
+        if penalty != state[PENALTY]:
+            penalty = state[PENALTY]
+            # seconds on a usual processor: a measure of work that does not depend on the clock
+            state[WORK] += 2.5e-10 * flops + 3e-8 * len(col)
+            for a in range(nc):
+                k = diagonal[a]
+                for s in range(d):
+                    shifted[k, s, s] = val[k, s, s] + penalty * weight[a]
+            if not factorise(d, ptr, col, back, shifted, symbolic, factors, exchange, front, stack):
+                return rows
+        for a in range(nc):
+            rho = penalty * weight[a]
+            for s in range(d):
+                at = d * a + s
+                old_z[at] = z[at]
+                old_y[at] = y[at]
+                x[at] = rho * (z[at] - y[at]) - q[at]
+            x[d * a] -= lift[a]
+        solve(d, symbolic, factors, exchange, x, part)
+        for a in range(nc):
+            rho = penalty * weight[a]
+            speed = 0.0
+            spin = 0.0
+            for s in range(1, 1 + nt):
+                at = d * a + s
+                speed += (rho * (z[at] - y[at] - x[at])) ** 2
+            for s in range(1 + nt, d):
+                at = d * a + s
+                spin += (rho * (z[at] - y[at] - x[at])) ** 2
+            lift[a] = mu[a] * math.sqrt(speed) + mu_r[a] * math.sqrt(spin)
+        _project(tangent, rolling, mu, mu_r, x, y, z)
+        apart, moved, size, dual, given = 0.0, 0.0, 0.0, 0.0, 0.0
+        for a in range(nc):
+            for s in range(d):
+                at = d * a + s
+                y[at] += x[at] - z[at]
+                apart += weight[a] * (x[at] - z[at]) ** 2
+                moved += weight[a] * (z[at] - old_z[at]) ** 2
+                size += weight[a] * max(z[at] ** 2, x[at] ** 2)
+                dual += weight[a] * y[at] ** 2
+                given += q[at] ** 2 / weight[a]
+        state[ITERATIONS] += 1.0
+        state[WORK] += 1e-9 * len(factors) + 1e-7 * nc + 1e-8 / every * len(col)
+        if state[ITERATIONS] % every == 0.0:
+            product(tangent, rolling, ptr, col, val, q, z, u)
+            error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, z, work)
+            if rows < len(history):
+                history[rows, 0] = state[ITERATIONS]
+                history[rows, 1] = error
+                history[rows, 2] = error_q
+                rows += 1
+            done = error <= tol and error_q <= tol_q
+            better = error < state[BEST]
+            if error <= tol and state[BEST] <= tol:
+                # the other figure decides, and impulses must not run away for it
+                better = error_q < state[BEST_Q] and norm(z) <= GROWTH * norm(r)
+            if better:
+                state[BEST] = error
+                state[BEST_Q] = error_q
+                for k in range(m):
+                    r[k] = z[k]
+            if done or not math.isfinite(error):
+                return rows
+        if accelerate:
+            residual = apart + moved
+            if residual < 0.999 * state[RESIDUAL] and state[RESIDUAL] > 0.0:
+                momentum = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * state[MOMENTUM] ** 2))
+                factor = (state[MOMENTUM] - 1.0) / momentum
+                state[MOMENTUM] = momentum
+            else:
+                factor = 0.0
+                state[MOMENTUM] = 1.0
+            state[RESIDUAL] = residual
+            for k in range(m):
+                new_z, new_y = z[k], y[k]
+                z[k] += factor * (new_z - last_z[k])
+                y[k] += factor * (new_y - last_y[k])
+                last_z[k] = new_z
+                last_y[k] = new_y
+        if state[ITERATIONS] >= state[NEXT]:
+            state[INTERVAL] *= 1.5
+            state[NEXT] = state[ITERATIONS] + state[INTERVAL]
+            # the dual scale is that of q where bodies rest, for there u is nothing
+            dual = max(dual, given / penalty**2)
+            if size > 0.0 and dual > 0.0 and moved > 0.0 and apart > 0.0:
+                ratio = math.sqrt((apart / size) / (moved / dual))
+                if ratio > 3.0 or ratio < 1.0 / 3.0:
+                    change = min(max(math.sqrt(ratio), 0.1), 10.0)
+                    state[PENALTY] = min(max(penalty * change, LEAST), MOST)
+                    scale = penalty / state[PENALTY]
+                    for k in range(m):
+                        y[k] *= scale
+                        last_y[k] *= scale
+                    state[MOMENTUM] = 1.0
+                    state[RESIDUAL] = 0.0
+    return rows
+
+
+class Splitting:
+    """An ADMM run that can be continued."""
+
+    def __init__(self, task: Task, *, accelerate: bool = True, warm: bool = True) -> None:
+        self.task = task
+        m = len(task.r)
+        self.accelerate = accelerate
+        self.z = task.r.copy() if warm else np.zeros(m)
+        self.y = np.zeros(m)
+        self.lift = np.zeros(task.blocks.contacts)
+        self.state: Any = np.zeros(STATE)
+        self.state[PENALTY] = PENALTY_0
+        self.state[NEXT] = self.state[INTERVAL] = FIRST_CHANGE
+        self.state[BEST] = self.state[BEST_Q] = np.inf
+        self.state[MOMENTUM] = 1.0
+
+    def penalise(self, penalty: float) -> None:
+        """Go on with another penalty."""
+        self.y *= self.state[PENALTY] / penalty
+        self.state[PENALTY] = penalty
+        self.state[NEXT] = self.state[ITERATIONS] + FIRST_CHANGE
+        self.state[INTERVAL] = FIRST_CHANGE
+        self.state[MOMENTUM], self.state[RESIDUAL] = 1.0, 0.0
+
+    @property
+    def error(self) -> float:
+        """Best error of this run."""
+        return float(self.state[BEST])
+
+    def advance(self, limit: int, every: float = 2.0) -> bool:
+        """Iterate at most `limit` times; return whether anything was done."""
+        task, state = self.task, self.state
+        b = task.blocks
+        r = task.r.copy()
+        history = np.empty((min(ROWS, limit), 3))
+        work, before = state[WORK], state[ITERATIONS]
+        rows = jit.function(admm)(
+            b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
+            self.z, self.y, self.lift, state, self.accelerate,
+            task.tol, task.tol_q, limit, every, history, 0,
+        )  # fmt: skip
+        history[:rows, 0] += task.iterations - before
+        task.work += float(state[WORK] - work)
+        task.iterations += int(state[ITERATIONS] - before)
+        if np.isfinite(state[BEST]):
+            task.offer(r, state[BEST], state[BEST_Q])
+        task.note("ADMM", history[:rows])
+        return bool(state[ITERATIONS] > before)
+
+
+def run(task: Task) -> None:
+    """Iterate until the goal is reached or the time is over (ADMM)."""
+    splitting = Splitting(task, warm=bool(task.r.any()))
+    best, since = np.inf, 0
+    while not task.done and not task.late and splitting.advance(500):
+        since = 0 if splitting.error < 0.99 * best else since + 1
+        best = min(best, splitting.error)
+        if since > 100:
+            return  # at rounding, or it does not converge

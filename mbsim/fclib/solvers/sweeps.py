@@ -1,0 +1,218 @@
+"""Block Gauss-Seidel (NSGS): contact by contact, each solved exactly."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.core.jitable import jitable
+from mbsim.fclib.blocks import (
+    block_rows,
+    compressed_rows,
+    diagonal_places,
+    product,
+    product_of_stored,
+)
+from mbsim.fclib.cone import relative_errors
+from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
+from mbsim.fclib.solvers.task import ROWS, Task
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.reduction import Blocks
+
+
+#: Sweeps that |F|/|q| gets at least once the error is small.
+GRACE = 20
+#: With few contacts, sweeps between leaps ahead.
+LEAP = 8
+
+
+@jitable
+def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
+    """Solve every contact once, with the newest impulses of the others; return |change|^2."""
+    d = 1 + len(tangent) + len(rolling)
+    change = 0.0
+    for a in range(len(mu)):
+        first = d * a
+        own = diagonal[a]
+        for row in range(d):
+            work[row] = q[first + row]
+        for k in range(ptr[a], ptr[a + 1]):
+            if k != own:
+                b = d * col[k]
+                for row in range(d):
+                    total = 0.0
+                    for c in range(d):
+                        total += val[k, row, c] * r[b + c]
+                    work[row] += total
+        for row in range(d):
+            work[d + row] = r[first + row]
+        if len(rolling) > 0:
+            contact_rolling(
+                tangent, rolling, val, own, work, mu[a], mu_r[a], r, first,
+                work[2 * d : 3 * d], work[3 * d : 5 * d],
+            )  # fmt: skip
+        elif len(tangent) == 1:
+            r[first], r[first + 1] = contact_2d(
+                val, own, work[0], work[1], mu[a], r[first], r[first + 1]
+            )
+        else:
+            r[first], r[first + 1], r[first + 2] = contact_3d(
+                val, own, work[0], work[1], work[2], mu[a],
+                r[first], r[first + 1], r[first + 2],
+            )  # fmt: skip
+        for row in range(d):
+            change += (r[first + row] - work[d + row]) ** 2
+    return change
+
+
+@jitable
+def local_sweeps(
+    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, history, check
+):
+    """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
+
+    `check` gets the errors with the stored W. Returns the blocks and what `gauss_seidel` does.
+    """
+    d = 1 + len(tangent)
+    ptr, col, val = block_rows(d, len(mu), *compressed_rows(m, m, nz, p, i, x))
+    diagonal = diagonal_places(ptr, col)
+    # without rolling directions the numbers of mu_r do not matter
+    done, error, error_q, rows = gauss_seidel(
+        tangent, (), ptr, col, val, diagonal, q, mu, mu, r, tol, tol_q, sweeps, every, grace,
+        history,
+    )  # fmt: skip
+    u = q.copy()
+    product_of_stored(m, nz, p, i, x, r, u)
+    check[0], check[1] = relative_errors(tangent, (), mu, mu, q, u, r, np.empty(m))
+    return ptr, col, val, diagonal, u, done, error, error_q, rows
+
+
+@jitable
+def _leap(r, old, older, trial):
+    """Write where three iterates lead if one slow direction is left; return whether they do.
+
+    The change shrinks by a factor c each sweep, so that c / (1 - c) of the last one is to come
+    (Aitken's extrapolation of vectors).
+    """
+    product_, square = 0.0, 0.0
+    for k in range(len(r)):
+        change = old[k] - older[k]
+        product_ += (r[k] - old[k]) * change
+        square += change * change
+    if not square > 0.0:
+        return False
+    shrink = product_ / square
+    if shrink < 0.3 or shrink > 0.99999:
+        return False
+    for k in range(len(r)):
+        trial[k] = r[k] + shrink / (1.0 - shrink) * (r[k] - old[k])
+    return True
+
+
+@jitable
+def gauss_seidel(
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, tol, tol_q, sweeps, every, grace,
+    history,
+):  # fmt: skip
+    """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
+
+    With the first reached, the second gets as many sweeps again, and `grace` more, at most.
+    The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
+    of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
+    Returns sweeps done, error, |F|/|q| and the number of rows.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    work = np.empty(5 * d)
+    u = np.empty(len(q))
+    missing = np.empty(len(q))
+    few = len(q) if every == 1 else 0
+    old, older, trial = np.empty(few), np.empty(few), np.empty(few)
+    rows = 0
+    error, error_q = np.inf, np.inf
+    done = 0
+    looked = -1
+    most = sweeps
+    while done < most:
+        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
+        done += 1
+        small = False
+        if done - looked > 1 and done % every:
+            size = 0.0
+            for k in range(len(r)):
+                size += r[k] * r[k]
+            small = change <= tol * tol * size
+        if done % every == 0 or small or done == most:
+            looked = done
+            product(tangent, rolling, ptr, col, val, q, r, u)
+            error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, r, missing)
+            if rows < len(history):
+                history[rows, 0] = done
+                history[rows, 1] = error
+                history[rows, 2] = error_q
+                rows += 1
+            if error <= tol:
+                if error_q <= tol_q:
+                    break
+                if most == sweeps:
+                    most = min(sweeps - 1, 2 * done + grace)
+            elif every == 1 and done >= LEAP:
+                # few contacts: one slow direction is often all that is left
+                phase = done % LEAP
+                if phase == LEAP - 2:
+                    older[:] = r
+                elif phase == LEAP - 1:
+                    old[:] = r
+                elif phase == 0 and _leap(r, old, older, trial):
+                    sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, work)
+                    product(tangent, rolling, ptr, col, val, q, trial, u)
+                    leapt, leapt_q = relative_errors(
+                        tangent, rolling, mu, mu_r, q, u, trial, missing
+                    )
+                    done += 1
+                    if leapt < error:
+                        r[:] = trial
+                        error, error_q = leapt, leapt_q
+                        if error <= tol and error_q <= tol_q:
+                            break
+    return done, error, error_q, rows
+
+
+def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -> Vector:
+    """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
+    b = task.blocks
+    r: Vector = (task.r if start is None else start).copy()
+    history = np.empty((min(ROWS, sweeps // every + 2), 3))
+    done, error, error_q, rows = jit.function(gauss_seidel)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
+        task.tol, task.tol_q, sweeps, every, GRACE, history,
+    )  # fmt: skip
+    history[:rows, 0] += task.iterations
+    task.iterations += done
+    task.work += done * sweep_work(b)
+    task.offer(r, error, error_q)
+    task.note("NSGS", history[:rows])
+    return r
+
+
+def sweep_work(b: Blocks) -> float:
+    """Return the estimated seconds of a sweep."""
+    if b.rolling:
+        return 1e-5 * b.contacts + 2e-8 * len(b.col)
+    if len(b.tangent) == 1:
+        return 2e-8 * b.contacts + 2.5e-9 * len(b.col)
+    return 9e-8 * b.contacts + 7e-9 * len(b.col)
+
+
+def run(task: Task) -> None:
+    """Sweep until the goal is reached or the time is over (NSGS)."""
+    every = 1 if task.blocks.contacts <= 10 else 5
+    chunk = 1000
+    while not task.done and not task.late:
+        before = task.error
+        nsgs(task, chunk, every)
+        if task.error >= before * (1.0 - 1e-12) and task.iterations >= 20 * chunk:
+            return  # at rounding, or it does not converge

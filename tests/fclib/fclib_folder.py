@@ -1,0 +1,23 @@
+"""Where the shared problems are, for the tests that use them."""
+
+from pathlib import Path
+
+import pytest
+
+FOLDER = next(
+    (
+        place
+        for folder in Path(__file__).resolve().parents
+        if (place := folder / "shared" / "data" / "fclib").is_dir()
+    ),
+    Path("../shared/data/fclib"),
+)
+NAMES = sorted(path.stem for path in FOLDER.glob("*.hdf5"))
+
+
+def problem_file(name: str) -> Path:
+    """Return a file of the shared folder, or skip the test where it is absent."""
+    path = FOLDER / f"{name}.hdf5"
+    if not path.is_file():
+        pytest.skip(f"{path} is not on this machine")
+    return path
