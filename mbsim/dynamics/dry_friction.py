@@ -42,7 +42,7 @@ STIFFNESS, LIMIT, STATIC = range(3)
 
 #: Part of the model's speed that is rounding.
 ROUNDING = 1e-13
-#: Velocities that something else holds count as rest below so many times that: assembly leaves them.
+#: What something else holds counts as at rest below so many times that: assembly leaves it.
 AT_REST = 1e4
 
 
