@@ -42,6 +42,8 @@ STIFFNESS, LIMIT, STATIC = range(3)
 
 #: Part of the model's speed that is rounding.
 ROUNDING = 1e-13
+#: What something else holds counts as at rest below so many times that: assembly leaves it.
+AT_REST = 1e4
 
 
 @jitable
@@ -116,12 +118,12 @@ def rest_of(scene, f):
 
 @jitable
 def holding_force(scene, f):
-    """Return the force against x that holds rigid dry friction f, 0 where nothing does."""
+    """Return the force against x that holds rigid dry friction f, no number where it need not."""
     active = scene.equations.active
     for r in range(active[len(active) - 1]):
         if active[r] == scene.applied.equation[f]:
             return -scene.sweep.multiplier[r]
-    return 0.0
+    return math.nan
 
 
 @jitable
@@ -147,6 +149,9 @@ def side_of_dry(scene, y, f):
         if math.isnan(kept[SLIDER]):
             return 0.0
         force, rest = holding_force(scene, f), rest_of(scene, f)
+        if kept[SLIDES] == 0.0 and math.isnan(force):
+            # joints or motions hold it, or move it
+            return math.copysign(1.0, rate) if abs(rate) > AT_REST * rest else 0.0
         return rigid_mode(force, rate, kept[SLIDES], par[STATIC], rest)
     return dry_mode(x, rate, kept[SLIDER], kept[SLIDES], par[STIFFNESS], par[LIMIT], par[STATIC], 1)
 

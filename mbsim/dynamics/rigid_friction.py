@@ -14,6 +14,7 @@ import math
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.dry_friction import (
+    AT_REST,
     STATIC,
     commit_dry,
     dry_motion,
@@ -39,8 +40,6 @@ from mbsim.system.arrays import (
 
 #: What `commit_rigid` returns where equations were taken into use or out of it.
 HELD_OTHERWISE = 2
-#: Velocities at the start count as rest below so many times what is rounding: assembly leaves them.
-AT_REST = 1e4
 
 
 @jitable
@@ -79,6 +78,8 @@ def release(scene):
         if scene.applied.equation[f] < 0 or kept[SLIDES] != 0.0:
             continue
         force = holding_force(scene, f)
+        if math.isnan(force):
+            continue
         kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, STATIC], 0.0)
         if kept[SLIDES] != 0.0:
             count += 1
