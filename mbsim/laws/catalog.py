@@ -50,6 +50,8 @@ class Parameter(NamedTuple):
     name: str
     default: float | None = None  # None: it must be given
     positive: bool = False  # else it may be 0 as well
+    ratio: bool = False  # a Poisson's ratio
+    needs: str = ""  # another attribute without which it means nothing
 
 
 #: What a law with memory does: mode 0 says that it began.

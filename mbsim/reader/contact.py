@@ -30,6 +30,7 @@ from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
+_STIFFNESS = "tangential_stiffness"
 _USERS = {
     *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
 }
@@ -59,6 +60,9 @@ def _build_contact(entry: Entry) -> None:
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in FRICTION_LAWS:
         check_coulomb(entry, cff_type)
+    if cff_type == "STICTION" and cnf_type == "USERCNF" and not entry.given(_STIFFNESS):
+        message = "missing; a user's normal force does not tell the stiffness it would follow from"
+        entry.fault(message, _STIFFNESS)
     posts = any(entry.given(name) for name in _POST)
     asks_user = _asks_user(entry, cff_type)
     cff = subroutine(entry, "cff", "CFFSUB") if asks_user else el.Subroutine()
@@ -119,6 +123,8 @@ def _own_attributes(entry: Entry, cff_type: str) -> tuple[tuple[str, float], ...
     for own in FRICTION_LAWS[cff_type].own:
         if entry.given(own.name):
             given.append((own.name, entry.get(own.name, 0.0)))
+            if own.needs and not entry.given(own.needs):
+                entry.fault(f"means nothing without {own.needs}", own.name)
         elif own.default is None:
             entry.fault(f'cff_type="{cff_type}" needs {own.name}', own.name)
     return tuple(given)
@@ -127,7 +133,9 @@ def _own_attributes(entry: Entry, cff_type: str) -> tuple[tuple[str, float], ...
 def _of_laws() -> dict[str, Spec]:
     """Return the attributes that friction laws bring with them."""
     laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
-    return {p.name: Spec(POSITIVE if p.positive else NOT_NEGATIVE) for law in laws for p in law.own}
+    own = [parameter for law in laws for parameter in law.own]
+    kinds = {p.name: RATIO if p.ratio else POSITIVE if p.positive else NOT_NEGATIVE for p in own}
+    return {name: Spec(kind) for name, kind in kinds.items()}
 
 
 def _check_count(entry: Entry, side: str) -> None:

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import MODELS
 
 import mbsim
+from mbsim.errors import DeckError
 
 
 def run(name, folder=None, edit=(), **settings):
@@ -122,3 +123,24 @@ def test_the_balance_of_energy_closes_with_springs_in_friction():
     assert lost[-1] + given == pytest.approx(given, rel=1e-3)
     total = kinetic + potential + lost
     assert np.abs(total - total[0]).max() < 1e-4 * given
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        ('"STICTION" poisson_ratio="2"', 'poisson_ratio="2": must be a number > -1 and <= 0.5'),
+        ('"STICTION" torsion_radius="2"', 'torsion_radius="2": means nothing without rotational'),
+        ('"CONTENSOU"', 'patch_radius: cff_type="CONTENSOU" needs patch_radius'),
+        ('"LUGRE" stribeck_vel="1"', 'bristle_stiffness: cff_type="LUGRE" needs bristle_stiff'),
+    ],
+)
+def test_what_a_law_cannot_use_is_said(law, said, tmp_path):
+    with pytest.raises(DeckError) as refused:
+        run("stiction_incline.xml", tmp_path, [('"STICTION"', law)])
+    assert said in str(refused.value)
+
+
+def test_stiction_asks_for_its_stiffness_where_the_users_normal_force_tells_none(tmp_path):
+    users = [('"IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"', '"USERCNF"')]
+    with pytest.raises(DeckError, match="tangential_stiffness: missing; a user's normal force"):
+        run("stiction_incline.xml", tmp_path, users)
