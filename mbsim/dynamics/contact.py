@@ -30,7 +30,14 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
-from mbsim.laws.abi import FRICTION_INPUTS, MEMORY_OUT
+from mbsim.laws.abi import (
+    FRICTION_INPUTS,
+    FROZEN,
+    MEMORY_OUT,
+    NORMAL_STIFFNESS,
+    SLIDING_LIMIT,
+    SLIPPING_MASS,
+)
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
 from mbsim.laws.user_normal import (
     EVALUATE,
@@ -172,10 +179,10 @@ def slipping_mass(scene, s):
 def remember(scene, y, s, c, given):
     """Give a friction law what it kept, and what only laws with memory look at."""
     state, at, z = scene.state, FRICTION_INPUTS, scene.slots.z[s]
-    given[20] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
-    given[21] = scene.work.slot[s, STIFFNESS]
-    given[22] = slipping_mass(scene, s)
-    given[23] = math.nan
+    given[FROZEN] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+    given[NORMAL_STIFFNESS] = scene.work.slot[s, STIFFNESS]
+    given[SLIPPING_MASS] = slipping_mass(scene, s)
+    given[SLIDING_LIMIT] = math.nan
     for k in range(scene.contacts.memory[c]):
         if z >= 0:
             given[at + k] = y[z + k]
@@ -233,7 +240,7 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
         code = call_int(contacts.sliding_law[c], call)
         if code != 0:
             return code
-        given[23] = math.hypot(out[0], out[1])
+        given[SLIDING_LIMIT] = math.hypot(out[0], out[1])
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 
@@ -321,9 +328,10 @@ def add_contact(scene, t, h, y, dy, s):
     normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
     row = work.slot[s]
-    # of a power law F = k d^e, whose energy is F d / (e + 1)
-    row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
     row[HELD] = row[MODE] = 0.0
+    if contacts.memory[c] > 0:
+        # of a power law F = k d^e, whose energy is F d / (e + 1)
+        row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
 
     force = scale(normal, n)
     torque = (0.0, 0.0, 0.0)

@@ -88,6 +88,17 @@ def push_of(scene, y, s, given, column):
 
 
 @jitable
+def take_known(L, table):
+    """Take what is known where X alone is carried, whose rates are slip; return the next column."""
+    for column in range(_GIVEN):
+        for row in range(5):
+            table[row, column] = L.law[row, column]
+        for j in range(3):
+            table[5 + j, column] = 1.0 if column == _OF_X[j] else 0.0
+    return _GIVEN
+
+
+@jitable
 def fill(scene, T, y):
     """Keep how friction in the slot named last in `held` depends on what it carries."""
     K, L = T.keeps, T.linear
@@ -102,8 +113,9 @@ def fill(scene, T, y):
             scale(0.5 * point[0], (point[4], point[5], point[6])),
         )
         around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
+    first = 0 if scene.slots.z[s] >= 0 else take_known(L, table)
     upper, lower = K.scratch[0], K.scratch[1]
-    for column in range(_GIVEN + n):
+    for column in range(first, _GIVEN + n):
         size, code = push_of(scene, y, s, given, column), 0
         for side in range(2):
             change = size if side == 0 else -size

@@ -28,7 +28,8 @@ from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
 FRICTION_INPUTS = 24
-DFLAG = 19
+#: Places of the last of them, which only derivatives and laws with memory look at.
+DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT = range(19, FRICTION_INPUTS)
 #: Fields of a law's output before its memory: force, torques, stored energy, mode.
 MEMORY_OUT = 7
 RAISED_INTERPRETED = 1

@@ -77,7 +77,7 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
                 (a[2], a[3], a[4]),
                 (a[5], a[6], a[7]),
                 a[10],
-                int(a[19]),
+                int(a[DFLAG]),
                 0,
                 kept,
                 a[0],
