@@ -332,7 +332,9 @@ def _about(file: Path, contents: Contents) -> dict[str, Any]:
 
 def _unknowns(problem: Local | Global) -> int:
     """Return the number of velocities of a global problem, of impulses of a local one."""
-    return problem.H.m if problem.kind != "local" else len(problem.q)  # type: ignore[union-attr]
+    from mbsim.fclib.problem import Local
+
+    return len(problem.q) if isinstance(problem, Local) else problem.H.m
 
 
 def _matrix(stored: Matrix) -> str:

@@ -236,8 +236,8 @@ def draw(rows: Sequence[Row], tol: float, path: Path) -> None:
         ours = solver.startswith("mbsim")
         x = [1.0, *values, end]
         y = [0.0, *((k + 1) / count for k in range(len(values))), len(values) / count]
-        style = {"linestyle": "-" if ours else "--", "linewidth": 2.0 if "AUTO" in solver else 1.2}
-        axes.step(x, y, where="post", label=solver, **style)  # type: ignore[arg-type]
+        line, width = "-" if ours else "--", 2.0 if "AUTO" in solver else 1.2
+        axes.step(x, y, where="post", label=solver, linestyle=line, linewidth=width)
     axes.set(xscale="log", xlim=(1.0, end), ylim=(0.0, 1.02))
     axes.set_xlabel("time over the best solver's on the same problem")
     axes.set_ylabel("share of problems solved")

@@ -94,7 +94,7 @@ def completed(problem: Local | Global, r: Vector, blocks: Blocks | None = None) 
     if isinstance(problem, Local) and problem.V is None:
         return Solution(_times(problem.W, r) + problem.q, r)
     blocks = reduce(problem) if blocks is None else blocks
-    l = multipliers(blocks, r)  # noqa: E741
+    l = multipliers(blocks, r)  # noqa: E741  FCLIB's name
     if isinstance(problem, Local):
         u = _times(problem.W, r) + problem.q
         return Solution(u if l is None or problem.V is None else u + _times(problem.V, l), r, l=l)
@@ -107,10 +107,13 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
 
     Multipliers and velocities that the solution does not have are computed from r.
     """
-    blocks = reduce(problem) if blocks is None and isinstance(problem, Global) else blocks
+    if isinstance(problem, Global):
+        blocks = reduce(problem) if blocks is None else blocks
+        q = blocks.q
+    else:
+        q = problem.q
     found = _whole(problem, solution, blocks)
     error, missing, u, dynamics, equalities, absolute = _error(problem, found)
-    q = problem.q if isinstance(problem, Local) else blocks.q  # type: ignore[union-attr]
     bound = _norm(q)
     return Figures(
         error,
@@ -186,7 +189,7 @@ def _velocities(
     These are: relative ones of the dynamics and of the equality constraints, and MERIT_1's of the
     latter.
     """
-    r, l = solution.r, solution.l  # noqa: E741
+    r, l = solution.r, solution.l  # noqa: E741  FCLIB's name
     equalities, absolute = 0.0, 0.0
     if isinstance(problem, Local):
         u = _times(problem.W, r) + problem.q

@@ -117,9 +117,9 @@ def solve(
     if guess is not None and guess.r.shape != (m,):
         raise ModelError(f"the guess has {len(guess.r)} impulses, the problem {m}")
     r = np.zeros(m) if guess is None else np.array(guess.r, dtype=np.float64)
-    plain = type(problem) is Local and problem.V is None and problem.mu_r is None
-    if plain and solver == "AUTO" and m:
-        return _solve_plain(problem, tol, r, strict, began, max_seconds)  # type: ignore[arg-type]
+    plain = isinstance(problem, Local) and problem.V is None and problem.mu_r is None
+    if isinstance(problem, Local) and plain and solver == "AUTO" and m:
+        return _solve_plain(problem, tol, r, strict, began, max_seconds)
     method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
     condensed = clock()

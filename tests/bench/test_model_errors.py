@@ -158,3 +158,26 @@ def test_errors_of_each_stop_alone(tmp_path):
         for tol in TOLS:
             results = mbsim.simulate(mbsim.read_model(deck), tol=tol)
             show("sdnd101 alone", tol, results, sdnd101(results, [body]))
+
+
+def test_errors_of_friction_that_holds():
+    for tol in (1e-5, 1e-7):
+        results = run_model("sdnd100.xml", tol=tol)
+        x = results["bodies/2/position"][-1, 0] * np.sqrt(2.0)
+        show("sdnd100", tol, results, {"of the swing": abs(x - 5e-5) / 0.85e-3})
+        results = run_model("stiction_incline.xml", tol=tol)
+        x = results["bodies/2/position"][results["time"] >= 10.0]
+        show("stiction_incline", tol, results, {"moves from 10 to 110 s": np.abs(x - x[0]).max()})
+        results = run_model("lugre_stick_slip.xml", tol=tol)
+        x = results["bodies/2/position"][results["time"] > 20.0 - 1e-9][0, 0]
+        show("lugre_stick_slip", tol, results, {"at 20 s": abs(x - 1.272596)})
+        belts = ("belt_stick_slip", 8.902605407814523, 1.0385164807)
+        for name, period, farthest in (belts, ("belt_weakening", 12.001031295, 1.133943658)):
+            results = run_model(f"{name}.xml", tol=tol)
+            slips = np.array([float(row[0]) for row in results["events"] if row[1] == "slip"])
+            # the last point of each slip that follows a long stick
+            last = slips[np.append(np.diff(slips) > 0.1, True)]
+            begins = last[np.diff(last, prepend=-10.0) > 5.0][1:]
+            found = results["bodies/2/position"][:, 0].max()
+            errors = {"period": np.abs(np.diff(begins) / period - 1.0).max()}
+            show(name, tol, results, errors | {"farthest": abs(found / farthest - 1.0)})
