@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import MODELS
+from decks_io import GROUND, MODELS, run_deck, sphere
 
 import mbsim
 from mbsim.errors import DeckError
@@ -144,3 +144,58 @@ def test_stiction_asks_for_its_stiffness_where_the_users_normal_force_tells_none
     users = [('"IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"', '"USERCNF"')]
     with pytest.raises(DeckError, match="tangential_stiffness: missing; a user's normal force"):
         run("stiction_incline.xml", tmp_path, users)
+
+
+def thrown_across(end):
+    """Return where a block comes to rest that is thrown across an incline, from its equations.
+
+    A damped spring holds it up to mu N; then it is dragged along, |z| = mu N/k.
+    """
+    from scipy.integrate import solve_ivp
+
+    k, limit, along = 1e4, 0.3 * 9.81, np.array([1.5, 0.0])
+    c = 0.4 * math.sqrt(k)
+
+    def stick(t, y):
+        z, v = y[2:4], y[4:6]
+        force = k * z + c * v
+        return [*v, *v, *(along - force * min(1.0, limit / max(np.hypot(*force), 1e-300)))]
+
+    def slip(t, y):
+        z, v = y[2:4], y[4:6]
+        pull = z / np.hypot(*z)
+        return [*v, *(v - (v @ pull) * pull), *(along - limit * pull)]
+
+    def slips(t, y):
+        return k * np.hypot(*y[2:4]) - limit
+
+    def goes_back(t, y):
+        return -(y[2:4] @ y[4:6])
+
+    slips.terminal = goes_back.terminal = True
+    slips.direction = goes_back.direction = 1
+    t, y, phases = 0.0, np.array([0, 0, 0, 0, 0, 2.0]), [(stick, slips), (slip, goes_back)]
+    while t < end:
+        rates, until = phases[0]
+        found = solve_ivp(rates, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-14, events=until)
+        t, y = found.t[-1], found.y[:, -1]
+        phases.reverse()
+    return y[:2]
+
+
+@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-5), ("DOPRI5", 1e-8), ("RADAU5", 1e-7)])
+def test_a_block_thrown_across_an_incline_goes_as_its_equations_say(tmp_path, method, tol):
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
+        + """
+<Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="1e4"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+    results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method, tol=tol)
+    # the spring's direction is followed to its own stretch of mu N/k, whatever the steps are
+    give = 0.3 * 9.81 / 1e4
+    assert results["bodies/2/position"][-1, :2] == pytest.approx(thrown_across(1.0), abs=give)
