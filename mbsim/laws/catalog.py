@@ -51,11 +51,16 @@ class Parameter(NamedTuple):
     default: float | None = None  # None: it must be given
     positive: bool = False  # else it may be 0 as well
     ratio: bool = False  # a Poisson's ratio
+    flag: bool = False  # TRUE or FALSE: 1 or 0
     needs: str = ""  # another attribute without which it means nothing
 
 
 #: What a law with memory does: mode 0 says that it began.
 BEGUN, STICK, SLIP = 0.0, 1.0, 2.0
+
+
+#: Part of the usual size below which what a law integrates does not follow any faster.
+LEAST = 1e-3
 
 
 class FrictionLaw(NamedTuple):
@@ -90,6 +95,7 @@ class FrictionInput(NamedTuple):
     stiffness: float  # of the normal force, by depth [F/L]; this and the next only with memory
     mass: float  # that slips, 1/(1/m_I + 1/m_J), a part for each point [M, such that F = m a]
     limit: float  # friction of the user's own function in sliding [F], NaN where there is none
+    size: float  # of what an integrated law keeps under a usual load, 0 of other laws
 
 
 NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.catalog import FRICTION_LAWS, Parameter
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
     CFF_TYPES,
@@ -23,6 +23,7 @@ from mbsim.reader.kinds import (
     TEXT,
     UNIT,
     USER,
+    Kind,
     keyword,
 )
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
@@ -122,7 +123,7 @@ def _own_attributes(entry: Entry, cff_type: str) -> tuple[tuple[str, float], ...
     given = []
     for own in FRICTION_LAWS[cff_type].own:
         if entry.given(own.name):
-            given.append((own.name, entry.get(own.name, 0.0)))
+            given.append((own.name, float(entry.get(own.name, 0.0))))
             if own.needs and not entry.given(own.needs):
                 entry.fault(f"means nothing without {own.needs}", own.name)
         elif own.default is None:
@@ -134,8 +135,16 @@ def _of_laws() -> dict[str, Spec]:
     """Return the attributes that friction laws bring with them."""
     laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
     own = [parameter for law in laws for parameter in law.own]
-    kinds = {p.name: RATIO if p.ratio else POSITIVE if p.positive else NOT_NEGATIVE for p in own}
-    return {name: Spec(kind) for name, kind in kinds.items()}
+    return {parameter.name: Spec(_kind_of(parameter)) for parameter in own}
+
+
+def _kind_of(parameter: Parameter) -> Kind:
+    """Return what an attribute that a law brings with it may be."""
+    if parameter.flag:
+        return FLAG
+    if parameter.ratio:
+        return RATIO
+    return POSITIVE if parameter.positive else NOT_NEGATIVE
 
 
 def _check_count(entry: Entry, side: str) -> None:

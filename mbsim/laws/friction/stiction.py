@@ -11,13 +11,16 @@ direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
 
 k is `tangential_stiffness`, or 2 (1 - nu)/(2 - nu) times the stiffness of the normal force at its
 depth (Mindlin), with nu `poisson_ratio`. Where k grows with the depth the force in the spring
-stays, where it falls z does, so that no energy comes of it (Thornton). c is `tangential_damping`,
+stays, where it falls z does, so that no energy comes of it (Thornton). With `incremental` FALSE z
+always stays, F = -k z: the rebound of impacts is nearer to measured ones, but a load that comes
+and goes may give energy by it (Elata). c is `tangential_damping`,
 or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more would let it slip late.
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
 up to mu_s N r. With `cff_fnc_name` the size of what that function returns takes the place of
 mu_d N.
 Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
-65 (1991) 153-166; J. C. Simo, T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
+65 (1991) 153-166; D. Elata, J. G. Berryman, Mechanics of Materials 24 (1996) 229-240; J. C. Simo,
+T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
 """
 
 from __future__ import annotations
@@ -77,6 +80,7 @@ def _dynamic_limit(inputs, mu_dynamic):
     Parameter("poisson_ratio", 0.3, ratio=True),
     Parameter("rotational_stiffness", 0.0, needs="torsion_radius"),
     Parameter("torsion_radius", 0.0, needs="rotational_stiffness"),
+    Parameter("incremental", 1.0, flag=True),
     memory=8,
     uses_x=True,
     takes_function=True,
@@ -92,6 +96,7 @@ def stiction(
     poisson_ratio,
     rotational_stiffness,
     torsion_radius,
+    incremental,
 ):
     """Return (Fx, Fy, Mx, My, Tz, energy of the springs, mode) and what is kept."""
     k = tangential_stiffness
@@ -105,7 +110,7 @@ def stiction(
         c = 2.0 * DAMPING * math.sqrt(k * inputs.mass)
 
     # the spring as it would be if nothing slipped
-    ease = memory[_STIFFNESS] / k if 0.0 < memory[_STIFFNESS] < k else 1.0
+    ease = memory[_STIFFNESS] / k if incremental == 1.0 and 0.0 < memory[_STIFFNESS] < k else 1.0
     kept = (memory[0] * ease, memory[1] * ease)
     zx = kept[0] + inputs.x[0] - memory[_X]
     zy = kept[1] + inputs.x[1] - memory[_X + 1]
