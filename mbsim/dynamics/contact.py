@@ -37,6 +37,7 @@ from mbsim.laws.abi import (
     NORMAL_STIFFNESS,
     SLIDING_LIMIT,
     SLIPPING_MASS,
+    USUAL_SIZE,
 )
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
 from mbsim.laws.user_normal import (
@@ -183,6 +184,7 @@ def remember(scene, y, s, c, given):
     given[NORMAL_STIFFNESS] = scene.work.slot[s, STIFFNESS]
     given[SLIPPING_MASS] = slipping_mass(scene, s)
     given[SLIDING_LIMIT] = math.nan
+    given[USUAL_SIZE] = scene.contacts.size[c]
     for k in range(scene.contacts.memory[c]):
         if z >= 0:
             given[at + k] = y[z + k]

@@ -27,9 +27,11 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
-FRICTION_INPUTS = 24
+FRICTION_INPUTS = 25
 #: Places of the last of them, which only derivatives and laws with memory look at.
-DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT = range(19, FRICTION_INPUTS)
+DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, USUAL_SIZE = range(
+    19, FRICTION_INPUTS
+)
 #: Fields of a law's output before its memory: force, torques, stored energy, mode.
 MEMORY_OUT = 7
 RAISED_INTERPRETED = 1
@@ -60,6 +62,7 @@ def friction_input(a):
         a[21],
         a[22],
         a[23],
+        a[24],
     )
 
 

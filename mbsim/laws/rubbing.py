@@ -40,6 +40,7 @@ class Sample(NamedTuple):
     memory: int = 0
     integrated: bool = False
     way: float = 0.0  # over which friction builds up
+    size: float = 0.0  # of what an integrated law keeps under a usual load
 
 
 def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sample:
@@ -57,7 +58,8 @@ def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sam
         stiffness = 0.8 * at.stiffness
     most = max(values.get("mu_static", 0.0), values.get("mu_dynamic", 0.0))
     way = most * at.nforce / stiffness if law.memory else 0.0
-    return Sample(law.name, ask, law.memory, law.size is not None, way)
+    size = law.size(at.nforce, *par) if law.size is not None else 0.0
+    return Sample(law.name, ask, law.memory, law.size is not None, way, size)
 
 
 class Rub:
@@ -86,6 +88,7 @@ class Rub:
             stiffness=at.stiffness,
             mass=at.mass,
             limit=math.nan,
+            size=self.sample.size,
         )
         return self.sample.ask(inputs, memory)
 

@@ -35,10 +35,12 @@ def parameters(law, **values):
     return [given[name] for name in law.parameters]
 
 
-def slip(x, y, spin=0.0, nforce=10.0, at=ZERO, rolling=(0.0, 0.0), frozen=0.0, stiffness=1e5):
+def slip(
+    x, y, spin=0.0, nforce=10.0, at=ZERO, rolling=(0.0, 0.0), frozen=0.0, stiffness=1e5, size=0.0
+):
     return FrictionInput(
         *(0.0, 0.0, at, (x, y, spin), rolling, nforce, 0.0, 0.0, ZERO, ZERO),
-        *(0.0, frozen, stiffness, 1.0, math.nan),
+        *(0.0, frozen, stiffness, 1.0, math.nan, size),
     )
 
 
@@ -55,11 +57,12 @@ class Rub:
 
     def __init__(self, law, *par):
         self.law, self.par = law, par
+        self.size = 0.0 if law.size is None else law.size(6.0, *par)
         self.memory, self.at, self.taken, self.force = (0.0,) * law.memory, np.zeros(3), 0.0, None
         self.mode = BEGUN
 
     def ask(self, v, nforce, at, memory):
-        inputs = slip(*v, nforce=nforce, at=tuple(at))
+        inputs = slip(*v, nforce=nforce, at=tuple(at), size=self.size)
         if self.law.memory == 0:
             return np.array(self.law.force(inputs, *self.par)), ()
         out, new = self.law.force(inputs, memory, *self.par)
@@ -159,18 +162,33 @@ def closed_way(rng, steps):
     return 10.0 ** rng.uniform(-3, -1) * v, np.maximum(load, 0.0)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_no_law_gives_energy_over_closed_ways_under_changing_loads(friction, seed):
+def energy_taken(friction, seed, ways, **own):
+    """Return what a law takes over random closed ways under changing loads, over all work done."""
     rng, steps, span = np.random.default_rng(seed), 400, 0.05
-    own = {"bristle_damping": 1.0, "damping_trans_vel": 0.01}
-    for _ in range(250 // (5 if friction.memory else 1)):
+    own = {"bristle_damping": 1.0, "damping_trans_vel": 0.01, **own}
+    found = []
+    for _ in range(ways):
         rub = Rub(friction, *parameters(friction, **own))
         v, load = closed_way(rng, steps)
         work = 0.0
         for each, nforce in zip(v, load, strict=True):
             force = rub.go(span / steps, each, nforce)
             work += span / steps * abs(force[[0, 1, 4]] @ each)
-        assert rub.taken >= -1e-3 * work
+        found.append(rub.taken / work)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_law_gives_energy_over_closed_ways_under_changing_loads(friction, seed):
+    taken = energy_taken(friction, seed, 50 if friction.memory else 250)
+    assert taken.min() >= -1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4, 20))
+@pytest.mark.parametrize("name", KEEPING)
+def test_no_law_with_memory_gives_energy_over_a_thousand_closed_ways(name, seed):
+    assert energy_taken(FRICTION_LAWS[name], seed, 50).min() >= -1e-3
 
 
 def test_coulomb_on_is_the_step_curve_of_the_manual():

@@ -199,3 +199,31 @@ def test_a_block_thrown_across_an_incline_goes_as_its_equations_say(tmp_path, me
     # the spring's direction is followed to its own stretch of mu N/k, whatever the steps are
     give = 0.3 * 9.81 / 1e4
     assert results["bodies/2/position"][-1, :2] == pytest.approx(thrown_across(1.0), abs=give)
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        'LUGRE" mu_static="0.4" mu_dynamic="0.3" stribeck_vel="0.01" bristle_damping="300"',
+        'DAHL" mu_dynamic="0.3"',
+    ],
+)
+def test_a_ball_lands_with_much_slip_on_bristles(tmp_path, law, method):
+    model = (
+        GROUND
+        + sphere(0.15, v=(3.0, 1.0, 0.0))
+        + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1.5" damping="30" dmax="1e-3"
+  cff_type="{law} bristle_stiffness="1e5"/>
+<Force_Gravity grav_z="-9.81"/>"""
+    )
+    results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method)
+    p, v, w = (
+        results[f"bodies/2/{name}"][-1] for name in ("position", "velocity", "angular_velocity")
+    )
+    # it rolls; momentum about the contact is kept: v = 5/7 v0 where friction acts at the radius
+    assert v[:2] == pytest.approx(np.array([3.0, 1.0]) * 5 / 7, rel=0.02)
+    # the contact is in the middle of the depth
+    assert v[:2] == pytest.approx(0.5 * (0.1 + p[2]) * np.array([w[1], -w[0]]), rel=1e-4)

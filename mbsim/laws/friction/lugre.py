@@ -7,6 +7,8 @@ s0 is `bristle_stiffness`, s1 `bristle_damping`, s2 `viscous_coef`. From slip to
 passive where s1 <= 4 g/|v|; the published set (s1 = sqrt(1e5)) breaks that at high slip. With
 `damping_trans_vel` v_d the damping of the bristles is s1 exp(-(v/v_d)^2), which keeps it.
 Under a load that goes to and fro it drifts: it does not hold like STICTION.
+As N goes to 0 the bristles would follow ever faster; so where g is less than a thousandth of the
+usual one they follow as at that, and give less force in the same ratio: g, in a steady slide.
 Sources: C. Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419-425; N. Barabanov,
 R. Ortega, ibid. 45 (2000) 675-686 on passivity.
 """
@@ -15,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import SLIP, Parameter, friction_law
+from mbsim.laws.catalog import LEAST, SLIP, Parameter, friction_law
 from mbsim.laws.curves import stribeck as falling
 
 
@@ -51,12 +53,14 @@ def lugre(
     z, v = memory, inputs.xdot
     speed = math.hypot(v[0], v[1])
     g = inputs.nforce * falling(speed, mu_static, mu_dynamic, stribeck_vel, 2.0)
-    if g <= 0.0:
+    least = max(g, LEAST * bristle_stiffness * inputs.size)
+    if least <= 0.0:
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), (0.0, 0.0)
-    wear = bristle_stiffness * speed / g
+    part, wear = g / least, bristle_stiffness * speed / least
     rate = (v[0] - wear * z[0], v[1] - wear * z[1])
     damping = bristle_damping * math.exp(-((speed / damping_trans_vel) ** 2))
-    fx = -(bristle_stiffness * z[0] + damping * rate[0] + viscous_coef * v[0])
-    fy = -(bristle_stiffness * z[1] + damping * rate[1] + viscous_coef * v[1])
-    stored = 0.5 * bristle_stiffness * (z[0] * z[0] + z[1] * z[1])
+    viscous = viscous_coef if g > 0.0 else 0.0
+    fx = -part * (bristle_stiffness * z[0] + damping * rate[0]) - viscous * v[0]
+    fy = -part * (bristle_stiffness * z[1] + damping * rate[1]) - viscous * v[1]
+    stored = 0.5 * part * bristle_stiffness * (z[0] * z[0] + z[1] * z[1])
     return (fx, fy, 0.0, 0.0, 0.0, stored, SLIP), rate
