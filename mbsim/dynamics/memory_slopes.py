@@ -182,13 +182,19 @@ def count_of(K, k):
 
 
 @jitable
-def follow(K, k, n, Z, row, column):
-    """Return an entry of C Z B: force `row` by argument `column`."""
-    total = 0.0 * Z[0, 0]
-    for i in range(n):
+def follow(K, k, n, Z, row, through, part):
+    """Write a row of C Z B into `part`, the force `row` by each argument; return whether any."""
+    some = False
+    for j in range(n):
+        through[j] = 0.0
+        for i in range(n):
+            through[j] += K.table[k, row, _GIVEN + i] * Z[i, j]
+    for column in range(_GIVEN):
+        part[column] = 0.0
         for j in range(n):
-            total += K.table[k, row, _GIVEN + i] * Z[i, j] * K.table[k, 5 + j, column]
-    return total
+            part[column] += through[j] * K.table[k, 5 + j, column]
+        some = some or part[column] != 0.0
+    return some
 
 
 @jitable
@@ -219,20 +225,24 @@ def add_to_matrix(scene, T, M):
                     if way == 5:
                         rate = -K.press[k, 0] * lever[q] - K.press[k, 1] * rate
                     turned[way, q] = rate
+            # E is free from here on
+            part, by_move = E[0], E[1]
             for row in range(5):
-                for column in range(_GIVEN):
-                    part = follow(K, k, n, Z, row, column)
-                    if part == 0.0:
+                if not follow(K, k, n, Z, row, A[0], part):
+                    continue
+                for j in range(6):
+                    by_move[j] = 0.0
+                    for column in range(_GIVEN):
+                        by_move[j] += part[column] * turned[column, j]
+                for of in range(2):
+                    a = pair[of]
+                    if a >= nb:
                         continue
-                    for of in range(2):
-                        a = pair[of]
-                        if a >= nb:
-                            continue
-                        size = part if of == by else -part
-                        block, lever = M.A[P.place[a, b]], K.lever[k, of, 1 + row]
-                        for i in range(6):
-                            for j in range(6):
-                                block[i, j] -= size * lever[i] * turned[column, j]
+                    sign = 1.0 if of == by else -1.0
+                    block, lever = M.A[P.place[a, b]], K.lever[k, of, 1 + row]
+                    for i in range(6):
+                        for j in range(6):
+                            block[i, j] -= sign * lever[i] * by_move[j]
 
 
 @jitable
@@ -246,18 +256,21 @@ def drive(scene, T, M, r, k, e, with_moves):
         b = pair[by]
         if b >= nb:
             continue
-        E, sign = M.work[2], 1.0 if by == 0 else -1.0
+        E, rates, sign = M.work[2], M.work[3, 0], 1.0 if by == 0 else -1.0
+        for i in range(6):
+            rates[i] = M.rate[b, i]
         if with_moves:
             times_rate(T.linear, M, b, E)
+            for i in range(6):
+                for q in range(6):
+                    rates[i] += E[i, q] * M.g[b, q]
         for way in range(6):
             lever = K.lever[k, by, (way + 1) % 6]
             move, rate = 0.0 * M.c[0, 0], 0.0 * M.c[0, 0]
             for i in range(6):
-                rate += lever[i] * M.rate[b, i]
+                rate += lever[i] * rates[i]
                 if with_moves:
                     move += lever[i] * M.g[b, i]
-                    for q in range(6):
-                        rate += lever[i] * E[i, q] * M.g[b, q]
             if way == 5:
                 rate = -K.press[k, 0] * move - K.press[k, 1] * rate
             for i in range(n):

@@ -151,6 +151,25 @@ def test_calls_of_friction_laws():
         assert total < 0.0 or law.memory > 0
 
 
+def test_cost_of_a_block_that_is_held(tmp_path):
+    """STICTION against friction over slip velocity by STEP, on 20 degrees for 110 s."""
+    text = (MODELS / "stiction_incline.xml").read_text()
+    step = 'cff_type="COULOMB_ON" stiction_trans_vel="1e-3" friction_trans_vel="2e-3"'
+    assert 'cff_type="STICTION"' in text
+    (tmp_path / "step.xml").write_text(text.replace('cff_type="STICTION"', step))
+    for tol in (1e-5, 1e-7):
+        for deck in (MODELS / "stiction_incline.xml", tmp_path / "step.xml"):
+            model = mbsim.read_model(deck)
+            runs = [mbsim.simulate(model, tol=tol) for _ in range(6)]
+            p = runs[-1]["bodies/2/position"][runs[-1]["time"] >= 10.0]
+            print(
+                f"\n{deck.stem}, tol {tol:g}: loop "
+                f"{1e3 * statistics.median(float(run.stats['loop_s']) for run in runs[1:]):.2f} ms, "
+                f"moves {np.abs(p - p[0]).max():.1e} m from 10 to 110 s"
+            )
+            assert np.isfinite(p).all()
+
+
 @jitable
 def _call(address, given, par, out):
     return call_int(address, (1, given, par, out))
@@ -164,8 +183,9 @@ def _calls(address, given, par, out, count):
 def ns_a_call(user, count):
     """Return the median time of a call of a friction function from compiled code [ns]."""
     from mbsim.core import jit
+    from mbsim.laws.abi import FRICTION_INPUTS
 
-    run, given, out = jit.function(_calls), np.zeros(24), np.zeros(5)
+    run, given, out = jit.function(_calls), np.zeros(FRICTION_INPUTS), np.zeros(5)
     given[5], given[10] = 0.3, 50.0
     run(user.address, given, user.row, out, 10)
     times = []
