@@ -26,6 +26,7 @@ from mbsim.runaway import Pace
 from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
+    from mbsim.dumping import ContactProblems
     from mbsim.results.reading import Results
     from mbsim.system.build import System
     from mbsim.system.changes import Parameters
@@ -81,6 +82,7 @@ class Runner:
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
         self.interrupted = False
+        self.dump: ContactProblems | None = None
 
     def _open_fcl_door(self) -> Any:
         """Put FCL behind the scene's door where a pair may need it."""
@@ -158,17 +160,52 @@ class Runner:
         scene = self.system.scene
         if len(scene.tree.body) == 0:
             return None
+
+        def serve(what: int, y: Any) -> None:
+            self._ask_joints(what, t, y, y)
+
+        return serve
+
+    def _ask_joints(self, what: int, t: float, y: Any, dy: Any) -> None:
+        """Ask something at the joints' door."""
         from mbsim.system.arrays import JOINTS_DOOR
 
         pointer = ctypes.c_void_p
         door = ctypes.CFUNCTYPE(
             ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer
-        )(int(scene.world.doors[JOINTS_DOOR]))
+        )(int(self.system.scene.world.doors[JOINTS_DOOR]))
+        door(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
 
-        def serve(what: int, y: Any) -> None:
-            door(self.problem.context, what, t, y.ctypes.data, y.ctypes.data)
+    def dump_every(self, every: int, resumed: bool) -> None:
+        """Write the contact problem of every so many steps from here on."""
+        from mbsim.dumping import ContactProblems
+        from mbsim.integrators import scheme
+        from mbsim.system.arrays import ACCELERATE
 
-        return serve
+        folder = self.recorder.directory
+        if folder is None:
+            raise ModelError("dump_fclib needs an output folder")
+        idle = np.zeros(len(self.method.y))
+
+        def evaluate(t: float, y: Any) -> float:
+            return self.call(self.problem.rhs, t, 0.0, y, idle)
+
+        def accelerate(t: float, y: Any, dy: Any) -> None:
+            self._ask_joints(ACCELERATE, t, y, dy)
+
+        self.dump = ContactProblems(
+            self.system, every, folder / "fclib", evaluate, accelerate, resumed
+        )
+        self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
+
+    def _dump(self) -> None:
+        """Write the contact problem of the step taken last, where its turn has come."""
+        from mbsim.integrators import scheme
+
+        memory = self.method.memory
+        t, h = float(memory[scheme.TIME]), float(memory[scheme.LAST_STEP])
+        if self.dump is not None:
+            self.dump.watch(int(self.method.counts[scheme.STEPS]), t, h, self.method.y)
 
     def balance(self, stage: Stage) -> None:
         """Put the bodies into equilibrium."""
@@ -377,7 +414,8 @@ class Runner:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         self._change()
-        budget, pace = FIRST_BUDGET, Pace(simulation.start_time, simulation.end_time)
+        budget = FIRST_BUDGET if self.dump is None else 1
+        pace = Pace(simulation.start_time, simulation.end_time)
         if fresh or stage.is_static:
             if not self._begin_stage(stage):
                 return
@@ -402,6 +440,10 @@ class Runner:
             # at most four times as many: the first calls also compile or load code
             budget = int(min(max(wanted, 1.0), 4.0 * budget))
             self.recorder.take()
+            if self.dump is not None and outcome != problem.FAILED:
+                # after every step
+                budget = 1
+                self._dump()
             if outcome == problem.DONE:
                 return
             if outcome == problem.HAPPENED and not self._sense(simulation.end_time):
@@ -505,6 +547,7 @@ def simulate(
     detector: str = "auto",
     interpret_plugins: bool = False,
     allow_overlap: bool = False,
+    dump_fclib: int | None = None,
     progress: Progress | None = None,
     notify: Notify | None = None,
 ) -> Results:
@@ -532,6 +575,8 @@ def simulate(
         "fcl" sends every pair through FCL.
     interpret_plugins, allow_overlap : bool
         Do not compile user subroutines; start although shapes overlap deeply.
+    dump_fclib : int, optional
+        Write the frictional contact problem of every so many steps into `output`/fclib.
     progress : callable, optional
         Called with time, step and end time [T] now and then.
     notify : callable, optional
@@ -606,8 +651,12 @@ def simulate(
             else:
                 runner.assemble()
                 runner.settle_contacts(allow_overlap)
+            if dump_fclib is not None:
+                runner.dump_every(dump_fclib, resume)
             runner.run(progress, resume)
             recorder.end()
+            if runner.dump is not None:
+                tell(f"{runner.dump.written} contact problems in {runner.dump.folder}")
         status = "finished"
     except Interrupted as error:
         status = "interrupted"

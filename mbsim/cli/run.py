@@ -73,6 +73,12 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
 )
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option("--allow-overlap", is_flag=True, help="Start although shapes overlap deeply.")
+@click.option(
+    "--dump-fclib",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Write the contact problem of every N-th step, FCLIB files in DIR/fclib.",
+)
 def command(
     model: str,
     output: Path | None,

@@ -1,0 +1,119 @@
+"""`mbsim run --dump-fclib N`: contacts of a run as frictional contact problems."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import GROUND, MODELS, sphere, write_deck
+
+import mbsim
+from mbsim.cli.main import main
+from mbsim.errors import ModelError, ResultsError
+from mbsim.fclib import hdf5
+from mbsim.fclib.solve import solve
+
+CONTACT = """
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="100" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.6" mu_dynamic="0.5"/>
+<Force_Gravity grav_x="2" grav_z="-9.81"/>"""
+
+
+def run(folder, deck, every=3, **settings):
+    out = folder / "out"
+    results = mbsim.simulate(mbsim.read_model(deck), output=out, dump_fclib=every, **settings)
+    files = sorted(
+        (out / "fclib").glob("*.hdf5"), key=lambda path: int(path.name.split("-i")[1].split("-")[0])
+    )
+    return results, [hdf5.read(path) for path in files], files
+
+
+def step_of(contents):
+    """Return time and step of a problem."""
+    words = contents.problem.info.description.replace(",", "").split()
+    return float(words[1]), float(words[3])
+
+
+def test_a_block_at_rest_needs_the_impulse_of_its_weight(tmp_path):
+    results, problems, files = run(tmp_path, MODELS / "stiction_incline.xml", every=5)
+    steps = int(results.stats["steps"])
+    assert [int(path.name.split("-i")[1].split("-")[0]) for path in files] == [
+        *range(5, steps + 1, 5)
+    ]
+    last = problems[-1]
+    t, h = step_of(last)
+    assert t <= 110.0
+    assert last.problem.contacts == 4
+    assert last.problem.mu == pytest.approx(0.4)
+    found = solve(last.problem, tol=1e-10)
+    assert found.status == "solved"
+    pressed, across = found.r[0::3].sum(), found.r.reshape(4, 3)[:, 1:].sum(axis=0)
+    angle = math.radians(20.0)
+    assert pressed == pytest.approx(9.81 * h * math.cos(angle), rel=1e-8)
+    assert np.hypot(*across) == pytest.approx(9.81 * h * math.sin(angle), rel=1e-8)
+    # the run's own forces do the same
+    guess = last.guesses[0]
+    assert guess.r[0::3].sum() == pytest.approx(pressed, rel=1e-6)
+    assert np.abs(guess.u).max() < 1e-6 * np.abs(last.problem.q).max()
+
+
+def test_a_ball_that_slides_has_its_matrix_in_closed_form(tmp_path):
+    deck = write_deck(tmp_path, GROUND + sphere(0.1 - 9.81e-5, v=(1.0, 0, 0)) + CONTACT, 0.05)
+    _, problems, _ = run(tmp_path, deck)
+    problem, arm = problems[0].problem, 0.1 - 0.5 * 9.81e-5
+    turn = arm**2 / (0.4 * 0.1**2)
+    wanted = np.diag([1.0, 1.0 + turn, 1.0 + turn])
+    np.testing.assert_allclose(problem.W.csr().toarray(), wanted, rtol=1e-5, atol=1e-12)
+
+
+def test_joints_are_in_the_matrix(tmp_path):
+    model = f"""
+<Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1" pos_z="-0.09999"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Reference_Marker id="11" body_id="1" theta="1.5707963267948966"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"/>
+<Reference_Marker id="20" body_id="2" pos_x="1"/>
+<Reference_Marker id="21" body_id="2" theta="1.5707963267948966"/>
+<Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.1"/>
+<Constraint_Joint id="1" type="REVOLUTE" i_marker_id="21" j_marker_id="11"/>
+{CONTACT}"""
+    _, problems, _ = run(tmp_path, write_deck(tmp_path, model, 0.2))
+    W = problems[-1].problem.W.csr().toarray()
+    # the rod turns about y: the normal has the arm 1, what lies along x 0.1, along y none
+    wanted = np.array([1.0, 0.1**2, 0.0]) / 1.1
+    np.testing.assert_allclose(np.diag(W), wanted, atol=2e-3)
+    assert np.linalg.matrix_rank(W, tol=1e-9) == 1
+    # what the weight alone would make of it in the step
+    _, h = step_of(problems[-1])
+    assert problems[-1].problem.q[0] == pytest.approx(-9.81 / 1.1 * h, rel=2e-3)
+    assert solve(problems[-1].problem, tol=1e-10).status == "solved"
+
+
+def test_the_run_is_the_same_with_and_without(tmp_path):
+    model = mbsim.read_model(MODELS / "stiction_incline.xml")
+    with_it = mbsim.simulate(model, output=tmp_path / "a", dump_fclib=2)
+    without = mbsim.simulate(model)
+    np.testing.assert_array_equal(with_it["state/y"], without["state/y"])
+
+
+def test_what_is_there_already_stays(tmp_path):
+    deck = str(MODELS / "stiction_incline.xml")
+    _, _, files = run(tmp_path, deck, every=40)
+    kept = files[0].read_bytes()
+    with pytest.raises(ResultsError, match="holds problems of an earlier run"):
+        run(tmp_path, deck, every=40)
+    assert files[0].read_bytes() == kept
+    with pytest.raises(ModelError, match="dump_fclib needs an output folder"):
+        mbsim.simulate(mbsim.read_model(deck), dump_fclib=1)
+    said = CliRunner().invoke(main, ["run", deck, "--dump-fclib", "0"])
+    assert said.exit_code == 2
+    assert "--dump-fclib" in said.output
