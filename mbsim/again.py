@@ -227,6 +227,7 @@ class Again:
             "stored": float(slot[at.STORED] + slot[at.HELD]),
             "point": row[a.INC_POINT : a.INC_POINT + 3],
             "normal": row[a.INC_NORMAL : a.INC_NORMAL + 3],
+            "area": float(row[a.INC_AREA]),
         }
         kept = int(contacts.memory[c])
         for k in range(kept if contacts.size[c] == 0.0 else 0):

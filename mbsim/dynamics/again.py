@@ -14,9 +14,11 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact import add_contact
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.output import fill_contacts
+from mbsim.geometry.catalog import AREA
 from mbsim.system.arrays import (
     AGAIN,
     CONTACT_COLUMNS,
+    INC_AREA,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -50,6 +52,8 @@ def put_back(scene, row):
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         state.t[s, k] = row[INC_TANGENT + k]
+    if scene.kinds.whole[pairs.kind[pair]] > 0.0:
+        work.points[s + 1, AREA] = row[INC_AREA]
     state.touching[s] = int(row[INC_FROZEN])
     for k in range(state.before.shape[1]):
         state.before[s, k] = row[INC_MEMORY + k]

@@ -30,6 +30,7 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.geometry.catalog import AREA
 from mbsim.laws.abi import (
     FRICTION_INPUTS,
     FROZEN,
@@ -38,6 +39,7 @@ from mbsim.laws.abi import (
     SLIDING_LIMIT,
     SLIPPING_MASS,
 )
+from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
 from mbsim.laws.user_normal import (
     EVALUATE,
@@ -67,6 +69,8 @@ DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 # of friction with memory: dF/d(depth) of the normal force, energy stored, mode
 STIFFNESS, HELD, MODE = 12, 13, 14
+# of a pair that is one incident: its area
+PATCH = 15
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -154,6 +158,18 @@ def contact_of(scene, s):
 
 
 @jitable
+def whole_of(scene, s):
+    """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
+    return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
+
+
+@jitable
+def patch(scene, s):
+    """Return the area of contact of slot s, 0 for a point."""
+    return scene.work.slot[s, PATCH] if whole_of(scene, s) > 0.0 else 0.0
+
+
+@jitable
 def add_wrench(scene, y, b, p, force, torque):
     """Add a force at p and a torque to body b."""
     arm = sub(p, position(scene, y, b))
@@ -226,8 +242,9 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
     given[8], given[9] = spin_rates[0], spin_rates[1]
     given[10] = normal
-    given[11] = 0.0
-    given[12] = 0.0
+    area = patch(scene, s)
+    given[11] = area
+    given[12] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
     if contacts.memory[c] > 0:
         remember(scene, y, s, c, given)
     scene.log.counters[FRICTION_CALLS] += 1
@@ -247,14 +264,15 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
 
 @jitable
 def ask_normal(scene, t, y, c, at, depth, rate, out):
-    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal."""
+    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal, area."""
     contacts = scene.contacts
     if contacts.user_normal[c] == 0:
         return call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     # a user's law looks at more, as if in the middle of a question for forces
-    gi, gj, p, n = at
+    gi, gj, p, n, area = at
     place = floats_at(contacts.user_normal[c], PLACE)
     place[TIME], place[PLACE_DEPTH], place[PLACE_RATE] = t, depth, rate
+    place[PLACE_AREA] = area
     loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
     locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
     ni, nj = along_marker(scene, gi, scale(-1.0, n)), along_marker(scene, gj, n)
@@ -318,20 +336,26 @@ def add_contact(scene, t, h, y, dy, s):
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
 
+    row, whole = work.slot[s], whole_of(scene, s)
+    if whole > 0.0:
+        row[PATCH] = work.points[s + 1, AREA]
+
     # normal force; out: force, force at rate 0, stored energy
     out = work.law_out
     scene.log.counters[NORMAL_CALLS] += 1
-    code = ask_normal(scene, t, y, c, (gi, gj, p, n), depth, rate, out)
+    code = ask_normal(scene, t, y, c, (gi, gj, p, n, patch(scene, s)), depth, rate, out)
     if code != 0:
         return code
     share = point[7]
     normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
-    row = work.slot[s]
     row[HELD] = row[MODE] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
         row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
+    if whole > 0.0:
+        # see geometry.region
+        stored = whole * out[2]
 
     force = scale(normal, n)
     torque = (0.0, 0.0, 0.0)

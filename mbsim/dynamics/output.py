@@ -16,6 +16,7 @@ from mbsim.dynamics.contact import (
     STORED,
     TORQUE,
     contact_of,
+    patch,
     sides,
 )
 from mbsim.dynamics.kinematics import position
@@ -23,6 +24,7 @@ from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
+    INC_AREA,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -91,6 +93,7 @@ def fill_contacts(scene, y, row):
         row[at + 6] = max(row[at + 6], values[DEPTH])
         row[at + 7] = max(row[at + 7], values[SLIP])
         row[at + 8] += 1.0
+        row[at + 9] += patch(scene, s)
 
 
 @jitable
@@ -109,7 +112,7 @@ def fill_incidents(scene, h, y):
             row[INC_NORMAL + j] = work.points[s, 4 + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
-        row[INC_DEPTH] = work.slot[s, DEPTH]
+        row[INC_DEPTH], row[INC_AREA] = work.slot[s, DEPTH], patch(scene, s)
         # what its force followed from besides y: see dynamics.again
         pair = scene.slots.pair[s]
         row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h

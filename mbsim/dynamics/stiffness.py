@@ -19,13 +19,22 @@ from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
-from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
+from mbsim.dynamics.contact import (
+    NORMAL,
+    contact_of,
+    friction,
+    in_marker,
+    sides,
+    velocity_at,
+    whole_of,
+)
 from mbsim.dynamics.dry_friction import STIFFNESS, dry_motion, dry_now, is_dry
 from mbsim.dynamics.expressions import run, value
 from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.geometry.catalog import REGION_ROWS
 from mbsim.laws.abi import DFLAG
 from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
@@ -143,6 +152,38 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
 
 
 @jitable
+def add_region_stiffness(scene, T, y, s, force, by_depth):
+    """Add how the force of one incident for many points changes with depth and tilt.
+
+    With the energy S U(d), d^2 = sum w_i d_i^2 / S of `geometry.region` and g_i the displacement
+    into the other body at point i, its second derivative is
+    F/d sum w_i g_i g_i' + (F' - F/d) / (S d^2) g g' with g = sum w_i d_i g_i. `force` is F,
+    `by_depth` F'; return how the whole force changes where all depths change alike.
+    """
+    P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    depth, whole, none = rows[s, 0], whole_of(scene, s), (0.0, 0.0, 0.0)
+    one, every = L.basis[:, 0], L.basis[:, 1]
+    every[:] = 0.0
+    weight, moment = 0.0, 0.0
+    first = s + REGION_ROWS
+    for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+        if rows[k, 0] > 0.0:
+            p, n, w = vector(rows[k, 1:4]), vector(rows[k, 4:7]), rows[k, 7]
+            for side in range(2):
+                lever(scene, L, y, i if side == 0 else j, p, n, none, one[side])
+            add_two_sided(P, L.K, nb, i, j, -w * force / depth, one, one)
+            weight += w
+            moment += w * rows[k, 0]
+            for side in range(2):
+                for c in range(6):
+                    every[side, c] += w * rows[k, 0] * one[side, c]
+    rest = (by_depth - force / depth) / (whole * depth * depth)
+    add_two_sided(P, L.K, nb, i, j, -rest, every, every)
+    return force / depth * weight + rest * moment * moment
+
+
+@jitable
 def add_contact_slopes(scene, T, t, h, y, s):
     """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
     P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
@@ -175,11 +216,15 @@ def add_contact_slopes(scene, T, t, h, y, s):
         return code
 
     # depth and its rate are -n . of displacement and velocity
-    normal = L.basis
+    normal, region = L.basis, whole_of(scene, s) > 0.0
+    if region:
+        slope = by_depth / share
+        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
     u, v = normal[:, 0], normal[:, 0]
-    add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
+    if not region:
+        add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
     add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
     if contacts.friction_law[c] == 0:
         return 0

@@ -15,6 +15,10 @@ arrays:
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
 The largest depth, where negative, is a lower bound of the distance of the two shapes.
+
+A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> area``,
+which writes the same rows and returns the area of contact, seen along the normal, in a second
+registry.
 """
 
 from __future__ import annotations
@@ -27,6 +31,10 @@ from mbsim.core.registry import Registry
 
 #: Numbers of one candidate: depth, point, normal, share.
 POINT = 8
+#: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
+#: the area in place of a point.
+REGION_ROWS = 2
+AREA = 1
 
 
 class Pair(NamedTuple):
@@ -39,7 +47,15 @@ class Pair(NamedTuple):
     regroups: bool = False
 
 
+class Region(NamedTuple):
+    """How a pair gives its points and the area of contact, and the shares of a flat face."""
+
+    points: Callable[..., float]
+    whole: float
+
+
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
+REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
 def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
@@ -49,6 +65,16 @@ def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
         name = f"{shape_i}-{shape_j}"
         PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
         return points
+
+    return register
+
+
+def region(shape_i: str, shape_j: str, whole: float) -> Any:
+    """Register the decorated function as the closed form of a pair with its area."""
+
+    def register(function: Callable[..., float]) -> Callable[..., float]:
+        REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
+        return function
 
     return register
 

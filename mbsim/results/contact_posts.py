@@ -9,7 +9,7 @@ import numpy as np
 
 from mbsim.plugins.contact_post import ContactPost, Pair, Shown
 from mbsim.plugins.helpers import host
-from mbsim.system.arrays import CONTACT_COLUMNS
+from mbsim.system.arrays import CONTACT_COLUMNS, INC_AREA
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -79,7 +79,7 @@ class ContactPosts:
             if scene.kinds.swapped[kind] == 1:
                 i, j = j, i
             key = (j, i) if (j, i) in found[id] and (i, j) not in found[id] else (i, j)
-            numbers = [row[13], *row[1:7], *row[10:13]]
+            numbers = [row[13], *row[1:7], *row[10:13], row[INC_AREA]]
             found[id].setdefault(key, []).append([float(value) for value in numbers])
         host.shown.clear()
         for post in self.posts:

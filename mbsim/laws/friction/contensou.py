@@ -9,7 +9,7 @@ f -> e, m -> 2/3 where it only spins, f -> 1 - 1/(8 e^2), m -> 1/(4 e) where it 
 these f and m are rational functions within 1.7 % of the integrals over the disc. So spin takes the
 sticking from sliding, and a spinning disc comes to rest in both at once. Where both are
 slow the force is smoothed: what counts is sqrt(v^2 + (R w)^2) against `friction_trans_vel`. R is
-`patch_radius`.
+`patch_radius`, or where that is 0 (not given) that of a disc with the area of contact.
 Sources: R. I. Leine, C. Glocker, Eur. J. Mech. A/Solids 22 (2003) 193-216 for the coupling; the
 functions are fitted to the integrals here, see tests/analytic/test_friction_laws.py.
 """
@@ -23,11 +23,11 @@ from mbsim.laws.curves import tanh_ratio
 
 
 @friction_law(
-    "CONTENSOU", "mu_dynamic", "friction_trans_vel", Parameter("patch_radius", positive=True)
+    "CONTENSOU", "mu_dynamic", "friction_trans_vel", Parameter("patch_radius", 0.0, positive=True)
 )
 def contensou(inputs, mu_dynamic, friction_trans_vel, patch_radius):
     """Return Fx, Fy, Mx, My, Tz on I."""
-    R = patch_radius
+    R = patch_radius if patch_radius > 0.0 else inputs.radius
     v, turn = math.hypot(inputs.xdot[0], inputs.xdot[1]), R * inputs.xdot[2]
     w, pull = abs(turn), -mu_dynamic * inputs.nforce
     total = math.hypot(v, w)
