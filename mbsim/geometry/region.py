@@ -29,6 +29,8 @@ from mbsim.geometry.polygon import TAG, X, Y, clip
 
 #: A cut's width along a cylinder's radius, as a part of it, below which the cylinder lies.
 _LYING = 1e-9
+#: A cut that is narrow, as a part of its distance to the cylinder's side.
+_NARROW = 1e-3
 
 
 @jitable
@@ -137,6 +139,12 @@ def disc_beyond(x, r):
 
 
 @jitable
+def chord(x, r):
+    """Return the length of the chord of a disc at distance x of its centre."""
+    return 2.0 * math.sqrt(max(0.0, (r - x) * (r + x)))
+
+
+@jitable
 def cylinder_cut(frame, r, half, origin, n):
     """Return the area of the cut of a cylinder with a plane: of an ellipse, between both ends.
 
@@ -150,10 +158,11 @@ def cylinder_cut(frame, r, half, origin, n):
         return 0.0
     if s == 0.0:
         return math.pi * r * r
-    first, last = (-height - half * c) / s, (-height + half * c) / s
-    if last - first < _LYING * r:
-        x = -height / s
-        return 4.0 * half / s * math.sqrt(max(0.0, (r - x) * (r + x)))
+    first, middle, last = (-height - half * c) / s, -height / s, (-height + half * c) / s
+    if last - first < max(_LYING * r, _NARROW * min(r - last, r + first)):
+        # two areas that differ little: Simpson's rule for the chords between
+        chords = chord(first, r) + 4.0 * chord(middle, r) + chord(last, r)
+        return half / (3.0 * s) * chords
     return (disc_beyond(first, r) - disc_beyond(last, r)) / c
 
 
@@ -265,7 +274,7 @@ def cylinder_on_rectangle(frame, r, half, face):
     if last - first < _LYING * r:
         # it lies: what it shares with the rectangle is one too
         x = -height / s
-        wide = math.sqrt(max(0.0, (r - x) * (r + x)))
+        wide = 0.5 * chord(x, r)
         along = cross(n, v)
         put_rectangle(polygon, face, centre, along, v, n)
         count = clip(polygon, 4, other, 1.0, 0.0, half, 0.0)
