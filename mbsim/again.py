@@ -117,7 +117,8 @@ class Again:
                 raise ModelError(f"{results.path}: {what} has changed since the run")
         scene = self.system.scene
         scene.world.fixed_step[0] = int(named["integrator"] == "VERLET")
-        self.wide = a.INC_MEMORY + scene.state.before.shape[1]
+        self.wide = scene.rows.incidents.shape[1]
+        self.region = self.wide > a.INC_MEMORY + scene.state.before.shape[1]
         self._open()
 
     def _changes(self) -> None:
@@ -227,7 +228,7 @@ class Again:
             "stored": float(slot[at.STORED] + slot[at.HELD]),
             "point": row[a.INC_POINT : a.INC_POINT + 3],
             "normal": row[a.INC_NORMAL : a.INC_NORMAL + 3],
-            "area": float(row[a.INC_AREA]),
+            "area": float(row[-a.INC_REGION]) if self.region else 0.0,
         }
         kept = int(contacts.memory[c])
         for k in range(kept if contacts.size[c] == 0.0 else 0):

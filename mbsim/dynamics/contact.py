@@ -30,7 +30,7 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
-from mbsim.geometry.catalog import AREA
+from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
 from mbsim.laws.abi import (
     FRICTION_INPUTS,
     FROZEN,
@@ -69,8 +69,8 @@ DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 # of friction with memory: dF/d(depth) of the normal force, energy stored, mode
 STIFFNESS, HELD, MODE = 12, 13, 14
-# of a pair that is one incident: its area
-PATCH = 15
+# of a pair that is one incident: its area, and how its normal force damps tilting
+PATCH, TILTING = 15, 16
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -318,6 +318,43 @@ def hold_back(scene, y, bi, bj, p, n, h, slip, out):
 
 
 @jitable
+def tilting(scene, t, y, c, s, at, depth, normal, w):
+    """Return code, couple on I and power lost of the points of slot s that are damped one by one.
+
+    With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
+    parts about the incident, in `plane_axes` x, y,
+
+        couple = -c [(Jyy wx - Jxy wy) x + (Jxx wy - Jxy wx) y]
+
+    asked of the law at the mean rate at which points come and go. It is no more than the normal
+    force has at their mean distance, for none of them pulls.
+    """
+    work, out, none = scene.work, scene.work.law_out, (0.0, 0.0, 0.0)
+    numbers, row, whole = work.points[s + 1], work.slot[s], whole_of(scene, s)
+    xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
+    row[TILTING] = 0.0
+    x, y_axis = plane_axes(at[3])
+    wx, wy = dot(w, x), dot(w, y_axis)
+    square = (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy) / whole
+    if square <= 0.0 or normal <= 0.0:
+        return 0, none, 0.0
+    rate = math.sqrt(square)
+    code = ask_normal(scene, t, y, c, at, depth, rate, out)
+    closing = out[0]
+    if code == 0:
+        code = ask_normal(scene, t, y, c, at, depth, -rate, out)
+    if code != 0:
+        return code, none, 0.0
+    damping = (closing - out[0]) / (2.0 * rate)
+    about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
+    size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
+    part = most / size if size > most else 1.0
+    row[TILTING] = part * damping
+    couple = add(scale(-part * about_x, x), scale(-part * about_y, y_axis))
+    return 0, couple, part * damping * whole * square
+
+
+@jitable
 def add_contact(scene, t, h, y, dy, s):
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
     contacts, work = scene.contacts, scene.work
@@ -340,10 +377,13 @@ def add_contact(scene, t, h, y, dy, s):
     if whole > 0.0:
         row[PATCH] = work.points[s + 1, AREA]
 
+    torque = (0.0, 0.0, 0.0)
+
     # normal force; out: force, force at rate 0, stored energy
     out = work.law_out
     scene.log.counters[NORMAL_CALLS] += 1
-    code = ask_normal(scene, t, y, c, (gi, gj, p, n, patch(scene, s)), depth, rate, out)
+    at_place = (gi, gj, p, n, patch(scene, s))
+    code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
     if code != 0:
         return code
     share = point[7]
@@ -356,9 +396,13 @@ def add_contact(scene, t, h, y, dy, s):
     if whole > 0.0:
         # see geometry.region
         stored = whole * out[2]
+        code, couple, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
+        if code != 0:
+            return code
+        torque = couple
+        lost += damped
 
     force = scale(normal, n)
-    torque = (0.0, 0.0, 0.0)
     if contacts.friction_law[c] != 0:
         if contacts.framed[c] == 1:
             loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
@@ -379,7 +423,7 @@ def add_contact(scene, t, h, y, dy, s):
             keep(scene, dy, s, c, out)
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
-        torque = add(scale(mx, tx), add(scale(my, ty), scale(tz, n)))
+        torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))
         lost -= fx * slip[0] + fy * slip[1]
         lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
     add_wrench(scene, y, bi, p, force, torque)

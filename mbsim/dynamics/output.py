@@ -18,13 +18,14 @@ from mbsim.dynamics.contact import (
     contact_of,
     patch,
     sides,
+    whole_of,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
-    INC_AREA,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -33,6 +34,7 @@ from mbsim.system.arrays import (
     INC_MEMORY,
     INC_NORMAL,
     INC_POINT,
+    INC_REGION,
     INC_SHARE,
     INC_SLOT,
     INC_STEP,
@@ -112,7 +114,7 @@ def fill_incidents(scene, h, y):
             row[INC_NORMAL + j] = work.points[s, 4 + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
-        row[INC_DEPTH], row[INC_AREA] = work.slot[s, DEPTH], patch(scene, s)
+        row[INC_DEPTH] = work.slot[s, DEPTH]
         # what its force followed from besides y: see dynamics.again
         pair = scene.slots.pair[s]
         row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
@@ -123,6 +125,14 @@ def fill_incidents(scene, h, y):
         row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
         for j in range(state.before.shape[1]):
             row[INC_MEMORY + j] = state.before[s, j]
+        if len(row) > INC_MEMORY + state.before.shape[1]:
+            at = len(row) - INC_REGION
+            for j in range(INC_REGION):
+                row[at + j] = 0.0
+            if whole_of(scene, s) > 0.0:
+                numbers = work.points[s + 1]
+                row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
+                row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
         k += 1
     rows.used[1] = k
     return k - first

@@ -21,6 +21,7 @@ from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
 from mbsim.dynamics.contact import (
     NORMAL,
+    TILTING,
     contact_of,
     friction,
     in_marker,
@@ -34,7 +35,7 @@ from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
-from mbsim.geometry.catalog import REGION_ROWS
+from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.laws.abi import DFLAG
 from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
@@ -152,6 +153,24 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
 
 
 @jitable
+def damp_tilting(scene, T, y, s):
+    """Add the couple against tilting of `contact.tilting`."""
+    P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
+    i, j = contact_bodies(scene, s)
+    point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
+    numbers = scene.work.points[s + 1]
+    p, (ax, ay) = vector(point[1:4]), plane_axes(vector(point[4:7]))
+    for side in range(2):
+        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
+        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
+    u, v = L.basis[:, 2], L.basis[:, 3]
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], u, v)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], v, u)
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
+
+
+@jitable
 def add_region_stiffness(scene, T, y, s, force, by_depth):
     """Add how the force of one incident for many points changes with depth and tilt.
 
@@ -178,6 +197,7 @@ def add_region_stiffness(scene, T, y, s, force, by_depth):
             for side in range(2):
                 for c in range(6):
                     every[side, c] += w * rows[k, 0] * one[side, c]
+    damp_tilting(scene, T, y, s)
     rest = (by_depth - force / depth) / (whole * depth * depth)
     add_two_sided(P, L.K, nb, i, j, -rest, every, every)
     return force / depth * weight + rest * moment * moment

@@ -28,13 +28,15 @@ from typing import Any, NamedTuple
 
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
+from mbsim.core.rotation import any_tangent, cross, scale
 
 #: Numbers of one candidate: depth, point, normal, share.
 POINT = 8
 #: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
-#: the area in place of a point.
+#: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
+#: points' part of the force about the incident, in `plane_axes`.
 REGION_ROWS = 2
-AREA = 1
+AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY = 1, 2, 3, 7
 
 
 class Pair(NamedTuple):
@@ -86,6 +88,18 @@ def put_point(row, depth, p, n, share=1.0):
     row[1], row[2], row[3] = p[0], p[1], p[2]
     row[4], row[5], row[6] = n[0], n[1], n[2]
     row[7] = share
+
+
+@jitable
+def plane_axes(n):
+    """Return two unit vectors x, y square to n; the same for n and -n, and x * y is one of both."""
+    k = 0
+    for c in range(1, 3):
+        if abs(n[c]) > abs(n[k]):
+            k = c
+    up = n if n[k] >= 0.0 else scale(-1.0, n)
+    x = any_tangent(up)
+    return x, cross(up, x)
 
 
 @jitable

@@ -10,7 +10,9 @@ that lies flat (`whole`),
 over points with d_i > 0. Its elastic energy is S U(depth), so force and place follow from a
 potential: what a tilt moves the place by, the torque of the points does too. Of a linear law
 force and torque are those of the points in every pose; of others they are where the depth is
-even. From a face over an edge to a corner nothing jumps, for the points do not.
+even. Damping has the rate of the place, which tilting hardly moves; what the points' dampers do
+against tilting is a couple (`dynamics.contact.tilting`) with the moments of their parts of the
+force about the place. From a face over an edge to a corner nothing jumps, for the points do not.
 
 The area is that of the cut of the shape with the plane it touches, or of the common part of two
 faces, as far as they overlap: closed forms.
@@ -24,7 +26,16 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import REGION_ROWS, axis, put_point
+from mbsim.geometry.catalog import (
+    AREA,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    REGION_ROWS,
+    axis,
+    plane_axes,
+    put_point,
+)
 from mbsim.geometry.polygon import TAG, X, Y, clip
 
 #: A cut's width along a cylinder's radius, as a part of it, below which the cylinder lies.
@@ -61,7 +72,7 @@ def sum_points(rows, whole, area):
     if square <= 0.0:
         for c in range(8):
             rows[0, c] = rows[1, c] = rows[deepest, c]
-        rows[1, 1] = 0.0
+        rows[1, AREA] = 0.0
         return
     p = scale(1.0 / weight, p)
     force = norm(push)
@@ -75,7 +86,16 @@ def sum_points(rows, whole, area):
     p = add(p, scale(1.0 / force, cross(n, torque)))
     depth = math.sqrt(square / whole)
     put_point(rows[0], depth, p, n, force / depth)
-    put_point(rows[1], 0.0, (area, 0.0, 0.0), n)
+    put_point(rows[1], 0.0, (0.0, 0.0, 0.0), n, 0.0)
+    rows[1, AREA] = area
+    x, y = plane_axes(n)
+    for k in range(REGION_ROWS, len(rows)):
+        if rows[k, 0] > 0.0:
+            part, q = rows[k, 7] * rows[k, 0] / depth, sub(vector(rows[k, 1:4]), p)
+            a, b = dot(q, x), dot(q, y)
+            rows[1, MOMENT_XX] += part * a * a
+            rows[1, MOMENT_XY] += part * a * b
+            rows[1, MOMENT_YY] += part * b * b
 
 
 @jitable

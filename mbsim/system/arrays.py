@@ -141,9 +141,11 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
     INC_KIND,
     INC_GRAPHIC_I,  # of the pair
     INC_GRAPHIC_J,
-    INC_AREA,
     INC_MEMORY,  # of friction at the begin of the step, as many as `State.before` has
-) = range(14, 23)
+) = range(14, 22)
+#: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
+#: xx, xy, yy (see geometry.catalog).
+INC_REGION = 4
 
 
 class Bodies(NamedTuple):
@@ -523,7 +525,7 @@ class Rows(NamedTuple):
     used: I1  # (3,) rows, incidents, events
 
 
-SLOT_COLUMNS = 16
+SLOT_COLUMNS = 17
 SPARE = 42  # and twice the memory
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 

@@ -399,6 +399,7 @@ def build(
             len(rows.values),
             len(rows.sensors.id) + len(model.dry_frictions),
             most,
+            region=a.INC_REGION if any(kind.region for kind in kinds) else 0,
         ),
     )
     if posts:
