@@ -43,8 +43,9 @@ OF_INCIDENTS = {
     "stored": 1,  # energy that normal force and friction hold
     "point": 3,
     "normal": 3,  # from J into I
+    "area": 1,  # of a region, 0 of a point
 }
-OF_CONTACTS = {"force": 3, "torque": 3, "penetration": 1, "slip_speed": 1, "incidents": 1}
+OF_CONTACTS = {"force": 3, "torque": 3, "penetration": 1, "slip_speed": 1, "incidents": 1, "area": 1}
 _AXES = ("x", "y", "z")
 _MODES = {1.0: "stick", 2.0: "slip"}
 _NAME = re.compile(r"Force_Contact\[(\d+)\](?:\.incident\[(\d+)\])?\.([A-Za-z_]\w*)(?:/(\w+))?")
@@ -252,7 +253,7 @@ class Again:
                 host.state = (host.seen[0], a[0], host.seen[1])
             user.call(
                 a[0], user.par, a[13:16], a[16:19], a[2:5], a[5:8], a[10],
-                int(a[19]), a[FRICTION_INPUTS:],
+                int(a[19]), a[FRICTION_INPUTS:], a[11],
             )  # fmt: skip
             return {name: _plain(value) for name, value in host.signals.items()}
         finally:
@@ -277,6 +278,7 @@ def _net(net: Array) -> dict[str, Any]:
         "penetration": float(net[6]),
         "slip_speed": float(net[7]),
         "incidents": float(net[8]),
+        "area": float(net[9]),
     }
 
 

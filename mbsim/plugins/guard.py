@@ -391,6 +391,7 @@ def reproduce(
             given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10],
             int(given[19]),
             state=given[24:],
+            area=given[11],
         )  # fmt: skip
     except BaseException as error:
         failure.clear()
