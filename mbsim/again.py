@@ -45,7 +45,14 @@ OF_INCIDENTS = {
     "normal": 3,  # from J into I
     "area": 1,  # of a region, 0 of a point
 }
-OF_CONTACTS = {"force": 3, "torque": 3, "penetration": 1, "slip_speed": 1, "incidents": 1, "area": 1}
+OF_CONTACTS = {
+    "force": 3,
+    "torque": 3,
+    "penetration": 1,
+    "slip_speed": 1,
+    "incidents": 1,
+    "area": 1,
+}
 _AXES = ("x", "y", "z")
 _MODES = {1.0: "stick", 2.0: "slip"}
 _NAME = re.compile(r"Force_Contact\[(\d+)\](?:\.incident\[(\d+)\])?\.([A-Za-z_]\w*)(?:/(\w+))?")
