@@ -43,8 +43,16 @@ OF_INCIDENTS = {
     "stored": 1,  # energy that normal force and friction hold
     "point": 3,
     "normal": 3,  # from J into I
+    "area": 1,  # of a region, 0 of a point
 }
-OF_CONTACTS = {"force": 3, "torque": 3, "penetration": 1, "slip_speed": 1, "incidents": 1}
+OF_CONTACTS = {
+    "force": 3,
+    "torque": 3,
+    "penetration": 1,
+    "slip_speed": 1,
+    "incidents": 1,
+    "area": 1,
+}
 _AXES = ("x", "y", "z")
 _MODES = {1.0: "stick", 2.0: "slip"}
 _NAME = re.compile(r"Force_Contact\[(\d+)\](?:\.incident\[(\d+)\])?\.([A-Za-z_]\w*)(?:/(\w+))?")
@@ -117,7 +125,8 @@ class Again:
                 raise ModelError(f"{results.path}: {what} has changed since the run")
         scene = self.system.scene
         scene.world.fixed_step[0] = int(named["integrator"] == "VERLET")
-        self.wide = a.INC_MEMORY + scene.state.before.shape[1]
+        self.wide = scene.rows.incidents.shape[1]
+        self.region = self.wide > a.INC_MEMORY + scene.state.before.shape[1]
         self._open()
 
     def _changes(self) -> None:
@@ -227,6 +236,7 @@ class Again:
             "stored": float(slot[at.STORED] + slot[at.HELD]),
             "point": row[a.INC_POINT : a.INC_POINT + 3],
             "normal": row[a.INC_NORMAL : a.INC_NORMAL + 3],
+            "area": float(row[-a.INC_REGION]) if self.region else 0.0,
         }
         kept = int(contacts.memory[c])
         for k in range(kept if contacts.size[c] == 0.0 else 0):
@@ -250,7 +260,7 @@ class Again:
                 host.state = (host.seen[0], a[0], host.seen[1])
             user.call(
                 a[0], user.par, a[13:16], a[16:19], a[2:5], a[5:8], a[10],
-                int(a[19]), a[FRICTION_INPUTS:],
+                int(a[19]), a[FRICTION_INPUTS:], a[11],
             )  # fmt: skip
             return {name: _plain(value) for name, value in host.signals.items()}
         finally:
@@ -275,6 +285,7 @@ def _net(net: Array) -> dict[str, Any]:
         "penetration": float(net[6]),
         "slip_speed": float(net[7]),
         "incidents": float(net[8]),
+        "area": float(net[9]),
     }
 
 

@@ -280,6 +280,8 @@ class Runner:
             if not depth > 0.0:
                 continue
             pair = int(scene.slots.pair[s])
+            if scene.kinds.whole[pairs.kind[pair]] > 0.0 and s != pairs.slot[pair]:
+                continue
             rows = (int(pairs.graphic_i[pair]), int(pairs.graphic_j[pair]))
             graphic_i, graphic_j = (self.system.graphic_ids[row] for row in rows)
             k = int(scene.kinds.contact[pairs.kind[pair]])

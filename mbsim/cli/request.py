@@ -24,11 +24,11 @@ import click
 def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: bool) -> None:
     """Evaluate contact forces again at the output times of RESULT.h5.
 
-    NAME is Force_Contact[ID].force (torque, penetration, slip_speed, incidents) or
+    NAME is Force_Contact[ID].force (torque, penetration, slip_speed, incidents, area) or
     Force_Contact[ID].incident[K].mu (force, torque, mode, slip, xdot, x, depth, rate, nforce,
-    friction, stored, point, normal, state0, ..., and what a user's function names by espy), K
-    counting the incidents of the row from 0. /x, /y, /z or /mag after a vector takes one number of
-    it. The deck and users' files must be those of the run.
+    friction, stored, point, normal, area, state0, ..., and what a user's function names by espy),
+    K counting the incidents of the row from 0. /x, /y, /z or /mag after a vector takes one number
+    of it. The deck and users' files must be those of the run.
     """
     from mbsim.again import request
     from mbsim.cli.messages import print_json

@@ -14,6 +14,7 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact import add_contact
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.output import fill_contacts
+from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.system.arrays import (
     AGAIN,
     CONTACT_COLUMNS,
@@ -25,6 +26,7 @@ from mbsim.system.arrays import (
     INC_MEMORY,
     INC_NORMAL,
     INC_POINT,
+    INC_REGION,
     INC_SHARE,
     INC_SLOT,
     INC_STEP,
@@ -50,6 +52,10 @@ def put_back(scene, row):
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         state.t[s, k] = row[INC_TANGENT + k]
+    if scene.kinds.whole[pairs.kind[pair]] > 0.0:
+        numbers, at = work.points[s + 1], len(row) - INC_REGION
+        numbers[AREA], numbers[MOMENT_XX] = row[at], row[at + 1]
+        numbers[MOMENT_XY], numbers[MOMENT_YY] = row[at + 2], row[at + 3]
     state.touching[s] = int(row[INC_FROZEN])
     for k in range(state.before.shape[1]):
         state.before[s, k] = row[INC_MEMORY + k]

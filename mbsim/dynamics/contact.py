@@ -30,6 +30,7 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
 from mbsim.laws.abi import (
     FRICTION_INPUTS,
     FROZEN,
@@ -39,6 +40,7 @@ from mbsim.laws.abi import (
     SLIPPING_MASS,
     USUAL_SIZE,
 )
+from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
 from mbsim.laws.user_normal import (
     EVALUATE,
@@ -68,6 +70,8 @@ DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 # of friction with memory: dF/d(depth) of the normal force, energy stored, mode
 STIFFNESS, HELD, MODE = 12, 13, 14
+# of a pair that is one incident: its area, and how its normal force damps tilting
+PATCH, TILTING = 15, 16
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -155,6 +159,18 @@ def contact_of(scene, s):
 
 
 @jitable
+def whole_of(scene, s):
+    """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
+    return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
+
+
+@jitable
+def patch(scene, s):
+    """Return the area of contact of slot s, 0 for a point."""
+    return scene.work.slot[s, PATCH] if whole_of(scene, s) > 0.0 else 0.0
+
+
+@jitable
 def add_wrench(scene, y, b, p, force, torque):
     """Add a force at p and a torque to body b."""
     arm = sub(p, position(scene, y, b))
@@ -228,8 +244,9 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
     given[8], given[9] = spin_rates[0], spin_rates[1]
     given[10] = normal
-    given[11] = 0.0
-    given[12] = 0.0
+    area = patch(scene, s)
+    given[11] = area
+    given[12] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
     if contacts.memory[c] > 0:
         remember(scene, y, s, c, given)
     scene.log.counters[FRICTION_CALLS] += 1
@@ -249,14 +266,15 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
 
 @jitable
 def ask_normal(scene, t, y, c, at, depth, rate, out):
-    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal."""
+    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal, area."""
     contacts = scene.contacts
     if contacts.user_normal[c] == 0:
         return call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     # a user's law looks at more, as if in the middle of a question for forces
-    gi, gj, p, n = at
+    gi, gj, p, n, area = at
     place = floats_at(contacts.user_normal[c], PLACE)
     place[TIME], place[PLACE_DEPTH], place[PLACE_RATE] = t, depth, rate
+    place[PLACE_AREA] = area
     loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
     locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
     ni, nj = along_marker(scene, gi, scale(-1.0, n)), along_marker(scene, gj, n)
@@ -302,6 +320,43 @@ def hold_back(scene, y, bi, bj, p, n, h, slip, out):
 
 
 @jitable
+def tilting(scene, t, y, c, s, at, depth, normal, w):
+    """Return code, couple on I and power lost of the points of slot s that are damped one by one.
+
+    With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
+    parts about the incident, in `plane_axes` x, y,
+
+        couple = -c [(Jyy wx - Jxy wy) x + (Jxx wy - Jxy wx) y]
+
+    asked of the law at the mean rate at which points come and go. It is no more than the normal
+    force has at their mean distance, for none of them pulls.
+    """
+    work, out, none = scene.work, scene.work.law_out, (0.0, 0.0, 0.0)
+    numbers, row, whole = work.points[s + 1], work.slot[s], whole_of(scene, s)
+    xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
+    row[TILTING] = 0.0
+    x, y_axis = plane_axes(at[3])
+    wx, wy = dot(w, x), dot(w, y_axis)
+    square = (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy) / whole
+    if square <= 0.0 or normal <= 0.0:
+        return 0, none, 0.0
+    rate = math.sqrt(square)
+    code = ask_normal(scene, t, y, c, at, depth, rate, out)
+    closing = out[0]
+    if code == 0:
+        code = ask_normal(scene, t, y, c, at, depth, -rate, out)
+    if code != 0:
+        return code, none, 0.0
+    damping = (closing - out[0]) / (2.0 * rate)
+    about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
+    size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
+    part = most / size if size > most else 1.0
+    row[TILTING] = part * damping
+    couple = add(scale(-part * about_x, x), scale(-part * about_y, y_axis))
+    return 0, couple, part * damping * whole * square
+
+
+@jitable
 def add_contact(scene, t, h, y, dy, s):
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
     contacts, work = scene.contacts, scene.work
@@ -320,23 +375,36 @@ def add_contact(scene, t, h, y, dy, s):
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
 
+    row, whole = work.slot[s], whole_of(scene, s)
+    if whole > 0.0:
+        row[PATCH] = work.points[s + 1, AREA]
+
+    torque = (0.0, 0.0, 0.0)
+
     # normal force; out: force, force at rate 0, stored energy
     out = work.law_out
     scene.log.counters[NORMAL_CALLS] += 1
-    code = ask_normal(scene, t, y, c, (gi, gj, p, n), depth, rate, out)
+    at_place = (gi, gj, p, n, patch(scene, s))
+    code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
     if code != 0:
         return code
     share = point[7]
     normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
-    row = work.slot[s]
     row[HELD] = row[MODE] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
         row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
+    if whole > 0.0:
+        # see geometry.region
+        stored = whole * out[2]
+        code, couple, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
+        if code != 0:
+            return code
+        torque = couple
+        lost += damped
 
     force = scale(normal, n)
-    torque = (0.0, 0.0, 0.0)
     if contacts.friction_law[c] != 0:
         if contacts.framed[c] == 1:
             loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
@@ -357,7 +425,7 @@ def add_contact(scene, t, h, y, dy, s):
             keep(scene, dy, s, c, out)
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
-        torque = add(scale(mx, tx), add(scale(my, ty), scale(tz, n)))
+        torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))
         lost -= fx * slip[0] + fy * slip[1]
         lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
     add_wrench(scene, y, bi, p, force, torque)

@@ -49,7 +49,9 @@ def gather(scene, pair):
     work, hit = scene.work, scene.work.hit
     kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
     last = len(hit) - 1
-    for s in range(first, first + scene.kinds.slots[kind]):
+    # of one region the points behind the first row are in that
+    count = scene.kinds.slots[kind] if scene.kinds.whole[kind] == 0.0 else 1
+    for s in range(first, first + count):
         depth = work.points[s, 0]
         if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
             work.touching[s] = 1

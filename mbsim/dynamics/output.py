@@ -16,9 +16,12 @@ from mbsim.dynamics.contact import (
     STORED,
     TORQUE,
     contact_of,
+    patch,
     sides,
+    whole_of,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
@@ -31,6 +34,7 @@ from mbsim.system.arrays import (
     INC_MEMORY,
     INC_NORMAL,
     INC_POINT,
+    INC_REGION,
     INC_SHARE,
     INC_SLOT,
     INC_STEP,
@@ -91,6 +95,7 @@ def fill_contacts(scene, y, row):
         row[at + 6] = max(row[at + 6], values[DEPTH])
         row[at + 7] = max(row[at + 7], values[SLIP])
         row[at + 8] += 1.0
+        row[at + 9] += patch(scene, s)
 
 
 @jitable
@@ -120,6 +125,14 @@ def fill_incidents(scene, h, y):
         row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
         for j in range(state.before.shape[1]):
             row[INC_MEMORY + j] = state.before[s, j]
+        if len(row) > INC_MEMORY + state.before.shape[1]:
+            at = len(row) - INC_REGION
+            for j in range(INC_REGION):
+                row[at + j] = 0.0
+            if whole_of(scene, s) > 0.0:
+                numbers = work.points[s + 1]
+                row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
+                row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
         k += 1
     rows.used[1] = k
     return k - first

@@ -20,13 +20,14 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate
-from mbsim.dynamics.contact import contact_of, sides
+from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, vector
+from mbsim.dynamics.contact import contact_of, sides, whole_of
 from mbsim.dynamics.detection import find_contacts
 from mbsim.dynamics.incidents import deepest_of_impact
 from mbsim.dynamics.kinematics import place_bodies, position
 from mbsim.dynamics.limits import longest_way
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point
+from mbsim.geometry.catalog import REGION_ROWS
 from mbsim.system.arrays import AXIS_TORQUE, BUSHING, LIVE
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
@@ -120,6 +121,18 @@ def add_to_block(block, n, stiffness, damping, turn):
 
 
 @jitable
+def add_points(scene, y, s, b, k, damping):
+    """Add the points that slot s stands for to the block of body b, each with its share."""
+    rows = scene.work.points
+    first = s + REGION_ROWS
+    for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+        if rows[row, 0] > 0.0:
+            p, n, share = vector(rows[row, 1:4]), vector(rows[row, 4:7]), rows[row, 7]
+            turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
+            add_to_block(scene.work.block[b], n, share * k, share * damping, turn)
+
+
+@jitable
 def add_touching(scene, y, s, out):
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
@@ -143,6 +156,9 @@ def add_touching(scene, y, s, out):
     both = 2.0 if bi < ground and bj < ground else 1.0
     for b in (bi, bj):
         if b == ground:
+            continue
+        if whole_of(scene, s) > 0.0:
+            add_points(scene, y, s, b, both * k / share, both * damping / share)
             continue
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
         add_to_block(work.block[b], n, both * k, both * damping, turn)

@@ -19,13 +19,24 @@ from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.blocks import couple
-from mbsim.dynamics.contact import contact_of, friction, in_marker, sides, velocity_at
+from mbsim.dynamics.contact import (
+    FORCE,
+    NORMAL,
+    TILTING,
+    contact_of,
+    friction,
+    in_marker,
+    sides,
+    velocity_at,
+    whole_of,
+)
 from mbsim.dynamics.dry_friction import STIFFNESS, dry_motion, dry_now, is_dry
 from mbsim.dynamics.expressions import run, value
 from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
+from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.laws.abi import DFLAG
 from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
@@ -45,6 +56,8 @@ from mbsim.system.arrays import (
 
 #: Differences of the laws' arguments, as parts of them and of the model's speed.
 _PART, _PART_OF_SPEED = 1e-6, 1e-8
+#: Row of `basis` with how the force of one incident for many points changes.
+PRESS = 6
 #: What `memory_slopes` is asked to keep.
 FILL = 0
 #: Differences of the state for user subroutines, as parts of length or speed, and radians.
@@ -143,6 +156,98 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
 
 
 @jitable
+def damp_tilting(scene, T, y, s):
+    """Add the couple against tilting of `contact.tilting`."""
+    P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
+    i, j = contact_bodies(scene, s)
+    point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
+    numbers = scene.work.points[s + 1]
+    p, (ax, ay) = vector(point[1:4]), plane_axes(vector(point[4:7]))
+    for side in range(2):
+        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
+        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
+    u, v = L.basis[:, 2], L.basis[:, 3]
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], u, v)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], v, u)
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
+
+
+@jitable
+def add_region_stiffness(scene, T, y, s, force, by_depth):
+    """Add how the force of one incident for many points changes with depth and tilt.
+
+    With the energy S U(d), d^2 = sum w_i d_i^2 / S of `geometry.region` and g_i the displacement
+    into the other body at point i, its second derivative is
+    F/d sum w_i g_i g_i' + (F' - F/d) / (S d^2) g g' with g = sum w_i d_i g_i. `force` is F,
+    `by_depth` F'; return how the whole force changes where all depths change alike. How it changes
+    with displacements is left in row PRESS of `basis`.
+    """
+    P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    depth, whole, none = rows[s, 0], whole_of(scene, s), (0.0, 0.0, 0.0)
+    one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
+    every[:] = press[:] = 0.0
+    weight, moment = 0.0, 0.0
+    first = s + REGION_ROWS
+    for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+        if rows[k, 0] > 0.0:
+            p, n, w = vector(rows[k, 1:4]), vector(rows[k, 4:7]), rows[k, 7]
+            for side in range(2):
+                lever(scene, L, y, i if side == 0 else j, p, n, none, one[side])
+            add_two_sided(P, L.K, nb, i, j, -w * force / depth, one, one)
+            weight += w
+            moment += w * rows[k, 0]
+            for side in range(2):
+                for c in range(6):
+                    every[side, c] += w * rows[k, 0] * one[side, c]
+                    press[side, c] += w * force / depth * one[side, c]
+    rest = (by_depth - force / depth) / (whole * depth * depth)
+    add_two_sided(P, L.K, nb, i, j, -rest, every, every)
+    for side in range(2):
+        for c in range(6):
+            press[side, c] += rest * moment * every[side, c]
+    damp_tilting(scene, T, y, s)
+    return force / depth * weight + rest * moment * moment
+
+
+@jitable
+def add_moves_of_place(scene, T, y, s, by_rate):
+    """Add that friction acts elsewhere, and at another slip, where tilting moves the place.
+
+    The place is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
+    w_i (p_i - p) / sum w_i d_i. Rows 1 to 5 of `basis` are those of friction, `law` its slopes.
+    """
+    P, L, work, nb = T.pattern, T.linear, scene.work, len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
+    p, n, tx = vector(point[1:4]), vector(point[4:7]), vector(work.t[s])
+    ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
+    rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
+    one, moved, first = L.basis[:, 7], L.basis[:, 8], s + REGION_ROWS
+    last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
+    for k in range(first, last):
+        weight += max(0.0, work.points[k, 0]) * work.points[k, 7]
+    for k in range(first, last):
+        row = work.points[k]
+        if row[0] <= 0.0:
+            continue
+        q = sub(vector(row[1:4]), p)
+        faster = cross(w_rel, q)
+        slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
+        torque = cross(q, rub)
+        for side in range(2):
+            b = i if side == 0 else j
+            lever(scene, L, y, b, vector(row[1:4]), vector(row[4:7]), none, one[side])
+            lever(scene, L, y, b, p, scale(by_rate * rate, n), torque, moved[side])
+            for r in range(5):
+                rise = L.law[r, 0] * slip_x + L.law[r, 1] * slip_y + L.law[r, 5] * by_rate * rate
+                for c in range(6):
+                    moved[side, c] += rise * L.basis[side, 1 + r, c]
+        add_two_sided(P, L.K, nb, i, j, -row[7] / weight, moved, one)
+
+
+@jitable
 def add_contact_slopes(scene, T, t, h, y, s):
     """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
     P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
@@ -175,11 +280,15 @@ def add_contact_slopes(scene, T, t, h, y, s):
         return code
 
     # depth and its rate are -n . of displacement and velocity
-    normal = L.basis
+    normal, region = L.basis, whole_of(scene, s) > 0.0
+    if region:
+        slope = by_depth / share
+        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
     u, v = normal[:, 0], normal[:, 0]
-    add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
+    if not region:
+        add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
     add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
     if contacts.friction_law[c] == 0:
         return 0
@@ -216,8 +325,13 @@ def add_contact_slopes(scene, T, t, h, y, s):
                 add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, 1 + column])
         by_normal = L.law[r, 5]
         if by_normal != 0.0:
-            add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
+            if region:
+                add_two_sided(P, L.K, nb, i, j, -by_normal, u, L.basis[:, PRESS])
+            else:
+                add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
+    if region:
+        add_moves_of_place(scene, T, y, s, by_rate)
     if scene.world.doors[MEMORY_DOOR] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]

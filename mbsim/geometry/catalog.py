@@ -15,6 +15,10 @@ arrays:
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
 The largest depth, where negative, is a lower bound of the distance of the two shapes.
+
+A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> area``,
+which writes the same rows and returns the area of contact, seen along the normal, in a second
+registry.
 """
 
 from __future__ import annotations
@@ -24,9 +28,15 @@ from typing import Any, NamedTuple
 
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
+from mbsim.core.rotation import any_tangent, cross, scale
 
 #: Numbers of one candidate: depth, point, normal, share.
 POINT = 8
+#: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
+#: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
+#: points' part of the force about the incident, in `plane_axes`.
+REGION_ROWS = 2
+AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY = 1, 2, 3, 7
 
 
 class Pair(NamedTuple):
@@ -39,7 +49,15 @@ class Pair(NamedTuple):
     regroups: bool = False
 
 
+class Region(NamedTuple):
+    """How a pair gives its points and the area of contact, and the shares of a flat face."""
+
+    points: Callable[..., float]
+    whole: float
+
+
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
+REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
 def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
@@ -53,6 +71,16 @@ def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
     return register
 
 
+def region(shape_i: str, shape_j: str, whole: float) -> Any:
+    """Register the decorated function as the closed form of a pair with its area."""
+
+    def register(function: Callable[..., float]) -> Callable[..., float]:
+        REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
+        return function
+
+    return register
+
+
 @jitable
 def put_point(row, depth, p, n, share=1.0):
     """Write one candidate into a row of `points`."""
@@ -60,6 +88,18 @@ def put_point(row, depth, p, n, share=1.0):
     row[1], row[2], row[3] = p[0], p[1], p[2]
     row[4], row[5], row[6] = n[0], n[1], n[2]
     row[7] = share
+
+
+@jitable
+def plane_axes(n):
+    """Return two unit vectors x, y square to n; the same for n and -n, and x * y is one of both."""
+    k = 0
+    for c in range(1, 3):
+        if abs(n[c]) > abs(n[k]):
+            k = c
+    up = n if n[k] >= 0.0 else scale(-1.0, n)
+    x = any_tangent(up)
+    return x, cross(up, x)
 
 
 @jitable

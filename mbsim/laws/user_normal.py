@@ -15,8 +15,20 @@ import math
 from mbsim.core.jitable import jitable
 
 # places in the array: LOCI, NI, LOCJ, NJ take three numbers each
-MODE, TIME, LOCI, NI, LOCJ, NJ, DEPTH, RATE, ID, PYTHON = 0, 1, 2, 5, 8, 11, 14, 15, 16, 17
-PLACE = 18
+MODE, TIME, LOCI, NI, LOCJ, NJ, DEPTH, RATE, ID, PYTHON, AREA = (
+    0,
+    1,
+    2,
+    5,
+    8,
+    11,
+    14,
+    15,
+    16,
+    17,
+    18,
+)
+PLACE = 19
 
 # what is asked: forces on bodies, how they change with depth and rate, or more; dflag but for the
 # first

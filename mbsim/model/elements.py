@@ -161,6 +161,11 @@ class Contact:
         return self.cff_type == "USERCFF" or bool(self.cff.fnc_name)
 
     @property
+    def needs_area(self) -> bool:
+        """Whether its friction follows from the area of contact alone."""
+        return self.cff_type == "CONTENSOU" and "patch_radius" not in dict(self.friction)
+
+    @property
     def with_itself(self) -> bool:
         """Whether I and J are the same graphics: all of them touch each other."""
         return set(self.i_graphics_id) == set(self.j_graphics_id)

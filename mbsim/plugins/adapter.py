@@ -42,6 +42,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
                 int(a[DFLAG]),
                 0,
                 a[0],
+                a[11],
             )
             if len(force) != 3:
                 raise ValueError("not three")
@@ -81,6 +82,7 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
                 0,
                 kept,
                 a[0],
+                a[11],
             )
             if len(force) != 3 or len(new) != states:
                 raise ValueError("not as many")

@@ -199,7 +199,8 @@ def callback(
         time, outer = 0.0, host.state
         try:
             given = inputs_at[inputs].tolist()
-            host.time = time = given[0]
+            host.time, host.area = given[0], given[11]
+            time = given[0]
             if host.seen is not None:
                 host.state = (host.seen[0], time, host.seen[1])
             result = function(
@@ -258,7 +259,8 @@ def _callback_with_state(
         time, outer = 0.0, host.state
         try:
             given = inputs_at[inputs].tolist()
-            host.time = time = given[0]
+            host.time, host.area = given[0], given[11]
+            time = given[0]
             if host.seen is not None:
                 host.state = (host.seen[0], time, host.seen[1])
             result = function(
@@ -389,6 +391,7 @@ def reproduce(
             given[0], user.par, given[13:16], given[16:19], given[2:5], given[5:8], given[10],
             int(given[19]),
             state=given[24:],
+            area=given[11],
         )  # fmt: skip
     except BaseException as error:
         failure.clear()

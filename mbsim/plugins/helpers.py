@@ -34,6 +34,8 @@ class Host:
 
     def __init__(self) -> None:
         self.time = 0.0
+        #: Of the contact whose subroutine runs: its area.
+        self.area = 0.0
         self.log: Callable[[str], None] = _to_stderr
         #: While a subroutine that may look at it runs: scene, time, and where y lies.
         self.state: tuple[int, float, int] | None = None
@@ -149,8 +151,8 @@ def py_getstm() -> float:
 
 
 def py_get_contact_area() -> float:
-    """Return the area of the contact patch: 0, all contacts being points so far."""
-    return 0.0
+    """Return the area of contact of the present call [L^2], 0 for a point."""
+    return host.area
 
 
 def _incidents(id: int, i_gra_id: int, j_gra_id: int) -> Any:
@@ -174,7 +176,7 @@ def py_get_ncontacts(id: int, i_gra_id: int, j_gra_id: int) -> list[Any]:
 def py_get_contact_post(id: int, i_gra_id: int, j_gra_id: int, index: int) -> list[Any]:
     """Return [values, errflg] of an incident, 1 to n, or with index 0 of the whole element.
 
-    Of an incident: depth, contact point (3) and normal (3) in the global frame, X (3). Of the
+    Of an incident: depth, contact point (3) and normal (3) in the global frame, X (3), area. Of the
     element: force (3) and torque about its cg (3) on I's body, in the global frame, largest
     depth, largest slip speed.
     """

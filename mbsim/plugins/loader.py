@@ -152,6 +152,7 @@ class UserFriction:
         nforce: float,
         dflag: int = 0,
         state: Any = (),
+        area: float = 0.0,
     ) -> list[float]:
         """Return [Fx, Fy, Tz] of the interpreted function, and its new state if it keeps one.
 
@@ -159,7 +160,7 @@ class UserFriction:
         """
         assert self.function is not None
         lists = [[float(value) for value in given] for given in (par, loci, locj, x, xdot)]
-        host.time = float(time)
+        host.time, host.area = float(time), float(area)
         values, loci, locj, x, xdot = lists
         result = self.function(
             self.element, host.time, values, len(values), loci, locj, x, xdot, float(nforce),
@@ -373,7 +374,7 @@ def _compiled(
 
     def call(a: list[float]) -> list[float]:
         given = a[13:16], a[16:19], a[2:5], a[5:8], a[10], int(a[DFLAG] + 0.5)
-        return twin.call(a[0], par, *given, state=a[FRICTION_INPUTS:])
+        return twin.call(a[0], par, *given, state=a[FRICTION_INPUTS:], area=a[11])
 
     # a place that the text does not read needs no probe
     read = [reads_parameter(script.text, name, position) for position in (4, 5, 6, 9)]

@@ -80,7 +80,7 @@ class UserNormal:
         given = self.place.tolist()
         vectors = [given[k : k + 3] for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
         dflag, par = int(given[at.MODE] != at.EVALUATE), self.par.tolist()
-        host.time = given[at.TIME]
+        host.time, host.area = given[at.TIME], given[at.AREA]
         return only_one(
             self.function(
                 self.element, given[at.TIME], par, len(par), *vectors, -depth, -rate, 0.0, dflag, 0

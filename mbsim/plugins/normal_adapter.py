@@ -24,6 +24,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.laws.abi import NORMAL_SIGNATURE
 from mbsim.laws.user_normal import (
+    AREA,
     EVALUATE,
     ID,
     LOCI,
@@ -48,7 +49,7 @@ class NormalCall(NamedTuple):
     whole: Annotated[npt.NDArray[np.int32], "int32", 1]  # id, npar, dflag, iflag
     par: F1  # (npar,) a copy: what the function writes there is gone at the next call
     place: F1  # (PLACE,)
-    gap: F1  # (4,) gap, its rate, its second derivative (0), area (0)
+    gap: F1  # (4,) gap, its rate, its second derivative (0), area
     result: F1  # (8,) what it returns, with room for a function that returns too much
 
 
@@ -59,7 +60,8 @@ def prepare(call, values, depth, rate):
         call.par[k] = values[k]
     call.whole[0], call.whole[1] = int(call.place[ID]), len(call.par)
     call.whole[2], call.whole[3] = int(call.place[MODE] != EVALUATE), 0
-    call.gap[0], call.gap[1], call.gap[2], call.gap[3] = -depth, -rate, 0.0, 0.0
+    call.gap[0], call.gap[1], call.gap[2] = -depth, -rate, 0.0
+    call.gap[3] = call.place[AREA]
     call.result[0] = np.nan
 
 
@@ -151,6 +153,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
                     int(at[MODE] != EVALUATE),
                     0,
                     at[TIME],
+                    at[AREA],
                 )
                 keep(result, k, depth, only_one(force))
         except Exception:  # the only kind Numba can catch; the interpreted twin finds out which

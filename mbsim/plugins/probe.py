@@ -158,7 +158,8 @@ def normal_disagreement(
         for _ in range(300):
             given = [0.0, chance.uniform(0, 10), *(chance.gauss(0, 1) for _ in range(12))]
             depth, rate = 10.0 ** chance.uniform(-7, 1), chance.gauss(0, 1)
-            yield [*given, depth, rate * 10.0 ** chance.uniform(-4, 2), *quiet[at.ID :]]
+            rate *= 10.0 ** chance.uniform(-4, 2)
+            yield [*given, depth, rate, *quiet[at.ID : at.AREA], chance.choice([0.0, 1e-4, 0.3])]
 
     def run(given: list[float]) -> tuple[bool, list[float]]:
         user.place[:] = given

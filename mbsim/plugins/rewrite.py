@@ -2,7 +2,7 @@
 
 The traps: a list of integers stays one when floats are stored into it (every force is then
 silently 0), `math` functions give nan where Python raises, helpers return lists of mixed
-type, and the time of `py_getstm` is no argument.
+type, and the time of `py_getstm` is no argument, nor is the area of `py_get_contact_area`.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class _Rewrite(ast.NodeTransformer):
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
         if documented:
-            # parameters beyond the documented ones keep their defaults; then comes the time
+            # parameters beyond the documented ones keep their defaults; then come time and area
             every = [*args.posonlyargs, *args.args]
             count = len(every) - len(args.defaults)
             extra = [
@@ -70,7 +70,7 @@ class _Rewrite(ast.NodeTransformer):
                 if position >= documented
             ]
             args.posonlyargs, args.defaults = [], []
-            args.args = [*every[:documented], ast.arg("mbsim_now")]
+            args.args = [*every[:documented], ast.arg("mbsim_now"), ast.arg("mbsim_area")]
             node.body = [*extra, *node.body]
         node.returns = None
         node.body = [self.visit(statement) for statement in node.body] or [ast.Pass()]
@@ -164,7 +164,7 @@ class _Rewrite(ast.NodeTransformer):
         if kind == "helper":
             if name in ("py_step", "py_step5"):
                 return self.kernel("mbsim_" + name[3:], *args)
-            return ast.Name("mbsim_now", ast.Load()) if name == "py_getstm" else ast.Constant(0.0)
+            return ast.Name("mbsim_now" if name == "py_getstm" else "mbsim_area", ast.Load())
         if kind == "builtin" and name == "int" and len(args) == 1:
             return self.kernel("mbsim_int", *args)
         return ast.Call(node.func, args, [])

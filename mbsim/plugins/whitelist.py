@@ -389,10 +389,10 @@ class _Check:
         if kind == "math" and (name in MATH_PLAIN or MATH_CHECKED.get(name) == count):
             return
         if kind == "helper" and HELPERS[name] == count and name != "py_errmes":
-            if name == "py_getstm" and "mbsim_now" not in self.parameters:
-                # only the subroutine itself is handed the time
+            if name in ("py_getstm", "py_get_contact_area"):
+                # only the subroutine itself is handed time and area
                 if len(self.parameters) < 11:
-                    raise refuse(node, "py_getstm outside the subroutine itself")
+                    raise refuse(node, f"{name} outside the subroutine itself")
             return
         if kind == "builtin" and name in BUILTINS:
             return

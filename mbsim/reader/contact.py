@@ -31,6 +31,7 @@ from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
+_RADIUS = "patch_radius"
 _STIFFNESS = "tangential_stiffness"
 _USERS = {
     *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
@@ -61,6 +62,10 @@ def _build_contact(entry: Entry) -> None:
         note_unused(entry, f"cff_type {cff_type}", CFF_ALL - CFF_USES[cff_type])
     if cff_type in FRICTION_LAWS:
         check_coulomb(entry, cff_type)
+    if cff_type == "CONTENSOU" and entry.get("contact_points", "POINTS") != "REGION":
+        if not entry.given(_RADIUS):
+            message = 'cff_type="CONTENSOU" needs patch_radius, or contact_points="REGION"'
+            entry.fault(message, _RADIUS)
     if cff_type == "STICTION" and cnf_type == "USERCNF" and not entry.given(_STIFFNESS):
         message = "missing; a user's normal force does not tell the stiffness it would follow from"
         entry.fault(message, _STIFFNESS)
@@ -205,8 +210,8 @@ FORCE_CONTACT = Statement(
         "enable_node_mode": Spec(FLAG, note=_SEARCH, harmless="FALSE"),
         "enable_analytical": Spec(FLAG, note=_SEARCH),
         "contact_stability_2d": Spec(REAL, refused=_NOT_BUILT),
-        # ours: one force a contact point, or one a connected region
-        "contact_points": Spec(keyword(spellings(POINTS=""), spellings(REGION=""))),
+        # ours: an incident a contact point, or one for all that two graphics touch with
+        "contact_points": Spec(keyword(spellings(POINTS="", REGION=""))),
         "cnf_type": Spec(keyword(CNF_TYPES, CNF_NOT_BUILT), required=True),
         "stiffness": Spec(NOT_NEGATIVE),
         "exponent": Spec(POSITIVE),

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbsim.plugins.contact_post import ContactPost, Pair, Shown
 from mbsim.plugins.helpers import host
-from mbsim.system.arrays import CONTACT_COLUMNS
+from mbsim.system.arrays import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -62,6 +62,11 @@ class ContactPosts:
             for pair in pairs[post.contact.id]:
                 post.call(pair, time, endflg=endflg)
 
+    def _area(self, row: np.ndarray[Any, Any]) -> float:
+        """Return the area of an incident, 0 of a point."""
+        points = len(row) == INC_MEMORY + self.system.scene.state.before.shape[1]
+        return 0.0 if points else float(row[-INC_REGION])
+
     def _show(self, time: float, net: np.ndarray[Any, Any], rows: np.ndarray[Any, Any]) -> None:
         """Let `py_get_ncontacts` and `py_get_contact_post` see a row."""
         scene, ids = self.system.scene, self.system.graphic_ids
@@ -79,7 +84,7 @@ class ContactPosts:
             if scene.kinds.swapped[kind] == 1:
                 i, j = j, i
             key = (j, i) if (j, i) in found[id] and (i, j) not in found[id] else (i, j)
-            numbers = [row[13], *row[1:7], *row[10:13]]
+            numbers = [row[13], *row[1:7], *row[10:13], self._area(row)]
             found[id].setdefault(key, []).append([float(value) for value in numbers])
         host.shown.clear()
         for post in self.posts:

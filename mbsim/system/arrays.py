@@ -143,6 +143,9 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
     INC_GRAPHIC_J,
     INC_MEMORY,  # of friction at the begin of the step, as many as `State.before` has
 ) = range(14, 22)
+#: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
+#: xx, xy, yy (see geometry.catalog).
+INC_REGION = 4
 
 
 class Bodies(NamedTuple):
@@ -177,6 +180,7 @@ class Kinds(NamedTuple):
     slots: I1  # (nk,) points it gives at most
     swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
     regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
+    whole: F1  # (nk,) shares of a flat face, where a pair is one incident with its area; else 0
     noise: F1  # (nk,) scatter of the normals that its detector gives
 
 
@@ -521,7 +525,7 @@ class Rows(NamedTuple):
     used: I1  # (3,) rows, incidents, events
 
 
-SLOT_COLUMNS = 15
+SLOT_COLUMNS = 17
 SPARE = 42  # and twice the memory
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 

@@ -316,7 +316,9 @@ def build(
     wide = np.zeros((ns, 2), dtype=np.int64)
     each = np.column_stack([3 * uses_x, (contacts.size > 0.0) * contacts.memory])
     for k, plan in enumerate(plans.pairs):
-        wide[pairs.slot[k] : pairs.last[k]] = each[contact_row[plan.kind.contact]]
+        # of one region the first row alone is an incident
+        end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
+        wide[pairs.slot[k] : end] = each[contact_row[plan.kind.contact]]
     for crowd in plans.crowds:
         places = wide[pairs.slot[len(plans.pairs)] :]
         places[...] = np.maximum(places, each[contact_row[crowd.contact]])
@@ -397,6 +399,7 @@ def build(
             len(rows.values),
             len(rows.sensors.id) + len(model.dry_frictions),
             most,
+            region=a.INC_REGION if any(kind.region for kind in kinds) else 0,
         ),
     )
     if posts:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.core import jit
-from mbsim.geometry.catalog import PAIRS, POINT, Pair
+from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS, REGIONS, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
@@ -53,6 +53,47 @@ def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
         )
 
     return entry
+
+
+def _adapt_region(region: Callable[..., float], whole: float, slots: int) -> Any:
+    """Return a pair function with area as a C function that writes its one incident ahead."""
+    from numba import carray
+
+    from mbsim.geometry.region import sum_points
+
+    def entry(frame_i, size_i, frame_j, size_j, out):
+        rows = carray(out, (slots, POINT))
+        area = region(
+            carray(frame_i, (12,)),
+            carray(size_i, (3,)),
+            carray(frame_j, (12,)),
+            carray(size_j, (3,)),
+            rows[REGION_ROWS:],
+        )
+        sum_points(rows, whole, area)
+        return slots
+
+    return entry
+
+
+@functools.cache
+def region_address(name: str, slots: int) -> int:
+    """Return the address of a closed-form pair that is one incident with `slots` rows in all."""
+    from numba import types
+
+    pointer = types.CPointer(types.float64)
+    signature = types.int64(pointer, pointer, pointer, pointer, pointer)
+    made = REGIONS[name]
+    return jit.address(_adapt_region(made.points, made.whole, slots), signature)
+
+
+def kernel_address(kind: Kind) -> int:
+    """Return the address of a kind's closed form, 0 where it has none."""
+    if not kind.closed_form:
+        return 0
+    if kind.region:
+        return region_address(kind.closed_form, kind.slots)
+    return pair_address(PAIRS[kind.closed_form])
 
 
 @functools.cache
@@ -102,13 +143,13 @@ def graphics_table(
 
 def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
-    known = {k.closed_form: pair_address(PAIRS[k.closed_form]) for k in kinds if k.closed_form}
     return a.Kinds(
         contact=np.array([contacts[k.contact] for k in kinds], dtype=np.int64),
-        kernel=np.array([known.get(k.closed_form, 0) for k in kinds], dtype=np.int64),
+        kernel=np.array([kernel_address(k) for k in kinds], dtype=np.int64),
         slots=np.array([k.slots for k in kinds], dtype=np.int64),
         swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
         regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
+        whole=np.array([REGIONS[k.closed_form].whole if k.region else 0.0 for k in kinds]),
         noise=np.array(
             [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),

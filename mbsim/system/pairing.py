@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mbsim.errors import DeckError, Fault
-from mbsim.geometry.catalog import PAIRS
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS
 from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
 from mbsim.model import hull
 from mbsim.model.elements import Contact, Graphic, Model
@@ -38,16 +38,20 @@ class Kind:
     swapped: bool
     closed_form: str  # name in PAIRS, or empty where FCL does it
     slots: int
+    region: bool = False  # whether its points are summed up to one incident
 
     @property
     def regroups(self) -> bool:
         """Whether a contact that goes on may begin another slot, which is then no impact."""
+        if self.region:
+            return False
         return not self.closed_form or PAIRS[self.closed_form].regroups
 
     @property
     def detector(self) -> str:
         """How `mbsim check` names it."""
-        return f"closed form {self.closed_form}" if self.closed_form else "FCL"
+        one = ", one region" if self.region else ""
+        return f"closed form {self.closed_form}{one}" if self.closed_form else "FCL"
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,42 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
     return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
+def _region_fault(model: Model, contact: Contact, i: Graphic, j: Graphic, why: str) -> Fault:
+    """Return the fault of a pair whose area is asked for and not known."""
+    return Fault(
+        model.file,
+        contact.source.line,
+        f"Force_Contact[{contact.id}]",
+        f'contact_points="REGION": Post_Graphic[{i.id}] on Post_Graphic[{j.id}] '
+        f"({i.shape} on {j.shape}) {why}",
+    )
+
+
+def _one_region(
+    model: Model, contact: Contact, i: Graphic, j: Graphic, kind: Kind, faults: list[Fault]
+) -> Kind:
+    """Return a kind as the contact wants it: as it is, or one incident with an area.
+
+    A pair of shapes that touch in one point only is one incident without area as it is.
+    """
+    if contact.contact_points != "REGION":
+        return kind
+    if kind.closed_form in REGIONS:
+        return replace(kind, slots=kind.slots + REGION_ROWS, region=True)
+    if not kind.closed_form:
+        why = "is found by FCL, which gives no area"
+    elif PAIRS[kind.closed_form].slots > 1:
+        why = "has no closed form of its area"
+    elif contact.needs_area:
+        why = f"touches in a point, so cff_type={contact.cff_type} needs patch_radius"
+    else:
+        return kind
+    if "needs" not in why:
+        why += '; give contact_points="POINTS"'
+    faults.append(_region_fault(model, contact, i, j, why))
+    return kind
+
+
 def shape_class(graphic: Graphic) -> str:
     """Return what graphics have in common that are tested in the same way."""
     if graphic.vertices is None:
@@ -162,7 +202,8 @@ def _crowd(
                 faults.append(_two_planes(model, contact, i, j))
             elif (shape_j, shape_i) not in kinds or not same:
                 a, b = model.graphics[i], model.graphics[j]
-                kinds[shape_i, shape_j] = _kind(contact.id, a, b, detector)
+                kind = _kind(contact.id, a, b, detector)
+                kinds[shape_i, shape_j] = _one_region(model, contact, a, b, kind, faults)
     return CrowdPlan(contact.id, i_ids, j_ids, same, kinds), faults
 
 
@@ -178,7 +219,8 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
     Raises
     ------
     DeckError
-        If two shapes cannot be tested against each other (two planes).
+        If two shapes cannot be tested against each other (two planes), or have no area that is
+        known where the contact asks for it.
     """
     pairs, crowds, faults = [], [], []
     for contact in model.contacts.values():
@@ -202,6 +244,7 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
                     faults.append(_two_planes(model, contact, i, j))
                     continue
                 kind = _kind(contact.id, a, b, detector)
+                kind = _one_region(model, contact, a, b, kind, faults)
                 pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
     if faults:
         raise DeckError(faults)

@@ -135,6 +135,7 @@ def empty_rows(
     values: int,
     sensors: int = 0,
     memory: int = 0,
+    region: int = 0,
 ) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
     return a.Rows(
@@ -147,7 +148,7 @@ def empty_rows(
         applied=np.zeros((ROWS, 6 * nf)),
         value=np.zeros((ROWS, values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
-        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + memory)),
+        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + memory + region)),
         events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + sensors, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

@@ -63,7 +63,7 @@ class Linear(NamedTuple):
     row: F3  # (border, nb, 6) gradient of an equation, or of a state's slope by xi
     row_rate: F3  # (border, nb, 6) of a state's slope by the rates
     slopes: F2  # (states, states) of states by states
-    basis: F3  # (2, 6, 6) scratch
+    basis: F3  # (2, 9, 6) scratch
     law: F2  # (6, 12) scratch
     rise: F1  # (13,) scratch
     rates: F1  # (3,) scratch
@@ -190,7 +190,7 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((blocks, 6, 6)),
         *(np.zeros((m, nb, 6)) for _ in range(3)),
         np.zeros((nz, nz)),
-        np.zeros((2, 6, 6)),
+        np.zeros((2, 9, 6)),
         np.zeros((6, 12)),
         np.zeros(13),
         np.zeros(3),

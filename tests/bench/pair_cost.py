@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from contracts.test_pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
 
 from mbsim.core.address import call_int
-from mbsim.geometry.catalog import PAIRS, POINT
-from mbsim.system.contacts import pair_address
+from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
+from mbsim.system.contacts import pair_address, region_address
 
 SHAPES = {
     **SIZES,
@@ -30,6 +30,8 @@ LEAN = turned((0.3, 1, 0), 1e-3)
 CALLS = 20_000
 CASES = [
     ("sphere on the side of a cylinder", "SPHERE-CYLINDER", frame([0.199, 0, 0], UPRIGHT), ORIGIN),
+    ("box on plane", "BOX-PLANE", frame([0, 0, SLAB[1][2] - 1e-3], LEAN), ORIGIN),
+    ("box on box", "BOX-BOX", frame([0.3, 0.1, SLAB[1][2] - 1e-3], LEAN), SLAB[0]),
     ("cylinder on plane", "CYLINDER-PLANE", frame([0, 0, 0.099], LEAN), ORIGIN),
     ("ellipsoid on plane", "ELLIPSOID-PLANE", frame([0, 0, 0.0499], LEAN), ORIGIN),
     ("ellipsoid on ellipsoid", "ELLIPSOID-ELLIPSOID", frame([0.02, 0.01, 0.095], LEAN), ORIGIN),
@@ -58,20 +60,29 @@ def call_often(address, arrays, count):
     return total
 
 
+def cost_of(address, arrays):
+    """Return the time of a call [ns]."""
+    call_often(address, arrays, 10)
+    times = []
+    for _ in range(5):
+        begin = time.perf_counter()
+        call_often(address, arrays, CALLS)
+        times.append(time.perf_counter() - begin)
+    return min(times) / CALLS * 1e9
+
+
 def main():
     for label, name, frame_i, frame_j in CASES:
         size_i, size_j = (SHAPES[shape] for shape in name.split("-"))
-        points = np.zeros((PAIRS[name].slots, POINT))
+        points = np.zeros((PAIRS[name].slots + REGION_ROWS, POINT))
         arrays = (frame_i, size_i, frame_j, size_j, points)
-        address = pair_address(PAIRS[name])
-        call_often(address, arrays, 10)
-        times = []
-        for _ in range(5):
-            begin = time.perf_counter()
-            call_often(address, arrays, CALLS)
-            times.append(time.perf_counter() - begin)
-        touching = int((points[:, 0] > 0.0).sum())
-        print(f"{label:34s}{min(times) / CALLS * 1e9:8.0f} ns, {touching} points touch")
+        region = ""
+        if name in REGIONS:
+            cost = cost_of(region_address(name, len(points)), arrays)
+            region = f", as one region {cost:.0f} ns, area {points[1, AREA]:.3g}"
+        cost = cost_of(pair_address(PAIRS[name]), arrays)
+        touching = int((points[: PAIRS[name].slots, 0] > 0.0).sum())
+        print(f"{label:34s}{cost:8.0f} ns, {touching} points touch{region}")
 
 
 if __name__ == "__main__":

@@ -207,7 +207,7 @@ def test_signals_belong_together(held):
         ("Force_Contact[301].incident[0].muu", "no such signal; there are mu, force, torque, mode"),
         (
             "Force_Contact[301].mu",
-            "there are force, torque, penetration, slip_speed, incidents, inc",
+            "there are force, torque, penetration, slip_speed, incidents, area, inc",
         ),
         ("Force_Contact[7].force", "no such contact; there are Force_Contact[301]"),
         ("Force_Contact[301].force/w", "no such part; there are /x, /y, /z, /mag"),

@@ -679,3 +679,22 @@ def test_slider_crank_clearance(tol, allowed):
 def test_slider_crank_clearance_for_five_turns(tol, allowed):
     # no chaos until 0.2 s: 350 touches and leaves, and errors still fall with tol
     check_loose_slider(0.2, tol, allowed)
+
+
+@pytest.mark.parametrize(("v", "w"), [(1.0, 20.0), (2.0, 20.0), (1.0, 15.0)])
+def test_contensou_disc(v, w):
+    # v / (R w) = 0.5, 1, 0.67 at first
+    starts = [f"Body_Rigid[2].v_ic_x={v}", f"Body_Rigid[2].w_ic_z={w}"]
+    results = run_model("contensou_disc.xml", overrides=starts, end_time=1.0)
+    slip = np.linalg.norm(results["bodies/2/velocity"][:, :2], axis=1)
+    rim = 0.1 * np.abs(results["bodies/2/angular_velocity"][:, 2])
+    slow = np.argmax(slip + rim < 3e-3)
+    assert slow > 0
+    assert slip[slow] / rim[slow] == pytest.approx(0.6530017892, rel=1e-2)
+    stops = [results["time"][np.argmax(part < 1e-4)] for part in (slip, rim)]
+    assert stops[0] == pytest.approx(stops[1], abs=2e-3)
+    # of one incident, with the area of its face
+    assert np.all(results["contacts/301/incidents"] == 1)
+    np.testing.assert_allclose(results["contacts/301/area"], np.pi * 0.01, rtol=1e-6)
+    total = sum(results[f"energy/{kind}"] for kind in ("kinetic", "potential", "dissipated"))
+    assert np.abs(total - total[0]).max() < 1e-4 * total[0]

@@ -284,10 +284,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         CONTACT_LINE + 1,
         ("Force_Contact[301]", 'cnf_type="VOLUME"', "not built yet", "IMPACT, POISSON"),
     ),
-    "REGION": (
-        deck(('cff_type="C', 'contact_points="REGION" cff_type="C')),
+    "incidents": (
+        deck(('cff_type="C', 'contact_points="PATCH" cff_type="C')),
         FRICTION_LINE,
-        ('contact_points="REGION"', "not built yet"),
+        ('contact_points="PATCH"', "must be one of POINTS, REGION"),
     ),
     "flexible side": (
         deck(('id="301"', 'id="301" i_flexbody_id="5"')),

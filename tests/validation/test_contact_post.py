@@ -67,7 +67,7 @@ def test_it_sees_what_the_results_hold(written):
             assert depth == net[0][6]
             centre = results["bodies/2/position"][k]
             np.testing.assert_allclose([x, y, z], [*centre[:2], -0.5 * depth], atol=1e-12)
-            np.testing.assert_allclose(n_and_x, [0, 0, 1, 0, 0, 0], atol=1e-12)
+            np.testing.assert_allclose(n_and_x, [0, 0, 1, 0, 0, 0, 0], atol=1e-12)
 
 
 def test_every_pair_of_graphics_is_asked_for(written):

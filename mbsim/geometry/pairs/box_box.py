@@ -31,8 +31,9 @@ import numpy as np
 from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.geometry.catalog import axis, pair, put_point, region
 from mbsim.geometry.polygon import TAG, X, Y, clip
+from mbsim.geometry.region import polygon_area
 
 #: Rows: for each of I's four diagonals its corner or the crossing where the edge that comes to
 #: it ends, and the crossing where the edge that leaves it begins; then a corner of J for each of
@@ -229,12 +230,14 @@ def _apart(points, frame_j, distance):
     """Write the same lower bound of the distance into every row."""
     for row in range(BOX_BOX_SLOTS):
         put_point(points[row], -distance, vector(frame_j), axis(frame_j, 2))
-    return BOX_BOX_SLOTS
 
 
 @jitable
-def _manifold(frame_j, hi, hj, s, n, points):
-    """Write the vertices of the two faces' common polygon, seen along n, into their rows."""
+def _manifold(frame_j, hi, hj, s, n, points, with_area):
+    """Write the vertices of the two faces' common polygon, seen along n, into their rows.
+
+    Return the area of what overlaps of it, seen along n, if that is asked for.
+    """
     # the faces that look at each other: J's along n, I's against it
     kj = _steepest(n[0], n[1], n[2])
     mj, oj = (kj + 1) % 3, (kj + 2) % 3
@@ -331,24 +334,40 @@ def _manifold(frame_j, hi, hj, s, n, points):
         depth *= g[0] * na + g[1] * nb + g[2] * nn
         p = add(vector(frame_j), _to_global(frame_j, middle, mj, oj, kj, sj))
         put_point(points[row], depth, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
+    if not with_area:
+        return 0.0
+    count = clip(polygon, count, other, -slope_x, -slope_y, depth_0, 8.0)
+    return nn * polygon_area(other, count)
 
 
-@pair("BOX", "BOX", slots=BOX_BOX_SLOTS, regroups=True)
-def box_box(frame_i, size_i, frame_j, size_j, points):
-    """The common polygon of two faces; apart, the largest gap along a face's or edges' axis."""
+@jitable
+def _box_on_box(frame_i, size_i, frame_j, size_j, points, with_area):
+    """Write the common polygon of two faces; return its area if that is asked for."""
     s = np.empty(_OVERLAP + _AXES)
     _relative_pose(frame_i, frame_j, s)
     least = _face_overlaps(size_i, size_j, s)
+    if least > 0.0:
+        least = min(least, _edge_overlaps(size_i, size_j, s))
     if least <= 0.0:
-        return _apart(points, frame_j, -least)
-    least = min(least, _edge_overlaps(size_i, size_j, s))
-    if least <= 0.0:
-        return _apart(points, frame_j, -least)
+        _apart(points, frame_j, -least)
+        return 0.0
     n = _direction(s, _least(s))
     j0, j1, j2 = axis(frame_j, 0), axis(frame_j, 1), axis(frame_j, 2)
     normal = add(scale(n[0], j0), add(scale(n[1], j1), scale(n[2], j2)))
     for row in range(BOX_BOX_SLOTS):
         # overlapping boxes have no distance: a row without a point says 0
         put_point(points[row], 0.0, vector(frame_j), normal)
-    _manifold(frame_j, size_i, size_j, s, n, points)
+    return _manifold(frame_j, size_i, size_j, s, n, points, with_area)
+
+
+@pair("BOX", "BOX", slots=BOX_BOX_SLOTS, regroups=True)
+def box_box(frame_i, size_i, frame_j, size_j, points):
+    """The common polygon of two faces; apart, the largest gap along a face's or edges' axis."""
+    _box_on_box(frame_i, size_i, frame_j, size_j, points, False)
     return BOX_BOX_SLOTS
+
+
+@region("BOX", "BOX", whole=4.0)
+def box_box_region(frame_i, size_i, frame_j, size_j, points):
+    """The common polygon of two faces, and its area."""
+    return _box_on_box(frame_i, size_i, frame_j, size_j, points, True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.geometry.catalog import axis, pair, put_point, region
+from mbsim.geometry.region import box_cut
 
 BOX_SLOTS = 8
 
@@ -30,3 +31,11 @@ def box_on_plane(frame_i, size_i, origin, n, points):
 def box_plane(frame_i, size_i, frame_j, size_j, points):
     """The corners of the box against the plane."""
     return box_on_plane(frame_i, size_i, vector(frame_j), axis(frame_j, 2), points)
+
+
+@region("BOX", "PLANE", whole=4.0)
+def box_plane_region(frame_i, size_i, frame_j, size_j, points):
+    """The corners, and the cut of the box with the plane."""
+    n, origin = axis(frame_j, 2), vector(frame_j)
+    box_on_plane(frame_i, size_i, origin, n, points)
+    return box_cut(frame_i, size_i, origin, n)

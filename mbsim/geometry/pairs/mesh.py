@@ -10,8 +10,8 @@ import math
 from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
-from mbsim.core.rotation import add, dot, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
+from mbsim.geometry.catalog import axis, pair, put_point, region
 from mbsim.geometry.polyhedron import (
     CUBE,
     HULL_SLOTS,
@@ -153,3 +153,42 @@ def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
     depth = size_i[0] - distance
     put_point(points[0], depth, sub(vector(frame_i), scale(size_i[0] - 0.5 * depth, n)), n)
     return 1
+
+
+@jitable
+def hull_cut(hull, height, n):
+    """Return the area of the cut of a polyhedron with a plane of normal n in its axes.
+
+    `height` is that of its origin. As of a box every face that is crossed has one side of it.
+    """
+    u = any_tangent(n)
+    v = cross(n, u)
+    corners, starts, loops = int(hull[AT_CORNERS]), int(hull[AT_STARTS]), int(hull[AT_LOOPS])
+    total = 0.0
+    for f in range(int(hull[FACES])):
+        up_x, up_y, down_x, down_y = 0.0, 0.0, 0.0, 0.0
+        first, last = int(hull[starts + f]), int(hull[starts + f + 1])
+        for at in range(first, last):
+            after = at + 1 if at + 1 < last else first
+            here = vector(hull[corners + 3 * int(hull[loops + 2 * at]) :])
+            there = vector(hull[corners + 3 * int(hull[loops + 2 * after]) :])
+            low, high = height + dot(here, n), height + dot(there, n)
+            if (low < 0.0) == (high < 0.0):
+                continue
+            q = add(here, scale(low / (low - high), sub(there, here)))
+            if low < 0.0:
+                up_x, up_y = dot(q, u), dot(q, v)
+            else:
+                down_x, down_y = dot(q, u), dot(q, v)
+        total += 0.5 * (up_x * down_y - up_y * down_x)
+    return abs(total)
+
+
+@region("MESH", "PLANE", whole=4.0)
+def mesh_plane_region(frame_i, size_i, frame_j, size_j, points):
+    """The corners below the plane, and the cut of the mesh with the plane."""
+    mesh_plane(frame_i, size_i, frame_j, size_j, points)
+    hull, n = floats_at(size_i[0], size_i[1]), axis(frame_j, 2)
+    height = dot(sub(vector(frame_i), vector(frame_j)), n)
+    local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
+    return hull_cut(hull, height, local)

@@ -6,8 +6,9 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point
+from mbsim.geometry.catalog import axis, pair, put_point, region
 from mbsim.geometry.convex import point_in_solid
+from mbsim.geometry.region import cylinder_cut, frustum_ends
 
 RIM_SLOTS = 6
 
@@ -78,3 +79,19 @@ def cylinder_plane(frame_i, size_i, frame_j, size_j, points):
 def frustum_plane(frame_i, size_i, frame_j, size_j, points):
     """Three points of each rim against the plane; the side lies on its two lowest points."""
     return solid_on_plane(frame_i, vector(size_i), vector(frame_j), axis(frame_j, 2), points)
+
+
+@region("CYLINDER", "PLANE", whole=3.0)
+def cylinder_plane_region(frame_i, size_i, frame_j, size_j, points):
+    """Three points of each rim, and the cut of the cylinder with the plane."""
+    n, origin = axis(frame_j, 2), vector(frame_j)
+    solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
+    return cylinder_cut(frame_i, size_i[0], size_i[1], origin, n)
+
+
+@region("FRUSTUM", "PLANE", whole=3.0)
+def frustum_plane_region(frame_i, size_i, frame_j, size_j, points):
+    """Three points of each rim, and the area of the ends below the plane."""
+    n, origin = axis(frame_j, 2), vector(frame_j)
+    solid_on_plane(frame_i, vector(size_i), origin, n, points)
+    return frustum_ends(frame_i, size_i, origin, n)

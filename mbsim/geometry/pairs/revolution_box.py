@@ -6,7 +6,7 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair, put_point
+from mbsim.geometry.catalog import pair, put_point, region
 from mbsim.geometry.convex import (
     BOX,
     ROTOR,
@@ -30,6 +30,7 @@ from mbsim.geometry.manifold import (
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
+from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
 from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
 #: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
@@ -381,3 +382,43 @@ def frustum_box(frame_i, size_i, frame_j, size_j, points):
     """Standing, lying, leaning or rolling over an edge."""
     i = placed(ROTOR, frame_i, vector(size_i))
     return solid_on_box(i, placed(BOX, frame_j, vector(size_j)), points)
+
+
+@jitable
+def face_below(j, points):
+    """Return whether some row touches, and the face of box J that looks most along its normal.
+
+    The face is its centre, its half edges and its outward normal.
+    """
+    deepest = 0
+    for row in range(1, len(points)):
+        if points[row, 0] > points[deepest, 0]:
+            deepest = row
+    n = vector(points[deepest, 4:7])
+    k = first_two(j, n)[0]
+    k1, k2 = (k + 1) % 3, (k + 2) % 3
+    o = edge_axis(j, k)
+    o = scale(1.0 if dot(o, n) >= 0.0 else -1.0, o)
+    a, b = scale(j[5][k1], edge_axis(j, k1)), scale(j[5][k2], edge_axis(j, k2))
+    return points[deepest, 0] > 0.0, (add(j[1], scale(j[5][k], o)), a, b, o)
+
+
+@region("CYLINDER", "BOX", whole=3.0)
+def cylinder_box_region(frame_i, size_i, frame_j, size_j, points):
+    """The points, and the cut of the cylinder with the box's face."""
+    j = placed(BOX, frame_j, vector(size_j))
+    solid_on_box(placed(ROTOR, frame_i, cylinder_size(size_i)), j, points)
+    touches, face = face_below(j, points)
+    return cylinder_on_rectangle(frame_i, size_i[0], size_i[1], face) if touches else 0.0
+
+
+@region("FRUSTUM", "BOX", whole=3.0)
+def frustum_box_region(frame_i, size_i, frame_j, size_j, points):
+    """The points, and the part of an end that is below the box's face."""
+    i, j = placed(ROTOR, frame_i, vector(size_i)), placed(BOX, frame_j, vector(size_j))
+    solid_on_box(i, j, points)
+    touches, face = face_below(j, points)
+    if not touches:
+        return 0.0
+    centre, o, r = end_disc(i, -1 if dot(i[4], face[3]) >= 0.0 else 1)
+    return disc_on_rectangle(centre, o, r, face)
