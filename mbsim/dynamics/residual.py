@@ -491,14 +491,23 @@ def mode_now(scene, t, y, e):
         return -1.0
     for k in range(nu):
         R.rows[k] = R.out[k]
-    if find_slopes(scene, e, False) != 0:
-        return -1.0
+        R.step[k] = 0.0
+    for k in range(nu):
+        if R.kind[R.begin[e] + k] != SWITCHING:
+            continue
+        at = 1 + 2 * na + nu + k
+        size = PART * (abs(R.given[at]) + scale_of(scene, e, k))
+        for side in range(2):
+            # either way: what has just come to stick is at the very end of its branch
+            code = difference(scene, e, at, size if side == 0 else -size, R.rise)
+            if code != 0:
+                return -1.0
+            for i in range(nu):
+                if R.rise[i] != 0.0:
+                    R.step[i] = 1.0
     mode = 0.0
     for i in range(nu):
-        for k in range(nu):
-            if R.kind[R.begin[e] + k] == SWITCHING and R.by[1, k, i] != 0.0:
-                mode += 2.0**i
-                break
+        mode += R.step[i] * 2.0**i
     return mode
 
 
