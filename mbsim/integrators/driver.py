@@ -246,9 +246,13 @@ def first_event(p, m, t, h, times):
 
 @jitable
 def side_at(p, m, t, h, s, what):
-    """Return whether a force is on another branch at the part s of the fitted step."""
+    """Return whether a force is on another branch at the part s of the fitted step.
+
+    Sides are those just behind the step's begin: before that only what is found exactly counts.
+    """
     interpolate(m, s, m.error)
-    return call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error)) > 0.0
+    differs = call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error))
+    return differs > (0.0 if s >= NEAR_KINK else 1.0)
 
 
 @jitable
