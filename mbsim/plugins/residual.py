@@ -32,6 +32,7 @@ from mbsim.laws.residual import (
 )
 from mbsim.model.elements import ForceElement
 from mbsim.plugins import guard
+from mbsim.plugins.dual import Dual, slope
 from mbsim.plugins.helpers import StopRun, host
 from mbsim.plugins.loader import Script, Scripts, find_script, user_function
 
@@ -191,14 +192,17 @@ def load_residual(
     place = name, str(script.path)
     twin, keep = _callback(function, element.id, place, par, axes, count)
 
-    def call(given: list[float]) -> list[float]:
+    def asked(given: list[float]) -> Any:
         first = 1 + 2 * axes
         parts = (given[1 : 1 + axes], given[1 + axes : first])
         f, fdot = given[first : first + count], given[first + count :]
-        return guard.numbers(function(*parts, f, fdot, given[0], par.tolist()), count)
+        return function(*parts, f, fdot, given[0], par.tolist())
+
+    def call(given: list[float]) -> list[float]:
+        return guard.numbers(asked(given), count)
 
     sizes = _sizes(script, par.tolist())
-    unknowns = _sorted(unknowns, call, sizes, axes, f"{title}: {name} of {script.path}")
+    unknowns = _sorted(unknowns, asked, sizes, axes, f"{title}: {name} of {script.path}")
     address, reason = 0, "--interpret-plugins"
     if not interpret:
         address, reason = _compiled(script, name, par, axes, count, call, sizes)
@@ -240,7 +244,7 @@ def _points(sizes: list[float], axes: int, count: int) -> Iterator[list[float]]:
 
 def _sorted(
     unknowns: tuple[Unknown, ...],
-    call: Callable[[list[float]], list[float]],
+    asked: Callable[[list[float]], Any],
     sizes: list[float],
     axes: int,
     who: str,
@@ -260,8 +264,7 @@ def _sorted(
     try:
         for given in _points(sizes, axes, count):
             try:
-                base = call(given)
-                moved = [_depends(call, given, first + k, base) for k in range(count)]
+                moved = [_depends(asked, given, first + k, count) for k in range(count)]
             except KeyboardInterrupt:
                 raise
             except (Exception, StopRun) as error:
@@ -283,14 +286,17 @@ def _sorted(
     )
 
 
-def _depends(
-    call: Callable[[list[float]], list[float]], given: list[float], at: int, base: list[float]
-) -> bool:
+def _depends(asked: Callable[[list[float]], Any], given: list[float], at: int, count: int) -> bool:
     """Return whether the residual differs where one argument does, a little, either way."""
+    marked: list[float] = [*given[:at], Dual(given[at], 1.0), *given[at + 1 :]]
+    found = asked(marked)
+    base = guard.numbers(found, count)
+    if any(slope(value) != 0.0 for value in found):
+        return True
     for part in (1e-3, -1e-3):
         other = given.copy()
         other[at] += part * (abs(other[at]) or 1e-3)
-        if call(other) != base:
+        if guard.numbers(asked(other), count) != base:
             return True
     return False
 
