@@ -190,7 +190,8 @@ def _unsolved(system: System, t: float) -> str:
     id = int(residuals.id[residuals.trouble[0]])
     user = system.residuals[id]
     return (
-        f"{title_of(system.model.force_elements[id])}: no unknowns ({', '.join(user.about())}) were "
-        f"found that make the residual {user.name} of {user.source} 0 at time {t:.9g}: it may have "
-        "no zero there, jump over it, or not depend on an unknown; results up to there are kept"
+        f"{title_of(system.model.force_elements[id])}: no unknowns ({', '.join(user.about())}) "
+        f"were found that make the residual {user.name} of {user.source} 0 at time {t:.9g}: it may "
+        "have no zero there, jump over it, or not depend on an unknown; results up to there are "
+        "kept"
     )

@@ -43,6 +43,8 @@ NOW, BEFORE = range(2)
 MOST_STEPS, MOST_SHORT, MOST_HALVES = 20, 60, 200
 #: A correction that ends the iteration, as a part of what is corrected and of its scale; rounding.
 SMALL, ROUNDING = 1e-11, 4e-16
+#: What is left of a residual, as a part of what it was at first, and counts as 0.
+ZERO = 1e-13
 #: Differences, as a part of what is changed and of its scale.
 PART = 1e-7
 #: Times of the model's own, L/V: shorter steps take x' for the mean; the shortest there is.
@@ -161,7 +163,7 @@ def ask_at(scene, e, h):
 
 @jitable
 def difference(scene, e, at, size, column):
-    """Fill a column with the change of the residual by one argument; `rows` holds r; return a code."""
+    """Fill a column with the residual by one argument, where r is in `rows`; return a code."""
     R = scene.residuals
     kept = R.given[at]
     R.given[at] = kept + size
@@ -260,19 +262,22 @@ def back(R, nu, b):
 
 
 @jitable
-def scale_of(scene, e, k):
+def scale_of(scene, e, k, h):
     """Return a usual size of what is sought of unknown k."""
     R = scene.residuals
     u = R.begin[e] + k
-    return R.scale[u] / (1.0 if R.kind[u] == ALGEBRAIC else own_time(scene))
+    if R.kind[u] == ALGEBRAIC:
+        return R.scale[u]
+    # over a long step a small rate makes a difference
+    return R.scale[u] / (max(h, own_time(scene)) if R.kind[u] == SWITCHING else own_time(scene))
 
 
 @jitable
-def is_small(scene, e):
-    """Return how large the step is, over what ends the iteration."""
+def is_small(scene, e, h):
+    """Return whether the step is one that ends the iteration."""
     R, worst = scene.residuals, 0.0
     for k in range(unknowns_of(scene, e)):
-        worst = max(worst, abs(R.step[k]) / (abs(R.z[k]) + scale_of(scene, e, k)))
+        worst = max(worst, abs(R.step[k]) / (abs(R.z[k]) + scale_of(scene, e, k, h)))
     return worst <= SMALL
 
 
@@ -296,7 +301,7 @@ def take_step(scene, e):
 
 @jitable
 def slopes_here(scene, e, h):
-    """Factor the residual by z, r being in `out` and z in `given`; return a code, -1 if singular."""
+    """Factor the residual by z, where r is in `out`; return a code, -1 if singular."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
         R.rows[k] = R.out[k]
@@ -310,12 +315,25 @@ def slopes_here(scene, e, h):
 
 
 @jitable
+def largest(R, nu):
+    """Return the largest number of the residual."""
+    most = 0.0
+    for k in range(nu):
+        most = max(most, abs(R.out[k]))
+    return most
+
+
+@jitable
 def newton(scene, e, h):
-    """Find z by Newton's method from where it is; return 0, -1 where it fails, or a code."""
+    """Find z by Newton's method from where it is; return 0, -1 where it fails, or a code.
+
+    -2: corrections are small, but the residual is not: differences reach over a kink.
+    """
     R, nu = scene.residuals, unknowns_of(scene, e)
     code = ask_at(scene, e, h)
     if code != 0 or is_naught(scene, e):
         return code
+    at_first = largest(R, nu)
     for _ in range(MOST_STEPS):
         code = slopes_here(scene, e, h)
         if code != 0:
@@ -337,18 +355,21 @@ def newton(scene, e, h):
         if is_naught(scene, e):
             return 0
         take_step(scene, e)
-        if is_small(scene, e):
+        if is_small(scene, e, h):
+            before = largest(R, nu)
             for k in range(nu):
                 R.z[k] += R.step[k]
-            return 0
+            code = ask_at(scene, e, h)
+            good = largest(R, nu) <= max(0.1 * before, ZERO * at_first)
+            return code if code != 0 or good else -2
     return -1
 
 
 @jitable
 def bracket(scene, e, h):
-    """Find the only unknown between values at which the residual has two signs; return as `newton`."""
+    """Find an only unknown between values where r has two signs; return what `newton` does."""
     R = scene.residuals
-    z0, size = R.start[0], scale_of(scene, e, 0)
+    z0, size = R.start[0], scale_of(scene, e, 0, h)
     R.z[0] = z0
     code = ask_at(scene, e, h)
     if code != 0:
@@ -395,7 +416,7 @@ def bracket(scene, e, h):
 
 @jitable
 def go_down(scene, e, h):
-    """Find several unknowns by shortened steps, each of which makes r smaller; return as `newton`."""
+    """Find several unknowns by steps that make r smaller; return what `newton` does."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
         R.z[k] = R.start[k]
@@ -407,7 +428,7 @@ def go_down(scene, e, h):
         if code != 0:
             return code
         take_step(scene, e)
-        if is_small(scene, e):
+        if is_small(scene, e, h):
             for k in range(nu):
                 R.z[k] += R.step[k]
             return 0
@@ -440,8 +461,14 @@ def solve(scene, e, h):
     for k in range(nu):
         R.z[k] = R.start[k]
     code = newton(scene, e, h)
+    found = R.z[0]
     if code == -1:
         code = bracket(scene, e, h) if nu == 1 else go_down(scene, e, h)
+    elif code == -2:
+        # nothing better may be found: what is left is then rounding
+        if nu > 1 or bracket(scene, e, h) != 0:
+            R.z[0] = found
+        code = 0
     if code == -1:
         R.trouble[0] = e
         return UNSOLVED_ELEMENT
@@ -452,7 +479,7 @@ def solve(scene, e, h):
 
 @jitable
 def find_unknowns(scene, t, y, e):
-    """Solve for the unknowns of element e at a point; f and f' are left in `given`; return a code."""
+    """Find the unknowns of element e at a point and leave them in `given`; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     memory = memory_of(scene, e)
     known = math.isfinite(memory[0])
@@ -496,7 +523,7 @@ def mode_now(scene, t, y, e):
         if R.kind[R.begin[e] + k] != SWITCHING:
             continue
         at = 1 + 2 * na + nu + k
-        size = PART * (abs(R.given[at]) + scale_of(scene, e, k))
+        size = PART * (abs(R.given[at]) + scale_of(scene, e, k, h))
         for side in range(2):
             # either way: what has just come to stick is at the very end of its branch
             code = difference(scene, e, at, size if side == 0 else -size, R.rise)
@@ -513,7 +540,7 @@ def mode_now(scene, t, y, e):
 
 @jitable
 def serve_residual(scene, t, y, e, component):
-    """Fill what element e gives into `Users.result`; return a code. The mode is found if asked for."""
+    """Fill what element e gives into `Users.result`, the mode if asked for; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     result = scene.users.result[R.user[e]]
     code = find_unknowns(scene, t, y, e)

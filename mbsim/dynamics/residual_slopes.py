@@ -4,8 +4,8 @@ By the implicit function theorem, with A the residual by what is sought (`dynami
 
     A dz + r_x dx + r_x' dx' + r_f df = 0,
 
-df of states; where x' is a mean over h it goes with dx, as dx/h, and f with h dz. That axes of J turn
-the force is counted, that they turn the rates is not: Newton's method is a little slower for it.
+df of states; where x' is a mean over h it goes with dx, as dx/h, and f with h dz. That axes of J
+turn the force is counted, that they turn the rates is not: Newton's method is a little slower.
 """
 
 from __future__ import annotations
@@ -73,7 +73,11 @@ def solve_slopes(scene, t, y, e):
         return -1.0 - code
     from_step = switches(scene, e)
     h = step_for_slopes(scene, t, e) if from_step else 1.0
-    if residual_here(scene, e) != 0 or find_slopes(scene, e, True) != 0 or fill_moves(scene, e) != 0:
+    if (
+        residual_here(scene, e) != 0
+        or find_slopes(scene, e, True) != 0
+        or fill_moves(scene, e) != 0
+    ):
         return -1.0
     fill_matrix(scene, e, h)
     if not factor(R, nu):

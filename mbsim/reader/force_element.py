@@ -1,4 +1,4 @@
-"""Force_Element (ours): forces between two markers by a user's residual, after Muscade's elements."""
+"""Force_Element (ours): forces between two markers by a user's residual, as Muscade has them."""
 
 from __future__ import annotations
 

@@ -58,9 +58,7 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     places = scene.states.place
     first_state = int(places[0]) if len(places) else 0
     looks = system.reader is not None
-    rows = acting(
-        model, table, first_state, system.subroutines, looks, residuals=system.residuals
-    )
+    rows = acting(model, table, first_state, system.subroutines, looks, residuals=system.residuals)
     applied = rows.applied
     markers, angles = table.arrays()
     listed = [with_radii(contact, model.graphics) for contact in model.contacts.values()]

@@ -30,9 +30,7 @@ def values_of(element: ForceElement, user: UserResidual) -> list[int]:
     return [first + k for k in range(len(user.unknowns))]
 
 
-def direction_rows(
-    markers: MarkerTable, i: int, j: int, direction: str
-) -> tuple[int, int]:
+def direction_rows(markers: MarkerTable, i: int, j: int, direction: str) -> tuple[int, int]:
     """Return the marker row whose z an axis of J is, and the row of its angle or -1."""
     axis = "XYZ".index(direction[1])
     turned = markers.turned(j, axis)

@@ -170,6 +170,26 @@ def test_a_stiff_maxwell_element_costs_an_implicit_method_little(script, tmp_pat
     assert results.stats["steps"] < 1500
 
 
+def test_what_switches_is_of_first_order_where_it_looks_at_time(tmp_path):
+    # the Maxwell element once more, as if it switched: backward Euler, so half the step, half the
+    # error
+    script = tmp_path / "kind.py"
+    declared = 'ELEMENT_UNKNOWNS = {"maxwell": {"f": {"kind": "SWITCHING"}}}'
+    script.write_text(SCRIPT.replace("def maxwell", declared + "\ndef maxwell", 1), "utf-8")
+    _, slopes, start, _ = SMOOTH["maxwell"]
+    y = solve_ivp(slopes, (0, 2), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    model = GROUND + body(2, 1.0, v=1.0) + spring(4.0) + element("maxwell", "20, 3", script)
+    miss = []
+    for h in (0.01, 0.005, 0.0025):
+        path = write_deck(tmp_path, model, 2.0, 0.1)
+        bound = f'<Param_Transient h_max="{h}"/><Simulate'
+        path.write_text(path.read_text("utf-8").replace("<Simulate", bound), encoding="utf-8")
+        results = mbsim.simulate(mbsim.read_model(path), integrator="DOPRI5", tol=1e-3)
+        miss.append(abs(results["bodies/2/position"][-1, 0] - y[0]))
+    assert 1.7 < miss[0] / miss[1] < 2.3
+    assert 1.7 < miss[1] / miss[2] < 2.3
+
+
 @pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])
 def test_forces_along_and_about_turning_axes_conserve_momentum(method, script, tmp_path):
     model = GROUND + body(2, 1.0, w=2.0) + body(3, 2.0, x=0.5, v=0.1, w=0.3)
