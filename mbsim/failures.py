@@ -125,6 +125,10 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
 
     if code == UNSETTLED:
         raise SolverError(_unsettled(system, contact, t))
+    from mbsim.dynamics.residual import UNSOLVED_ELEMENT
+
+    if code == UNSOLVED_ELEMENT:
+        raise SolverError(_unsolved(system, t))
     element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
     if code == USER_NORMAL_FAILED:
         from mbsim.plugins.normal import reproduce_normal
@@ -175,4 +179,19 @@ def _unsettled(system: System, row: int, t: float) -> str:
     return (
         f"{name} does not settle at time {t:.9g}: it follows from reactions that follow from it, "
         "and no value was found that agrees with both; results up to there are kept"
+    )
+
+
+def _unsolved(system: System, t: float) -> str:
+    """Return what is said of an element whose residual is not made 0."""
+    from mbsim.plugins.residual import title_of
+
+    residuals = system.scene.residuals
+    id = int(residuals.id[residuals.trouble[0]])
+    user = system.residuals[id]
+    return (
+        f"{title_of(system.model.force_elements[id])}: no unknowns ({', '.join(user.about())}) "
+        f"were found that make the residual {user.name} of {user.source} 0 at time {t:.9g}: it may "
+        "have no zero there, jump over it, or not depend on an unknown; results up to there are "
+        "kept"
     )

@@ -159,6 +159,7 @@ def _refuse_verlet(model: Model) -> None:
         "Force_Scalar_TwoBody": model.scalar_forces,
         "Force_Vector_TwoBody": model.vector_forces,
         "Force_Vector_OneBody": model.body_forces,
+        "Force_Element": model.force_elements,
         "Control_Diff": model.differentials,
     }
     for statement, elements in {**constraints, **expressed}.items():
@@ -168,6 +169,8 @@ def _refuse_verlet(model: Model) -> None:
             why = "free bodies and this model has joints or other constraints"
             if statement not in constraints:
                 why = "forces of known stiffness, which an expression does not say"
+            if statement == "Force_Element":
+                why = "forces of known stiffness, which a user's residual does not say"
                 if statement == "Control_Diff":
                     why = "bodies alone, and this model has states of its own"
             raise ModelError(

@@ -104,8 +104,9 @@ def _report(system: System, found: Balance, before: Array, y: Array, t: float) -
 
 def _unsettled(system: System, rest: Rest, t: float) -> str:
     """Return which state has no equilibrium."""
-    id = list(system.model.differentials)[rest.state]
-    name = element_name(system.model.file, "Control_Diff", id)
+    states = [("Control_Diff", id) for id in system.model.differentials]
+    states += [("Force_Element", id) for id, user in system.residuals.items() for _ in user.states]
+    name = element_name(system.model.file, *states[rest.state])
     return (
         f"no static equilibrium found at time {t:.9g}: the rate of {name} stays "
         f"{rest.rate:.6g} after {rest.iterations} iterations, which is not 0"

@@ -18,6 +18,7 @@ def _without_file(deck: Model) -> Iterator[str]:
         ("Force_Vector_TwoBody", deck.vector_forces),
         ("Force_Vector_OneBody", deck.body_forces),
         ("Reference_Variable", deck.variables),
+        ("Force_Element", deck.force_elements),
     ):
         for element in table.values():
             if element.user is not None and not element.user.script_name:

@@ -145,6 +145,12 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
         name, par = element_name(model.file, statement, id), list(user.par)
         given = [id, 0.0, par, len(par), 0, 1]
         found[name] = about(user, name, prefix, ARGUMENTS, given, plugins, scripts)
+    if model.force_elements:
+        from mbsim.plugins.residual import about_residual
+
+        for element in model.force_elements.values():
+            name = element_name(model.file, "Force_Element", element.id)
+            found[name] = about_residual(element, plugins, scripts)
     return {"subroutines": found} if found else {}
 
 

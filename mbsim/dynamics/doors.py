@@ -158,6 +158,10 @@ def open_expressions(scene: Scene) -> None:
     if np.isin(kind, (DRY_SLIDE, DRY_TURN)).any():
         rigid = bool((scene.applied.equation >= 0).any())
         doors[DRY_DOOR] = jit.address(_serve_rigid if rigid else _serve_dry, _KEEP)
+    if len(scene.residuals.id) > 0:
+        from mbsim.dynamics.residual_door import open_residuals
+
+        open_residuals(scene)
     if len(scene.applied.late) > 0:
         # only then: it is compiled with all that it needs
         doors[FRICTION_DOOR] = jit.address(_settle, _APPLY)

@@ -23,6 +23,7 @@ from mbsim.system.arrays import (
     BALL_FRICTION,
     BEND_DOOR,
     BUSHING,
+    RESIDUAL,
     SLIDE_FRICTION,
     SLOPES_DOOR,
     TANGENT_DOOR,
@@ -133,6 +134,8 @@ def open_slopes(scene: Scene) -> None:
     kinds = set(scene.applied.kind.tolist())
     more = kinds & {BUSHING, *range(SLIDE_FRICTION, BALL_FRICTION + 1)}
     hook = _all_slopes if more else _slopes
+    if RESIDUAL in kinds:
+        from mbsim.dynamics.residual_door import residual_slopes as hook
     scene.world.doors[SLOPES_DOOR] = jit.address(hook, _VALUES)
     if len(scene.programs.start) > 1:
         open_jets(scene)

@@ -48,6 +48,7 @@ from mbsim.system.arrays import (
     LATE,
     LINE_FORCE,
     MEMORY_DOOR,
+    RESIDUAL,
     SLIDE_FRICTION,
     SLIDE_LIMIT,
     TURN_LIMIT,
@@ -748,7 +749,7 @@ def add_applied_slopes(scene, T, t, y):
             add_vector_slopes(scene, T, t, y, f)
         elif is_dry(kind):
             add_dry_slopes(scene, T, y, f)
-        elif kind != BUSHING and kind < SLIDE_FRICTION:
+        elif kind != BUSHING and kind != RESIDUAL and kind < SLIDE_FRICTION:
             add_scalar_slopes(scene, T, t, y, f)
     return 0
 

@@ -11,16 +11,21 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.system.arrays import PYTHON_CALLS
+from mbsim.system.arrays import PYTHON_CALLS, RESIDUAL_DOOR
 
 
 @jitable
-def user_result(scene, t, y, row, component):
-    """Return result `component` of subroutine `row`: 0 calls it, the others are of that call."""
+def user_result(scene, t, y, row, component, calls):
+    """Return result `component` of subroutine `row`: 0 calls it, and what `calls`, or reads."""
     users = scene.users
-    if component == 0:
-        scene.log.counters[PYTHON_CALLS] += 1
-        code = call_int(users.address[row], (scene, t, y, users.result[row]))
+    if component == 0 or calls == 1:
+        element = users.element[row]
+        if element >= 0:
+            door = scene.world.doors[RESIDUAL_DOOR]
+            code = call_int(door, (scene, t, y, element, component))
+        else:
+            scene.log.counters[PYTHON_CALLS] += 1
+            code = call_int(users.address[row], (scene, t, y, users.result[row]))
         if code != 0:
             if users.failed[0] == 0:
                 users.failed[0] = code

@@ -135,7 +135,7 @@ def evaluate_program(scene, t, y, program):
         elif op == USER:
             s[top] = x
             top += 1
-            x = user_result(scene, t, y, code[1], code[2])
+            x = user_result(scene, t, y, code[1], code[2], code[3])
         elif op < FIRST_MEASURE:
             s[top] = x
             top = apply_value(op, code[1], s, top + 1) - 1

@@ -246,23 +246,29 @@ def first_event(p, m, t, h, times):
 
 @jitable
 def side_at(p, m, t, h, s, what):
-    """Return whether a force is on another branch at the part s of the fitted step."""
+    """Return whether a force is on another branch at the part s of the fitted step.
+
+    Sides are those just behind the step's begin: before that only what is found exactly counts.
+    """
     interpolate(m, s, m.error)
-    return call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error)) > 0.0
+    differs = call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error))
+    return differs > (0.0 if s >= NEAR_KINK else 1.0)
 
 
 @jitable
-def first_kink(p, m, t, h):
+def first_kink(p, m, t, h, whole):
     """Return the length of the fitted step up to its first kink that matters, h for none.
 
-    The problem is left evaluated at the trial point.
+    `whole` is its length before it was cut. The problem is left evaluated at the trial point.
     """
     low, high, near = NEAR_KINK, 1.0, NEAR_KINK
     side_at(p, m, t, h, low, SETTLE)
     differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
     if differs > 1.0:
         # it is told from what was committed, however near that is
-        low, near = 0.0, NEAR_CHANGE
+        # a part of the whole step: where it lies at the very begin, as behind another, a step
+        # that is cut again and again would get too short to reach it
+        low, near = 0.0, NEAR_CHANGE * whole / h
     if differs > 0.0:
         while high - low > 0.1 * near:
             middle = 0.5 * (low + high)
@@ -333,14 +339,14 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     tried a little longer.
     """
     near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
-    shortened, retakes, cuts = False, 0, 0
+    shortened, retakes, cuts, whole = False, 0, 0, h
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
         code, part, asked, kinked = attempt(p, m, steps, t, h, times)
         failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
         if kinked and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
-            cut = first_kink(p, m, t, h)
+            cut = first_kink(p, m, t, h, whole)
             if floor < cut < h:
                 h = cut
                 continue

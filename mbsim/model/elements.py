@@ -458,6 +458,22 @@ class DryFriction:
 
 
 @dataclass(frozen=True)
+class ForceElement:
+    """Force_Element (ours): forces along and about axes of J by a user's residual.
+
+    `directions` are TX ... RZ, each once. The function and its unknowns are in the user's script.
+    """
+
+    id: int
+    directions: tuple[str, ...]
+    user: Subroutine
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Variable:
     """Reference_Variable, Adams' VARIABLE: an expression that others use by VARVAL(id)."""
 
@@ -585,6 +601,7 @@ class Model:
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
     dry_frictions: dict[int, DryFriction] = field(default_factory=dict)
+    force_elements: dict[int, ForceElement] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
     splines: dict[int, Spline] = field(default_factory=dict)

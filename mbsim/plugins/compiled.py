@@ -42,6 +42,16 @@ def compile_normal(text: str, values: dict[str, Any], name: str, par_count: int)
     return _compile(text, values, name, par_count, normal_address, 13)
 
 
+def compile_residual(
+    text: str, values: dict[str, Any], name: str, par_count: int, axes: int, unknowns: int
+) -> tuple[int, str]:
+    """Return the address of a compiled residual and '', or 0 and the reason."""
+    from mbsim.plugins.residual_adapter import residual_address
+
+    adapted = functools.partial(residual_address, axes=axes, unknowns=unknowns)
+    return _compile(text, values, name, par_count, adapted, 6)
+
+
 def _compile(
     text: str,
     values: dict[str, Any],

@@ -176,6 +176,27 @@ def normal_disagreement(
     return _compare(run, call, cases(), shown)
 
 
+def residual_disagreement(
+    address: int,
+    call: Callable[[list[float]], list[float]],
+    par: Any,
+    cases: Iterator[list[float]],
+    count: int,
+) -> str:
+    """Return '' if the code at `address` does what `call`, a residual, does in all cases."""
+    entry = guard.C_FUNCTION(address)
+    c_out, c_par = (ctypes.c_double * count)(), (ctypes.c_double * max(len(par), 1))(*par)
+
+    def run(given: list[float]) -> tuple[bool, list[float]]:
+        failed = entry(0, (ctypes.c_double * len(given))(*given), c_par, c_out) != 0
+        return failed, list(c_out)
+
+    def shown(given: list[float]) -> str:
+        return "t, x, xdot, f, fdot = " + ", ".join(f"{value:g}" for value in given)
+
+    return _compare(run, call, cases, shown)
+
+
 def _compare(
     run: Callable[[list[float]], tuple[bool, list[float]]],
     call: Callable[[list[float]], list[float]],

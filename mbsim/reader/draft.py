@@ -38,6 +38,7 @@ class Draft:
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, el.JointLimit] = field(default_factory=dict)
     dry_frictions: dict[int, el.DryFriction] = field(default_factory=dict)
+    force_elements: dict[int, el.ForceElement] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
     sensors: dict[int, el.Sensor] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)

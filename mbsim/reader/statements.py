@@ -17,6 +17,7 @@ from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
 from mbsim.reader.dry_friction import FORCE_DRYFRICTION
+from mbsim.reader.force_element import FORCE_ELEMENT
 from mbsim.reader.forces import (
     FORCE_BUSHING,
     FORCE_SCALAR_TWOBODY,
@@ -66,6 +67,7 @@ STATEMENTS = (
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
     FORCE_DRYFRICTION,
+    FORCE_ELEMENT,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
     REFERENCE_SPLINE,

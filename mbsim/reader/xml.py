@@ -169,6 +169,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         joint_frictions=draft.joint_frictions,
         joint_limits=draft.joint_limits,
         dry_frictions=draft.dry_frictions,
+        force_elements=draft.force_elements,
         variables=draft.variables,
         differentials=draft.differentials,
         splines=draft.splines,

@@ -42,13 +42,14 @@ GROUPS = {
     ),
     "JOINTLIMIT": Group("joint_limits", "joint_limits", "joint limit", "Force_JointLimit"),
     "DRYFRICTION": Group("dry_frictions", "dry_frictions", "dry friction", "Force_DryFriction"),
+    "FORCEELEMENT": Group("force_elements", "force_elements", "force element", "Force_Element"),
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
 APPLIED = (
     *("SPRINGDAMPER", "SFORCE", "BUSHING", "VECTORFORCE", "BODYFORCE"),
-    *("JOINTFRICTION", "JOINTLIMIT", "DRYFRICTION"),
+    *("JOINTFRICTION", "JOINTLIMIT", "DRYFRICTION", "FORCEELEMENT"),
 )
 
 

@@ -332,8 +332,10 @@ class Recorder:
             path = f"{GROUPS[statement].path}/{id}"
             yield f"{path}/force", wrenches[:, k, 0:3]
             yield f"{path}/torque", wrenches[:, k, 3:6]
-        for place, id in zip(system.scene.states.place, system.model.differentials, strict=True):
+        for place, id in zip(system.scene.states.place, system.model.differentials, strict=False):
             yield f"diffs/{id}/value", block.y[:, place]
+        for name, column in system.unknowns():
+            yield name, block.value[:, column]
         forces = Forces(system, bodies, block.joint, block.applied, block.contact)
         for request in system.model.requests.values():
             markers = system.placement.markers

@@ -19,6 +19,7 @@ from mbsim.system.states import sensors_table, states_table
 from mbsim.system.weight import Pull, pulls
 
 if TYPE_CHECKING:
+    from mbsim.plugins.residual import UserResidual
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.system.subroutines import StateReader
 
@@ -43,9 +44,18 @@ def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
     return found
 
 
-def _values(model: Model, programs: ProgramTable) -> list[tuple[int, int]]:
-    """Make the programs of requests, the last of all; return request and F number of each."""
+def _values(
+    model: Model, programs: ProgramTable, residuals: Mapping[int, UserResidual] | None
+) -> list[tuple[int, int]]:
+    """Make the programs of requests, the last of all; return request and F number of each.
+
+    Before them those of the unknowns of elements are made, which have no request: id 0.
+    """
     made = []
+    if residuals:
+        from mbsim.system.residuals import unknown_programs
+
+        made = [(0, k) for k, _ in enumerate(unknown_programs(model, programs, residuals))]
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs):
             if expression is not None:
@@ -77,6 +87,7 @@ class Acting:
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
+    residuals: a.Residuals | None
 
 
 def _link_dry(
@@ -97,11 +108,12 @@ def acting(
     subroutines: Mapping[tuple[str, int], UserSubroutine | None],
     looks: bool,
     runs: bool = True,
+    residuals: Mapping[int, UserResidual] | None = None,
 ) -> Acting:
     """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
 
     `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
-    look at, is left out unless it `runs`.
+    look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.
     """
     programs = ProgramTable(
         table,
@@ -112,7 +124,8 @@ def acting(
         model.splines,
         model.arrays,
     )
-    programs.users = {element: k for k, element in enumerate(subroutines)}
+    elements = [("FORCEELEMENT", id) for id in model.force_elements]
+    programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)
     mechanism = constrain(model, table, programs)
     applied, applied_ids = in_order(
@@ -120,6 +133,12 @@ def acting(
     )
     _link_dry(model, mechanism, applied, applied_ids)
     states = states_table(model, programs)
+    table_of_residuals, modes = None, []
+    if residuals:
+        from mbsim.system.residuals import mode_programs, residuals_table
+
+        table_of_residuals, states = residuals_table(model, table, programs, residuals, states)
+        modes = mode_programs(model, programs, residuals)
     held = (mechanism.connections, mechanism.elements, programs)
     check_states(model, states, applied, applied_ids, *held)
     return Acting(
@@ -129,10 +148,11 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
-        kinks_table(model, programs, applied),
+        kinks_table(model, programs, applied, modes),
         _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
-        _values(model, programs),  # the last of all
+        _values(model, programs, residuals),  # the last of all
+        table_of_residuals,
     )
 
 

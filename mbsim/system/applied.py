@@ -12,6 +12,7 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import (
     Bushing,
     DryFriction,
+    ForceElement,
     JointFriction,
     JointLimit,
     Model,
@@ -81,6 +82,7 @@ def _tables(model: Model) -> dict[str, dict[int, Any]]:
         "JOINTFRICTION": model.joint_frictions,
         "JOINTLIMIT": model.joint_limits,
         "DRYFRICTION": model.dry_frictions,
+        "FORCEELEMENT": model.force_elements,
     }
 
 
@@ -226,6 +228,25 @@ def _add_dry(
     made.par[k, 2] = friction.friction if static is None else static
 
 
+def _add_element(
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    made: a.Applied,
+    k: int,
+    element: ForceElement,
+) -> None:
+    """Fill row k with an element of a user's residual."""
+    from mbsim.system.residuals import force_program
+
+    made.i[k], made.j[k] = markers.row(element.i_marker_id), markers.row(element.j_marker_id)
+    made.kind[k], made.axes[k] = a.RESIDUAL, made.j[k]
+    made.par[k, 0] = list(model.force_elements).index(element.id)
+    for at, direction in enumerate(element.directions):
+        c = 3 * "TR".index(direction[0]) + "XYZ".index(direction[1])
+        made.components[k, c] = force_program(programs, element.id, at)
+
+
 #: What fills a row, by statement.
 _FILL: dict[str, Callable[..., None]] = {
     "SPRINGDAMPER": _add_spring,
@@ -236,4 +257,5 @@ _FILL: dict[str, Callable[..., None]] = {
     "JOINTFRICTION": _add_friction,
     "JOINTLIMIT": _add_limit,
     "DRYFRICTION": _add_dry,
+    "FORCEELEMENT": _add_element,
 }

@@ -63,9 +63,10 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     EVALUATE_DOOR,  # the whole rhs
     MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
     MEMORY_PAIR_DOOR,  # the same in complex ones
-    DRY_DOOR,  # what Force_DryFriction keeps of an accepted step
-) = range(17)
-DOORS = 17
+    DRY_DOOR,  # what Force_DryFriction and Force_Element keep of an accepted step
+    RESIDUAL_DOOR,  # a Force_Element by its residual
+) = range(18)
+DOORS = 18
 
 # entries of `Applied.kind`
 (
@@ -74,6 +75,7 @@ DOORS = 17
     AXIS_TORQUE,
     VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of dynamics.wrenches
     BUSHING,
+    RESIDUAL,  # Force_Element
     SLIDE_LIMIT,
     TURN_LIMIT,
     DRY_SLIDE,  # Force_DryFriction along an axis, then about one: dynamics.dry_friction
@@ -82,7 +84,7 @@ DOORS = 17
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(13)
+) = range(14)
 LATE = 16  # is added to the kind of forces that need reactions, see dynamics.late_forces
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
@@ -314,10 +316,52 @@ class Kinks(NamedTuple):
 class Users(NamedTuple):
     """User subroutines of forces and variables, see dynamics.subroutines."""
 
-    address: I1  # (nu,) of their guarded C functions
+    address: I1  # (nu,) of their guarded C functions, 0 for a residual
+    element: I1  # (nu,) row of `Residuals`, -1 for a subroutine
     result: F2  # (nu, most) what each returned last
     failed: I1  # (1,) code of the first that failed in this evaluation, or 0
     seen: F1  # (ny,) y when a friction subroutine that looks at it is called; else (0,)
+
+
+class Residuals(NamedTuple):
+    """Force_Element: forces whose unknowns a user's residual makes 0, see dynamics.residual.
+
+    Rows have na directions and nu unknowns each, at most `axes` and `unknowns`; what they give as
+    `Users.result`: less f along every direction, f' of states, f of every unknown, the mode.
+    """
+
+    id: I1  # (n,)
+    i: I1  # (n,) markers
+    j: I1  # (n,)
+    first: I1  # (n + 1,) first direction of each
+    begin: I1  # (n + 1,) first unknown of each
+    axis: I1  # (directions,) marker whose z it is
+    angle: I1  # (directions,) row of `Angles` of a turn, -1 for a slide
+    kind: I1  # (unknowns,) of laws.residual
+    state: I1  # (unknowns,) row of `States`, -1 for none
+    place: I1  # (unknowns,) in y, -1 for none
+    initial: F1  # (unknowns,)
+    scale: F1  # (unknowns,) a usual size
+    address: I1  # (n,) of the residual
+    twin: I1  # (n,) of the interpreted one, which says why it fails
+    interpreted: I1  # (n,) 1 where `address` enters Python
+    user: I1  # (n,) row of `Users`
+    par: F2  # (n, widest)
+    given: F1  # (inputs,) scratch
+    out: F1  # (unknowns,) scratch, as all below, of one element
+    base: F1
+    start: F1
+    z: F1
+    step: F1
+    size: F1
+    rows: F1
+    by: F3  # (2, unknowns, unknowns) residual by f and by f'
+    moves: F3  # (2, unknowns, directions) residual by x and by x'
+    A: F2  # (unknowns, unknowns)
+    swap: I1
+    rise: F1
+    slopes: F3  # (3, unknowns, wide) unknowns by x, x' and states
+    trouble: I1  # (1,) row of the element that was not solved, -1 for none
 
 
 class Applied(NamedTuple):
@@ -432,6 +476,8 @@ class State(NamedTuple):
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
     frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     dry: F2  # (nf, 4) of dry friction, see the names above
+    residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
+    # and at the begin of the last step
 
 
 class Log(NamedTuple):
@@ -547,6 +593,7 @@ class Scene(NamedTuple):
     sensors: Sensors
     kinks: Kinks
     users: Users
+    residuals: Residuals
     applied: Applied
     tree: Tree
     equations: Equations

@@ -7,7 +7,8 @@ without friction no friction law, a law that does not look at X no X.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import typing
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from mbsim.plugins.contact_post import ContactPost
     from mbsim.plugins.loader import Script
     from mbsim.plugins.normal import UserNormal
+    from mbsim.plugins.residual import UserResidual
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.system.subroutines import StateReader
 
@@ -81,6 +83,15 @@ class System:
     user_normal: dict[int, UserNormal] = field(default_factory=dict)  # by contact id
     posts: list[ContactPost] = field(default_factory=list)  # the users' CONTACTPOSTs
     load: float = 0.0  # a usual force, by which friction is judged
+    residuals: dict[int, UserResidual] = field(default_factory=dict)  # by Force_Element
+
+    def unknowns(self) -> Iterator[tuple[str, int]]:
+        """Yield the place in a result file of every unknown of elements, and its column."""
+        column = 0
+        for id, user in self.residuals.items():
+            for unknown in user.unknowns:
+                yield f"force_elements/{id}/{unknown.name}", column
+                column += 1
 
     @property
     def user_laws(self) -> list[tuple[int, UserFriction | UserNormal]]:
@@ -245,11 +256,49 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
-def _users(users: dict[tuple[str, int], UserSubroutine], seen: int) -> a.Users:
-    """Return the rows of user subroutines; `seen`: how much of y friction subroutines look at."""
+def _no_residuals() -> a.Residuals:
+    """Return the rows of a model without elements of users' residuals."""
+    kinds = typing.get_type_hints(a.Residuals, include_extras=True).values()
+    return a.Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
+
+
+def _load_residuals(
+    model: Model,
+    plugins: Sequence[Path],
+    interpret: bool,
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> dict[int, UserResidual]:
+    """Load the users' residuals."""
+    if not model.force_elements:
+        return {}
+    from mbsim.plugins.residual import load_residual
+    from mbsim.plugins.subroutine import begin_run
+
+    begin_run(log)
+    return {
+        id: load_residual(element, plugins, interpret, scripts, log)
+        for id, element in model.force_elements.items()
+    }
+
+
+def _users(
+    users: dict[tuple[str, int], UserSubroutine], seen: int, model: Model, made: Any
+) -> a.Users:
+    """Return the rows of user subroutines and of residuals behind them.
+
+    `seen`: how much of y friction subroutines look at; `made`: the residuals by id.
+    """
+    counts = [user.count for user in users.values()]
+    if made:
+        from mbsim.system.residuals import results_of
+
+        counts += [results_of(model.force_elements[id], user) for id, user in made.items()]
+    addresses = [user.address for user in users.values()]
     return a.Users(
-        np.array([user.address for user in users.values()], dtype=np.int64),
-        np.zeros((len(users), max((user.count for user in users.values()), default=1))),
+        np.array([*addresses, *(0 for _ in made)], dtype=np.int64),
+        np.array([*(-1 for _ in users), *range(len(made))], dtype=np.int64),
+        np.zeros((len(counts), max(counts, default=1))),
         np.zeros(1, dtype=np.int64),
         np.zeros(seen),
     )
@@ -291,6 +340,7 @@ def build(
     normal = _load_user_normal(model, plugins, interpret, log, scripts)
     posts = _load_posts(model, plugins, log, scripts)
     subroutines = _load_subroutines(model, plugins, log, scripts)
+    residuals = _load_residuals(model, plugins, interpret, log, scripts)
     body_ids = list(placement.bodies)
     nb = len(body_ids)
     row = {body.id: nb for body in model.bodies.values()}
@@ -330,7 +380,7 @@ def build(
     first_state = a.BODY_SIZE * nb + carried
     rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
-    rows = acting(model, table, first_state, subroutines, looks)
+    rows = acting(model, table, first_state, subroutines, looks, residuals=residuals)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
     nu = len(rows.applied.late)
@@ -338,7 +388,13 @@ def build(
     ledger = _ledger(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, carried + nz + kept)
-    y0[states.place] = [state.ic for state in model.differentials.values()]
+    y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
+    held = rows.residuals or _no_residuals()
+    if residuals:
+        from mbsim.system.residuals import fill_scales
+
+        fill_scales(held, states, load, placement.L)
+        y0[held.place[held.place >= 0]] = held.initial[held.place >= 0]
     markers, angles = table.arrays()
     instructions = rows.programs.arrays(mechanism.elements, rows.applied_ids, contact_ids)
     if any(s.analysis_type == "STATIC" for s in model.simulations):
@@ -362,7 +418,8 @@ def build(
         states=states,
         sensors=rows.sensors,
         kinks=rows.kinks,
-        users=_users(subroutines, len(y0) if rubs else 0),
+        users=_users(subroutines, len(y0) if rubs else 0, model, residuals),
+        residuals=held,
         applied=rows.applied,
         tree=mechanism.tree,
         equations=mechanism.equations,
@@ -385,6 +442,7 @@ def build(
             len(rows.kinks.program),
             most,
             nf,
+            (len(held.id), 2, len(held.given)),
         ),
         log=empty_log(len(contact_ids)),
         work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
@@ -430,4 +488,5 @@ def build(
         normal,
         posts,
         load=load,
+        residuals=residuals,
     )

@@ -57,16 +57,17 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     table = MarkerTable(system.placement, bodies)
     places = scene.states.place
     first_state = int(places[0]) if len(places) else 0
-    rows = acting(model, table, first_state, system.subroutines, system.reader is not None)
+    looks = system.reader is not None
+    rows = acting(model, table, first_state, system.subroutines, looks, residuals=system.residuals)
     applied = rows.applied
     markers, angles = table.arrays()
     listed = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
     contacts, _ = contacts_table(listed, system.user_friction, system.user_normal, system.load)
-    looks = all(
+    same = all(
         np.array_equal(x, y)
         for x, y in ((markers.body, scene.markers.body), (markers.p, scene.markers.p))
     )
-    if not looks or not all(map(np.array_equal, angles, scene.angles)):
+    if not same or not all(map(np.array_equal, angles, scene.angles)):
         raise _refused(system, changes, "looks at other markers than before: not built yet")
     if not _same(scene.contacts, contacts, _OF_CONTACTS) or not _same(
         scene.applied, applied, _OF_APPLIED

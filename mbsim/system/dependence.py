@@ -147,7 +147,8 @@ def check_states(
     DeckError
         Naming the state.
     """
-    for state, program in zip(model.differentials.values(), states.program, strict=True):
+    # states of elements, which stand behind these, look at no forces
+    for state, program in zip(model.differentials.values(), states.program, strict=False):
         rows, reaction = _needed(
             [int(program)], applied, elements, connections, connection_ids, programs
         )

@@ -39,7 +39,8 @@ def find_depends(scene: Scene) -> Depends:
             markers.update(map(int, row[1 : 1 + _MARKERS.get(int(row[0]), 0)]))
             if row[0] == p.ANGLE:
                 markers.update((int(scene.angles.i[row[1]]), int(scene.angles.j[row[1]])))
-        calls = bool((code[:, 0] == p.USER).any())
+        # what a Force_Element gives has slopes of its own: dynamics.residual_slopes
+        calls = any(row[0] == p.USER and scene.users.element[row[1]] < 0 for row in code)
         found = {int(scene.markers.body[m]) for m in markers}
         if calls:
             found |= acts_on.get(k, set())

@@ -19,7 +19,7 @@ differs where a branch does:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -133,8 +133,13 @@ def has_modes(model: Model) -> bool:
     return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
 
 
-def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.Kinks:
-    """Return what is watched: a program for each expression, limits, dry friction, modes."""
+def kinks_table(
+    model: Model, programs: ProgramTable, applied: a.Applied, modes: Sequence[int] = ()
+) -> a.Kinks:
+    """Return what is watched: a program for each expression, limits, dry friction, modes.
+
+    `modes` are programs that tell the modes of users' elements.
+    """
     variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
     rows, any_found = [], any(s.changes for s in model.simulations)
     still = [Instruction(NUMBER, value=0.0)]
@@ -148,6 +153,7 @@ def kinks_table(model: Model, programs: ProgramTable, applied: a.Applied) -> a.K
         rows.append(row)
     if not any_found:
         rows = []
+    rows += modes
     watched = (a.SLIDE_LIMIT, a.TURN_LIMIT, a.DRY_SLIDE, a.DRY_TURN)
     limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
     last = [-1] if has_modes(model) else []

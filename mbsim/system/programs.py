@@ -28,7 +28,7 @@ up to five numbers:
 |                    | comp, marker k                                                        |
 | SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
 |                    | topmost jets                                                          |
-| USER               | row of `Users`, which of its results; 0 calls it, others read         |
+| USER               | row of `Users`, which of its results, 1 to call it; so does result 0  |
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ def start_state(
     kinks: int = 0,
     memory: int = 0,
     forces: int = 0,
+    residual: tuple[int, int, int] = (0, 2, 0),
 ) -> a.State:
     """Return the incident table before anything touched."""
     dry = np.zeros((forces, 4))
@@ -52,6 +53,8 @@ def start_state(
         sides=np.zeros((kinks, 2)),
         frozen=np.zeros(1, dtype=np.int64),
         dry=dry,
+        # no time: nothing is remembered yet
+        residual=np.full(residual, np.nan),
     )
 
 

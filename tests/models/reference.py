@@ -594,3 +594,45 @@ def loose_slider(times, law, mu, slip, g=9.81):
     ).y[:3]  # fmt: skip
     place = np.column_stack([l1 * np.cos(p) + l2 * np.cos(q), l1 * np.sin(p) + l2 * np.sin(q)])
     return p, q, r, place
+
+
+def jenkins_block(
+    t: np.ndarray, k: float, friction: float, dx: float, x: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and f of a unit mass on a spring k and on dry friction with a spring before it.
+
+    It starts at rest at `x`, f = 0. Each stretch is harmonic; the next begins where abs(f) comes to
+    the friction, or where x' comes to 0 in slip.
+    """
+    give = friction / dx
+    found_x, found_f = np.empty_like(t), np.empty_like(t)
+    start, v, slider, slides = 0.0, 0.0, x, 0.0
+    while True:
+        stiff = k if slides else k + give
+        middle = -slides * friction / k if slides else give * slider / stiff
+        w = np.sqrt(stiff)
+        reach, phase = np.hypot(x - middle, v / w), np.arctan2(-v / w, x - middle)
+        if slides:
+            # x' = -reach w sin(w s + phase) has the sign of `slides` up to the next multiple of pi
+            length = (np.pi * (1.0 if slides < 0.0 else 0.0) - phase) / w
+            while length <= 1e-12:
+                length += 2.0 * np.pi / w
+        else:
+            # f = give (x - slider) = +-friction, on the way out
+            ends = [(slider + side * dx - middle) / reach for side in (-1.0, 1.0)]
+            angles = [side * np.arccos(c) for c in ends if abs(c) <= 1.0 for side in (-1.0, 1.0)]
+            waits = [((a - phase) % (2.0 * np.pi)) / w for a in angles]
+            # it begins at one of them where slip has just ended
+            length = min((s for s in waits if s > 1e-7 / w), default=np.inf)
+            length = min((s for s in waits if s > 1e-12 and s < length), default=length)
+        here = (t >= start) & (t <= start + length)
+        found_x[here] = middle + reach * np.cos(w * (t[here] - start) + phase)
+        found_f[here] = slides * friction if slides else give * (found_x[here] - slider)
+        start += length
+        if start > t[-1]:
+            return found_x, found_f
+        x, v = middle + reach * np.cos(w * length + phase), -reach * w * np.sin(w * length + phase)
+        if slides:
+            slider, slides, v = x - slides * dx, 0.0, 0.0
+        else:
+            slides = np.sign(v)

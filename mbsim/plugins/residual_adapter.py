@@ -1,0 +1,55 @@
+"""The arguments of a residual on the inside of its compiled function.
+
+Apart from `compiled`, as `adapter` is, for the cache's sake.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# what Numba compiles carries no annotations, as in laws/ and core/blend.py
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import carray  # type: ignore[attr-defined]
+from numba.extending import register_jitable
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from mbsim.core import jit
+from mbsim.laws.abi import FRICTION_SIGNATURE, RAISED_COMPILED
+
+
+def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -> Any:
+    """Return a residual with `count` parameters as a C function that signals what it raises."""
+    first = 1 + 2 * axes
+    size = first + 2 * unknowns
+
+    def entry(element, given, par, out):
+        a = carray(given, (size,))
+        # mypy sees the typing context that Numba passes to an intrinsic as a first argument
+        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
+        x: Any = to_fixed_tuple(a[1:], axes)  # type: ignore[call-arg]
+        xdot: Any = to_fixed_tuple(a[1 + axes :], axes)  # type: ignore[call-arg]
+        f: Any = to_fixed_tuple(a[first:], unknowns)  # type: ignore[call-arg]
+        fdot: Any = to_fixed_tuple(a[first + unknowns :], unknowns)  # type: ignore[call-arg]
+        result = carray(out, (unknowns,))
+        code = 0
+        try:
+            found = function(x, xdot, f, fdot, a[0], values, a[0])
+            if len(found) != unknowns:
+                raise ValueError("not as many")
+            for k in range(unknowns):
+                result[k] = found[k]
+        except Exception:  # the only kind Numba can catch; the interpreted twin says which
+            code = RAISED_COMPILED
+        return code
+
+    return entry
+
+
+def residual_address(
+    function: Callable[..., Any], callees: list[Any], count: int, axes: int, unknowns: int
+) -> int:
+    """Return the address of a rewritten residual behind FRICTION_SIGNATURE."""
+    for each in (*callees, function):
+        register_jitable(error_model="python", boundscheck=True)(each)
+    return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE)
