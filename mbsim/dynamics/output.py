@@ -19,6 +19,7 @@ from mbsim.dynamics.contact import (
     sides,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.laws.friction.stiction import HELD_X
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
@@ -120,6 +121,10 @@ def fill_incidents(scene, h, y):
         row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
         for j in range(state.before.shape[1]):
             row[INC_MEMORY + j] = state.before[s, j]
+        if len(work.held) > 0 and scene.contacts.rigid[contact_of(scene, s)] == 1:
+            # what equations hold, the law can tell only from here
+            for j in range(2):
+                row[INC_MEMORY + HELD_X + j] = work.held[s, j]
         k += 1
     rows.used[1] = k
     return k - first

@@ -7,6 +7,7 @@ Nothing here is converted, placed or checked; see `placement` and `checks`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -159,6 +160,11 @@ class Contact:
     def asks_user(self) -> bool:
         """Whether a function of the user's gives its friction, or a law's friction of sliding."""
         return self.cff_type == "USERCFF" or bool(self.cff.fnc_name)
+
+    @property
+    def rigid(self) -> bool:
+        """Whether its friction holds without give: tangential_stiffness is INFINITE."""
+        return math.isinf(dict(self.friction).get("tangential_stiffness", 0.0))
 
     @property
     def with_itself(self) -> bool:

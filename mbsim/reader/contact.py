@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from mbsim.laws.catalog import FRICTION_LAWS
+import math
+
+from mbsim.laws.catalog import FRICTION_LAWS, Parameter
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
     CFF_TYPES,
@@ -18,11 +20,13 @@ from mbsim.reader.kinds import (
     IDS,
     NOT_NEGATIVE,
     POSITIVE,
+    POSITIVE_OR_INFINITE,
     RATIO,
     REAL,
     TEXT,
     UNIT,
     USER,
+    Kind,
     keyword,
 )
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
@@ -31,6 +35,8 @@ from mbsim.reader.subroutine import subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 _STIFFNESS = "tangential_stiffness"
+#: What STICTION has beside that of the spring that holds.
+_OF_SPRINGS = ("tangential_damping", "poisson_ratio", "rotational_stiffness", "torsion_radius")
 _USERS = {
     *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
 }
@@ -63,6 +69,8 @@ def _build_contact(entry: Entry) -> None:
     if cff_type == "STICTION" and cnf_type == "USERCNF" and not entry.given(_STIFFNESS):
         message = "missing; a user's normal force does not tell the stiffness it would follow from"
         entry.fault(message, _STIFFNESS)
+    if cff_type == "STICTION":
+        _check_rigid(entry)
     posts = any(entry.given(name) for name in _POST)
     asks_user = _asks_user(entry, cff_type)
     cff = subroutine(entry, "cff", "CFFSUB") if asks_user else el.Subroutine()
@@ -134,8 +142,23 @@ def _of_laws() -> dict[str, Spec]:
     """Return the attributes that friction laws bring with them."""
     laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
     own = [parameter for law in laws for parameter in law.own]
-    kinds = {p.name: RATIO if p.ratio else POSITIVE if p.positive else NOT_NEGATIVE for p in own}
-    return {name: Spec(kind) for name, kind in kinds.items()}
+    return {parameter.name: Spec(_kind_of(parameter)) for parameter in own}
+
+
+def _kind_of(parameter: Parameter) -> Kind:
+    """Return what values a parameter of a friction law may have."""
+    if parameter.infinite:
+        return POSITIVE_OR_INFINITE
+    return RATIO if parameter.ratio else POSITIVE if parameter.positive else NOT_NEGATIVE
+
+
+def _check_rigid(entry: Entry) -> None:
+    """Fault what means nothing where friction holds without give."""
+    if not math.isinf(entry.get(_STIFFNESS, 0.0)):
+        return
+    for name in _OF_SPRINGS:
+        if entry.given(name):
+            entry.fault(f"means nothing with {_STIFFNESS}=INFINITE: nothing gives", name)
 
 
 def _check_count(entry: Entry, side: str) -> None:
