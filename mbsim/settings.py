@@ -180,22 +180,30 @@ def _refuse_verlet(model: Model) -> None:
 
 
 def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
-    """Return the method that runs a model, and what is to be said, where dry friction is rigid.
+    """Return the method that runs a model, and what is to be said, where friction is rigid.
 
     Raises
     ------
     ModelError
         For an explicit method: it has no unknown for the force that holds.
     """
-    rigid = next((f for f in model.dry_frictions.values() if f.dx == 0.0), None)
-    if rigid is None or method in IMPLICIT_METHODS:
+    contact = next((c for c in model.contacts.values() if c.rigid), None)
+    dry = next((f for f in model.dry_frictions.values() if f.dx == 0.0), None)
+    if (contact is None and dry is None) or method in IMPLICIT_METHODS:
         return method, []
-    name = element_name(model.file, "Force_DryFriction", rigid.id)
+    if contact is not None:
+        source, name = contact.source, element_name(model.file, "Force_Contact", contact.id)
+        said, instead = "tangential_stiffness=INFINITE", "a stiffness"
+    else:
+        assert dry is not None
+        source, name = dry.source, element_name(model.file, "Force_DryFriction", dry.id)
+        said, instead = "dx=0", "dx"
     if method == AUTO:
         return IMPLICIT, [f"integrator AUTO: {IMPLICIT} from the start, for {name} is rigid"]
     raise ModelError(
-        f"{model.file}:{rigid.source.line}: {name}: dx=0: rigid friction is for implicit methods "
-        f"and integrator {method} is explicit; take {' or '.join(IMPLICIT_METHODS)}, or give dx"
+        f"{model.file}:{source.line}: {name}: {said}: rigid friction is for implicit methods "
+        f"and integrator {method} is explicit; take {' or '.join(IMPLICIT_METHODS)}, or give "
+        f"{instead}"
     )
 
 

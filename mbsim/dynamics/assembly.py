@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
+from mbsim.dynamics.equations import lasting
 from mbsim.dynamics.start import MOST_DIRECTIONS, start_velocities
 from mbsim.system.arrays import ANGLE, CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
 from mbsim.system.build import System
@@ -88,11 +89,12 @@ def assemble(scene: Scene, y: Array, serve: Serve, given: dict[int, Array]) -> A
     chosen = [int(e) for e in equations.active[: equations.active[-1]]]
     serve(PROJECT, y)
     moved, sped = _changes(scene, before, y)
+    lasts = lasting(scene)
     return Assembly(
         moved,
         sped,
         _lost(scene, y, given),
-        [e for e in range(n) if e not in set(chosen) and equations.dry[e] < 0],
+        [e for e in range(n) if e not in set(chosen) and lasts[e]],
         int(scene.tree.free.sum()) - len(chosen),
     )
 
@@ -126,8 +128,8 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
 
 def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
     """Take the residuals of a column away, for the equations that hold at that level."""
-    # dry friction, whose equations are the last, holds nothing yet
-    n = int((scene.equations.dry < 0).sum())
+    # friction, whose equations are the last, holds nothing yet
+    n = int(lasting(scene).sum())
     given, levels = scene.equations.start[:n, column], scene.equations.level[:n]
     starts = (levels < level) & np.isfinite(given)
     held = (levels >= level) | starts

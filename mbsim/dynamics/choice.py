@@ -20,8 +20,10 @@ from mbsim.dynamics.equations import (
     fill_equations,
     fill_matrix,
     is_active,
+    is_friction,
     side_place,
 )
+from mbsim.laws.catalog import STICK
 from mbsim.system.arrays import (
     CHOSEN,
     NEAR_FOLD,
@@ -30,10 +32,14 @@ from mbsim.system.arrays import (
     SLIDES,
     SLIDES_BEFORE,
     USUAL,
+    WITHIN,
 )
 
 #: What at most is left of an equation that others imply, as part of its size for free bodies.
 IMPLIED = 1e-12
+#: The same of friction at contact points. Those of a flat face lie in a plane but for their depths;
+#: holding by lever arms of that size would take forces far above any limit.
+LEVER = 1e-4
 #: A choice is made anew when its least pivot falls below this part of what it was.
 _WORN = 0.1
 #: A state is near a position in which a loop can fold below this part of the usual pivots.
@@ -92,23 +98,28 @@ def fill_skyline(scene):
 
 @jitable
 def sticks(scene, e):
-    """Return whether equation e is of dry friction that sticks at the point being evaluated."""
+    """Return whether equation e is of friction that sticks at the point being evaluated."""
+    s = scene.equations.slot[e]
+    if s >= 0:
+        if scene.world.past[0] == WITHIN:
+            return scene.state.before[s, 0] == STICK and scene.state.touching[s] == 1
+        return scene.state.memory[s, 0] == STICK
     f = scene.equations.dry[e]
     if f < 0:
         return False
     kept = scene.state.dry[f]
-    if scene.world.past[0] == 1:
+    if scene.world.past[0] == WITHIN:
         return kept[SLIDER_BEFORE] == 0.0 and kept[SLIDES_BEFORE] == 0.0
     return kept[SLIDER] == 0.0 and kept[SLIDES] == 0.0
 
 
 @jitable
 def use_all(scene, sticking):
-    """Take all equations into use, of dry friction those that stick if that is wanted, or none."""
+    """Take all equations into use, of friction those that stick if that is wanted, or none."""
     active, count = scene.equations.active, 0
     n = len(active) - 1
     for e in range(n):
-        if scene.equations.dry[e] < 0 or (sticking == 1 and sticks(scene, e)):
+        if not is_friction(scene, e) or (sticking == 1 and sticks(scene, e)):
             active[count] = e
             count += 1
     active[n] = count
@@ -116,10 +127,18 @@ def use_all(scene, sticking):
 
 
 @jitable
+def may_be_chosen(scene, e, pivot, friction):
+    """Return whether equation e with what is left of it may be chosen; 1: friction may, too."""
+    if not is_friction(scene, e):
+        return True
+    return friction == 1 and (scene.equations.slot[e] < 0 or pivot > LEVER)
+
+
+@jitable
 def choose(scene, t, y):
     """Choose equations that are independent at y, where the tree has been prepared.
 
-    Dry friction holds what nothing else does: it is asked last.
+    Friction holds what nothing else does: it is asked last.
     """
     sweep, active = scene.sweep, scene.equations.active
     use_all(scene, 1)
@@ -140,7 +159,7 @@ def choose(scene, t, y):
     while count < n:
         best, pivot = -1, 0.0
         for r in range(n):
-            waits = active[r] < 0 and (friction == 1 or scene.equations.dry[-1 - active[r]] < 0)
+            waits = active[r] < 0 and may_be_chosen(scene, -1 - active[r], A[r, r], friction)
             if waits and A[r, r] > 1.001 * pivot:
                 best, pivot = r, A[r, r]
         if best < 0 or pivot <= IMPLIED:

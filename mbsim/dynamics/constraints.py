@@ -14,6 +14,7 @@ from mbsim.dynamics.equations import (
     active_count,
     fill_matrix,
     hold,
+    is_friction,
 )
 from mbsim.dynamics.projection import (
     displace,
@@ -57,7 +58,7 @@ def constrain(scene, t, y, dy):
         # the work of what moves with time: multiplier times the rate of its equation's sum
         power, sweep = 0.0, scene.sweep
         for r in range(active_count(scene)):
-            if scene.equations.dry[scene.equations.active[r]] >= 0:
+            if is_friction(scene, scene.equations.active[r]):
                 continue
             power += sweep.multiplier[r] * sweep.rate[scene.equations.active[r], FLOW]
         dy[ledger] = power

@@ -16,6 +16,7 @@ from mbsim.dynamics.interpreter import interpret
 from mbsim.dynamics.joint_friction import add_friction
 from mbsim.dynamics.late_forces import add_late
 from mbsim.dynamics.limits import longest_step
+from mbsim.dynamics.rigid_contact import serve_held
 from mbsim.dynamics.rigid_friction import serve_rigid
 from mbsim.dynamics.states import add_slopes
 from mbsim.dynamics.subroutines import failure_or
@@ -30,6 +31,7 @@ from mbsim.system.arrays import (
     DRY_TURN,
     EXPRESSION_DOOR,
     FRICTION_DOOR,
+    RIGID_DOOR,
     SLIDE_LIMIT,
     VALUE_DOOR,
     VALUES_DOOR,
@@ -127,6 +129,19 @@ def _serve_rigid(context, what, t, y):
     """The same where some is rigid."""
     scene = view(context, Scene)
     return serve_rigid(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+
+
+def _serve_held(context, what, t, y):
+    """What contacts do whose friction is rigid."""
+    scene = view(context, Scene)
+    return serve_held(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+
+
+def open_held(scene: Scene) -> None:
+    """Open the doors of contacts whose friction is rigid."""
+    doors = scene.world.doors
+    doors[RIGID_DOOR] = jit.address(_serve_held, _KEEP)
+    doors[DRY_DOOR] = jit.address(_serve_rigid, _KEEP)
 
 
 def limit_turn(context, t, h, a, b):

@@ -14,6 +14,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.angles import followed_angle
@@ -21,7 +24,17 @@ from mbsim.dynamics.expressions import gradient, jet
 from mbsim.dynamics.kinematics import position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.tree import load, origin, put, respond
-from mbsim.system.arrays import ANGLE, GENERAL, OFFSET, PERP, USUAL
+from mbsim.system.arrays import (
+    ANGLE,
+    GENERAL,
+    OFFSET,
+    PERP,
+    PLACE_HELD,
+    RIGID_DOOR,
+    TOUCHING,
+    USUAL,
+    Scene,
+)
 
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
@@ -134,6 +147,34 @@ def distance_term(scene, y, i, j, G):
 
 
 @jitable
+def touching_term(scene, y, i, j, way, s, G):
+    """Return rate and second rate of slip along x or y of slot s, and fill its gradient.
+
+    With p where the surfaces touch, t the axis and n the normal, which all go with the contact:
+
+        slip = t . v,  v = v_I + w_I x (p - x_I) - v_J - w_J x (p - x_J)
+        its second rate by velocities = t' . v + t . (w_I x (p' - v_I) - w_J x (p' - v_J)),
+
+    and where nothing slips t' . v = -(t . n') (n . v). `dynamics.rigid_contact` places the slot.
+    """
+    row = scene.work.hold[s]
+    p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
+    if way == 1:
+        t = cross(n, t)
+    dp, dn = (row[9], row[10], row[11]), (row[12], row[13], row[14])
+    bi, bj = scene.markers.body[i], scene.markers.body[j]
+    wi, wj = vector(scene.work.w[bi]), vector(scene.work.w[bj])
+    vi, vj = vector(scene.work.v[bi]), vector(scene.work.v[bj])
+    at_i = add(vi, cross(wi, sub(p, position(scene, y, bi))))
+    v = sub(at_i, add(vj, cross(wj, sub(p, position(scene, y, bj)))))
+    zero = (0.0, 0.0, 0.0)
+    add_side(scene, y, G[0:6], i, p, t, zero)
+    add_side(scene, y, G[6:12], j, p, scale(-1.0, t), zero)
+    turning = sub(cross(wi, sub(dp, vi)), cross(wj, sub(dp, vj)))
+    return dot(t, v), dot(t, turning) - dot(t, dn) * dot(n, v)
+
+
+@jitable
 def general_term(scene, t, y, i, program, G):
     """Fill the gradient of a program with respect to the body of marker i."""
     b = scene.markers.body[i]
@@ -155,6 +196,9 @@ def fill_equation(scene, t, y, e):
         kind = eq.kind[k]
         if kind == GENERAL:
             general_term(scene, t, y, i, eq.program[e], G)
+            continue
+        if kind == TOUCHING:
+            flow, second = touching_term(scene, y, i, j, eq.axis[k, 0], eq.axis[k, 1], G)
             continue
         g, dg, ddg = 0.0, 0.0, 0.0
         if kind == OFFSET:
@@ -206,8 +250,21 @@ def is_active(scene, e):
 
 
 @jitable
+def is_friction(scene, e):
+    """Return whether equation e is of friction: it holds only while that sticks."""
+    return scene.equations.dry[e] >= 0 or scene.equations.slot[e] >= 0
+
+
+def lasting(scene: Scene) -> np.ndarray:
+    """Return which equations are of no friction and hold always, (ne,)."""
+    return np.asarray((scene.equations.dry < 0) & (scene.equations.slot < 0))
+
+
+@jitable
 def fill_equations(scene, t, y):
     """Fill gradient, residual and rates of the equations in use."""
+    if scene.world.doors[RIGID_DOOR] != 0:
+        call_int(scene.world.doors[RIGID_DOOR], (scene, PLACE_HELD, t, y))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 

@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
+from mbsim.dynamics.choice import sticks
+from mbsim.dynamics.equations import lasting
 from mbsim.dynamics.start import equation_rows, tree_map
-from mbsim.system.arrays import CHOOSE, MATRIX, SLIDER, SLIDES, Scene
+from mbsim.system.arrays import CHOOSE, MATRIX, Scene
 
 Array = np.ndarray[Any, Any]
 
@@ -163,12 +165,9 @@ class Search:
         return np.hstack([loose, held])
 
     def holding(self) -> Array:
-        """Return which equations hold: those of dry friction only while it sticks, (ne,)."""
-        dry, kept = self.scene.equations.dry, self.scene.state.dry
-        sticks = np.array(
-            [row >= 0 and not kept[row, [SLIDER, SLIDES]].any() for row in dry], dtype=bool
-        )
-        return np.asarray((dry < 0) | sticks)
+        """Return which equations hold: those of friction only while it sticks, (ne,)."""
+        lasts = lasting(self.scene)
+        return np.array([lasts[e] or sticks(self.scene, e) for e in range(len(lasts))], dtype=bool)
 
     def stiffness(self, y: Array, P: Array) -> Array | None:
         """Return how the forces along P change with displacements along P, by differences."""

@@ -20,7 +20,9 @@ from mbsim.system.arrays import (
     JOINTS_DOOR,
     NEAR_FOLD,
     NOW,
+    RIGID_DOOR,
     SEAT,
+    SHARE_HELD,
     WITHIN,
 )
 
@@ -121,5 +123,7 @@ def evaluate_past(scene, t, h, y, dy):
     if scene.world.doors[DRY_DOOR] != 0:
         call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, y))
     code = evaluate(scene, t, h, y, dy)
+    if code == 0 and scene.world.doors[RIGID_DOOR] != 0:
+        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, y))
     scene.world.past[0] = NOW
     return code

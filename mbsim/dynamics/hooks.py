@@ -27,6 +27,8 @@ from mbsim.system.arrays import (
     LISTINGS,
     NEAR_DOOR,
     PROJECT,
+    RIGID_DOOR,
+    SHARE_HELD,
     Scene,
 )
 
@@ -81,6 +83,9 @@ def _commit(context, t, h, a, b):
     """
     scene = view(context, Scene)
     listings = scene.log.counters[LISTINGS]
+    if scene.world.doors[RIGID_DOOR] != 0:
+        # before equations may be chosen anew
+        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, a))
     if scene.world.doors[JOINTS_DOOR] != 0:
         code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
         if code != 0:
@@ -185,6 +190,10 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.doors import open_expressions
 
         open_expressions(scene)
+    if scene.contacts.rigid.any():
+        from mbsim.dynamics.doors import open_held
+
+        open_held(scene)
     if len(scene.crowds.contact) > 0:
         scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
     if len(scene.tree.body) > 0:

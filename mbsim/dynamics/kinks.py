@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from numba import carray
 
-from mbsim.core.address import call_float, view
+from mbsim.core.address import call_float, call_int, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
@@ -17,7 +17,17 @@ from mbsim.dynamics.contact import MODE
 from mbsim.dynamics.dry_friction import is_dry, side_of_dry
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.system.arrays import EVALUATE_DOOR, HEAT, HOT, SIDE, SLIDE_LIMIT, SLIDES, Scene
+from mbsim.system.arrays import (
+    ASK_HELD,
+    EVALUATE_DOOR,
+    HEAT,
+    HOT,
+    RIGID_DOOR,
+    SIDE,
+    SLIDE_LIMIT,
+    SLIDES,
+    Scene,
+)
 
 #: Each change of side heats by 1, each step takes a tenth of the heat.
 COOLING = 0.9
@@ -61,7 +71,7 @@ def side(scene, t, y, k):
 
 @jitable
 def watch(scene, context, t, y, what):
-    """Return 1 if a side differs from that kept, 2 for dry friction, else 0.
+    """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
     Unless it is only asked, the sides are kept.
     """
@@ -80,6 +90,9 @@ def watch(scene, context, t, y, what):
         leaves = now != scene.state.dry[f, SLIDES] if dry else other
         if leaves and sides[k, HEAT] <= HOT:
             differs = max(differs, 2.0 if dry else 1.0)
+        if k == last and scene.world.doors[RIGID_DOOR] != 0 and sides[k, HEAT] <= HOT:
+            asks = call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y))
+            differs = max(differs, 2.0 * asks)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:

@@ -296,6 +296,9 @@ def add_bends(scene, T, t, y):
     eq = scene.equations
     for row in range(active_count(scene)):
         e = eq.active[row]
+        if eq.slot[e] >= 0:
+            # incidents stay where they are
+            continue
         for term in range(eq.first[e], eq.first[e + 1]):
             first, end = terms_behind(scene, e, term)
             for by in range(first, end):

@@ -91,12 +91,27 @@ def drive_by(scene, L, t, y, row, e, b):
 
 
 @jitable
+def slip_row(scene, L, row, e):
+    """Fill the row of slip in a contact that is held: its gradient, where it is now."""
+    eq = scene.equations
+    for term in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+            if k >= 0:
+                for i in range(POSES):
+                    L.row_rate[row, scene.tree.body[k], i] += scene.sweep.G[term, 6 * side + i]
+
+
+@jitable
 def add_motion_rows(scene, T, t, y):
     """Fill the rows of all motions in use that hold velocities or accelerations."""
     eq = scene.equations
     for row in range(active_count(scene)):
         e = eq.active[row]
         if eq.level[e] == 2:
+            continue
+        if eq.slot[e] >= 0:
+            slip_row(scene, T.linear, row, e)
             continue
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):

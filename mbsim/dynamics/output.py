@@ -22,6 +22,7 @@ from mbsim.dynamics.contact import (
 )
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.laws.friction.stiction import HELD_X
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
@@ -133,6 +134,10 @@ def fill_incidents(scene, h, y):
                 numbers = work.points[s + 1]
                 row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
                 row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
+        if len(work.held) > 0 and scene.contacts.rigid[contact_of(scene, s)] == 1:
+            # what equations hold, the law can tell only from here
+            for j in range(2):
+                row[INC_MEMORY + HELD_X + j] = work.held[s, j]
         k += 1
     rows.used[1] = k
     return k - first

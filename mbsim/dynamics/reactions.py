@@ -16,6 +16,7 @@ from mbsim.dynamics.equations import (
     along,
     fill_equation,
     is_active,
+    is_friction,
     side_place,
     solve_matrix,
 )
@@ -32,7 +33,7 @@ def add_equation_reaction(scene, y, e, multiplier, out):
     eq, sweep = scene.equations, scene.sweep
     c = eq.connection[e]
     if c < 0:
-        # dry friction shows its force itself
+        # friction shows its force itself
         return
     body = scene.markers.body[scene.connections.i[c]]
     other = scene.markers.body[scene.connections.j[c]]
@@ -97,7 +98,7 @@ def fill_stresses(scene, t, y):
     """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
     stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
-        if is_active(scene, e) or scene.equations.dry[e] >= 0:
+        if is_active(scene, e) or is_friction(scene, e):
             continue
         new = stress[count]
         self_stress(scene, t, y, e, new)

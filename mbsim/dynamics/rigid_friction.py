@@ -1,10 +1,11 @@
-"""Rigid Force_DryFriction: what sticks is held, exactly, by an equation; what slides is not.
+"""Rigid friction: what sticks is held, exactly, by an equation; what slides is not.
 
 While it sticks, x' = 0 is an equation in use like that of a motion of velocities, and its
 multiplier is the friction force. Where that passes the limit the step ends, the equation goes out
 of use and f is a force of that size against the slip; where x' comes back to 0 the step ends too,
 the equation is taken into use, and goes out again at once where the force that it would need is
-above the limit. Integrators begin anew there, for accelerations jump.
+above the limit. Integrators begin anew there, for accelerations jump. Contacts have two equations
+at each point and do their part behind a door, `dynamics.rigid_contact`.
 """
 
 from __future__ import annotations
@@ -25,11 +26,16 @@ from mbsim.dynamics.dry_friction import (
 )
 from mbsim.laws.dry import rigid_mode
 from mbsim.system.arrays import (
+    BEGIN_HELD,
+    CHANGED_HELD,
     CHOOSE,
     EVALUATE_DOOR,
     JOINTS_DOOR,
     KEEP_DRY,
     PROJECT,
+    RECORD_HELD,
+    RELEASE_HELD,
+    RIGID_DOOR,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -62,6 +68,13 @@ def begin_or_go_on(scene, y, f):
 
 
 @jitable
+def ask_contacts(scene, what, t, y):
+    """Return what contacts answer whose friction is rigid, 0 where there are none."""
+    door = scene.world.doors[RIGID_DOOR]
+    return call_int(door, (scene, what, t, y)) if door != 0 else 0
+
+
+@jitable
 def hold_sticking(scene, t, y):
     """Take the equations of what sticks into use, bring y onto them and evaluate; return a code."""
     call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
@@ -88,16 +101,19 @@ def release(scene):
 
 @jitable
 def commit_rigid(scene, t, y):
-    """Keep what rigid dry frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
-    changed = False
+    """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
+    changed = ask_contacts(scene, BEGIN_HELD, t, y) == 1
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
+        ask_contacts(scene, RECORD_HELD, t, y)
         return 0
     # one more slides each time, so this ends
-    while hold_sticking(scene, t, y) == 0.0 and release(scene) > 0:
-        continue
+    while hold_sticking(scene, t, y) == 0.0:
+        if release(scene) + ask_contacts(scene, RELEASE_HELD, t, y) == 0:
+            break
+    ask_contacts(scene, RECORD_HELD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
@@ -113,7 +129,10 @@ def commit_rigid(scene, t, y):
 @jitable
 def hold_again(scene, t, y):
     """Take into use what holds at the point to be evaluated, where the last step changed that."""
-    kept = scene.state.dry
+    kept, contacts = scene.state.dry, ask_contacts(scene, CHANGED_HELD, t, y)
+    if contacts == 1:
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
+        return
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and kept[f, SLIDES] != kept[f, SLIDES_BEFORE]:
             call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))

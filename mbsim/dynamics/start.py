@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.core.layout import BODY_SIZE
+from mbsim.dynamics.equations import lasting
 from mbsim.system.arrays import Scene
 
 Array = np.ndarray[Any, Any]
@@ -103,7 +104,7 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
     starts = np.where(scene.equations.level < 1, scene.equations.start[:, 1], np.nan)
     held = (scene.equations.level >= 1) | np.isfinite(starts)
     # what slides at the start may do so
-    held &= scene.equations.dry < 0
+    held &= lasting(scene)
     asked, wanted = _flows(scene, found, held, starts)
     size, freedom = float(np.linalg.norm(found, 2)), found.shape[1]
     rate, free = np.zeros(freedom), np.eye(freedom)

@@ -53,6 +53,7 @@ class Parameter(NamedTuple):
     ratio: bool = False  # a Poisson's ratio
     flag: bool = False  # TRUE or FALSE: 1 or 0
     needs: str = ""  # another attribute without which it means nothing
+    infinite: bool = False  # it may be INFINITE: then `FrictionLaw.rigid` is the law
 
 
 #: What a law with memory does: mode 0 says that it began.
@@ -75,6 +76,7 @@ class FrictionLaw(NamedTuple):
     uses_x: bool = False  # whether it looks at X
     takes_function: bool = False  # whether a user's function may give its friction of sliding
     modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
+    rigid: FrictionLaw | None = None  # where what sticks is held by equations
 
 
 class FrictionInput(NamedTuple):
@@ -126,6 +128,7 @@ def friction_law(
     uses_x: bool = False,
     takes_function: bool = False,
     modes: bool = False,
+    rigid: FrictionLaw | None = None,
 ) -> Any:
     """Register the decorated function as the friction law `name` of these attributes."""
 
@@ -133,8 +136,16 @@ def friction_law(
         own = tuple(each for each in parameters if isinstance(each, Parameter))
         names = tuple(getattr(each, "name", each) for each in parameters)
         made = jitable(force)
-        law = FrictionLaw(name, made, names, own, memory, size, uses_x, takes_function, modes)
+        law = FrictionLaw(
+            name, made, names, own, memory, size, uses_x, takes_function, modes, rigid
+        )
         FRICTION_LAWS.put(name, law)
         return force
 
     return register
+
+
+def friction_law_of(contact: Any) -> FrictionLaw:
+    """Return the built-in law of a Force_Contact, or what stands for it where it is rigid."""
+    law = FRICTION_LAWS[contact.cff_type]
+    return law.rigid if law.rigid is not None and contact.rigid else law

@@ -7,6 +7,7 @@ Nothing here is converted, placed or checked; see `placement` and `checks`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -164,6 +165,11 @@ class Contact:
     def needs_area(self) -> bool:
         """Whether its friction follows from the area of contact alone."""
         return self.cff_type == "CONTENSOU" and "patch_radius" not in dict(self.friction)
+
+    @property
+    def rigid(self) -> bool:
+        """Whether its friction holds without give: tangential_stiffness is INFINITE."""
+        return math.isinf(dict(self.friction).get("tangential_stiffness", 0.0))
 
     @property
     def with_itself(self) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mbsim.laws.catalog import FRICTION_LAWS, Parameter
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
@@ -18,6 +20,7 @@ from mbsim.reader.kinds import (
     IDS,
     NOT_NEGATIVE,
     POSITIVE,
+    POSITIVE_OR_INFINITE,
     RATIO,
     REAL,
     TEXT,
@@ -33,6 +36,11 @@ from mbsim.reader.subroutine import subroutine
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 _RADIUS = "patch_radius"
 _STIFFNESS = "tangential_stiffness"
+#: What STICTION has beside that of the spring that holds.
+_OF_SPRINGS = (
+    *("tangential_damping", "poisson_ratio", "rotational_stiffness", "torsion_radius"),
+    "incremental",
+)
 _USERS = {
     *("cff_param_string", "cff_fnc_name", "cff_dll_name", "cff_language"),
 }
@@ -69,6 +77,8 @@ def _build_contact(entry: Entry) -> None:
     if cff_type == "STICTION" and cnf_type == "USERCNF" and not entry.given(_STIFFNESS):
         message = "missing; a user's normal force does not tell the stiffness it would follow from"
         entry.fault(message, _STIFFNESS)
+    if cff_type == "STICTION":
+        _check_rigid(entry)
     posts = any(entry.given(name) for name in _POST)
     asks_user = _asks_user(entry, cff_type)
     cff = subroutine(entry, "cff", "CFFSUB") if asks_user else el.Subroutine()
@@ -145,11 +155,22 @@ def _of_laws() -> dict[str, Spec]:
 
 def _kind_of(parameter: Parameter) -> Kind:
     """Return what an attribute that a law brings with it may be."""
+    if parameter.infinite:
+        return POSITIVE_OR_INFINITE
     if parameter.flag:
         return FLAG
     if parameter.ratio:
         return RATIO
     return POSITIVE if parameter.positive else NOT_NEGATIVE
+
+
+def _check_rigid(entry: Entry) -> None:
+    """Fault what means nothing where friction holds without give."""
+    if not math.isinf(entry.get(_STIFFNESS, 0.0)):
+        return
+    for name in _OF_SPRINGS:
+        if entry.given(name):
+            entry.fault(f"means nothing with {_STIFFNESS}=INFINITE: nothing gives", name)
 
 
 def _check_count(entry: Entry, side: str) -> None:

@@ -66,6 +66,16 @@ def real(
     return Kind(allowed, parse)
 
 
+def _parse_positive_or_infinite(text: str) -> float:
+    """Return a number > 0, or infinity for INFINITE."""
+    if fold(text) == "infinite":
+        return math.inf
+    value = parse_real(text)
+    if not value > 0.0:
+        raise BadValueError
+    return value
+
+
 def _parse_expression(text: str) -> float:
     """Return a number; anything else may be an expression, which is not built."""
     if re.search(r"[A-Za-z]{2,}|[*/()]", text) and fold(text) not in ("nan", "inf", "-inf"):
@@ -186,6 +196,7 @@ def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = No
 REAL = real()
 POSITIVE = real("a number > 0", above=0.0)
 NOT_NEGATIVE = real("a number >= 0", least=0.0)
+POSITIVE_OR_INFINITE = Kind("a number > 0 or INFINITE", _parse_positive_or_infinite)
 UNIT = real("a number from 0 to 1", least=0.0, most=1.0)
 RATIO = real("a number > -1 and <= 0.5", above=-1.0, most=0.5)
 REAL_NO_EXPRESSION = Kind("a number", _parse_expression)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from mbsim.system.applied import applied_forces
 from mbsim.system.dependence import check_states, in_order
 from mbsim.system.kinks import kinks_table
 from mbsim.system.markers import MarkerTable
-from mbsim.system.mechanism import Mechanism, constrain
+from mbsim.system.mechanism import Grip, Mechanism, constrain
 from mbsim.system.programs import ProgramTable
 from mbsim.system.states import sensors_table, states_table
 from mbsim.system.weight import Pull, pulls
@@ -93,9 +93,13 @@ class Acting:
 def _link_dry(
     model: Model, mechanism: Mechanism, applied: a.Applied, applied_ids: list[tuple[str, int]]
 ) -> None:
-    """Let rigid dry frictions and their equations, which are the last, know each other."""
+    """Let rigid dry frictions and their equations, know each other.
+
+    Theirs are the last but for those of contacts.
+    """
     rigid = [id for id, friction in model.dry_frictions.items() if friction.dx == 0.0]
-    first = len(mechanism.equations.program) - len(rigid)
+    grips = int((mechanism.equations.slot >= 0).sum())
+    first = len(mechanism.equations.program) - grips - len(rigid)
     for k, id in enumerate(rigid):
         row = applied_ids.index(("DRYFRICTION", id))
         applied.equation[row], mechanism.equations.dry[first + k] = first + k, row
@@ -109,11 +113,13 @@ def acting(
     looks: bool,
     runs: bool = True,
     residuals: Mapping[int, UserResidual] | None = None,
+    grips: Sequence[Grip] = (),
 ) -> Acting:
     """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
 
     `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
     look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.
+    `grips`: slots whose friction is rigid.
     """
     programs = ProgramTable(
         table,
@@ -127,7 +133,7 @@ def acting(
     elements = [("FORCEELEMENT", id) for id in model.force_elements]
     programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)
-    mechanism = constrain(model, table, programs)
+    mechanism = constrain(model, table, programs, grips)
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )

@@ -65,8 +65,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     MEMORY_PAIR_DOOR,  # the same in complex ones
     DRY_DOOR,  # what Force_DryFriction and Force_Element keep of an accepted step
     RESIDUAL_DOOR,  # a Force_Element by its residual
-) = range(18)
-DOORS = 18
+    RIGID_DOOR,  # contacts whose friction holds without give: dynamics.rigid_contact
+) = range(19)
+DOORS = 19
 
 # entries of `Applied.kind`
 (
@@ -96,11 +97,14 @@ ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALON
 # what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
 KEEP_DRY, HOLD_AGAIN = range(2)
 
+# what is asked for at RIGID_DOOR, see dynamics.rigid_contact
+PLACE_HELD, SHARE_HELD, ASK_HELD, BEGIN_HELD, RELEASE_HELD, RECORD_HELD, CHANGED_HELD = range(7)
+
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
 # kinds of terms: `Equations.kind`
-OFFSET, PERP, ANGLE, DISTANCE, GENERAL = range(5)
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING = range(6)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left
@@ -244,6 +248,7 @@ class Contacts(NamedTuple):
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts
     user_normal: I1  # (nc,) where `laws.user_normal` has its place, 0 for a built-in normal law
+    rigid: I1  # (nc,) 1 where friction holds by equations: dynamics.rigid_contact
 
 
 class Slots(NamedTuple):
@@ -423,11 +428,12 @@ class Equations(NamedTuple):
     start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
     connection: I1  # (ne,) the element that it belongs to
-    dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for one that holds always
+    dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for any other
+    slot: I1  # (ne,) slot that it holds along x or y while that sticks, -1 for any other
     kind: I1  # (terms,)
     i: I1  # (terms,) markers
     j: I1  # (terms,)
-    axis: I2  # (terms, 2) of I and of J
+    axis: I2  # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot
     factor: F1  # (terms,)
     angle: I1  # (terms,) row of `Angles`, -1 for none
     active: I1  # (ne + 1,) equations in use, ascending, their number last; saved with the state
@@ -521,6 +527,10 @@ class Work(NamedTuple):
     secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
+    hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
+    held: F2  # (ns, 2) forces that hold these, along x and y; no rows for the two where none is
+    # rigid
+    look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before
 
 
 class Sweep(NamedTuple):
@@ -552,6 +562,10 @@ class Sweep(NamedTuple):
     quality: F1  # (5,) least pivot over its size squared, see the names above
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
+    share: F2  # (nh, nh) self-stresses of equations of slots, by rows
+    mix: F2  # (nh, nh + 1) how they are mixed
+    kept_p: F2  # (nt or 0, 6) p and multipliers while others are tried
+    kept: F1  # (ne or 0,)
 
 
 class Rows(NamedTuple):

@@ -28,6 +28,7 @@ from mbsim.system.contacts import (
     kinds_table,
     pairs_table,
 )
+from mbsim.system.grips import grips
 from mbsim.system.kinks import has_modes
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import sweep
@@ -380,7 +381,8 @@ def build(
     first_state = a.BODY_SIZE * nb + carried
     rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
-    rows = acting(model, table, first_state, subroutines, looks, residuals=residuals)
+    held = grips(model, plans, pairs, graphics, table)
+    rows = acting(model, table, first_state, subroutines, looks, residuals=residuals, grips=held)
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
     nu = len(rows.applied.late)
@@ -445,7 +447,19 @@ def build(
             (len(held.id), 2, len(held.given)),
         ),
         log=empty_log(len(contact_ids)),
-        work=scratch(nb, graphics, len(pairs.slot), ns, len(contact_ids), nf, nj, nu, most, looked),
+        work=scratch(
+            nb,
+            graphics,
+            len(pairs.slot),
+            ns,
+            len(contact_ids),
+            nf,
+            nj,
+            nu,
+            most,
+            looked,
+            int((pairs.last - pairs.slot).max(initial=0)) if held else 0,
+        ),
         sweep=sweep(mechanism),
         rows=empty_rows(
             len(y0),

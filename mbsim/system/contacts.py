@@ -13,7 +13,7 @@ from mbsim.core import jit
 from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS, REGIONS, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
-from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement
 from mbsim.system import arrays as a
@@ -284,7 +284,7 @@ def contacts_table(
             friction.append(np.zeros(0))
             addresses.append(0)
         else:
-            friction_law = FRICTION_LAWS[contact.cff_type]
+            friction_law = friction_law_of(contact)
             friction.append(abi.friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
@@ -330,5 +330,6 @@ def contacts_table(
             [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
             dtype=np.int64,
         ),
+        rigid=np.array([c.rigid for c in contacts], dtype=np.int64),
     )
     return made, uses_x

@@ -7,9 +7,10 @@ of terms (`dynamics.equations`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,6 +100,7 @@ class _Sums:
     unit: list[float] = field(default_factory=list)
     connection: list[int] = field(default_factory=list)
     dry: list[int] = field(default_factory=list)
+    slot: list[int] = field(default_factory=list)
     terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -123,6 +125,7 @@ class _Sums:
         self.unit.append(unit)
         self.connection.append(connection)
         self.dry.append(-1)
+        self.slot.append(-1)
         self.names.append(name)
 
     def arrays(self) -> a.Equations:
@@ -142,6 +145,7 @@ class _Sums:
             unit=np.array(self.unit, dtype=np.float64),
             connection=ints(self.connection),
             dry=ints(self.dry),
+            slot=ints(self.slot),
             kind=ints(t[0] for t in self.terms),
             i=ints(t[1] for t in self.terms),
             j=ints(t[2] for t in self.terms),
@@ -164,6 +168,15 @@ class Mechanism:
     connections: a.Connections
     elements: list[tuple[str, int]]
     names: list[str]
+
+
+class Grip(NamedTuple):
+    """A slot whose friction is rigid."""
+
+    contact: int  # id
+    slot: int
+    i: int  # marker rows on the bodies of the contact's I and J
+    j: int
 
 
 class _Builder:
@@ -328,6 +341,13 @@ class _Builder:
         self.add_term(row, i, j, 1.0)
         self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
 
+    def add_grip(self, grip: Grip) -> None:
+        """Add the two velocities that rigid friction of a slot holds while it sticks."""
+        for way in range(2):
+            self.sums.terms.append((a.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
+            self.sums.close(-1, f"Force_Contact[{grip.contact}]", 0.0, self.length, level=1)
+            self.sums.slot[-1] = grip.slot
+
     # the tree
 
     def bodies_in_equations(self) -> Iterator[int]:
@@ -482,7 +502,9 @@ def empty_tree(ground: int, n: int) -> a.Tree:
     )
 
 
-def constrain(model: Model, markers: MarkerTable, programs: ProgramTable) -> Mechanism:
+def constrain(
+    model: Model, markers: MarkerTable, programs: ProgramTable, grips: Sequence[Grip] = ()
+) -> Mechanism:
     """Return the constraints of a model."""
     builder = _Builder(model, markers, programs)
     for joint in model.joints.values():
@@ -495,13 +517,17 @@ def constrain(model: Model, markers: MarkerTable, programs: ProgramTable) -> Mec
         builder.add_motion(motion)
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
-    # dry friction is held by none of the tree, and its equations are the last
+    # friction is held by none of the tree, and its equations are the last
     rigid = [friction for friction in model.dry_frictions.values() if friction.dx == 0.0]
     held = [marker for f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
-    tree, places = builder.tree([markers.row(marker) for marker in held])
+    others = [markers.row(marker) for marker in held]
+    others += [marker for grip in grips for marker in (grip.i, grip.j)]
+    tree, places = builder.tree(others)
     builder.add_joint_equations(set(places))
     for friction in rigid:
         builder.add_dry(friction)
+    for grip in grips:
+        builder.add_grip(grip)
     n = len(builder.pairs)
     pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
     connections = a.Connections(
@@ -516,6 +542,7 @@ def constrain(model: Model, markers: MarkerTable, programs: ProgramTable) -> Mec
 def sweep(mechanism: Mechanism) -> a.Sweep:
     """Return scratch for the recursion and the equations."""
     nt, ne = len(mechanism.tree.body), len(mechanism.equations.program)
+    nh = int((mechanism.equations.slot >= 0).sum())
     return a.Sweep(
         H=np.zeros((nt, 6, 6)),
         S=np.zeros((nt, 6, 6)),
@@ -539,4 +566,8 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         quality=np.zeros(5),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
+        share=np.zeros((nh, nh)),
+        mix=np.zeros((nh, nh + 1)),
+        kept_p=np.zeros((nt if nh else 0, 6)),
+        kept=np.zeros(ne if nh else 0),
     )

@@ -82,8 +82,12 @@ def scratch(
     nu: int,
     memory: int,
     looked: int,
+    points: int = 0,
 ) -> a.Work:
-    """Return scratch, with the ground's rows as they stay."""
+    """Return scratch, with the ground's rows as they stay.
+
+    `points`: most candidates of a pair where friction of contacts is rigid, else 0.
+    """
     ng = len(graphics.body)
     fixed = graphics.body == nb
     frames = np.full((ng, 12), np.nan)
@@ -125,6 +129,9 @@ def scratch(
         secant=np.zeros((nu, nu)),
         reaction=np.zeros(6 * nj),
         trouble=np.full(2, -1, dtype=np.int64),
+        hold=np.zeros((ns if points else 0, 15)),
+        held=np.zeros((ns if points else 0, 2)),
+        look=np.zeros((3, points, POINT)),
     )
 
 

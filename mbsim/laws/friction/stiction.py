@@ -18,6 +18,13 @@ or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more woul
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
 up to mu_s N r. With `cff_fnc_name` the size of what that function returns takes the place of
 mu_d N.
+With k INFINITE there is no spring: what sticks is held by equations (`dynamics.rigid_contact`), and
+what slips has F = -mu_d N v/|v|, d in place of v where that is 0:
+
+    F = -mu_d N u/|u|,  u = d + v mirrored where it goes against d,
+
+d being the direction in which it slipped at the committed state, of a length that is rounding of
+velocities. A step that goes on past a reversal, which it will be cut at, thus goes on smoothly.
 Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
 65 (1991) 153-166; D. Elata, J. G. Berryman, Mechanics of Materials 24 (1996) 229-240; J. C. Simo,
 T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
@@ -28,7 +35,7 @@ from __future__ import annotations
 import math
 
 from mbsim.core.jitable import jitable
-from mbsim.laws.catalog import SLIP, STICK, Parameter, friction_law
+from mbsim.laws.catalog import BEGUN, SLIP, STICK, FrictionLaw, Parameter, friction_law
 
 #: Damping over the critical one where none is given.
 DAMPING = 0.2
@@ -71,11 +78,31 @@ def _dynamic_limit(inputs, mu_dynamic):
     return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
 
 
+#: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown.
+KEPT_MODE, KEPT_X, KEPT_Y, HELD_X, HELD_Y = range(5)
+
+
+@jitable
+def rigid(inputs, memory, mu_static, mu_dynamic):
+    """Return the same where k is infinite; what holds is not told but asked for by equations."""
+    mode, dx, dy = memory[KEPT_MODE], memory[KEPT_X], memory[KEPT_Y]
+    if mode == STICK:
+        return (memory[HELD_X], memory[HELD_Y], 0.0, 0.0, 0.0, 0.0, mode), memory
+    ux, uy = inputs.xdot[0], inputs.xdot[1]
+    if mode != BEGUN:
+        along = (ux * dx + uy * dy) / (dx * dx + dy * dy)
+        over = 1.0 - 2.0 * min(along, 0.0)
+        ux, uy = ux + over * dx, uy + over * dy
+    size = math.hypot(ux, uy)
+    part = _dynamic_limit(inputs, mu_dynamic) / size if size > 0.0 else 0.0
+    return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode), memory
+
+
 @friction_law(
     "STICTION",
     "mu_static",
     "mu_dynamic",
-    Parameter("tangential_stiffness", math.nan, positive=True),
+    Parameter("tangential_stiffness", math.nan, positive=True, infinite=True),
     Parameter("tangential_damping", math.nan),
     Parameter("poisson_ratio", 0.3, ratio=True),
     Parameter("rotational_stiffness", 0.0, needs="torsion_radius"),
@@ -85,6 +112,9 @@ def _dynamic_limit(inputs, mu_dynamic):
     uses_x=True,
     takes_function=True,
     modes=True,
+    rigid=FrictionLaw(
+        "STICTION", rigid, ("mu_static", "mu_dynamic"), memory=5, takes_function=True, modes=True
+    ),
 )
 def stiction(
     inputs,
