@@ -102,6 +102,7 @@ def fake_system_of(model: Model) -> Any:
         rows=rows,
     )
     return SimpleNamespace(
+        unknowns=lambda: iter(()),
         model=model,
         placement=placement,
         scene=scene,
