@@ -103,6 +103,7 @@ def fake_system_of(model: Model) -> Any:
     )
     return SimpleNamespace(
         unknowns=lambda: iter(()),
+        residuals={},
         model=model,
         placement=placement,
         scene=scene,
