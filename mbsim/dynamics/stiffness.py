@@ -37,6 +37,7 @@ from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
 from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
+from mbsim.dynamics.subroutines import user_result
 from mbsim.laws.abi import DFLAG
 from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
@@ -54,6 +55,7 @@ from mbsim.system.arrays import (
     TURN_LIMIT,
     VECTOR_FORCE,
 )
+from mbsim.system.programs import USER
 
 #: Differences of the laws' arguments, as parts of them and of the model's speed.
 _PART, _PART_OF_SPEED = 1e-6, 1e-8
@@ -438,6 +440,18 @@ def keep_spin(scene, y, body, axis, size):
 
 
 @jitable
+def value_anew(scene, t, y, program):
+    """Return the value of a program, where a subroutine is called for each of its results."""
+    programs = scene.programs
+    for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
+        code = programs.quick[at]
+        if code[0] == USER and code[2] > 0:
+            # which only reads what a call for the first result has left
+            user_result(scene, t, y, code[1], 0, 0)
+    return value(scene, t, y, program)
+
+
+@jitable
 def program_rise(scene, T, t, y, program, body, row):
     """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
 
@@ -449,13 +463,13 @@ def program_rise(scene, T, t, y, program, body, row):
             size = _PUSH * (1.0 if way % POSES >= 3 else scene.world.scale[0])
             if way >= POSES:
                 size *= scene.world.scale[1] / scene.world.scale[0]
-            before = value(scene, t, y, program)
+            before = value_anew(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
             if 3 <= way < POSES:
                 keep_spin(scene, y, body, way - 3, size)
             pushed(scene, y, body, way, size)
-            rise = (value(scene, t, y, program) - before) / size
+            rise = (value_anew(scene, t, y, program) - before) / size
             for k in range(7):
                 y[at + k] = kept[k]
             for k in range(6):
@@ -507,10 +521,10 @@ def state_rise(scene, T, t, y, program, z):
     if T.depends.user[program] == 0:
         run(scene, t, y, program, A_STATE, place)
         return scene.programs.stack[0, 1]
-    before, kept = value(scene, t, y, program), y[place]
+    before, kept = value_anew(scene, t, y, program), y[place]
     size = _PUSH * max(abs(kept), scene.states.scale[z])
     y[place] = kept + size
-    rise = (value(scene, t, y, program) - before) / size
+    rise = (value_anew(scene, t, y, program) - before) / size
     y[place] = kept
     return rise
 

@@ -439,6 +439,10 @@ def _digests(system: System) -> dict[str, Value]:
     for post in system.posts:
         users.update(f"{post.contact.id} {post.user.fnc_name} {post.user.par}\n".encode())
         users.update(post.source.read_bytes())
+    for id, residual in system.residuals.items():
+        # kinds decide what is a state
+        users.update(f"Force_Element {id} {residual.name} {residual.unknowns}\n".encode())
+        users.update(residual.source.read_bytes())
     for element, subroutine in system.subroutines.items():
         users.update(f"{element} {subroutine.name}\n".encode())
         users.update(Path(subroutine.source).read_bytes())

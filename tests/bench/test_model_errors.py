@@ -22,6 +22,7 @@ from models.reference import (
     four_bar_on_stop,
     geneva_wheel,
     hopping_follower,
+    jenkins_block,
     loose_slider,
     roller_follower,
 )
@@ -158,6 +159,17 @@ def test_errors_of_each_stop_alone(tmp_path):
         for tol in TOLS:
             results = mbsim.simulate(mbsim.read_model(deck), tol=tol)
             show("sdnd101 alone", tol, results, sdnd101(results, [body]))
+
+
+def test_errors_of_dry_friction_built_in_and_as_an_element():
+    for tol in (1e-5, 1e-7):
+        for method in ("AUTO", "RADAU5", "GALPHA"):
+            results = run_model("dry_friction_element.xml", tol=tol, integrator=method)
+            x, _ = jenkins_block(results["time"], 1e4, 1.0, 1e-6, 8.5e-4)
+            built_in, own = (results[f"bodies/{id}/position"][:, 0] for id in (2, 3))
+            found = {"built in": built_in - x, "own": own - x, "apart": own - built_in}
+            of_swing = {name: np.abs(miss).max() / 8.5e-4 for name, miss in found.items()}
+            show(f"dry_friction_element {method}", tol, results, of_swing)
 
 
 def test_errors_of_friction_that_holds():

@@ -24,6 +24,7 @@ from models.reference import (
     four_bar_on_stop,
     geneva_wheel,
     hopping_follower,
+    jenkins_block,
     loose_slider,
     roller_follower,
     slider_crank,
@@ -698,3 +699,15 @@ def test_contensou_disc(v, w):
     np.testing.assert_allclose(results["contacts/301/area"], np.pi * 0.01, rtol=1e-6)
     total = sum(results[f"energy/{kind}"] for kind in ("kinetic", "potential", "dissipated"))
     assert np.abs(total - total[0]).max() < 1e-4 * total[0]
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 2e-6), (1e-7, 3e-8)])
+def test_dry_friction_element(method, tol, allowed):
+    results = run_model("dry_friction_element.xml", integrator=method, tol=tol)
+    x, f = jenkins_block(results["time"], 1e4, 1.0, 1e-6, 8.5e-4)
+    built_in, own = (results[f"bodies/{id}/position"][:, 0] for id in (2, 3))
+    np.testing.assert_allclose(built_in, x, rtol=0, atol=allowed * 8.5e-4)
+    np.testing.assert_allclose(own, x, rtol=0, atol=allowed * 8.5e-4)
+    np.testing.assert_allclose(own, built_in, rtol=0, atol=0.1 * allowed * 8.5e-4)
+    np.testing.assert_allclose(results["force_elements/2/f"], f, rtol=0, atol=1e3 * allowed)

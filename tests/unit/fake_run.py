@@ -102,6 +102,8 @@ def fake_system_of(model: Model) -> Any:
         rows=rows,
     )
     return SimpleNamespace(
+        unknowns=lambda: iter(()),
+        residuals={},
         model=model,
         placement=placement,
         scene=scene,

@@ -455,3 +455,21 @@ def test_friction_about_an_axis_stops_a_spin(tmp_path):
     slides = (t > 0.1) & (t < 1.49)
     np.testing.assert_allclose(w[slides] + 2.0 * t[slides], (w + 2.0 * t)[slides][0], atol=1e-9)
     assert np.abs(w[t > 1.51]).max() < math.sqrt(0.2 * 1e-3 / 0.1) * 1.001
+
+
+def test_a_run_goes_on_with_the_script_with_which_it_began(tmp_path, monkeypatch):
+    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    script = tmp_path / "mine.py"
+    script.write_text(DRY.read_text("utf-8"), encoding="utf-8")
+    text = GROUND + body(2, 1.0, v=1.0) + spring(4.0) + element("dry_friction", "1, 0.02", script)
+    model = mbsim.read_model(write_deck(tmp_path, text, 6.0, 0.1))
+
+    def stop(time, step, until):
+        raise Interrupted("enough")
+
+    with pytest.raises(Interrupted):
+        mbsim.simulate(model, output=tmp_path, progress=stop)
+    script.write_text(script.read_text("utf-8") + "# changed\n", encoding="utf-8")
+    with pytest.raises(ModelError, match="a user subroutine has changed"):
+        mbsim.simulate(model, output=tmp_path, resume=True)

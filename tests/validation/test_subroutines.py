@@ -427,3 +427,36 @@ def test_a_call_while_the_script_is_loaded_is_told_that_there_is_no_state(tmp_pa
     run(tmp_path, element, script, output=tmp_path / "out", end_time=0.1, print_interval=0.1)
     log = next((tmp_path / "out").glob("*.log")).read_text()
     assert log.count("py_sysfnc is called where there is no state to look at") == 1
+
+
+def test_implicit_methods_see_every_result_of_a_subroutine(tmp_path):
+    script = tmp_path / "stiff.py"
+    script.write_text(
+        "def VFOSUB(id, time, par, npar, dflag, iflag):\n"
+        '    y, _ = py_sysfnc("DY", [20, 10])\n    v, _ = py_sysfnc("VY", [20, 10])\n'
+        "    return [0.0, -1e6 * y - 1e4 * v, 0.0]\n",
+        encoding="utf-8",
+    )
+    force = (
+        f'usrsub_param_string="USER(1)" usrsub_fnc_name="VFOSUB" script_name="{script}"',
+        'fy_expression="-1e6*DY(20,10)-1e4*VY(20,10)"',
+    )
+    steps = []
+    for given in force:
+        deck = tmp_path / "deck.xml"
+        deck.write_text(
+            """<Deck><Model><Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"
+  v_ic_y="1" v_ic_y_flag="TRUE"/><Reference_Marker id="20" body_id="2"/>
+<Force_Vector_TwoBody id="1" type="ForceOnly" i_marker_id="20" j_floating_marker_id="10"
+  ref_marker_id="10" """
+            + given
+            + """/></Model><Command>
+<Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/></Command></Deck>""",
+            encoding="utf-8",
+        )
+        steps.append(mbsim.simulate(mbsim.read_model(deck), integrator="RADAU5").stats["steps"])
+    # stability would ask for 3000
+    assert steps[0] == pytest.approx(steps[1], abs=3)
+    assert steps[1] < 200
