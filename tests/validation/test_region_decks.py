@@ -81,7 +81,7 @@ def test_flat_it_rests_as_deep_as_on_its_corners(tmp_path):
     # swapped: the force on I, which is the ground
     model = GROUND + block() + contact(sides=("100", "200")) + GRAVITY
     swapped = run_deck(tmp_path, model, 0.5)
-    assert swapped["contacts/301/force"][-1, 2] == pytest.approx(-9.81, rel=1e-6)
+    assert swapped["contacts/301/force"][-1, 2] == pytest.approx(-9.81, rel=1e-4)
     assert swapped["contacts/301/area"][-1] == pytest.approx(0.01, rel=1e-9)
 
 
