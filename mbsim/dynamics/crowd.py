@@ -14,6 +14,7 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import norm, sub, vector
+from mbsim.dynamics.detection import measure_pair
 from mbsim.system.arrays import BODY_SIZE, FIXED, FREE, LISTINGS, LIVE, WANTED
 
 #: Members wider than so many usual ones are held against everybody.
@@ -357,6 +358,11 @@ def close_ranks(scene):
         put_aside(scene, 1, s, crowds.spare[h])
         state.touching[s] = work.touching[s] = 1
         state.hit[h] = work.hit[h] = s
+    for h in range(state.hit[last]):
+        pair = scene.slots.pair[state.hit[h]]
+        if pair >= fixed and scene.kinds.whole[pairs.kind[pair]] > 0.0:
+            # the points that one incident stands for
+            measure_pair(scene, pair)
 
 
 @jitable

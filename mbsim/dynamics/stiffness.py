@@ -26,6 +26,7 @@ from mbsim.dynamics.contact import (
     contact_of,
     friction,
     in_marker,
+    patch,
     sides,
     velocity_at,
     whole_of,
@@ -39,7 +40,7 @@ from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
 from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.dynamics.subroutines import user_result
 from mbsim.laws.abi import DFLAG
-from mbsim.laws.user_normal import EXPLORE, MODE, PLACE, SLOPES
+from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -265,7 +266,8 @@ def add_contact_slopes(scene, T, t, h, y, s):
     # the normal law by depth and rate
     user = contacts.user_normal[c]
     if user != 0:
-        floats_at(user, PLACE)[MODE] = SLOPES
+        place = floats_at(user, PLACE)
+        place[MODE], place[AREA] = SLOPES, patch(scene, s)
     step = _PART * depth
     call = (depth + step, rate, contacts.normal_par[c], out)
     code = call_int(contacts.normal_law[c], call)

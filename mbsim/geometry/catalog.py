@@ -16,9 +16,9 @@ It fills every one of its `slots` rows (with meshes: as many as their polyhedra 
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
 The largest depth, where negative, is a lower bound of the distance of the two shapes.
 
-A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> area``,
-which writes the same rows and returns the area of contact, seen along the normal, in a second
-registry.
+A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> count,
+area``, which writes the same rows and returns beside their number the area of contact, seen along
+the normal; it is in a second registry.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Pair(NamedTuple):
 class Region(NamedTuple):
     """How a pair gives its points and the area of contact, and the shares of a flat face."""
 
-    points: Callable[..., float]
+    points: Callable[..., tuple[int, float]]
     whole: float
 
 
@@ -74,7 +74,7 @@ def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
 def region(shape_i: str, shape_j: str, whole: float) -> Any:
     """Register the decorated function as the closed form of a pair with its area."""
 
-    def register(function: Callable[..., float]) -> Callable[..., float]:
+    def register(function: Callable[..., Any]) -> Callable[..., Any]:
         REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
         return function
 

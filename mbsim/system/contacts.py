@@ -55,7 +55,7 @@ def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
     return entry
 
 
-def _adapt_region(region: Callable[..., float], whole: float, slots: int) -> Any:
+def _adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
     """Return a pair function with area as a C function that writes its one incident ahead."""
     from numba import carray
 
@@ -63,27 +63,28 @@ def _adapt_region(region: Callable[..., float], whole: float, slots: int) -> Any
 
     def entry(frame_i, size_i, frame_j, size_j, out):
         rows = carray(out, (slots, POINT))
-        area = region(
+        count, area = region(
             carray(frame_i, (12,)),
             carray(size_i, (3,)),
             carray(frame_j, (12,)),
             carray(size_j, (3,)),
             rows[REGION_ROWS:],
         )
-        sum_points(rows, whole, area)
-        return slots
+        count += REGION_ROWS
+        sum_points(rows[:count], whole, area)
+        return count
 
     return entry
 
 
 @functools.cache
-def region_address(name: str, slots: int) -> int:
-    """Return the address of a closed-form pair that is one incident with `slots` rows in all."""
+def region_address(name: str) -> int:
+    """Return the address of a closed-form pair that is one incident."""
     from numba import types
 
     pointer = types.CPointer(types.float64)
     signature = types.int64(pointer, pointer, pointer, pointer, pointer)
-    made = REGIONS[name]
+    made, slots = REGIONS[name], PAIRS[name].slots + REGION_ROWS
     return jit.address(_adapt_region(made.points, made.whole, slots), signature)
 
 
@@ -92,7 +93,7 @@ def kernel_address(kind: Kind) -> int:
     if not kind.closed_form:
         return 0
     if kind.region:
-        return region_address(kind.closed_form, kind.slots)
+        return region_address(kind.closed_form)
     return pair_address(PAIRS[kind.closed_form])
 
 

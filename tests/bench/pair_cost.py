@@ -78,7 +78,7 @@ def main():
         arrays = (frame_i, size_i, frame_j, size_j, points)
         region = ""
         if name in REGIONS:
-            cost = cost_of(region_address(name, len(points)), arrays)
+            cost = cost_of(region_address(name), arrays)
             region = f", as one region {cost:.0f} ns, area {points[1, AREA]:.3g}"
         cost = cost_of(pair_address(PAIRS[name]), arrays)
         touching = int((points[: PAIRS[name].slots, 0] > 0.0).sum())

@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
+from mbsim.model.hull import polyhedron_of
 from mbsim.system.contacts import region_address
 
 SIZES = {
@@ -27,8 +28,7 @@ FLAT = np.concatenate([np.zeros(3), np.eye(3).ravel()])
 @functools.cache
 def entry(name):
     """Return the compiled region as a function of ctypes."""
-    address = region_address(name, PAIRS[name].slots + REGION_ROWS)
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5)(address)
+    return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5)(region_address(name))
 
 
 def rows_of(name, frame_i, frame_j=FLAT):
@@ -252,3 +252,21 @@ def test_apart_it_says_the_distance_and_no_area(name):
         rows = rows_of(name, placed(name, -gap, 0.1))
         assert rows[1, AREA] == 0.0
         assert rows[0, 0] == rows[REGION_ROWS:, 0].max() <= -0.5 * gap
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-3, 0.02, 0.3, 0.8, 1.2])
+def test_the_mesh_of_a_box_on_a_plane_is_a_box(tilt):
+    # wherever it has other rows, with the same corners
+    corners = (
+        np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * SIZES["BOX"]
+    )
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = np.array([part for a, b, c, d in faces for part in ([a, b, c], [a, c, d])])
+    hull = polyhedron_of(corners, triangles)
+    size = np.array([float(hull.ctypes.data), float(len(hull)), 0.0])
+    frame = placed("BOX-PLANE", 3e-3, tilt)
+    rows = np.full((PAIRS["MESH-PLANE"].slots + REGION_ROWS, POINT), np.nan)
+    arrays = (frame, size, FLAT, SIZES["PLANE"], rows)
+    assert entry("MESH-PLANE")(*(array.ctypes.data for array in arrays)) == REGION_ROWS + 8
+    of_box = rows_of("BOX-PLANE", frame)
+    np.testing.assert_allclose(rows[:2], of_box[:2], rtol=1e-9, atol=1e-12)

@@ -370,4 +370,5 @@ def box_box(frame_i, size_i, frame_j, size_j, points):
 @region("BOX", "BOX", whole=4.0)
 def box_box_region(frame_i, size_i, frame_j, size_j, points):
     """The common polygon of two faces, and its area."""
-    return _box_on_box(frame_i, size_i, frame_j, size_j, points, True)
+    area = _box_on_box(frame_i, size_i, frame_j, size_j, points, True)
+    return BOX_BOX_SLOTS, area

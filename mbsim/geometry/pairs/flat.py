@@ -37,5 +37,5 @@ def box_plane(frame_i, size_i, frame_j, size_j, points):
 def box_plane_region(frame_i, size_i, frame_j, size_j, points):
     """The corners, and the cut of the box with the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
-    box_on_plane(frame_i, size_i, origin, n, points)
-    return box_cut(frame_i, size_i, origin, n)
+    count = box_on_plane(frame_i, size_i, origin, n, points)
+    return count, box_cut(frame_i, size_i, origin, n)

@@ -187,8 +187,8 @@ def hull_cut(hull, height, n):
 @region("MESH", "PLANE", whole=4.0)
 def mesh_plane_region(frame_i, size_i, frame_j, size_j, points):
     """The corners below the plane, and the cut of the mesh with the plane."""
-    mesh_plane(frame_i, size_i, frame_j, size_j, points)
+    count = mesh_plane(frame_i, size_i, frame_j, size_j, points)
     hull, n = floats_at(size_i[0], size_i[1]), axis(frame_j, 2)
     height = dot(sub(vector(frame_i), vector(frame_j)), n)
     local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
-    return hull_cut(hull, height, local)
+    return count, hull_cut(hull, height, local)

@@ -85,13 +85,13 @@ def frustum_plane(frame_i, size_i, frame_j, size_j, points):
 def cylinder_plane_region(frame_i, size_i, frame_j, size_j, points):
     """Three points of each rim, and the cut of the cylinder with the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
-    solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
-    return cylinder_cut(frame_i, size_i[0], size_i[1], origin, n)
+    count = solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
+    return count, cylinder_cut(frame_i, size_i[0], size_i[1], origin, n)
 
 
 @region("FRUSTUM", "PLANE", whole=3.0)
 def frustum_plane_region(frame_i, size_i, frame_j, size_j, points):
     """Three points of each rim, and the area of the ends below the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
-    solid_on_plane(frame_i, vector(size_i), origin, n, points)
-    return frustum_ends(frame_i, size_i, origin, n)
+    count = solid_on_plane(frame_i, vector(size_i), origin, n, points)
+    return count, frustum_ends(frame_i, size_i, origin, n)

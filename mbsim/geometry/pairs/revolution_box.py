@@ -385,13 +385,13 @@ def frustum_box(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def face_below(j, points):
+def face_below(j, points, count):
     """Return whether some row touches, and the face of box J that looks most along its normal.
 
     The face is its centre, its half edges and its outward normal.
     """
     deepest = 0
-    for row in range(1, len(points)):
+    for row in range(1, count):
         if points[row, 0] > points[deepest, 0]:
             deepest = row
     n = vector(points[deepest, 4:7])
@@ -407,18 +407,19 @@ def face_below(j, points):
 def cylinder_box_region(frame_i, size_i, frame_j, size_j, points):
     """The points, and the cut of the cylinder with the box's face."""
     j = placed(BOX, frame_j, vector(size_j))
-    solid_on_box(placed(ROTOR, frame_i, cylinder_size(size_i)), j, points)
-    touches, face = face_below(j, points)
-    return cylinder_on_rectangle(frame_i, size_i[0], size_i[1], face) if touches else 0.0
+    count = solid_on_box(placed(ROTOR, frame_i, cylinder_size(size_i)), j, points)
+    touches, face = face_below(j, points, count)
+    area = cylinder_on_rectangle(frame_i, size_i[0], size_i[1], face) if touches else 0.0
+    return count, area
 
 
 @region("FRUSTUM", "BOX", whole=3.0)
 def frustum_box_region(frame_i, size_i, frame_j, size_j, points):
     """The points, and the part of an end that is below the box's face."""
     i, j = placed(ROTOR, frame_i, vector(size_i)), placed(BOX, frame_j, vector(size_j))
-    solid_on_box(i, j, points)
-    touches, face = face_below(j, points)
+    count = solid_on_box(i, j, points)
+    touches, face = face_below(j, points, count)
     if not touches:
-        return 0.0
+        return count, 0.0
     centre, o, r = end_disc(i, -1 if dot(i[4], face[3]) >= 0.0 else 1)
-    return disc_on_rectangle(centre, o, r, face)
+    return count, disc_on_rectangle(centre, o, r, face)
