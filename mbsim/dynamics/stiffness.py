@@ -37,8 +37,8 @@ from mbsim.dynamics.kinematics import place_body, position
 from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.measures import unit
 from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
-from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.dynamics.subroutines import user_result
+from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.laws.abi import DFLAG
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
