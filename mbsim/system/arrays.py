@@ -586,7 +586,8 @@ class Rows(NamedTuple):
 
 
 SLOT_COLUMNS = 17
-SPARE = 42  # and twice the memory
+#: What `crowd.put_aside` keeps of a slot, and twice the memory: frames, mode, point, `Work.slot`.
+SPARE = 24 + SLOT_COLUMNS
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
 
 
