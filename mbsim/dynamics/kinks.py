@@ -93,10 +93,15 @@ def watch(scene, context, t, y, what):
         if k == last and scene.world.doors[RIGID_DOOR] != 0 and sides[k, HEAT] <= HOT:
             asks = call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y))
             differs = max(differs, 2.0 * asks)
+            scene.work.asked[0] = max(scene.work.asked[0], asks)
         if what == PASS:
+            # what was asked for and not done heats too: else it could be asked for ever
+            other = other or (k == last and scene.work.asked[0] == 1)
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
+    if what == PASS:
+        scene.work.asked[0] = 0
     # where modes change at nearly every step they are left to each evaluation
     hottest = sides[last, HEAT]
     for k in range(last):

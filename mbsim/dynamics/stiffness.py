@@ -200,7 +200,8 @@ def add_contact_slopes(scene, T, t, h, y, s):
     if code != 0:
         return code
     for k in range(4):
-        work.grip[s, k] = L.law[k // 2, k % 2]
+        # of rigid friction the direction alone follows from slip, from rest on however small
+        work.grip[s, k] = 0.0 if contacts.rigid[c] == 1 else L.law[k // 2, k % 2]
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

@@ -96,7 +96,16 @@ ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALON
 KEEP_DRY, HOLD_AGAIN = range(2)
 
 # what is asked for at RIGID_DOOR, see dynamics.rigid_contact
-PLACE_HELD, SHARE_HELD, ASK_HELD, BEGIN_HELD, RELEASE_HELD, RECORD_HELD, CHANGED_HELD = range(7)
+(
+    PLACE_HELD,
+    SHARE_HELD,
+    ASK_HELD,
+    BEGIN_HELD,
+    RELEASE_HELD,
+    AIM_HELD,
+    RECORD_HELD,
+    CHANGED_HELD,
+) = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -478,8 +487,9 @@ class Work(NamedTuple):
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
     hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
-    held: F2  # (ns, 2) forces that hold these, along x and y; no rows for the two where none is
-    # rigid
+    held: F2  # (ns, 2) forces that hold these, along x and y
+    aim: F2  # (ns, 8) of what begins to slip; no rows for the three where none is rigid
+    asked: I1  # (1,) 1 where one of them asked for another mode since the committed state
     look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before
 
 

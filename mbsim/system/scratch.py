@@ -128,6 +128,8 @@ def scratch(
         trouble=np.full(2, -1, dtype=np.int64),
         hold=np.zeros((ns if points else 0, 15)),
         held=np.zeros((ns if points else 0, 2)),
+        aim=np.zeros((ns if points else 0, 8)),
+        asked=np.zeros(1, dtype=np.int64),
         look=np.zeros((3, points, POINT)),
     )
 
