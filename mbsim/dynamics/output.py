@@ -11,6 +11,7 @@ from mbsim.dynamics.contact import (
     DEPTH,
     FORCE,
     HELD,
+    MODE,
     NORMAL,
     SLIP,
     STORED,
@@ -19,6 +20,7 @@ from mbsim.dynamics.contact import (
     sides,
 )
 from mbsim.dynamics.kinematics import position
+from mbsim.laws.catalog import STICK
 from mbsim.laws.friction.stiction import HELD_X
 from mbsim.system.arrays import (
     BODY_SIZE,
@@ -121,7 +123,8 @@ def fill_incidents(scene, h, y):
         row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
         for j in range(state.before.shape[1]):
             row[INC_MEMORY + j] = state.before[s, j]
-        if len(work.held) > 0 and scene.contacts.rigid[contact_of(scene, s)] == 1:
+        rigid = scene.contacts.rigid[contact_of(scene, s)]
+        if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here
             for j in range(2):
                 row[INC_MEMORY + HELD_X + j] = work.held[s, j]

@@ -34,7 +34,7 @@ from mbsim.dynamics.incidents import record_event
 from mbsim.dynamics.kinematics import place_body, place_graphic
 from mbsim.dynamics.tree import respond
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
-from mbsim.laws.friction.stiction import HELD_X, KEPT_MODE, KEPT_X, KEPT_Y
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.system.arrays import (
     AIM_HELD,
     ASK_HELD,
@@ -367,10 +367,18 @@ def ask_held(scene, y):
 
 
 @jitable
-def let_slip(scene, s, x, y):
-    """Let slot s slip along (x, y) from here on."""
+def let_slip(scene, s, x, y, speed):
+    """Let slot s slip along (x, y) from here on, at a speed."""
     kept, size = scene.state.memory[s], rest(scene) / math.hypot(x, y)
     kept[KEPT_MODE], kept[KEPT_X], kept[KEPT_Y] = SLIP, size * x, size * y
+    kept[KEPT_SPEED] = speed
+
+
+@jitable
+def let_stick(scene, s):
+    """Let slot s stick from here on."""
+    scene.state.memory[s, KEPT_MODE] = STICK
+    scene.state.memory[s, KEPT_SPEED] = 0.0
 
 
 @jitable
@@ -380,7 +388,7 @@ def begin_slot(scene, y, s):
     speed = math.hypot(v[0], v[1])
     if kept[KEPT_MODE] == STICK:
         if passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1])
+            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
         return 0
     turns, rests = 0, speed <= AT_REST * rest(scene)
     if kept[KEPT_MODE] == SLIP:
@@ -389,9 +397,9 @@ def begin_slot(scene, y, s):
         # where such points are not located, it came to rest within the step
         rests = rests or (scene.state.frozen[0] == 0 and -along > 0.7 * speed)
     if not rests:
-        let_slip(scene, s, v[0], v[1])
+        let_slip(scene, s, v[0], v[1], speed)
     elif kept[KEPT_MODE] == BEGUN or turns == 1:
-        kept[KEPT_MODE] = STICK
+        let_stick(scene, s)
     return turns
 
 
@@ -416,7 +424,7 @@ def begin_held(scene, y):
         if slips and state.touching[s] == 1:
             v = slip_of(scene, y, s)
             if math.hypot(v[0], v[1]) <= AT_REST * rest(scene):
-                state.memory[s, KEPT_MODE] = STICK
+                let_stick(scene, s)
     return 1
 
 
@@ -434,7 +442,7 @@ def release_held(scene, t, y):
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
         if scene.state.memory[s, KEPT_MODE] == STICK and passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1])
+            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
             count += 1
     return count
 
@@ -478,7 +486,7 @@ def turn_aim(scene, t, y):
         row[3], row[4] = row[1], row[2]
         if size > 0.0:
             row[1], row[2] = x / size, z / size
-            let_slip(scene, slot[e], x, z)
+            let_slip(scene, slot[e], x, z, 0.0)
         most = max(most, math.hypot(row[1] - row[3], row[2] - row[4]))
     return most
 
@@ -528,7 +536,7 @@ def record_held(scene, t):
             continue
         if before[KEPT_MODE] == BEGUN:
             # rows of the step in which it began show what holds from there on
-            for k in range(HELD_X):
+            for k in range(len(before)):
                 before[k] = kept[k]
         turned = kept[KEPT_X] * before[KEPT_X] + kept[KEPT_Y] * before[KEPT_Y] < 0.0
         if kept[KEPT_MODE] == STICK and before[KEPT_MODE] == SLIP:
