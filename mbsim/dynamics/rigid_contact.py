@@ -42,6 +42,7 @@ from mbsim.system.arrays import (
     BODY_SIZE,
     CHANGED_HELD,
     EVALUATE_DOOR,
+    HOT,
     PLACE_HELD,
     RECORD_HELD,
     RELEASE_HELD,
@@ -395,7 +396,7 @@ def begin_slot(scene, y, s):
         along = onward(scene, s, v)
         turns = 1 if along < -rest(scene) else 0
         # where such points are not located, it came to rest within the step
-        rests = rests or (scene.state.frozen[0] == 0 and -along > 0.7 * speed)
+        rests = rests or (scene.state.heat[0] > HOT and -along > 0.7 * speed)
     if not rests:
         let_slip(scene, s, v[0], v[1], speed)
     elif kept[KEPT_MODE] == BEGUN or turns == 1:

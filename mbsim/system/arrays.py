@@ -443,6 +443,7 @@ class State(NamedTuple):
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
     frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     dry: F2  # (nf, 4) of dry friction, see the names above
+    heat: F1  # (1,) the same as of sides for contacts whose friction is rigid: see dynamics.kinks
 
 
 class Log(NamedTuple):

@@ -52,6 +52,7 @@ def start_state(
         sides=np.zeros((kinks, 2)),
         frozen=np.zeros(1, dtype=np.int64),
         dry=dry,
+        heat=np.zeros(1),
     )
 
 

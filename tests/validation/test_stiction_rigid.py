@@ -41,7 +41,8 @@ def block(v=(0.0, 0.0), tilt=0.0, low=False, height=0.1):
     middle = 0.5 * height - depth
     cg = -0.5 * depth if low else middle
     flags = "".join(
-        f'v_ic_{axis}="{part!r}" v_ic_{axis}_flag="TRUE" ' for axis, part in zip("xy", v, strict=True)
+        f'v_ic_{axis}="{part!r}" v_ic_{axis}_flag="TRUE" '
+        for axis, part in zip("xy", v, strict=True)
     )
     inertia = (0.04 + height**2) / 12.0
     return f"""
@@ -110,7 +111,8 @@ def test_a_block_stays_on_an_incline_at_four_points(method, tmp_path):
         results["bodies/2/velocity"][:, 0], height * spin, rtol=0, atol=1e-4 * np.abs(spin).max()
     )
     assert np.ptp(x) < (1e-15 if method == "RADAU5" else 1e-8)
-    assert results["contacts/301/force"][-1, 0] == pytest.approx(slope, rel=1e-8)
+    # what is shared out over points that lie in a plane but for their depths
+    assert results["contacts/301/force"][-1, 0] == pytest.approx(slope, rel=1e-5)
 
 
 @pytest.mark.parametrize(("method", "close"), [("RADAU5", 1e-8), ("GALPHA", 1e-5)])
@@ -121,7 +123,7 @@ def test_what_is_pushed_slips_when_its_static_friction_is_passed(method, close, 
     model = plane() + block(low=True) + rub(static, dynamic) + push("2*TIME")
     results = run_deck(tmp_path, model, end, 0.1, integrator=method, tol=1e-8)
     np.testing.assert_allclose(events(results, "slip"), begins, rtol=0, atol=1e-8)
-    assert len(results["events"]) == 8
+    assert len(results["events"]) == 8  # four points
     way = end - begins
     x = (end**3 - begins**3) / 3.0 - begins**2 * way - 0.5 * dynamic * G * way**2
     place = results["bodies/2/position"]
@@ -155,7 +157,7 @@ def test_a_block_thrown_across_an_incline_stops_where_it_must(method, close, tmp
 
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_sphere_rolls_down_an_incline_without_slip(method, tmp_path):
-    # a = g sin/(1 + J/(m r^2)): 5/7 of g sin for J = 2/5 m r^2; r to the middle of what is pressed in
+    # a = g sin/(1 + J/(m r^2)): 5/7 of g sin for J = 2/5 m r^2; r to the middle of the depth
     mass, radius, tilt = 2.0, 0.1, math.radians(20.0)
     depth = (mass * G * math.cos(tilt) / 1e5) ** (2.0 / 3.0)
     r = radius - 0.5 * depth
@@ -209,11 +211,17 @@ def test_blocks_on_each_other_part_where_the_weaker_friction_gives_way(tmp_path)
 
 
 def test_incidents_show_what_holds_them(tmp_path):
-    deck = write_deck(tmp_path, plane(20.0) + block(tilt=20.0, low=True) + rub(), 0.1, 0.05)
-    mbsim.simulate(mbsim.read_model(deck), output=tmp_path / "out", integrator="RADAU5")
-    names = [f"contacts/301/incidents/{k}/{what}" for k in range(4) for what in ("friction", "mode")]
-    found = request(tmp_path / "out", names) if False else None
-    assert found is None
+    # pushed where it rubs all points hold alike
+    model = plane(20.0) + block(tilt=20.0, low=True) + rub()
+    results = run_deck(tmp_path, model, 0.1, 0.05, integrator="RADAU5")
+    first = "Force_Contact[301].incident"
+    names = [f"{first}[{k}].{what}" for k in range(4) for what in ("friction", "mode", "slip")]
+    _, columns = request(results, names)
+    for k in range(4):
+        assert columns[f"{first}[{k}].mode"] == ["stick"] * 3
+        held = np.hypot(columns[f"{first}[{k}].friction/x"], columns[f"{first}[{k}].friction/y"])
+        np.testing.assert_allclose(held, 0.25 * G * math.sin(math.radians(20.0)), rtol=1e-5)
+        assert max(columns[f"{first}[{k}].slip"]) < 1e-12
 
 
 def test_explicit_methods_refuse_it_by_name(tmp_path):
@@ -235,7 +243,10 @@ def test_explicit_methods_refuse_it_by_name(tmp_path):
     ("more", "said"),
     [
         ({"tangential_stiffness": "inf"}, "must be a number > 0 or INFINITE"),
-        ({"tangential_damping": 1}, "tangential_damping=.* means nothing with tangential_stiffness"),
+        (
+            {"tangential_damping": 1},
+            "tangential_damping=.* means nothing with tangential_stiffness",
+        ),
         ({"rotational_stiffness": 1, "torsion_radius": 1}, "means nothing with tangential_stiff"),
     ],
 )
@@ -254,7 +265,7 @@ def test_pairs_that_fcl_finds_are_refused(tmp_path):
 def test_resumed_it_is_the_same_run(method, tmp_path, monkeypatch):
     monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
     monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
-    text = plane() + block() + rub(0.5, 0.3) + push("6*SIN(4*TIME)", "COS(3*TIME)")
+    text = plane() + block() + rub(0.5, 0.3) + push("6*SIN(9*TIME)", "0.1*TIME")
     model = mbsim.read_model(write_deck(tmp_path, text, 1.5, 0.05))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
