@@ -96,7 +96,7 @@ SECOND = 10.0
 #: The step grows as far as the iteration would still converge at this rate.
 GOOD_RATE = 0.2
 #: A step is foretold from the last one up to so many times its length.
-FARTHEST = 100.0
+FARTHEST = 1e5
 
 # rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
 # and solutions of the real system and of the pair, f at the trial point
