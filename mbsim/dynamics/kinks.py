@@ -70,6 +70,23 @@ def side(scene, t, y, k):
 
 
 @jitable
+def watch_held(scene, t, y, what):
+    """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
+
+    A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
+    leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
+    """
+    heat, asked, differs = scene.state.heat, scene.work.asked, 0.0
+    if what == PASS:
+        heat[0] = heat[0] + 1.0 if asked[0] == 1 else 0.5 * heat[0]
+        asked[0] = 0
+    elif heat[0] <= HOT:
+        if call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y)) == 1:
+            asked[0], differs = 1, 2.0
+    return differs
+
+
+@jitable
 def watch(scene, context, t, y, what):
     """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
@@ -90,13 +107,12 @@ def watch(scene, context, t, y, what):
         leaves = now != scene.state.dry[f, SLIDES] if dry else other
         if leaves and sides[k, HEAT] <= HOT:
             differs = max(differs, 2.0 if dry else 1.0)
-        if k == last and scene.world.doors[RIGID_DOOR] != 0 and sides[k, HEAT] <= HOT:
-            asks = call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y))
-            differs = max(differs, 2.0 * asks)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
+    if scene.world.doors[RIGID_DOOR] != 0:
+        differs = max(differs, watch_held(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
     hottest = sides[last, HEAT]
     for k in range(last):

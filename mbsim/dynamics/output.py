@@ -11,6 +11,7 @@ from mbsim.dynamics.contact import (
     DEPTH,
     FORCE,
     HELD,
+    MODE,
     NORMAL,
     SLIP,
     STORED,
@@ -22,6 +23,7 @@ from mbsim.dynamics.contact import (
 )
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.laws.catalog import STICK
 from mbsim.laws.friction.stiction import HELD_X
 from mbsim.system.arrays import (
     BODY_SIZE,
@@ -134,7 +136,8 @@ def fill_incidents(scene, h, y):
                 numbers = work.points[s + 1]
                 row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
                 row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
-        if len(work.held) > 0 and scene.contacts.rigid[contact_of(scene, s)] == 1:
+        rigid = scene.contacts.rigid[contact_of(scene, s)]
+        if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here
             for j in range(2):
                 row[INC_MEMORY + HELD_X + j] = work.held[s, j]

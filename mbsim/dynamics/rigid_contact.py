@@ -14,16 +14,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.choice import sticks
 from mbsim.dynamics.contact import FORCE, NORMAL, contact_of, sides, tangent, velocity_at
 from mbsim.dynamics.dry_friction import AT_REST, ROUNDING
 from mbsim.dynamics.equations import (
+    GAMMA,
     active_count,
     add_wrench,
     along,
+    along_motion,
     fill_equation,
     is_active,
     solve_matrix,
@@ -32,12 +34,15 @@ from mbsim.dynamics.incidents import record_event
 from mbsim.dynamics.kinematics import place_body, place_graphic
 from mbsim.dynamics.tree import respond
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
-from mbsim.laws.friction.stiction import HELD_X, KEPT_MODE, KEPT_X, KEPT_Y
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.system.arrays import (
+    AIM_HELD,
     ASK_HELD,
     BEGIN_HELD,
     BODY_SIZE,
     CHANGED_HELD,
+    EVALUATE_DOOR,
+    HOT,
     PLACE_HELD,
     RECORD_HELD,
     RELEASE_HELD,
@@ -52,6 +57,9 @@ MOMENT = 1e-5
 #: What of a second difference, over the model's length, is no jump of the point from one place to
 #: another.
 SMOOTH = 1e-8
+#: Directions of slip that begins are good to so much, or are not sought any longer: the first step
+#: finds the rest.
+AIMED, MOST_TURNS = 1e-4, 50
 
 
 @jitable
@@ -360,10 +368,18 @@ def ask_held(scene, y):
 
 
 @jitable
-def let_slip(scene, s, x, y):
-    """Let slot s slip along (x, y) from here on."""
+def let_slip(scene, s, x, y, speed):
+    """Let slot s slip along (x, y) from here on, at a speed."""
     kept, size = scene.state.memory[s], rest(scene) / math.hypot(x, y)
     kept[KEPT_MODE], kept[KEPT_X], kept[KEPT_Y] = SLIP, size * x, size * y
+    kept[KEPT_SPEED] = speed
+
+
+@jitable
+def let_stick(scene, s):
+    """Let slot s stick from here on."""
+    scene.state.memory[s, KEPT_MODE] = STICK
+    scene.state.memory[s, KEPT_SPEED] = 0.0
 
 
 @jitable
@@ -373,15 +389,18 @@ def begin_slot(scene, y, s):
     speed = math.hypot(v[0], v[1])
     if kept[KEPT_MODE] == STICK:
         if passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1])
+            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
         return 0
-    turns = 0
+    turns, rests = 0, speed <= AT_REST * rest(scene)
     if kept[KEPT_MODE] == SLIP:
-        turns = 1 if onward(scene, s, v) < -rest(scene) else 0
-    if speed > AT_REST * rest(scene):
-        let_slip(scene, s, v[0], v[1])
+        along = onward(scene, s, v)
+        turns = 1 if along < -rest(scene) else 0
+        # where such points are not located, it came to rest within the step
+        rests = rests or (scene.state.heat[0] > HOT and -along > 0.7 * speed)
+    if not rests:
+        let_slip(scene, s, v[0], v[1], speed)
     elif kept[KEPT_MODE] == BEGUN or turns == 1:
-        kept[KEPT_MODE] = STICK
+        let_stick(scene, s)
     return turns
 
 
@@ -406,7 +425,7 @@ def begin_held(scene, y):
         if slips and state.touching[s] == 1:
             v = slip_of(scene, y, s)
             if math.hypot(v[0], v[1]) <= AT_REST * rest(scene):
-                state.memory[s, KEPT_MODE] = STICK
+                let_stick(scene, s)
     return 1
 
 
@@ -424,9 +443,86 @@ def release_held(scene, t, y):
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
         if scene.state.memory[s, KEPT_MODE] == STICK and passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1])
+            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
             count += 1
     return count
+
+
+@jitable
+def begins_to_slip(scene, y, s):
+    """Return whether slot s slips from here on, from rest."""
+    if scene.state.touching[s] == 0 or scene.state.memory[s, KEPT_MODE] != SLIP:
+        return False
+    v = slip_of(scene, y, s)
+    return math.hypot(v[0], v[1]) <= AT_REST * rest(scene)
+
+
+@jitable
+def turn_aim(scene, t, y):
+    """Turn all that begins to slip towards where it is accelerated; return by how much at most.
+
+    By a part of the acceleration, over how fast accelerations turn with directions: with less than
+    that they would run away from what is sought.
+    """
+    slot, first, aim = scene.equations.slot, first_of_slots(scene), scene.work.aim
+    steepest, fastest, most = 0.0, 0.0, 0.0
+    for e in range(first, len(slot), 2):
+        row = aim[slot[e]]
+        if row[0] == 0.0:
+            continue
+        x = along_motion(scene, e) + scene.sweep.rate[e, GAMMA]
+        z = along_motion(scene, e + 1) + scene.sweep.rate[e + 1, GAMMA]
+        way = math.hypot(row[1] - row[3], row[2] - row[4])
+        if way > 0.0:
+            steepest = max(steepest, math.hypot(x - row[5], z - row[6]) / way)
+        fastest = max(fastest, math.hypot(x, z))
+        row[5], row[6] = x, z
+    for e in range(first, len(slot), 2):
+        row = aim[slot[e]]
+        if row[0] == 0.0 or fastest == 0.0:
+            continue
+        part = 1.0 / (steepest + fastest)
+        x, z = row[1] + part * row[5], row[2] + part * row[6]
+        size = math.hypot(x, z)
+        row[3], row[4] = row[1], row[2]
+        if size > 0.0:
+            row[1], row[2] = x / size, z / size
+            let_slip(scene, slot[e], x, z, 0.0)
+        most = max(most, math.hypot(row[1] - row[3], row[2] - row[4]))
+    return most
+
+
+@jitable
+def aim_held(scene, t, y):
+    """Let what begins to slip do so where friction lets it go, not against what held it.
+
+    The two differ where a force at a point does not accelerate it along itself. Directions are
+    sought for which friction against them leaves accelerations along them.
+    """
+    slot, first, aim, count = scene.equations.slot, first_of_slots(scene), scene.work.aim, 0
+    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    for e in range(first, len(slot), 2):
+        s = slot[e]
+        row, kept = aim[s], scene.state.memory[s]
+        row[0] = 1.0 if begins_to_slip(scene, y, s) else 0.0
+        if row[0] == 0.0:
+            continue
+        count += 1
+        look_around(scene, y, scene.slots.pair[s], moment)
+        fill_hold(scene, y, s, moment)
+        fill_equation(scene, t, y, e)
+        fill_equation(scene, t, y, e + 1)
+        size = math.hypot(kept[KEPT_X], kept[KEPT_Y])
+        row[1] = row[3] = kept[KEPT_X] / size
+        row[2] = row[4] = kept[KEPT_Y] / size
+        row[5] = row[6] = 0.0
+    for _ in range(MOST_TURNS if count > 0 else 0):
+        turned = turn_aim(scene, t, y)
+        door = scene.world.doors[EVALUATE_DOOR]
+        if call_float(door, (scene, t, 0.0, y, scene.work.idle)) != 0.0 or turned < AIMED:
+            break
+    if count > 0:
+        share_held(scene, t, y)
 
 
 @jitable
@@ -441,7 +537,7 @@ def record_held(scene, t):
             continue
         if before[KEPT_MODE] == BEGUN:
             # rows of the step in which it began show what holds from there on
-            for k in range(HELD_X):
+            for k in range(len(before)):
                 before[k] = kept[k]
         turned = kept[KEPT_X] * before[KEPT_X] + kept[KEPT_Y] * before[KEPT_Y] < 0.0
         if kept[KEPT_MODE] == STICK and before[KEPT_MODE] == SLIP:
@@ -477,6 +573,8 @@ def serve_held(scene, what, t, y):
         return begin_held(scene, y)
     elif what == RELEASE_HELD:
         return release_held(scene, t, y)
+    elif what == AIM_HELD:
+        aim_held(scene, t, y)
     elif what == RECORD_HELD:
         record_held(scene, t)
     elif what == CHANGED_HELD:

@@ -26,6 +26,7 @@ from mbsim.dynamics.dry_friction import (
 )
 from mbsim.laws.dry import rigid_mode
 from mbsim.system.arrays import (
+    AIM_HELD,
     BEGIN_HELD,
     CHANGED_HELD,
     CHOOSE,
@@ -113,6 +114,7 @@ def commit_rigid(scene, t, y):
     while hold_sticking(scene, t, y) == 0.0:
         if release(scene) + ask_contacts(scene, RELEASE_HELD, t, y) == 0:
             break
+    ask_contacts(scene, AIM_HELD, t, y)
     ask_contacts(scene, RECORD_HELD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]

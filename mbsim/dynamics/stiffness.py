@@ -62,6 +62,8 @@ from mbsim.system.programs import USER
 _PART, _PART_OF_SPEED = 1e-6, 1e-8
 #: Row of `basis` with how the force of one incident for many points changes.
 PRESS = 6
+#: Slip, over the model's speed, below which directions of rigid friction need not converge.
+SLOW = 1e-3
 #: What `memory_slopes` is asked to keep.
 FILL = 0
 #: Differences of the state for user subroutines, as parts of length or speed, and radians.
@@ -313,8 +315,11 @@ def add_contact_slopes(scene, T, t, h, y, s):
     code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
     if code != 0:
         return code
+    # of rigid friction that nearly rests slopes are as large as one likes, and tell nothing
+    least = SLOW * scene.world.scale[1]
+    begins = contacts.rigid[c] == 1 and abs(given[0]) + abs(given[1]) <= least
     for k in range(4):
-        work.grip[s, k] = L.law[k // 2, k % 2]
+        work.grip[s, k] = 0.0 if begins else L.law[k // 2, k % 2]
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

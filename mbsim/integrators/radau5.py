@@ -95,6 +95,8 @@ KEEP = 0.01
 SECOND = 10.0
 #: The step grows as far as the iteration would still converge at this rate.
 GOOD_RATE = 0.2
+#: A step is foretold from the last one up to so many times its length.
+FARTHEST = 1e5
 
 # rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
 # and solutions of the real system and of the pair, f at the trial point
@@ -126,9 +128,15 @@ def carried_on(m, s, i):
 
 
 @jitable
+def is_short(m, h):
+    """Return whether the last step was too short for its polynomial to tell a step of length h."""
+    return h > FARTHEST * m.memory[LAST_STEP]
+
+
+@jitable
 def foretell(m, h):
     """Write the stages as the last step's polynomial, carried on, has them."""
-    fresh = m.memory[FRESH] == 1.0
+    fresh = m.memory[FRESH] == 1.0 or is_short(m, h)
     for j in range(3):
         s = 1.0 if fresh else 1.0 + C[j] * h / m.memory[LAST_STEP]
         for i in range(len(m.y)):
@@ -245,7 +253,7 @@ def iterate(p, m, t, h):
 @jitable
 def place(m, t, h):
     """Return the time at which a step of length h is linearised."""
-    return t if m.memory[FRESH] == 1.0 else t + m.memory[WHERE] * h
+    return t if m.memory[FRESH] == 1.0 or is_short(m, h) else t + m.memory[WHERE] * h
 
 
 @jitable
@@ -255,7 +263,7 @@ def linearise_within(p, m, t, h):
     What turns or bends in a step is by half as much off in its middle as at its begin.
     """
     ahead = m.memory[WHERE] * h
-    if m.memory[FRESH] == 1.0 or ahead == 0.0:
+    if m.memory[FRESH] == 1.0 or ahead == 0.0 or is_short(m, h):
         return linearise(p, m, t, 0.0, m.y, m.k[F])
     s = 1.0 + ahead / m.memory[LAST_STEP]
     for i in range(len(m.y)):

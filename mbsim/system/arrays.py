@@ -98,7 +98,16 @@ ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALON
 KEEP_DRY, HOLD_AGAIN = range(2)
 
 # what is asked for at RIGID_DOOR, see dynamics.rigid_contact
-PLACE_HELD, SHARE_HELD, ASK_HELD, BEGIN_HELD, RELEASE_HELD, RECORD_HELD, CHANGED_HELD = range(7)
+(
+    PLACE_HELD,
+    SHARE_HELD,
+    ASK_HELD,
+    BEGIN_HELD,
+    RELEASE_HELD,
+    AIM_HELD,
+    RECORD_HELD,
+    CHANGED_HELD,
+) = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -484,6 +493,7 @@ class State(NamedTuple):
     dry: F2  # (nf, 4) of dry friction, see the names above
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
+    heat: F1  # (1,) the same as of sides for contacts whose friction is rigid: see dynamics.kinks
 
 
 class Log(NamedTuple):
@@ -528,8 +538,9 @@ class Work(NamedTuple):
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     trouble: I1  # (2,) worst body of the error norm, contact at fault
     hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
-    held: F2  # (ns, 2) forces that hold these, along x and y; no rows for the two where none is
-    # rigid
+    held: F2  # (ns, 2) forces that hold these, along x and y
+    aim: F2  # (ns, 8) of what begins to slip; no rows for the three where none is rigid
+    asked: I1  # (1,) 1 where one of them asked for another mode since the committed state
     look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before
 
 

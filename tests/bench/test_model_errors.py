@@ -177,6 +177,9 @@ def test_errors_of_friction_that_holds():
         results = run_model("sdnd100.xml", tol=tol)
         x = results["bodies/2/position"][-1, 0] * np.sqrt(2.0)
         show("sdnd100", tol, results, {"of the swing": abs(x - 5e-5) / 0.85e-3})
+        results = run_model("stiction_rigid.xml", tol=tol)
+        x = results["bodies/2/position"][-1, 0] * np.sqrt(2.0)
+        show("stiction_rigid", tol, results, {"of the swing": abs(x - 5e-5) / 0.85e-3})
         results = run_model("stiction_incline.xml", tol=tol)
         x = results["bodies/2/position"][results["time"] >= 10.0]
         show("stiction_incline", tol, results, {"moves from 10 to 110 s": np.abs(x - x[0]).max()})

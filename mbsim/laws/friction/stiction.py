@@ -21,7 +21,7 @@ mu_d N.
 With k INFINITE there is no spring: what sticks is held by equations (`dynamics.rigid_contact`), and
 what slips has F = -mu_d N v/|v|, d in place of v where that is 0:
 
-    F = -mu_d N u/|u|,  u = d + v mirrored where it goes against d,
+    F = -mu_d N u/|u|,  u = d + v, mirrored where it goes against d,
 
 d being the direction in which it slipped at the committed state, of a length that is rounding of
 velocities. A step that goes on past a reversal, which it will be cut at, thus goes on smoothly.
@@ -78,8 +78,19 @@ def _dynamic_limit(inputs, mu_dynamic):
     return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
 
 
-#: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown.
+#: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown; in
+#: place of that force, while it slips, the speed at the committed state.
 KEPT_MODE, KEPT_X, KEPT_Y, HELD_X, HELD_Y = range(5)
+KEPT_SPEED = HELD_X
+#: Slip across d that is less than this part of the committed speed is rounding. It is to stay so
+#: where v goes through 0: there it is compared with a part of that speed at least.
+STRAIGHT, PART = 1e-6, 0.7
+
+
+@jitable
+def _least_speed(across, speed):
+    """Return what slip across d is compared with at least."""
+    return PART * speed * max(0.0, 1.0 - abs(across) / (STRAIGHT * speed)) if speed > 0.0 else 0.0
 
 
 @jitable
@@ -88,14 +99,19 @@ def rigid(inputs, memory, mu_static, mu_dynamic):
     mode, dx, dy = memory[KEPT_MODE], memory[KEPT_X], memory[KEPT_Y]
     if mode == STICK:
         return (memory[HELD_X], memory[HELD_Y], 0.0, 0.0, 0.0, 0.0, mode), memory
+    limit = _dynamic_limit(inputs, mu_dynamic)
     ux, uy = inputs.xdot[0], inputs.xdot[1]
-    if mode != BEGUN:
-        along = (ux * dx + uy * dy) / (dx * dx + dy * dy)
-        over = 1.0 - 2.0 * min(along, 0.0)
-        ux, uy = ux + over * dx, uy + over * dy
-    size = math.hypot(ux, uy)
-    part = _dynamic_limit(inputs, mu_dynamic) / size if size > 0.0 else 0.0
-    return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode), memory
+    if mode == BEGUN:
+        size = math.hypot(ux, uy)
+        part = limit / size if size > 0.0 else 0.0
+        return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode), memory
+    rest = math.hypot(dx, dy)
+    dx, dy = dx / rest, dy / rest
+    along, across = abs(ux * dx + uy * dy) + rest, uy * dx - ux * dy
+    sine = across / max(math.hypot(along, across), _least_speed(across, memory[KEPT_SPEED]))
+    cosine = math.sqrt(max(0.0, 1.0 - sine * sine))
+    fx, fy = -limit * (cosine * dx - sine * dy), -limit * (cosine * dy + sine * dx)
+    return (fx, fy, 0.0, 0.0, 0.0, 0.0, mode), memory
 
 
 @friction_law(
