@@ -60,6 +60,13 @@ class ContactProblems:
         self.written, self.next = 0, every
         if every < 1:
             raise ModelError(f"dump_fclib={every}: must be a whole number > 0")
+        for contact in system.model.contacts.values():
+            if contact.rigid:
+                # its equations would stand in W
+                raise ModelError(
+                    f"Force_Contact[{contact.id}]: dump_fclib does not go with "
+                    'tangential_stiffness="INFINITE"; leave that out for this run'
+                )
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not resumed and any(folder.glob("*.hdf5")):

@@ -112,6 +112,8 @@ def test_what_is_there_already_stays(tmp_path):
     with pytest.raises(ResultsError, match="holds problems of an earlier run"):
         run(tmp_path, deck, every=40)
     assert files[0].read_bytes() == kept
+    with pytest.raises(ModelError, match=r"Force_Contact\[\d+\]: dump_fclib does not go with"):
+        run(tmp_path, MODELS / "stiction_rigid.xml")
     with pytest.raises(ModelError, match="dump_fclib needs an output folder"):
         mbsim.simulate(mbsim.read_model(deck), dump_fclib=1)
     said = CliRunner().invoke(main, ["run", deck, "--dump-fclib", "0"])
