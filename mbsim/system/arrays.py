@@ -156,6 +156,8 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
     INC_GRAPHIC_J,
     INC_MEMORY,  # of friction at the begin of the step, as many as `State.before` has
 ) = range(14, 22)
+#: Of these, where friction is rigid: what holds along x and y, see laws.friction.stiction.
+INC_HELD = INC_MEMORY + 3
 
 
 class Bodies(NamedTuple):
