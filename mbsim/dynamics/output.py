@@ -24,7 +24,6 @@ from mbsim.dynamics.contact import (
 from mbsim.dynamics.kinematics import position
 from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.laws.catalog import STICK
-from mbsim.laws.friction.stiction import HELD_X
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
@@ -33,6 +32,7 @@ from mbsim.system.arrays import (
     INC_FROZEN,
     INC_GRAPHIC_I,
     INC_GRAPHIC_J,
+    INC_HELD,
     INC_KIND,
     INC_MEMORY,
     INC_NORMAL,
@@ -140,7 +140,7 @@ def fill_incidents(scene, h, y):
         if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here
             for j in range(2):
-                row[INC_MEMORY + HELD_X + j] = work.held[s, j]
+                row[INC_HELD + j] = work.held[s, j]
         k += 1
     rows.used[1] = k
     return k - first

@@ -23,8 +23,10 @@ from scipy.spatial.transform import Rotation
 
 import mbsim
 from mbsim.dynamics.implicit_hooks import implicit_hooks
+from mbsim.laws.catalog import SLIP, STICK
 from mbsim.settings import settle
 from mbsim.simulation import Runner
+from mbsim.system.arrays import CHOOSE
 from mbsim.system.build import build
 
 COEFFICIENTS = (1.0, 10.0, 1e3)
@@ -569,6 +571,34 @@ def test_contacts(name, slip, tmp_path):
     assert worst[0] < 2e-3
     assert worst[1] < 0.02 * worst[0]
     assert worst[2] < 1e-6
+
+
+RIGID = CONTACT.replace('"COULOMB_ON"', '"STICTION" tangential_stiffness="INFINITE"').replace(
+    'stiction_trans_vel="0.1" friction_trans_vel="0.2"', ""
+)
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.15])
+@pytest.mark.parametrize("name", TOUCHING)
+def test_contacts_without_give(name, slip, tmp_path):
+    # held by equations at all points, or slipping at all
+    bodies, graphics, (i, j) = TOUCHING[name]
+    it = Linearised(of(Scene(bodies, [], extra=graphics + RIGID.format(i=i, j=j)), tmp_path))
+    y = it.y.copy()
+    y[7:13] = slip, 0.3 * slip, -0.01, 0.2, 0.3, 0.4
+    it.f(y, 0.0)
+    hit = it.scene.work.hit[: it.scene.work.hit[-1]]
+    it.scene.state.memory[hit, 0] = SLIP if slip else STICK
+    it.scene.state.memory[hit, 1] = 1e-13
+    it.runner._door(0.0)(CHOOSE, y)
+    held = int(it.scene.equations.active[-1])
+    assert held == (0 if slip else 2 if len(hit) == 1 else 3)
+    worst = it.misses(it.on_manifold(y, 0.0), coefficients=(1e3, 1e4, 1e5))
+    print(name, slip, worst)
+    # points frozen on what holds are of first order in the step
+    assert worst[0] < 1e-3
+    assert worst[1] < 0.3 * worst[0]
+    assert worst[2] < 1e-5
 
 
 # --- the systems themselves ---
