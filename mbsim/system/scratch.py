@@ -52,7 +52,7 @@ def start_state(
         sides=np.zeros((kinks, 2)),
         frozen=np.zeros(1, dtype=np.int64),
         dry=dry,
-        heat=np.zeros(1),
+        heat=np.zeros(2),
     )
 
 
@@ -130,7 +130,6 @@ def scratch(
         hold=np.zeros((ns if points else 0, 15)),
         held=np.zeros((ns if points else 0, 2)),
         aim=np.zeros((ns if points else 0, 8)),
-        asked=np.zeros(1, dtype=np.int64),
         look=np.zeros((3, points, POINT)),
     )
 
