@@ -76,13 +76,13 @@ def watch_held(scene, t, y, what):
     A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
     leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
     """
-    heat, asked, differs = scene.state.heat, scene.work.asked, 0.0
+    heat, differs = scene.state.heat, 0.0
     if what == PASS:
-        heat[0] = heat[0] + 1.0 if asked[0] == 1 else 0.5 * heat[0]
-        asked[0] = 0
+        heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
+        heat[1] = 0.0
     elif heat[0] <= HOT:
         if call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y)) == 1:
-            asked[0], differs = 1, 2.0
+            heat[1], differs = 1.0, 2.0
     return differs
 
 

@@ -495,7 +495,8 @@ class State(NamedTuple):
     dry: F2  # (nf, 4) of dry friction, see the names above
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
-    heat: F1  # (1,) the same as of sides for contacts whose friction is rigid: see dynamics.kinks
+    heat: F1  # (2,) of contacts whose friction is rigid: heat as of sides, 1 where one asked for
+    # another mode since the committed state: see dynamics.kinks
 
 
 class Log(NamedTuple):
@@ -542,7 +543,6 @@ class Work(NamedTuple):
     hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
     held: F2  # (ns, 2) forces that hold these, along x and y
     aim: F2  # (ns, 8) of what begins to slip; no rows for the three where none is rigid
-    asked: I1  # (1,) 1 where one of them asked for another mode since the committed state
     look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before
 
 

@@ -55,7 +55,7 @@ def start_state(
         dry=dry,
         # no time: nothing is remembered yet
         residual=np.full(residual, np.nan),
-        heat=np.zeros(1),
+        heat=np.zeros(2),
     )
 
 
@@ -133,7 +133,6 @@ def scratch(
         hold=np.zeros((ns if points else 0, 15)),
         held=np.zeros((ns if points else 0, 2)),
         aim=np.zeros((ns if points else 0, 8)),
-        asked=np.zeros(1, dtype=np.int64),
         look=np.zeros((3, points, POINT)),
     )
 
