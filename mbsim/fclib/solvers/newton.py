@@ -24,7 +24,7 @@ from mbsim.fclib.blocks import product
 from mbsim.fclib.cone import natural_map, norm, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
+from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 RHO = 30.0
 #: Newton iterations of one proximal step, and when a hopeless one is given up.
 MOST, EARLY, HOPELESS = 15, 8, 0.3
+#: Newton iterations of the step that makes a solution found a better one.
+FINAL = 4
 #: Trial steps of the line search, and how many earlier norms it compares with.
 HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
@@ -203,6 +205,7 @@ def proximal_newton(
 
     `r` holds the best iterate, in and out; `centre` and `state` what a later call goes on from (a
     first call has state[ALPHA] > 0, state[BEST] the error of r, and the centre at r).
+    With the goal reached, one more step, of at most FINAL iterations, is taken to a tenth of it.
     Returns the number of rows in `history` (Newton iterations so far, error, |F|/|q|).
     """
     nt = len(tangent)
@@ -247,7 +250,8 @@ def proximal_newton(
     spent = 0
     bound = norm(q)
     flops = 0.0
-    while spent < limit:
+    finishing = False
+    while spent < limit or finishing:
         alpha = state[ALPHA]
         shift = alpha * mean
         for a in range(nc):
@@ -263,10 +267,16 @@ def proximal_newton(
         if state[BEST] > 0.0:
             final = min(tol, tol_q * state[BEST] / state[BEST_Q])
         aim = max(0.1 * min(state[ERROR], state[BEST]), 0.2 * final)
+        most = MOST
+        if finishing:
+            # proximal terms hold back as much as they help, this near
+            shift *= POLISHED
+            aim *= 0.5 * POLISHED
+            most = FINAL
         recent[:] = size_f
         newtons = 0
         good = False
-        while newtons < MOST:
+        while newtons < most:
             # Newton's direction
             same = newtons + spent > 0
             for a in range(nc):
@@ -386,8 +396,15 @@ def proximal_newton(
                 r[k] = x[k]
         else:
             state[STALLED] += 1.0
-        if done:
+        if finishing:
             break
+        if done:
+            if error_q <= POLISHED * tol_q:
+                break
+            finishing = True
+            for k in range(m):
+                centre[k] = x[k]
+            continue
         if good and error > ASTRAY * state[BEST] and state[BEST] < 1e-4:
             # another branch, and most of these have no solution: back, with shorter steps
             state[FAILED_AT] = alpha
