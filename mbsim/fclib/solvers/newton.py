@@ -29,8 +29,9 @@ from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
 
-#: rho = RHO / (mean diagonal of the contact's block); 10 to 100 is good (state[SHARP]).
-RHO = 30.0
+#: rho = RHO / (mean diagonal of the contact's block); 10 to 30 is good, and 100 or 1 is not: too
+#: many contacts change their state at once, or too few (state[SHARP]).
+RHO = 10.0
 #: Newton iterations of one proximal step, and when a hopeless one is given up.
 MOST, EARLY, HOPELESS = 15, 8, 0.3
 #: Newton iterations of the step that makes a solution found a better one.
@@ -40,8 +41,6 @@ HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
-#: The error may rise, and comes back, but not from this far above the best.
-ASTRAY = 50.0
 
 # places in `state`, what a later call needs to go on
 ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH = range(
@@ -405,15 +404,7 @@ def proximal_newton(
             for k in range(m):
                 centre[k] = x[k]
             continue
-        if good and error > ASTRAY * state[BEST] and state[BEST] < 1e-4:
-            # another branch, and most of these have no solution: back, with shorter steps
-            state[FAILED_AT] = alpha
-            state[SINCE] = 0.0
-            state[ALPHA] = min(4.0 * alpha, 1e6)
-            state[ERROR] = state[BEST]
-            for k in range(m):
-                centre[k] = r[k]
-        elif good:
+        if good:
             state[ERROR] = error
             state[SINCE] += 1
             for k in range(m):
@@ -439,7 +430,8 @@ def proximal_newton(
 class Proximal:
     """A proximal Newton run that can be continued; `alpha` = 0 is Newton's method alone.
 
-    It starts from `start`, by default the best iterate, and keeps a best one of its own.
+    It starts from `start`, by default the best iterate, and keeps a best one of its own and the
+    mean of its centres.
     """
 
     def __init__(
@@ -453,6 +445,7 @@ class Proximal:
         self.task = task
         self.r = (task.r if start is None else start).copy()
         self.centre = self.r.copy()
+        self.total, self.samples = np.zeros(len(self.r)), 0
         self.state: Any = np.zeros(STATE)
         self.state[ALPHA], self.state[SHARP], self.state[REACH] = alpha, rho, reach
         error, error_q = task.look(self.r)
@@ -475,6 +468,17 @@ class Proximal:
         """Estimated seconds of a Newton iteration so far (0 before the first)."""
         return float(self.state[WORK] / max(self.state[NEWTONS], 1.0))
 
+    @property
+    def mean(self) -> Vector:
+        """Mean of the centres since `forget`: the middle, if the run goes round in a circle."""
+        found: Vector = self.total / max(self.samples, 1)
+        return found
+
+    def forget(self) -> None:
+        """Begin a new mean."""
+        self.total[:] = 0.0
+        self.samples = 0
+
     def advance(self, limit: int) -> bool:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
@@ -488,6 +492,8 @@ class Proximal:
             task.tol, task.tol_q, limit, history, 0,
         )  # fmt: skip
         history[:rows, 0] += before
+        self.total += self.centre
+        self.samples += 1
         task.work += float(state[WORK] - work)
         task.iterations += int(state[NEWTONS] - newtons)
         self.r = r
