@@ -68,7 +68,8 @@ def run(task: Task) -> None:
         if not task.over:
             _try_splitting(task, splitting_work, finish)
     _sweep(task, finish, near=True)
-    _finish(task)
+    if not task.over:
+        _finish(task)
 
 
 def _costs(task: Task) -> tuple[float, float, float]:
