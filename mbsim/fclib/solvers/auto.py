@@ -130,7 +130,10 @@ def _sweep(task: Task, work: float, *, near: bool = False) -> None:
         if left * cost > work:
             return
         chunk = 25 if task.iterations < 100 else 100
+        best = task.r
         sweeps.nsgs(task, chunk)
+        if task.r is best:
+            return  # the next ones would be the same
 
 
 def _try_splitting(task: Task, cost: float, finish: float) -> None:

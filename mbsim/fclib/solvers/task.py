@@ -44,7 +44,7 @@ class Task:
         Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
     strict
         Whether the second must be reached; else it gets more work, at most twenty times as much and
-        not much more than 50 ms or a fifth.
+        not much more than 50 ms or half as much.
     deadline
         Value of `clock` at which to give up.
     """
@@ -106,7 +106,7 @@ class Task:
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
         if error <= self.tol and self.grace == np.inf:
-            self.grace = self.work + min(20.0 * self.work + 2e-5, 0.05 + 0.2 * self.work)
+            self.grace = self.work + min(20.0 * self.work + 2e-5, 0.05 + 0.5 * self.work)
         return better
 
     def note(self, name: str, rows: Any) -> None:
