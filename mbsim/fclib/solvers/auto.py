@@ -37,6 +37,8 @@ NEAR = 1.5e-4
 RUNS = ((10.0, 1.6), (10.0, 1.0), (30.0, 1.0))
 #: Newton iterations in which a run must halve its error, and how often its centre is looked at.
 WINDOW, SAMPLE = 240, 8
+#: Runs from a best point without gain after which the sweeps' way is better.
+IDLE = 3
 #: Error of a mean of centres that is a good start.
 MIDDLE = 1e-3
 #: Restarts without any gain after which there is nothing more to hope for.
@@ -159,28 +161,35 @@ def _finish(task: Task) -> None:
     """Run the proximal method until the goal is reached or there is no hope.
 
     The problem is not convex, so a run may go round in a circle about a solution: the middle of
-    the circle, which is nearer to it, is where the next run starts. One that is lost starts from
-    where the sweeps have got to meanwhile, on their own way.
+    the circle, which is nearer to it, is where the next run starts. Else that starts from the best
+    point of one that was near, with other numbers, and at last from where the sweeps have got to
+    meanwhile, on their own way.
     """
     start = chain = task.r
-    vain = 0
+    vain = idle = 0
+    spent = task.work
     for restart in count():
         rho, reach = RUNS[restart % len(RUNS)]
-        before, spent = task.error, task.work
+        before = task.error
         run = newton.Proximal(task, rho=rho, start=start, reach=reach)
+        begin = run.error
         _proximal(task, run)
         vain = 0 if task.error < 0.9 * before else vain + 1
         if task.over or vain >= HOPELESS:
             return
+        idle = 0 if run.error < 0.5 * begin else idle + 1
         start = run.mean
         if task.look(start)[0] < MIDDLE:
             continue
-        spent, begin = 0.2 * (task.work - spent), task.work
-        while not task.over and task.work - begin < spent:
+        if run.error < NEAR and idle < IDLE:
+            start = run.r
+            continue
+        spent, work = 0.2 * (task.work - spent), task.work
+        while not task.over and task.work - work < spent:
             chain = sweeps.nsgs(task, FIRST_SMALL * (restart + 1), start=chain)
         if task.over:
             return
-        start = chain
+        start, spent, idle = chain, task.work, 0
 
 
 def _proximal(task: Task, run: newton.Proximal) -> None:
