@@ -146,7 +146,7 @@ def _solve_plain(
         tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol_q, sweeps, every, GRACE,
         history, check,
     )  # fmt: skip
-    if check[0] <= tol and (check[1] <= tol_q or (not strict and done < sweeps)):
+    if check[0] <= tol and check[1] <= tol_q:
         return Result(
             problem, "AUTO", tol, strict, r, u, float(check[0]), float(check[1]),
             clock() - began, 0.0, done, [("NSGS", history[:rows])],

@@ -16,6 +16,7 @@ from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.problem import Global, Local, Solution, matrix
 from mbsim.fclib.reduction import reduce
 from mbsim.fclib.solve import solve
+from mbsim.fclib.solvers import newton, sweeps
 from mbsim.fclib.solvers.catalog import SOLVERS
 from mbsim.fclib.solvers.task import Task
 
@@ -256,6 +257,79 @@ def test_within_the_tolerance_impulses_must_not_grow():
     assert task.offer(np.ones(6), 1e-5, 1e-3)
     assert not task.offer(np.full(6, 1e6), 1e-9, 1e-4)
     assert task.offer(np.full(6, 1.5), 1e-6, 1e-4)
+
+
+@pytest.mark.parametrize("solver", ["NSGS", "ADMM", "PROX"])
+def test_a_method_goes_on_a_little_beyond_its_goal(solver):
+    result = solve(some_local(80), 1e-5, solver)
+    rows = np.concatenate([rows for _, rows in result.history])
+    reached = rows[rows[:, 1:].max(axis=1) <= 1e-5][0]
+    assert result.error_q < reached[2]
+    # and no further than a third of the work, or one Newton step more
+    assert result.iterations <= reached[0] + max(reached[0] / 3.0 + 1.0, newton.FINAL)
+
+
+def test_more_sweeps_are_undone_if_they_gain_nothing():
+    problem = some_local(80)
+    blocks = reduce(problem)
+    best = solve(problem, 1e-13).r
+    task = Task(blocks, best.copy(), 1e-5, 1e-5)
+    after = sweeps.nsgs(task, 20)
+    assert task.look(after)[1] <= task.look(best)[1] + 1e-15
+
+
+def test_a_proximal_run_knows_the_mean_of_its_centres():
+    task = Task(reduce(some_local(80)), np.zeros(240), 1e-12, 1e-12)
+    run = newton.Proximal(task)
+    assert run.advance(1)
+    run.forget()
+    centres = []
+    for _ in range(3):
+        assert run.advance(1)
+        centres.append(run.centre.copy())
+    assert run.mean == pytest.approx(np.mean(centres, axis=0), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "bound"),
+    [
+        # |F|/|q| of the best of Siconos' solvers at 1e-4, or the tolerance where that is better
+        ("LMGC_100_PR_PerioBox-i00361-60-03000", 4.9e-4),
+        ("Confeti-ex03-Fc3D-SBM", 1e-4),
+        ("Capsules-i101-404", 1e-4),
+        ("Gen_spheres-nc133-s30", 1e-4),
+    ],
+)
+def test_large_impulses_do_not_hide_what_is_missing(name, bound):
+    result = solve(hdf5.read(problem_file(name)).problem, 1e-4)
+    assert result.status == "solved"
+    assert result.figures.error_q <= bound
+    assert result.figures.merit1 <= max(bound, 2.8e-4)
+
+
+def perturbed(problem, seed):
+    """Return a copy with other q, still in the range of W, and other friction."""
+    rng = np.random.default_rng(seed)
+    w = problem.W.csr()
+    shift = w @ rng.normal(size=problem.W.m)
+    size = (0.01, 0.02, 0.05)[seed % 3] * np.linalg.norm(problem.q) / np.linalg.norm(shift)
+    q = problem.q * (1.0 + 0.02 * rng.normal()) + size * shift
+    return Local(problem.spacedim, problem.W, q, problem.mu * (1.1 if seed % 2 else 0.9))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "name",
+    ["Gen_capsules-nc582-s260", "Gen_chute-nc787-s200", "Gen_chute-nc1035-s350",
+     "Gen_kapla-nc1204-s40", "Gen_pyramid-nc1061-s20", "OneObject-i100000-316",
+     "fc2d_granularflowonwall_02020_00213"],
+)  # fmt: skip
+def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
+    problem = perturbed(hdf5.read(problem_file(name)).problem, seed)
+    result = solve(problem, 1e-8, max_seconds=60.0)  # a busy machine must not decide
+    assert result.status == "solved"
+    assert judge(problem, result.solution).error <= 1e-8
 
 
 @pytest.mark.slow

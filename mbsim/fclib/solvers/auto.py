@@ -33,13 +33,14 @@ RESTED = 5
 FINISH = 40
 #: Error from which the proximal method is started, unless sweeps do not get there.
 NEAR = 1.5e-4
-#: Values of alpha and rho that restarts of the proximal method go through.
-STARTS = ((1e-3, 30.0), (1e-2, 30.0), (1e-3, 10.0), (1e-4, 100.0), (1e-1, 30.0))
-#: Proximal steps without gain that end a run.
-STALL, STALL_NEAR = 60, 15
-#: Error from which a run goes on from its best point, and with which alpha and reach.
-NEARBY = 1e-5
-NEARER = ((1e-4, 1.0), (1e-6, 1.0), (1e-2, 1.0), (1e-5, 1.3), (1e-3, 1.6))
+#: rho and reach of successive runs of the proximal method: one that fails should not be repeated.
+RUNS = ((10.0, 1.6), (10.0, 1.0), (30.0, 1.0))
+#: Newton iterations in which a run must halve its error, and how often its centre is looked at.
+WINDOW, SAMPLE = 240, 8
+#: Runs from a best point without gain after which the sweeps' way is better.
+IDLE = 3
+#: Error of a mean of centres that is a good start.
+MIDDLE = 1e-3
 #: Restarts without any gain after which there is nothing more to hope for.
 HOPELESS = 20
 
@@ -69,7 +70,8 @@ def run(task: Task) -> None:
         if not task.over:
             _try_splitting(task, splitting_work, finish)
     _sweep(task, finish, near=True)
-    _finish(task, finish)
+    if not task.over:
+        _finish(task)
 
 
 def _costs(task: Task) -> tuple[float, float, float]:
@@ -130,7 +132,10 @@ def _sweep(task: Task, work: float, *, near: bool = False) -> None:
         if left * cost > work:
             return
         chunk = 25 if task.iterations < 100 else 100
+        best = task.r
         sweeps.nsgs(task, chunk)
+        if task.r is best:
+            return  # the next ones would be the same
 
 
 def _try_splitting(task: Task, cost: float, finish: float) -> None:
@@ -152,50 +157,48 @@ def _try_splitting(task: Task, cost: float, finish: float) -> None:
         limit = 30
 
 
-def _finish(task: Task, finish: float) -> None:
-    """Alternate proximal Newton and sweeps until the goal is reached or there is no hope.
+def _finish(task: Task) -> None:
+    """Run the proximal method until the goal is reached or there is no hope.
 
-    The problem is not convex, so a run may end on a branch without a solution: the next one starts
-    from where the sweeps have got to meanwhile, on their own way, and with other numbers.
+    The problem is not convex, so a run may go round in a circle about a solution: the middle of
+    the circle, which is nearer to it, is where the next run starts. Else that starts from the best
+    point of one that was near, with other numbers, and at last from where the sweeps have got to
+    meanwhile, on their own way.
     """
-    budget = max(6.0 * task.work, 2.0 * finish)
-    chain = task.r
-    vain = 0
+    start = chain = task.r
+    vain = idle = 0
+    spent = task.work
     for restart in count():
-        alpha, rho = STARTS[restart % len(STARTS)]
-        begin, spent = task.error, task.work
-        run = newton.Proximal(task, alpha, rho, task.r if restart % 2 else chain)
-        _proximal(task, run, budget, STALL)
-        # it may have been near and left again: from its best point, with shorter steps
-        for alpha, reach in NEARER:
-            if task.over or not run.error < NEARBY:
-                break
-            before = run.error
-            run = newton.Proximal(task, alpha, rho, run.r, reach)
-            _proximal(task, run, budget, STALL_NEAR)
-            if run.error > 0.5 * before and before > 0.1 * NEARBY:
-                break
-        vain = 0 if task.error < 0.9 * begin else vain + 1
+        rho, reach = RUNS[restart % len(RUNS)]
+        before = task.error
+        run = newton.Proximal(task, rho=rho, start=start, reach=reach)
+        begin = run.error
+        _proximal(task, run)
+        vain = 0 if task.error < 0.9 * before else vain + 1
         if task.over or vain >= HOPELESS:
             return
-        spent, before = 0.2 * (task.work - spent), task.work
-        while not task.over and task.work - before < spent:
+        idle = 0 if run.error < 0.5 * begin else idle + 1
+        start = run.mean
+        if task.look(start)[0] < MIDDLE:
+            continue
+        if run.error < NEAR and idle < IDLE:
+            start = run.r
+            continue
+        spent, work = 0.2 * (task.work - spent), task.work
+        while not task.over and task.work - work < spent:
             chain = sweeps.nsgs(task, FIRST_SMALL * (restart + 1), start=chain)
         if task.over:
             return
-        budget *= 1.3
+        start, spent, idle = chain, task.work, 0
 
 
-def _proximal(task: Task, run: newton.Proximal, budget: float, stall: int) -> None:
+def _proximal(task: Task, run: newton.Proximal) -> None:
     """Take proximal Newton steps while they gain."""
-    mark, mark_work = run.error, task.work
-    while not task.over:
-        cost = run.newton_work
-        limit = 10 if cost == 0.0 else max(10, min(50, int(0.25 * budget / cost)))
-        if not run.advance(limit):
-            return
-        if run.error < mark / 3.0:
-            mark, mark_work = run.error, task.work
-        patience = budget if run.error > NEAR else 4.0 * budget
-        if task.work - mark_work > patience or run.stalled > stall:
+    while True:
+        before = run.error
+        run.forget()
+        for _ in range(WINDOW // SAMPLE):
+            if not run.advance(SAMPLE) or task.over:
+                return
+        if run.error > 0.5 * before:
             return

@@ -24,22 +24,23 @@ from mbsim.fclib.blocks import product
 from mbsim.fclib.cone import natural_map, norm, relative_errors
 from mbsim.fclib.factor import factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import GROWTH, ROWS, Task
+from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
 
-#: rho = RHO / (mean diagonal of the contact's block); 10 to 100 is good (state[SHARP]).
-RHO = 30.0
+#: rho = RHO / (mean diagonal of the contact's block); 10 to 30 is good, and 100 or 1 is not: too
+#: many contacts change their state at once, or too few (state[SHARP]).
+RHO = 10.0
 #: Newton iterations of one proximal step, and when a hopeless one is given up.
 MOST, EARLY, HOPELESS = 15, 8, 0.3
+#: Newton iterations of the step that makes a solution found a better one.
+FINAL = 4
 #: Trial steps of the line search, and how many earlier norms it compares with.
 HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
-#: The error may rise, and comes back, but not from this far above the best.
-ASTRAY = 50.0
 
 # places in `state`, what a later call needs to go on
 ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH = range(
@@ -203,6 +204,7 @@ def proximal_newton(
 
     `r` holds the best iterate, in and out; `centre` and `state` what a later call goes on from (a
     first call has state[ALPHA] > 0, state[BEST] the error of r, and the centre at r).
+    With the goal reached, one more step, of at most FINAL iterations, is taken to a tenth of it.
     Returns the number of rows in `history` (Newton iterations so far, error, |F|/|q|).
     """
     nt = len(tangent)
@@ -247,7 +249,8 @@ def proximal_newton(
     spent = 0
     bound = norm(q)
     flops = 0.0
-    while spent < limit:
+    finishing = False
+    while spent < limit or finishing:
         alpha = state[ALPHA]
         shift = alpha * mean
         for a in range(nc):
@@ -263,10 +266,16 @@ def proximal_newton(
         if state[BEST] > 0.0:
             final = min(tol, tol_q * state[BEST] / state[BEST_Q])
         aim = max(0.1 * min(state[ERROR], state[BEST]), 0.2 * final)
+        most = MOST
+        if finishing:
+            # proximal terms hold back as much as they help, this near
+            shift *= POLISHED
+            aim *= 0.5 * POLISHED
+            most = FINAL
         recent[:] = size_f
         newtons = 0
         good = False
-        while newtons < MOST:
+        while newtons < most:
             # Newton's direction
             same = newtons + spent > 0
             for a in range(nc):
@@ -386,17 +395,16 @@ def proximal_newton(
                 r[k] = x[k]
         else:
             state[STALLED] += 1.0
-        if done:
+        if finishing:
             break
-        if good and error > ASTRAY * state[BEST] and state[BEST] < 1e-4:
-            # another branch, and most of these have no solution: back, with shorter steps
-            state[FAILED_AT] = alpha
-            state[SINCE] = 0.0
-            state[ALPHA] = min(4.0 * alpha, 1e6)
-            state[ERROR] = state[BEST]
+        if done:
+            if error_q <= POLISHED * tol_q:
+                break
+            finishing = True
             for k in range(m):
-                centre[k] = r[k]
-        elif good:
+                centre[k] = x[k]
+            continue
+        if good:
             state[ERROR] = error
             state[SINCE] += 1
             for k in range(m):
@@ -422,7 +430,8 @@ def proximal_newton(
 class Proximal:
     """A proximal Newton run that can be continued; `alpha` = 0 is Newton's method alone.
 
-    It starts from `start`, by default the best iterate, and keeps a best one of its own.
+    It starts from `start`, by default the best iterate, and keeps a best one of its own and the
+    mean of its centres.
     """
 
     def __init__(
@@ -436,6 +445,7 @@ class Proximal:
         self.task = task
         self.r = (task.r if start is None else start).copy()
         self.centre = self.r.copy()
+        self.total, self.samples = np.zeros(len(self.r)), 0
         self.state: Any = np.zeros(STATE)
         self.state[ALPHA], self.state[SHARP], self.state[REACH] = alpha, rho, reach
         error, error_q = task.look(self.r)
@@ -458,6 +468,17 @@ class Proximal:
         """Estimated seconds of a Newton iteration so far (0 before the first)."""
         return float(self.state[WORK] / max(self.state[NEWTONS], 1.0))
 
+    @property
+    def mean(self) -> Vector:
+        """Mean of the centres since `forget`: the middle, if the run goes round in a circle."""
+        found: Vector = self.total / max(self.samples, 1)
+        return found
+
+    def forget(self) -> None:
+        """Begin a new mean."""
+        self.total[:] = 0.0
+        self.samples = 0
+
     def advance(self, limit: int) -> bool:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
@@ -471,6 +492,8 @@ class Proximal:
             task.tol, task.tol_q, limit, history, 0,
         )  # fmt: skip
         history[:rows, 0] += before
+        self.total += self.centre
+        self.samples += 1
         task.work += float(state[WORK] - work)
         task.iterations += int(state[NEWTONS] - newtons)
         self.r = r

@@ -15,9 +15,9 @@ from mbsim.fclib.blocks import (
     product,
     product_of_stored,
 )
-from mbsim.fclib.cone import relative_errors
+from mbsim.fclib.cone import norm, relative_errors
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
-from mbsim.fclib.solvers.task import ROWS, Task
+from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -120,7 +120,8 @@ def gauss_seidel(
 ):  # fmt: skip
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
-    With the first reached, the second gets as many sweeps again, and `grace` more, at most.
+    With the first reached, the second gets as many sweeps again, and `grace` more, at most; with
+    both reached, a third of the sweeps more may bring a tenth of them (POLISHED).
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
@@ -136,6 +137,8 @@ def gauss_seidel(
     done = 0
     looked = -1
     most = sweeps
+    kept = np.empty(0)
+    kept_error, kept_q = np.inf, np.inf
     while done < most:
         change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
         done += 1
@@ -155,10 +158,14 @@ def gauss_seidel(
                 history[rows, 2] = error_q
                 rows += 1
             if error <= tol:
-                if error_q <= tol_q:
+                if error_q <= POLISHED * tol_q:
                     break
-                if most == sweeps:
-                    most = min(sweeps - 1, 2 * done + grace)
+                if error_q <= tol_q and len(kept) == 0:
+                    most = min(sweeps, done + 1 + done // (2 if every == 1 else 3))
+                    kept = r.copy()
+                    kept_error, kept_q = error, error_q
+                elif most == sweeps:
+                    most = min(sweeps, 2 * done + grace)
             elif every == 1 and done >= LEAP:
                 # few contacts: one slow direction is often all that is left
                 phase = done % LEAP
@@ -178,6 +185,9 @@ def gauss_seidel(
                         error, error_q = leapt, leapt_q
                         if error <= tol and error_q <= tol_q:
                             break
+    if len(kept) > 0 and not (error <= tol and error_q < kept_q and norm(r) <= GROWTH * norm(kept)):
+        r[:] = kept
+        error, error_q = kept_error, kept_q
     return done, error, error_q, rows
 
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 #: Growth of |r| that a smaller |F|/|q| is worth.
 GROWTH = 2.0
+#: A method that has reached its goal goes on to this share of it while that costs little: its last
+#: iterations gain most for their work, and what is only just good enough serves nobody well.
+POLISHED = 0.1
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
 
@@ -40,7 +43,8 @@ class Task:
     tol, tol_q
         Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
     strict
-        Whether the second must be reached; else it gets some more work, at most four times as much.
+        Whether the second must be reached; else it gets more work, at most twenty times as much and
+        not much more than 50 ms or half as much.
     deadline
         Value of `clock` at which to give up.
     """
@@ -102,7 +106,7 @@ class Task:
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
         if error <= self.tol and self.grace == np.inf:
-            self.grace = self.work + min(4.0 * self.work + 2e-5, 0.02 + 0.1 * self.work)
+            self.grace = self.work + min(20.0 * self.work + 2e-5, 0.05 + 0.5 * self.work)
         return better
 
     def note(self, name: str, rows: Any) -> None:
