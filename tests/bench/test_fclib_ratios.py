@@ -52,7 +52,8 @@ def test_times_over_those_of_siconos(tol):
     for row in rows:
         best = theirs.get(row.problem, math.nan)
         print(
-            f"{row.problem}: {row.status}, {1e3 * row.seconds:.3g} ms, Siconos {1e3 * best:.3g} ms, "
+            f"{row.problem}: {row.status}, {1e3 * row.seconds:.3g} ms, "
+            f"Siconos {1e3 * best:.3g} ms, "
             f"error {row.error:.1e}, |F|/|q| {row.error_q:.1e}, MERIT_1 {row.merit1:.1e}"
         )
         if best >= TOO_SHORT:
