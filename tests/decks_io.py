@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import mbsim
+from mbsim import simulation
+from mbsim.errors import Interrupted
 
 ROOT = Path(__file__).resolve().parent.parent
 MODELS = ROOT / "models"
@@ -39,6 +41,30 @@ def run_deck(folder, model, end_time=1.0, print_interval=0.01, **settings):
     """Run model statements and return the results."""
     path = write_deck(folder, model, end_time, print_interval)
     return mbsim.simulate(mbsim.read_model(path), **settings)
+
+
+def run_in_pieces(model, folder, monkeypatch, pieces=(9, 14, 6), **settings):
+    """Interrupt a run after so many looks at its progress, resume it, and return the whole.
+
+    It looks as often as it can from here on.
+    """
+    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    for k, most in enumerate(pieces):
+        left = [most]
+
+        def stop(time, step, until, left=left):
+            left[0] -= 1
+            if left[0] == 0:
+                raise Interrupted("enough")
+
+        resume = k > 0
+        try:
+            mbsim.simulate(model, output=folder, progress=stop, resume=resume, **settings)
+        except Interrupted:
+            continue
+        raise AssertionError(f"it ended before it was interrupted, piece {k}")
+    return mbsim.simulate(model, output=folder, resume=True, **settings)
 
 
 def sphere(

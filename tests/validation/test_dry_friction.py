@@ -11,11 +11,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import run_deck, write_deck
+from decks_io import run_deck, run_in_pieces, write_deck
 
 import mbsim
-from mbsim import simulation
-from mbsim.errors import DeckError, Interrupted, ModelError
+from mbsim.errors import DeckError, ModelError
 
 IMPLICIT = ("RADAU5", "GALPHA")
 
@@ -189,27 +188,15 @@ def test_a_static_simulate_finds_where_friction_holds(more, rest, tmp_path):
 
 @pytest.mark.parametrize(("dx", "method"), [(0.0, "RADAU5"), (0.0, "GALPHA"), (0.02, "DOPRI5")])
 def test_resumed_it_is_the_same_run(dx, method, tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
     text = ground() + body(2, 1.0, x=0.85) + spring(4.0) + friction(f'friction="0.4" dx="{dx}"')
     model = mbsim.read_model(write_deck(tmp_path, text, 8.0, 0.1))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
     assert len(straight["events"]) >= 4
-    for k, most in enumerate((9, 14, 6)):
-        left = most
-
-        def stop(time, step, until):
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise Interrupted("enough")
-
-        with pytest.raises(Interrupted):
-            mbsim.simulate(model, output=tmp_path, progress=stop, resume=k > 0, **settings)
-    found = mbsim.simulate(model, output=tmp_path, resume=True, **settings)
+    found = run_in_pieces(model, tmp_path, monkeypatch, **settings)
     for name in straight.keys():
         np.testing.assert_array_equal(found[name], straight[name], err_msg=name)
+    found.close()
 
 
 def test_what_a_motion_drives_is_rubbed_both_ways(tmp_path):

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import USERFUNCS, run_deck, write_deck
+from decks_io import USERFUNCS, run_deck, run_in_pieces, write_deck
 from models.reference import jenkins_block
 
 import mbsim
@@ -289,25 +289,12 @@ def test_compiled_and_interpreted_are_the_same(tmp_path, script):
 @pytest.mark.parametrize("method", ["DOPRI5", "RADAU5", "GALPHA"])
 @pytest.mark.parametrize(("name", "par"), [("dry_friction", "0.4, 0.02"), ("maxwell", "20, 3")])
 def test_resumed_it_is_the_same_run(name, par, method, tmp_path, script, monkeypatch):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
     file = DRY if name == "dry_friction" else script
     text = GROUND + body(2, 1.0, x=0.85) + spring(4.0) + element(name, par, file)
     model = mbsim.read_model(write_deck(tmp_path, text, 6.0, 0.1))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
-    for k, most in enumerate((9, 14, 6)):
-        left = most
-
-        def stop(time, step, until):
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise Interrupted("enough")
-
-        with pytest.raises(Interrupted):
-            mbsim.simulate(model, output=tmp_path, progress=stop, resume=k > 0, **settings)
-    found = mbsim.simulate(model, output=tmp_path, resume=True, **settings)
+    found = run_in_pieces(model, tmp_path, monkeypatch, **settings)
     for path in straight.keys():
         np.testing.assert_array_equal(found[path], straight[path], err_msg=path)
     found.close()

@@ -12,12 +12,11 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import MODELS, contact, run_deck, sphere, write_deck
+from decks_io import MODELS, contact, run_deck, run_in_pieces, sphere, write_deck
 
 import mbsim
-from mbsim import simulation
 from mbsim.again import request
-from mbsim.errors import DeckError, Interrupted, ModelError
+from mbsim.errors import DeckError, ModelError
 
 G = 9.81
 IMPLICIT = ("RADAU5", "GALPHA")
@@ -263,24 +262,12 @@ def test_pairs_that_fcl_finds_are_refused(tmp_path):
 
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_resumed_it_is_the_same_run(method, tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
     text = plane() + block() + rub(0.5, 0.3) + push("6*SIN(9*TIME)", "0.1*TIME")
     model = mbsim.read_model(write_deck(tmp_path, text, 1.5, 0.05))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
     assert len(straight["events"]) >= 12
-    for k, most in enumerate((9, 14, 6)):
-        left = most
-
-        def stop(time, step, until):
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise Interrupted("enough")
-
-        with pytest.raises(Interrupted):
-            mbsim.simulate(model, output=tmp_path, progress=stop, resume=k > 0, **settings)
-    found = mbsim.simulate(model, output=tmp_path, resume=True, **settings)
+    found = run_in_pieces(model, tmp_path, monkeypatch, **settings)
     for name in straight.keys():
         np.testing.assert_array_equal(found[name], straight[name], err_msg=name)
+    found.close()
