@@ -28,7 +28,8 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | arrive | y committed, scratch        | 1 if something happened by this committed point that  |
 |        |                             | the caller of `advance` must act on, else 0           |
 | kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
-|        |                             | point, 2 if that shall be found exactly, else 0       |
+|        |                             | point, 2 if that shall be found exactly, else 0;      |
+|        |                             | LOAD: what friction holds over what it can, or < 0    |
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
@@ -114,10 +115,10 @@ AT_ONCE = 100
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER = range(7)
 
-# what `kinks` is asked: whether sides differ, to keep them too, and that a step was taken
+# what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads
 #: What `commit` adds where the motion is held otherwise from here on.
 BEGIN_ANEW = 8.0
-ASK, SETTLE, PASS = 0.0, 1.0, 2.0
+ASK, SETTLE, PASS, LOAD = 0.0, 1.0, 2.0, 3.0
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON = range(4)

@@ -141,7 +141,9 @@ def open_held(scene: Scene) -> None:
     """Open the doors of contacts whose friction is rigid."""
     doors = scene.world.doors
     doors[RIGID_DOOR] = jit.address(_serve_held, _KEEP)
-    doors[DRY_DOOR] = jit.address(_serve_rigid, _KEEP)
+    if len(scene.residuals.id) == 0:
+        # elements of users have opened it for both
+        doors[DRY_DOOR] = jit.address(_serve_rigid, _KEEP)
 
 
 def limit_turn(context, t, h, a, b):

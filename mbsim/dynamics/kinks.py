@@ -7,14 +7,17 @@ becomes another than it was at the committed state.
 
 from __future__ import annotations
 
+import math
+
 from numba import carray
 
 from mbsim.core.address import call_float, call_int, view
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, PASS
+from mbsim.core.problem import ASK, LOAD, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import MODE
-from mbsim.dynamics.dry_friction import is_dry, side_of_dry
+from mbsim.dynamics.dry_friction import STATIC, holding_force, is_dry, side_of_dry
+from mbsim.dynamics.equations import is_friction
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.system.arrays import (
@@ -22,6 +25,7 @@ from mbsim.system.arrays import (
     EVALUATE_DOOR,
     HEAT,
     HOT,
+    LOAD_HELD,
     RIGID_DOOR,
     SIDE,
     SLIDE_LIMIT,
@@ -87,6 +91,30 @@ def watch_held(scene, t, y, what):
 
 
 @jitable
+def load(scene, context, t, y):
+    """Return the largest force by which friction without give holds, over its limit.
+
+    -1 where nothing is held so, and -1 too where modes are left to each evaluation.
+    """
+    active, most = scene.equations.active, -1.0
+    for r in range(active[len(active) - 1]):
+        if is_friction(scene, active[r]):
+            most = 0.0
+    if most < 0.0 or scene.state.frozen[0] == 0:
+        return -1.0
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+    for f in range(len(scene.applied.kind)):
+        if scene.applied.equation[f] >= 0:
+            force = holding_force(scene, f)
+            if not math.isnan(force):
+                most = max(most, abs(force) / scene.applied.par[f, STATIC])
+    if scene.world.doors[RIGID_DOOR] != 0:
+        held = call_int(scene.world.doors[RIGID_DOOR], (scene, LOAD_HELD, t, y))
+        most = max(most, 1e-6 * held)
+    return most
+
+
+@jitable
 def watch(scene, context, t, y, what):
     """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
@@ -124,6 +152,8 @@ def watch(scene, context, t, y, what):
 
 
 def kinks_hook(context, t, h, a, b):
-    """Whether a force is on another branch; h says whether that is to be kept."""
+    """Whether a force is on another branch; h says whether that is kept, or asks for loads."""
     scene = view(context, Scene)
+    if h == LOAD:
+        return load(scene, context, t, carray(a, (scene.rows.y.shape[1],)))
     return watch(scene, context, t, carray(a, (scene.rows.y.shape[1],)), h)

@@ -73,6 +73,8 @@ def open_residuals(scene: Scene) -> None:
     doors = scene.world.doors
     doors[RESIDUAL_DOOR] = jit.address(_serve, _RESIDUAL)
     hook = _keep
-    if np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any():
-        hook = _keep_with_rigid if (scene.applied.equation >= 0).any() else _keep_with_dry
+    if (scene.applied.equation >= 0).any() or scene.contacts.rigid.any():
+        hook = _keep_with_rigid
+    elif np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any():
+        hook = _keep_with_dry
     doors[DRY_DOOR] = jit.address(hook, _KEEP)

@@ -43,6 +43,7 @@ from mbsim.system.arrays import (
     CHANGED_HELD,
     EVALUATE_DOOR,
     HOT,
+    LOAD_HELD,
     PLACE_HELD,
     RECORD_HELD,
     RELEASE_HELD,
@@ -368,6 +369,19 @@ def ask_held(scene, y):
 
 
 @jitable
+def load_held(scene):
+    """Return the largest force that holds a slot, in millionths of what holds at most."""
+    slot, most = scene.equations.slot, 0.0
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        able = capacity(scene, s)
+        if able > 0.0 and sticks(scene, e):
+            held = scene.work.held[s]
+            most = max(most, math.hypot(held[0], held[1]) / able)
+    return int(1e6 * min(most, 1e6))
+
+
+@jitable
 def let_slip(scene, s, x, y, speed):
     """Let slot s slip along (x, y) from here on, at a speed."""
     kept, size = scene.state.memory[s], rest(scene) / math.hypot(x, y)
@@ -579,4 +593,7 @@ def serve_held(scene, what, t, y):
         record_held(scene, t)
     elif what == CHANGED_HELD:
         return changed_held(scene)
+    elif what == LOAD_HELD:
+        share_held(scene, t, y)
+        return load_held(scene)
     return 0

@@ -22,6 +22,7 @@ from mbsim.core.problem import (
     DONE,
     FAILED,
     HAPPENED,
+    LOAD,
     NOT_CONVERGED,
     NOT_FINITE,
     PASS,
@@ -86,6 +87,9 @@ NEAR_KINK = 1e-4
 NEAR_CHANGE = 1e-9
 #: So often at most a step is taken again to end at a kink.
 MOST_CUTS = 3
+#: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol),
+#: and how often a step is shortened for that.
+BENT, MOST_SHORT = 2.0, 20
 
 #: A hook that fails is tried again at a tenth of the step, so many times.
 MOST_FAILURES = 8
@@ -304,10 +308,36 @@ def outputs(p, m, steps, times):
 
 
 @jitable
+def load_at(p, m, t, h, s):
+    """Return the load of what holds at the part s of the fitted step."""
+    interpolate(m, s, m.error)
+    return call_float(p.kinks, (p.context, t + s * h, LOAD, m.error, m.error))
+
+
+@jitable
+def reach_of(p, m, t, h, begin):
+    """Return the part of the fitted step over which the load of what holds is known, 1 for all.
+
+    What holds does not move, so that the method's error says nothing of its load: that is to go
+    straight from `begin` to the trial point but for BENT sqrt(tol) of the limit, so that it cannot
+    pass the limit and come back unseen. What passes it there is cut off. The problem is left
+    evaluated at the trial point.
+    """
+    a, b, c = load_at(p, m, t, h, 0.25), load_at(p, m, t, h, 0.5), load_at(p, m, t, h, 0.75)
+    end = call_float(p.kinks, (p.context, t + h, LOAD, m.trial, m.error))
+    if max(a, b, c) > 1.0:
+        return 0.25 if a > 1.0 else (0.5 if b > 1.0 else 0.75)
+    bent = max(abs(a - 0.75 * begin - 0.25 * end), abs(c - 0.25 * begin - 0.75 * end))
+    bent = max(bent, abs(b - 0.5 * (begin + end)))
+    allowed = BENT * math.sqrt(m.memory[TOL])
+    return 1.0 if bent <= allowed else max(0.1, 0.9 * math.sqrt(allowed / bent))
+
+
+@jitable
 def attempt(p, m, steps, t, h, times):
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
-    And whether it ends on another branch of a force.
+    And whether it ends on another branch of a force, and the part of it that `reach_of` allows.
 
     A step that fails is not checked. The dense output of one that will be taken is fitted
     before the problem is committed, while its hooks still know the step's begin. Single impacts
@@ -315,18 +345,22 @@ def attempt(p, m, steps, t, h, times):
     """
     code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
     if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code, 1.0, -1.0, False
-    asked, kinked = -1.0, False
+        return code, 1.0, -1.0, False, 1.0
+    asked, kinked, begin, reach = -1.0, False, -1.0, 1.0
     if steps.order > 0.0:
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
         if part < 1.0:
-            return 0.0, part, -1.0, False
+            return 0.0, part, -1.0, False, 1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if p.kinks != 0:
         kinked = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0
-    if asked >= 0.0 or kinked or p.happens != 0 or output_within(m, times, t + h):
+        if not kinked:
+            begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
+    if asked >= 0.0 or kinked or begin >= 0.0 or p.happens != 0 or output_within(m, times, t + h):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
-    return code, 1.0, asked, kinked
+    if begin >= 0.0 and code == 0.0:
+        reach = reach_of(p, m, t, h, begin)
+    return code, 1.0, asked, kinked, reach
 
 
 @jitable
@@ -339,16 +373,21 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     tried a little longer.
     """
     near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
-    shortened, retakes, cuts, whole = False, 0, 0, h
+    shortened, retakes, cuts, short, whole = False, 0, 0, 0, h
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
-        code, part, asked, kinked = attempt(p, m, steps, t, h, times)
+        code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
         failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
         if kinked and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
             cut = first_kink(p, m, t, h, whole)
             if floor < cut < h:
                 h = cut
+                continue
+        if reach < 1.0 and not failed and short < MOST_SHORT and not shortened:
+            short += 1
+            if reach * h > floor:
+                h *= reach
                 continue
         if p.happens == 0 or failed:
             return code, part, asked, h

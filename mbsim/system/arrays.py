@@ -107,7 +107,8 @@ KEEP_DRY, HOLD_AGAIN = range(2)
     AIM_HELD,
     RECORD_HELD,
     CHANGED_HELD,
-) = range(8)
+    LOAD_HELD,
+) = range(9)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)

@@ -199,6 +199,25 @@ def test_resumed_it_is_the_same_run(dx, method, tmp_path, monkeypatch):
     found.close()
 
 
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_what_rests_under_a_load_that_comes_and_goes_slips_in_time(method, tmp_path):
+    # nothing moves, so that no error shortens a step: it is not to miss the load's peak
+    push = """
+<Force_Vector_OneBody id="3" type="ForceOnly" i_marker_id="20" ref_marker_id="10"
+  fx_expression="1.01*SIN(9*TIME)" fy_expression="0" fz_expression="0"/>"""
+    results = run_deck(
+        tmp_path,
+        ground() + body(2, 1.0) + push + friction('friction="1"'),
+        3.0,
+        0.5,
+        integrator=method,
+    )
+    times = results["events"]["time"][results["events"]["kind"] == "slip"]
+    np.testing.assert_allclose(times[0], math.asin(1.0 / 1.01) / 9.0, rtol=0, atol=1e-6)
+    # at every peak
+    assert len(times) == 9
+
+
 def test_what_a_motion_drives_is_rubbed_both_ways(tmp_path):
     turned = 'psi="1.5707963267948966" theta="1.5707963267948966"'
     model = (

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from decks_io import MODELS, contact, run_deck, run_in_pieces, sphere, write_deck
+from decks_io import MODELS, USERFUNCS, contact, run_deck, run_in_pieces, sphere, write_deck
 
 import mbsim
 from mbsim.again import request
@@ -271,3 +271,38 @@ def test_resumed_it_is_the_same_run(method, tmp_path, monkeypatch):
     for name in straight.keys():
         np.testing.assert_array_equal(found[name], straight[name], err_msg=name)
     found.close()
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_what_rests_under_a_load_that_comes_and_goes_slips_in_time(method, tmp_path):
+    # nothing moves, so that no error shortens a step: it is not to miss the load's peak
+    model = (
+        plane() + block(low=True) + rub(0.5, 0.3) + push("4.95*SIN(9*(TIME-2))*STEP(TIME,1,0,2,1)")
+    )
+    results = run_deck(tmp_path, model, 2.2, 0.1, integrator=method)
+    begins = 2.0 + math.asin(0.5 * G / 4.95) / 9.0
+    np.testing.assert_allclose(events(results, "slip")[0], begins, rtol=0, atol=1e-6)
+
+
+def test_beside_an_element_of_the_users_own_both_remember(tmp_path):
+    # apart from each other, so that each goes as it goes alone
+    script = USERFUNCS / "dry_friction_element.py"
+    other = """
+<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"/>
+<Reference_Marker id="30" body_id="3" pos_x="0.85"/>
+<Force_Vector_TwoBody id="402" type="ForceOnly" i_marker_id="30" j_floating_marker_id="10"
+  ref_marker_id="10" fx_expression="-4*DX(30,10)" fy_expression="0" fz_expression="0"/>"""
+    own = f"""
+<Force_Element id="7" i_marker_id="30" j_marker_id="10" direction="TX" script_name="{script}"
+  usrsub_fnc_name="dry_friction" usrsub_param_string="USER(0.4, 0.02)"/>"""
+    rubs = plane() + block(low=True) + rub(0.5, 0.3) + push("6*SIN(9*TIME)")
+    settings = {"integrator": "RADAU5", "tol": 1e-7}
+    both = run_deck(tmp_path, rubs + other + own, 1.5, 0.05, **settings)
+    block_alone = run_deck(tmp_path, rubs, 1.5, 0.05, **settings)
+    other_alone = run_deck(tmp_path, plane() + other + own, 1.5, 0.05, **settings)
+    for id, alone in ((2, block_alone), (3, other_alone)):
+        name = f"bodies/{id}/position"
+        np.testing.assert_allclose(both[name], alone[name], rtol=0, atol=2e-6)
+    slips = both["events"][both["events"]["kind"] == "slip"]
+    assert len(slips) > 4
+    assert np.ptp(both["force_elements/7/f"]) > 0.39
