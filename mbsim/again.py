@@ -262,6 +262,13 @@ class Again:
                 a[0], user.par, a[13:16], a[16:19], a[2:5], a[5:8], a[10],
                 int(a[19]), a[FRICTION_INPUTS:], a[11],
             )  # fmt: skip
+            for name in host.signals:
+                # what is one number may be the user's own
+                if OF_INCIDENTS.get(name, 1) > 1:
+                    raise ModelError(
+                        f"{user.source}: espy({name}=...): {name} is a vector of every incident; "
+                        "choose another name"
+                    )
             return {name: _plain(value) for name, value in host.signals.items()}
         finally:
             host.state, host.signals = outer, None

@@ -171,12 +171,25 @@ def _refuse_verlet(model: Model) -> None:
                 why = "forces of known stiffness, which an expression does not say"
             if statement == "Force_Element":
                 why = "forces of known stiffness, which a user's residual does not say"
-                if statement == "Control_Diff":
-                    why = "bodies alone, and this model has states of its own"
+            if statement == "Control_Diff":
+                why = "bodies alone, and this model has states of its own"
             raise ModelError(
                 f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
                 "take DOPRI5 or DOP853"
             )
+
+
+def _creeps(model: Model) -> list[str]:
+    """Return notes on friction that holds, but not in steps of VERLET."""
+    from mbsim.laws.catalog import FRICTION_LAWS
+
+    laws = {id: contact.cff_type for id, contact in model.contacts.items()}
+    return [
+        f"Force_Contact[{id}]: {law} creeps with integrator VERLET, which holds friction back to a "
+        "quarter of what would stop the slip in a step; others hold it"
+        for id, law in laws.items()
+        if law in FRICTION_LAWS and FRICTION_LAWS[law].memory > 0
+    ]
 
 
 def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
@@ -251,6 +264,7 @@ def settle(
     method, said_of_names = _method(asked)
     if method == "VERLET":
         _refuse_verlet(model)
+        notes += _creeps(model)
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
     return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))

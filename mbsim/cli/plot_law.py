@@ -172,23 +172,33 @@ def _ignore(line: str) -> None:
 
 def _users(name: str, par: list[float], plugins: Sequence[Path]) -> Sample:
     """Return a user's friction function, interpreted."""
+    from mbsim.errors import ModelError, PluginError
     from mbsim.laws.catalog import FrictionInput
     from mbsim.laws.rubbing import Sample
     from mbsim.model.elements import Contact, Subroutine
     from mbsim.plugins import host, load_friction
+    from mbsim.plugins.helpers import StopRun
 
     host.forget()
     user = Subroutine(par=tuple(par), fnc_name=name, dll_name="NULL")
     contact = Contact(id=1, cff_type="USERCFF", cff=user)
     function = load_friction(contact, plugins, interpret=True, log=_ignore)
+    if function.function is None:
+        raise ModelError(f"{function.source}: {name} is no Python function: it cannot be drawn")
 
     def ask(
         inputs: FrictionInput, memory: tuple[float, ...]
     ) -> tuple[list[float], tuple[float, ...]]:
-        found = function.call(
-            inputs.time, par, inputs.loci, inputs.locj, inputs.x, inputs.xdot, inputs.nforce,
-            state=memory,
-        )  # fmt: skip
+        try:
+            found = function.call(
+                inputs.time, par, inputs.loci, inputs.locj, inputs.x, inputs.xdot, inputs.nforce,
+                state=memory,
+            )  # fmt: skip
+        except (Exception, StopRun) as error:
+            given = f"--set par={','.join(map(str, par))}" if par else "no --set par=1,2,..."
+            raise PluginError(
+                f"{name} of {function.source} failed: {type(error).__name__}: {error} ({given})"
+            ) from None
         return [found[0], found[1], 0.0, 0.0, found[2]], tuple(found[3:])
 
     return Sample(name, ask, function.states)

@@ -280,6 +280,13 @@ def _sorted(
         SWITCHING if never and always else DIFFERENTIAL if always else ALGEBRAIC
         for never, always in seen
     ]
+    for u, kind in zip(unknowns, kinds, strict=True):
+        # at times is what any kind may look like where it was asked
+        if u.kind is not None and u.kind != SWITCHING and kind != SWITCHING and u.kind != kind:
+            raise ModelError(
+                f"{who}: {u.name} is declared {KINDS[u.kind]}, but asked at many points the "
+                f"residual is {KINDS[kind]} in it"
+            )
     return tuple(
         u if u.kind is not None else replace(u, kind=kind)
         for u, kind in zip(unknowns, kinds, strict=True)

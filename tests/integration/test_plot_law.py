@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from mbsim.cli.main import main
 from mbsim.cli.plot_law import USUAL
+from mbsim.errors import PluginError
 from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.laws.rubbing import Conditions, cycle, sample_of, steady
 
@@ -72,6 +73,14 @@ def test_what_cannot_be_drawn_is_one_line(arguments, said):
     done = plot_law(*arguments)
     assert done.exit_code == 2
     assert said in done.output
+    assert done.output.count("\n") == 1
+
+
+def test_a_function_that_fails_is_one_line():
+    done = plot_law("CFFSUB", "--plugin", WITH_STATE)
+    assert done.exit_code == PluginError.exit_code
+    assert "stiction_with_state.py failed: IndexError: " in done.output
+    assert "(no --set par=1,2,...)" in done.output
     assert done.output.count("\n") == 1
 
 

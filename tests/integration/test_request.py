@@ -98,9 +98,6 @@ def test_forces_are_those_of_the_run_to_the_last_bit(tmp_path, friction, method)
     deck: dict[str, object] = {}
     if method == "VERLET":
         deck = {"vx": 1, "force": ""}
-    if friction == "LUGRE":
-        # in touch from the start: bristles that a blow meets at high slip are too stiff
-        deck = {"spin": 0, "block": 0.04999, "ball": 0.09999}
     with run(tmp_path, FRICTIONS[friction], deck=deck, integrator=method) as results:
         rows = same(results)
     # block and sphere both touch, and the forces are no zeros
@@ -261,6 +258,15 @@ def test_signals_of_the_users_own(tmp_path, given):
         np.testing.assert_array_equal(words[there], np.where(slip[there] < 0.01, "slow", "fast"))
         with pytest.raises(ModelError, match=r"no such signal; there are .*mode_of_mine"):
             request(results, [f"{at}mode_of_yours"])
+
+
+def test_espy_cannot_take_the_name_of_a_vector(tmp_path):
+    script = SPIED.replace("espy(mu=ratio * v", "espy(normal=ratio * v")
+    with (
+        run(tmp_path, FRICTIONS["plugin"], script) as results,
+        pytest.raises(ModelError, match=r"law.py: espy\(normal=...\): normal is a vector"),
+    ):
+        request(results, ["Force_Contact[301].incident[0].normal"])
 
 
 def test_espy_with_what_may_fail_keeps_a_function_interpreted(tmp_path):

@@ -176,6 +176,12 @@ def test_larger_dynamic_friction_warns(tmp_path: Path) -> None:
     assert 'mu_dynamic="0.4": larger than mu_static (0.3)' in warning
 
 
+def test_friction_without_a_coefficient_warns(tmp_path: Path) -> None:
+    bare = deck(('mu_static="0.3" ', ""), ('mu_dynamic="0.2"', ""))
+    warnings = read(tmp_path, bare).warnings
+    assert any("mu_dynamic: not given: 0, so that COULOMB_ON rubs nothing" in w for w in warnings)
+
+
 def test_friction_is_off_where_no_type_is_given(tmp_path: Path) -> None:
     model = read(tmp_path, deck(('cff_type="COULOMB_ON" ', "")))
     assert model.contacts[301].cff_type == "COULOMB_OFF"

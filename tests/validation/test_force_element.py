@@ -344,6 +344,11 @@ WRONG = {
         "ELEMENT_UNKNOWNS = {'bad': ('f',)}\ndef bad(x, v, f):\n    return f",
         "cannot be called with the 6 arguments",
     ),
+    "declared": (
+        "ELEMENT_UNKNOWNS = {'bad': {'f': {'kind': 'ALGEBRAIC'}}}\n"
+        "def bad(x, v, f, g, t, p):\n    return [g[0] + f[0] - v[0]]",
+        "f is declared ALGEBRAIC, but asked at many points the residual is DIFFERENTIAL in it",
+    ),
     "count": (
         "ELEMENT_UNKNOWNS = {'bad': ('f',)}\ndef bad(x, v, f, g, t, p):\n    return [1.0, 2.0]",
         "fails wherever it is asked: returned 2 values",

@@ -92,6 +92,17 @@ def test_energy_of_an_undamped_vibration_stays_bounded(tmp_path):
     assert last == pytest.approx(first, rel=0.02)
 
 
+def test_it_says_that_friction_which_holds_creeps(tmp_path):
+    said = []
+    model = mbsim.read_model(MODELS / "stiction_incline.xml")
+    mbsim.simulate(
+        model, integrator="VERLET", end_time=0.01, print_interval=0.01, notify=said.append
+    )
+    assert any(
+        "Force_Contact[301]: STICTION creeps with integrator VERLET" in line for line in said
+    )
+
+
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
 @pytest.mark.parametrize("height", [0.0, 1e-6, 0.1, 1.0])
 def test_a_ball_from_rest_keeps_its_energy(tmp_path, exponent, height):
