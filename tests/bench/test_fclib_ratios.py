@@ -43,7 +43,7 @@ def test_times_over_those_of_siconos(tol):
         files,
         tol,
         ["AUTO"],
-        repeats=3,
+        repeats=20,
         max_seconds=20.0,
         siconos_seconds=0.0,
         say=lambda line: None,
