@@ -323,14 +323,19 @@ def reach_of(p, m, t, h, begin):
     pass the limit and come back unseen. What passes it there is cut off. The problem is left
     evaluated at the trial point.
     """
-    a, b, c = load_at(p, m, t, h, 0.25), load_at(p, m, t, h, 0.5), load_at(p, m, t, h, 0.75)
     end = call_float(p.kinks, (p.context, t + h, LOAD, m.trial, m.error))
-    if max(a, b, c) > 1.0:
-        return 0.25 if a > 1.0 else (0.5 if b > 1.0 else 0.75)
-    bent = max(abs(a - 0.75 * begin - 0.25 * end), abs(c - 0.25 * begin - 0.75 * end))
-    bent = max(bent, abs(b - 0.5 * (begin + end)))
+    bent, passed = 0.0, 1.0
+    for k in range(3, 0, -1):
+        s = 0.25 * k
+        load = load_at(p, m, t, h, s)
+        bent = max(bent, abs(load - (1.0 - s) * begin - s * end))
+        if load > 1.0:
+            passed = s
+    call_float(p.kinks, (p.context, t + h, LOAD, m.trial, m.error))
     allowed = BENT * math.sqrt(m.memory[TOL])
-    return 1.0 if bent <= allowed else max(0.1, 0.9 * math.sqrt(allowed / bent))
+    if passed < 1.0 or bent <= allowed:
+        return passed
+    return max(0.1, 0.9 * math.sqrt(allowed / bent))
 
 
 @jitable
