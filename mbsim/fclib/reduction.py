@@ -186,7 +186,7 @@ def multipliers(blocks: Blocks, r: Vector) -> Vector | None:
     return found
 
 
-def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> Vector:  # noqa: E741
+def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> Vector:  # noqa: E741  FCLIB
     """Return v (n,) that goes with r and l: M v = H r + G l + f."""
     forces = problem.f + problem.H.apply(r)
     if problem.G is not None and l is not None:
