@@ -181,6 +181,30 @@ class Views(dict[int, Any]):
         return view
 
 
+def _put_force(room: Any, result: Any) -> None:
+    """Write what a function of forces alone returned."""
+    try:
+        fx, fy, tz = result
+        if type(result) is not list or fx - fx + fy - fy + tz - tz != 0.0:
+            fx, fy, tz = three_numbers(result)
+        room[0] = fx
+        room[1] = fy
+        room[4] = tz
+    except Exception:  # not three plain numbers: say what it is, or take what converts
+        room[0], room[1], room[4] = three_numbers(result)
+    room[2] = room[3] = 0.0
+
+
+def _put_force_and_state(room: Any, result: Any, states: int, first: int) -> None:
+    """Write what (..., state) -> (force, new state) returned, the state from `first` on."""
+    found = force_and_state(result, states)
+    room[0], room[1], room[4] = found[:3]
+    # neither torque across, nor what is stored, nor whether it sticks
+    room[2] = room[3] = room[5] = room[6] = 0.0
+    for k in range(states):
+        room[first + k] = found[3 + k]
+
+
 def callback(
     function: Callable[..., Any], name: str, source: str, par_count: int, states: int = 0
 ) -> tuple[int, object]:
@@ -188,62 +212,6 @@ def callback(
 
     With `states` it keeps so many numbers of its own.
     """
-    if states:
-        return _callback_with_state(function, name, source, par_count, states)
-    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, RAISED_INTERPRETED, STOPPED_BY_USER
-
-    # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
-    inputs_at, par_at, out_at = Views(FRICTION_INPUTS), Views(par_count), Views(5)
-
-    def guarded(element: int, inputs: int, par: int, out: int) -> int:
-        time, outer = 0.0, host.state
-        try:
-            given = inputs_at[inputs].tolist()
-            host.time, host.area = given[0], given[11]
-            time = given[0]
-            if host.seen is not None:
-                host.state = (host.seen[0], time, host.seen[1])
-            result = function(
-                element,
-                time,
-                par_at[par].tolist() if par_count else [],
-                par_count,
-                given[13:16],
-                given[16:19],
-                given[2:5],
-                given[5:8],
-                given[10],
-                int(given[DFLAG]),
-                0,
-            )
-            force = out_at[out]
-            try:
-                fx, fy, tz = result
-                if type(result) is not list or fx - fx + fy - fy + tz - tz != 0.0:
-                    fx, fy, tz = three_numbers(result)
-                force[0] = fx
-                force[1] = fy
-                force[4] = tz
-            except Exception:  # not three plain numbers: say what it is, or take what converts
-                force[0], force[1], force[4] = three_numbers(result)
-            force[2] = force[3] = 0.0
-            return 0
-        except PassedOn:
-            return RAISED_INTERPRETED
-        except BaseException as error:
-            failure.store(error, f"Force_Contact[{element}]", time, name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
-        finally:
-            host.state = outer
-
-    entry = C_FUNCTION(guarded)
-    return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry
-
-
-def _callback_with_state(
-    function: Callable[..., Any], name: str, source: str, par_count: int, states: int
-) -> tuple[int, object]:
-    """Return what `callback` does, for a function of (..., state) -> (force, new state)."""
     from mbsim.laws.abi import (
         DFLAG,
         FRICTION_INPUTS,
@@ -252,8 +220,9 @@ def _callback_with_state(
         STOPPED_BY_USER,
     )
 
+    # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
     inputs_at, par_at = Views(FRICTION_INPUTS + states), Views(par_count)
-    out_at = Views(MEMORY_OUT + states)
+    out_at = Views(MEMORY_OUT + states if states else 5)
 
     def guarded(element: int, inputs: int, par: int, out: int) -> int:
         time, outer = 0.0, host.state
@@ -275,15 +244,12 @@ def _callback_with_state(
                 given[10],
                 int(given[DFLAG]),
                 0,
-                given[FRICTION_INPUTS:],
+                *((given[FRICTION_INPUTS:],) if states else ()),
             )
-            found = force_and_state(result, states)
-            room = out_at[out]
-            room[0], room[1], room[4] = found[:3]
-            # neither torque across, nor what is stored, nor whether it sticks
-            room[2] = room[3] = room[5] = room[6] = 0.0
-            for k in range(states):
-                room[MEMORY_OUT + k] = found[3 + k]
+            if states:
+                _put_force_and_state(out_at[out], result, states, MEMORY_OUT)
+            else:
+                _put_force(out_at[out], result)
             return 0
         except PassedOn:
             return RAISED_INTERPRETED
