@@ -111,12 +111,12 @@ def _ours(
 def _siconos(
     name: str, problem: Local | Global, tol: float, repeats: int, max_seconds: float
 ) -> list[Row]:
-    """Return the rows of Siconos' solvers, condensation included where there is one."""
+    """Return the rows of Siconos' solvers, our condensation included where they need it."""
     began = clock()
     blocks = reduce(problem)
     condensed = clock() - began if problem.kind != "local" or problem.equalities else 0.0
     rows = []
-    for run in peers.run(blocks, tol, max_seconds, repeats):
+    for run in peers.run(problem, blocks, tol, max_seconds, repeats):
         if run.r is None:
             nothing = (math.nan,) * 4
             figures = ("not_solved", math.inf, 0, *nothing)
@@ -125,7 +125,8 @@ def _siconos(
             # its own test stands on the same error, but of the condensed problem
             met = judged.error <= 2.0 * tol
             figures = (
-                "solved" if met else "not_solved", run.seconds + condensed, run.iterations,
+                "solved" if met else "not_solved",
+                run.seconds + (condensed if run.condensed else 0.0), run.iterations,
                 judged.error, judged.error_q, judged.merit1, judged.impulse_norm,
             )  # fmt: skip
         rows.append(Row(name, problem.kind, problem.contacts, run.solver, *figures))

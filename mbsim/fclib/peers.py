@@ -1,8 +1,9 @@
 """Debian's python3-siconos beside ours: the same problem, the same clock, our error.
 
-Siconos gets the problem as our condensation leaves it (it takes no equality constraints), so its
-time is that of its solver and of our condensation. Its Python need not be ours: it is asked
-through files.
+Its local solvers get the problem as our condensation leaves it (they take no equality constraints
+and no masses), so their time is that of the solver and of our condensation. A global problem
+without equality constraints goes to its global solvers as well, as it is. Its Python need not be
+ours: it is asked through files.
 """
 
 from __future__ import annotations
@@ -15,29 +16,35 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.problem import Global, Local, Vector
     from mbsim.fclib.reduction import Blocks
 
-#: Solvers asked by spacedim, those that are fastest on some problem.
+#: Local solvers asked by spacedim, those that are fastest on some problem.
 SOLVERS = {
     2: ("NSGS", "CPG", "LEMKE"),
     3: ("NSGS", "ADMM", "NSN_AC", "PROX", "TFP"),
 }
+#: Global ones; NSGS_WR condenses by itself.
+GLOBAL_SOLVERS = ("GLOBAL_NSGS_WR", "GLOBAL_ADMM", "GLOBAL_NSN_AC")
 _PYTHONS = ("/usr/bin/python3", "python3")
 
 
 class Run(NamedTuple):
-    """One run of a Siconos solver: its r (None if it was stopped), iterations, seconds."""
+    """One run of a Siconos solver: its r (None if it was stopped), iterations, seconds.
+
+    `condensed`: it got W and q, so condensation is not in its seconds.
+    """
 
     solver: str
     r: Vector | None
     iterations: int
     seconds: float
+    condensed: bool
 
 
 @functools.cache
@@ -55,22 +62,25 @@ def python() -> str | None:
     return None
 
 
-def run(blocks: Blocks, tol: float, seconds: float, repeats: int) -> list[Run]:
-    """Run Siconos' solvers on a problem in blocks, each at most `seconds` long."""
+def run(
+    problem: Local | Global, blocks: Blocks, tol: float, seconds: float, repeats: int
+) -> list[Run]:
+    """Run Siconos' solvers on a problem, given in blocks too, each at most `seconds` long."""
     d = 1 + len(blocks.tangent)
     found = python()
     if found is None or blocks.rolling or not blocks.contacts:
         return []
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "problem.dat"
-        _write(blocks, path)
+        _write(blocks, Path(folder) / "local.dat")
+        names = SOLVERS[d]
+        if problem.kind == "global" and not problem.equalities and d == 3:
+            _write_global(cast("Global", problem), Path(folder) / "global.npz")
+            names += GLOBAL_SOLVERS
         script = Path(__file__).with_name("siconos_runs.py")
-        command = [found, str(script), str(path), folder, repr(tol), repr(seconds), str(repeats)]
+        command = [found, str(script), folder, repr(tol), repr(seconds), str(repeats), *names]
         environment = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
         environment.pop("PYTHONPATH", None)
-        done = subprocess.run(
-            [*command, *SOLVERS[d]], capture_output=True, text=True, env=environment, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
         return [
             _outcome(json.loads(line), Path(folder))
             for line in done.stdout.splitlines()
@@ -80,10 +90,26 @@ def run(blocks: Blocks, tol: float, seconds: float, repeats: int) -> list[Run]:
 
 def _outcome(line: dict[str, Any], folder: Path) -> Run:
     """Return a run from what was printed."""
-    name = str(line["solver"])
+    name, seconds = str(line["solver"]), float(line["seconds"])
     file = folder / f"{name}.npy"
-    r = np.load(file) if file.is_file() and math.isfinite(line["seconds"]) else None
-    return Run(f"Siconos {name}", r, int(line["iterations"]), float(line["seconds"]))
+    r = np.load(file) if file.is_file() and math.isfinite(seconds) else None
+    condensed = name not in GLOBAL_SOLVERS
+    return Run(f"Siconos {name}", r, int(line["iterations"]), seconds, condensed)
+
+
+def _write_global(problem: Global, path: Path) -> None:
+    """Write a global problem's matrices by columns, and its vectors."""
+    from scipy import sparse
+
+    arrays: dict[str, Any] = {"f": problem.f, "w": problem.w, "mu": problem.mu}
+    for name in ("M", "H"):
+        stored = sparse.csc_array(getattr(problem, name).csr())
+        stored.sort_indices()
+        arrays |= {
+            f"{name}_data": stored.data, f"{name}_indices": stored.indices,
+            f"{name}_indptr": stored.indptr, f"{name}_shape": np.array(stored.shape),
+        }  # fmt: skip
+    np.savez(path, **arrays)
 
 
 def _write(blocks: Blocks, path: Path) -> None:

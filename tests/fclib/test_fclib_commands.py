@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from test_merit import some_global
 from test_solvers import some_local, wedge
 
 from mbsim.cli.main import main
@@ -140,11 +142,27 @@ def test_siconos_solves_what_we_write_for_it():
 
     for d in (2, 3):
         problem = some_local(4, d, mu=0.3)
-        runs = {run.solver: run for run in peers.run(reduce(problem), 1e-8, 5.0, 1)}
+        runs = {run.solver: run for run in peers.run(problem, reduce(problem), 1e-8, 5.0, 1)}
         assert len(runs) == len(peers.SOLVERS[d])
         r = runs["Siconos NSGS"].r
         assert judge(problem, Solution(np.zeros_like(r), r)).error < 2e-8
         assert np.allclose(r, solve(problem, 1e-10).r, atol=1e-5)
+
+
+def test_siconos_gets_global_problems_as_they_are():
+    if peers.python() is None:
+        pytest.skip("Debian's python3-siconos is not installed")
+    from mbsim.fclib.reduction import reduce
+
+    problem = some_global()
+    runs = {run.solver: run for run in peers.run(problem, reduce(problem), 1e-8, 5.0, 2)}
+    wanted = solve(problem, 1e-10)
+    for name in peers.GLOBAL_SOLVERS:
+        run = runs[f"Siconos {name}"]
+        assert not run.condensed
+        assert math.isfinite(run.seconds)
+        assert np.allclose(run.r, wanted.r, atol=1e-5), name
+    assert runs["Siconos NSGS"].condensed
 
 
 def test_a_matrix_of_no_known_storage_is_refused():
