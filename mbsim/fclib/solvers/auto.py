@@ -15,7 +15,7 @@ from typing import Any
 from mbsim.core import jit
 from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers import newton, splitting, sweeps
-from mbsim.fclib.solvers.task import Task
+from mbsim.fclib.solvers.task import POLISHED, Task
 
 #: Sweeps before anything is predicted: with few contacts, else.
 FIRST_SMALL, FIRST = 100, 20
@@ -27,6 +27,8 @@ STACKS, TRIAL = 50, 30
 SETTLED = 3e-4
 #: Seconds that beginning another method takes, whatever the size.
 BEGIN = 4e-4
+#: Seconds that beginning a dash of Newton's method takes, and the share of all work it may take.
+BEGIN_DASH, SHARE = 5e-5, 0.5
 #: Iterations of ADMM that show whether all bodies rest.
 RESTED = 5
 #: Newton iterations that a proximal finish takes, roughly.
@@ -59,7 +61,16 @@ def run(task: Task) -> None:
     if task.blocks.rolling:
         _rolling(task)
         return
+    _solve(task)
+    if not task.late:
+        _dash(task)
+
+
+def _solve(task: Task) -> None:
+    """Solve with sweeps, ADMM and Newton's method."""
     _sweep(task, BEGIN)
+    if not task.over:
+        _dash(task)
     if task.over:
         return
     newton_work, splitting_work, factor_work = _costs(task)
@@ -72,6 +83,23 @@ def run(task: Task) -> None:
     _sweep(task, finish, near=True)
     if not task.over:
         _finish(task)
+
+
+def _dash(task: Task) -> None:
+    """Try Newton's method from the best point, where that takes little against the work so far.
+
+    Sweeps and ADMM gain ever less near the solution, Newton's method ever more: it makes what is
+    only just good enough good. What it takes in vain is not counted as work.
+    """
+    polished = task.error <= task.tol and task.error_q <= POLISHED * task.tol_q
+    if polished or task.work < task.dash_at or task.blocks.contacts <= FEW:
+        return
+    if not task.dash_at:
+        task.dash_at = (BEGIN_DASH + _costs(task)[0]) / SHARE
+        if task.work < task.dash_at:
+            return
+    newton.Proximal(task, newton.DASH_ALPHA).dash()
+    task.dash_at = 2.0 * task.work
 
 
 def _costs(task: Task) -> tuple[float, float, float]:
@@ -136,6 +164,7 @@ def _sweep(task: Task, work: float, *, near: bool = False) -> None:
         sweeps.nsgs(task, chunk)
         if task.r is best:
             return  # the next ones would be the same
+        _dash(task)
 
 
 def _try_splitting(task: Task, cost: float, finish: float) -> None:
@@ -152,7 +181,8 @@ def _try_splitting(task: Task, cost: float, finish: float) -> None:
     limit = TRIAL
     while run.advance(limit) and not task.over:
         left = _remaining(task.history[-1][1], task)
-        if left * cost > finish or task.work - spent > 2.0 * finish:
+        _dash(task)
+        if task.over or left * cost > finish or task.work - spent > 2.0 * finish:
             return
         limit = 30
 

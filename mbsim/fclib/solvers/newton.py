@@ -36,6 +36,8 @@ RHO = 10.0
 MOST, EARLY, HOPELESS = 15, 8, 0.3
 #: Newton iterations of the step that makes a solution found a better one.
 FINAL = 4
+#: Iterations and alpha of a dash, which ends where one leaves more than a share of the error.
+MOST_DASH, DASH_ALPHA, GAIN = 6, 1e-9, 0.3
 #: Trial steps of the line search, and how many earlier norms it compares with.
 HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
@@ -43,10 +45,10 @@ OVER = 1.6
 SMALLEST_ALPHA = 1e-12
 
 # places in `state`, what a later call needs to go on
-ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH = range(
-    12
-)
-STATE = 12
+(
+    ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH, DASH,
+) = range(13)  # fmt: skip
+STATE = 13
 
 
 @jitable
@@ -272,9 +274,13 @@ def proximal_newton(
             shift *= POLISHED
             aim *= 0.5 * POLISHED
             most = FINAL
+        if state[DASH] > 0.0:
+            aim = 0.0
+            most = int(state[DASH])
         recent[:] = size_f
         newtons = 0
         good = False
+        reached = state[BEST]
         while newtons < most:
             # Newton's direction
             same = newtons + spent > 0
@@ -365,9 +371,14 @@ def proximal_newton(
             for a in range(nc):
                 missing += natural_map(tangent, (), mu[a], 0.0, u, x, d * a, 1.0, work)
             scale = max(bound, norm(x), norm(u))
-            if math.sqrt(missing) <= aim * (scale if scale > 0.0 else 1.0):
+            near = math.sqrt(missing) / (scale if scale > 0.0 else 1.0)
+            if near <= aim:
                 good = True
                 break
+            if state[DASH] > 0.0:
+                if near > GAIN * reached:
+                    break
+                reached = near
             if newtons >= EARLY and size_f > HOPELESS * begin:
                 break
         spent += newtons
@@ -395,7 +406,7 @@ def proximal_newton(
                 r[k] = x[k]
         else:
             state[STALLED] += 1.0
-        if finishing:
+        if finishing or state[DASH] > 0.0:
             break
         if done:
             if error_q <= POLISHED * tol_q:
@@ -482,24 +493,42 @@ class Proximal:
     def advance(self, limit: int) -> bool:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
-        b = task.blocks
-        r = self.r.copy()
-        history = np.empty((ROWS, 3))
         work, newtons = state[WORK], state[NEWTONS]
-        before = task.iterations - newtons
-        rows = jit.function(proximal_newton)(
-            b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, r, self.centre, state,
-            task.tol, task.tol_q, limit, history, 0,
-        )  # fmt: skip
-        history[:rows, 0] += before
+        rows = self._step(limit)
+        rows[:, 0] += task.iterations - newtons
         self.total += self.centre
         self.samples += 1
         task.work += float(state[WORK] - work)
         task.iterations += int(state[NEWTONS] - newtons)
-        self.r = r
-        task.offer(r, state[BEST], state[BEST_Q])
-        task.note("NSN" if state[ALPHA] == 0.0 else "PROX", history[:rows])
+        task.offer(self.r, state[BEST], state[BEST_Q])
+        task.note("NSN" if state[ALPHA] == 0.0 else "PROX", rows)
         return bool(state[NEWTONS] > newtons)
+
+    def dash(self) -> None:
+        """Take Newton steps while each of them gains; offer and count them if they led anywhere.
+
+        With every contact in its final state two or three end at rounding, else one shows it.
+        """
+        task, state = self.task, self.state
+        state[DASH] = MOST_DASH
+        rows = self._step(1)
+        if state[BEST] <= GAIN * task.error and task.offer(self.r, state[BEST], state[BEST_Q]):
+            task.work += float(state[WORK])
+            task.iterations += int(state[NEWTONS])
+            rows[:, 0] = task.iterations
+            task.note("NSN", rows)
+
+    def _step(self, limit: int) -> Any:
+        """Spend about `limit` Newton iterations and return rows for the history."""
+        b, task = self.task.blocks, self.task
+        r = self.r.copy()
+        history = np.empty((ROWS, 3))
+        rows = jit.function(proximal_newton)(
+            b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, r, self.centre, self.state,
+            task.tol, task.tol_q, limit, history, 0,
+        )  # fmt: skip
+        self.r = r
+        return history[:rows]
 
 
 def run(task: Task) -> None:

@@ -26,8 +26,10 @@ from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
 
 # places in `state`, what a later call needs to go on
-PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK = range(9)
-STATE = 9
+(
+    PENALTY, ITERATIONS, NEXT, INTERVAL, BEST, BEST_Q, MOMENTUM, RESIDUAL, WORK, FACTORED,
+) = range(10)  # fmt: skip
+STATE = 10
 #: First penalty, the iteration of its first change, and the range in which it moves.
 PENALTY_0, FIRST_CHANGE, LEAST, MOST = 0.1, 10, 0.03, 30.0
 #: A penalty with which bodies that all stick need a handful of iterations.
@@ -62,16 +64,28 @@ def _project(tangent, rolling, mu, mu_r, x, y, z):
 
 
 @jitable
+def room_for_factors(d, ptr, col, val):
+    """Return the analysis of W + rho D, and room for the matrix and its factors."""
+    nc = len(ptr) - 1
+    symbolic = analyse(nc, ptr, col, d)
+    wide = symbolic[6][0]
+    return (
+        symbolic, transposed_places(nc, ptr, col), val.copy(), np.empty(symbolic[5][-1]),
+        np.empty(d * nc, np.int32), np.empty(wide**2), np.empty(symbolic[6][1]), np.empty(wide),
+    )  # fmt: skip
+
+
+@jitable
 def admm(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, lift, state, accelerate,
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, lift, room, state, accelerate,
     tol, tol_q, limit, every, history, rows,
 ):  # fmt: skip
     """Iterate until the error is small enough or `limit` iterations are done.
 
     With the goal reached, a quarter of the iterations more may bring a tenth of it (POLISHED).
-    `r` holds the best iterate, in and out. z, y, lift (s, one a contact) and `state` are what a
-    later call goes on from; a first call has state[PENALTY], state[NEXT] and state[BEST] set, z at
-    the start. Returns the number of rows in `history` (iterations so far, error, |F|/|q|).
+    `r` holds the best iterate, in and out. z, y, lift (s, one a contact), `room` (with the factors
+    of state[FACTORED], a penalty) and `state` are what a later call goes on from; a first call has
+    state[PENALTY], state[NEXT] and state[BEST] set, z at the start. Returns the number of rows in `history` (iterations so far, error, |F|/|q|).
     """
     nt, nr = len(tangent), len(rolling)
     d = 1 + nt + nr
@@ -89,14 +103,7 @@ def admm(
     for a in range(nc):
         # a contact whose block is zero needs some weight too
         weight[a] = weight[a] if weight[a] > 1e-8 * mean else mean
-    symbolic = analyse(nc, ptr, col, d)
-    back = transposed_places(nc, ptr, col)
-    factors = np.empty(symbolic[5][-1])
-    front = np.empty(symbolic[6][0] ** 2)
-    stack = np.empty(symbolic[6][1])
-    part = np.empty(symbolic[6][0])
-    exchange = np.empty(m, np.int32)
-    shifted = val.copy()
+    symbolic, back, shifted, factors, exchange, front, stack, part = room
     x = np.empty(m)
     u = np.empty(m)
     old_z = np.empty(m)
@@ -104,13 +111,11 @@ def admm(
     last_z = z.copy()
     last_y = y.copy()
     work = np.empty(m)
-    penalty = -1.0
     flops = elimination_flops(symbolic, d)
-    state[WORK] += 5e-8 * len(col)
     last = np.inf
     for _ in range(limit):
-        if penalty != state[PENALTY]:
-            penalty = state[PENALTY]
+        penalty = state[PENALTY]
+        if penalty != state[FACTORED]:
             # seconds on a usual processor: a measure of work that does not depend on the clock
             state[WORK] += 2.5e-10 * flops + 3e-8 * len(col)
             for a in range(nc):
@@ -119,6 +124,7 @@ def admm(
                     shifted[k, s, s] = val[k, s, s] + penalty * weight[a]
             if not factorise(d, ptr, col, back, shifted, symbolic, factors, exchange, front, stack):
                 return rows
+            state[FACTORED] = penalty
         for a in range(nc):
             rho = penalty * weight[a]
             for s in range(d):
@@ -227,6 +233,9 @@ class Splitting:
         self.state[NEXT] = self.state[INTERVAL] = FIRST_CHANGE
         self.state[BEST] = self.state[BEST_Q] = np.inf
         self.state[MOMENTUM] = 1.0
+        b = task.blocks
+        d = 1 + len(b.tangent) + len(b.rolling)
+        self.room = jit.function(room_for_factors)(d, b.ptr, b.col, b.val)
 
     def penalise(self, penalty: float) -> None:
         """Go on with another penalty."""
@@ -250,7 +259,7 @@ class Splitting:
         work, before = state[WORK], state[ITERATIONS]
         rows = jit.function(admm)(
             b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
-            self.z, self.y, self.lift, state, self.accelerate,
+            self.z, self.y, self.lift, self.room, state, self.accelerate,
             task.tol, task.tol_q, limit, every, history, 0,
         )  # fmt: skip
         history[:rows, 0] += task.iterations - before

@@ -60,6 +60,8 @@ class Task:
     #: Estimated seconds, and iterations: what the methods have done so far.
     work: float = 0.0
     grace: float = np.inf
+    #: Where `work` allows the next dash of Newton's method.
+    dash_at: float = 0.0
     iterations: int = 0
     #: (method, rows of iteration, error, |F|/|q|) in the order in which the methods ran.
     history: list[tuple[str, Any]] = field(default_factory=list)
