@@ -102,3 +102,25 @@ def relative_errors(tangent, rolling, mu, mu_r, q, u, r, work):
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
     return error, (missing / bound if bound > 0.0 else missing)
+
+
+@jitable
+def count_changes(tangent, mu, r, states):
+    """Write whether contacts are open (0), stick (1) or slip (2); return how many were not before.
+
+    Solvers that project on the cone leave impulses of slipping contacts on its edge.
+    """
+    d = 1 + len(tangent)
+    changed = 0
+    for a in range(len(mu)):
+        first = d * a
+        square = 0.0
+        for k in range(len(tangent)):
+            square += r[first + 1 + k] ** 2
+        state = 0
+        if r[first] > 0.0:
+            state = 1 if math.sqrt(square) < (1.0 - 1e-6) * mu[a] * r[first] else 2
+        if states[a] != state:
+            changed += 1
+        states[a] = state
+    return changed

@@ -124,7 +124,10 @@ def solve(
     blocks = reduce(problem)
     condensed = clock()
     task = Task(blocks, r, tol, _second(blocks.q, tol), strict, began + max_seconds)
-    task.offer(r, *task.look(r))
+    error, error_q = task.look(r)
+    if guess is not None or error == 0.0:
+        # that r = 0 happens to be near enough makes it no solution
+        task.offer(r, error, error_q)
     result = _rounds(problem, solver, method, task)
     result.solve_s = clock() - began
     result.condense_s = condensed - began if not plain else 0.0

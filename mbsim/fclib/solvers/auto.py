@@ -10,12 +10,18 @@ from __future__ import annotations
 
 import math
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from mbsim.core import jit
+from mbsim.fclib.cone import count_changes
 from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers import newton, splitting, sweeps
-from mbsim.fclib.solvers.task import POLISHED, Task
+from mbsim.fclib.solvers.task import Task
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
 
 #: Sweeps before anything is predicted: with few contacts, else.
 FIRST_SMALL, FIRST = 100, 20
@@ -26,9 +32,12 @@ STACKS, TRIAL = 50, 30
 #: Error after the first sweeps below which bodies do not stack: ADMM gains nothing there.
 SETTLED = 3e-4
 #: Seconds that beginning another method takes, whatever the size.
-BEGIN = 4e-4
-#: Seconds that beginning a dash of Newton's method takes, and the share of all work it may take.
-BEGIN_DASH, SHARE = 5e-5, 0.5
+BEGIN = 2e-4
+#: Seconds that beginning a dash of Newton's method takes, the share of all work it may take, and
+#: how many of its steps in a row need not gain at the end.
+BEGIN_DASH, SHARE, PATIENCE = 5e-5, 0.4, 2
+#: Share of the contacts, beside one, that may have changed their state where all have settled.
+CHANGES = 0.01
 #: Iterations of ADMM that show whether all bodies rest.
 RESTED = 5
 #: Newton iterations that a proximal finish takes, roughly.
@@ -52,74 +61,103 @@ def first_sweeps(contacts: int) -> tuple[int, int]:
     return (FIRST_SMALL, 1) if contacts <= FEW else (FIRST, 5)
 
 
+class Costs(NamedTuple):
+    """Estimated seconds of a Newton iteration, an ADMM iteration and its factors."""
+
+    newton: float
+    splitting: float
+    factor: float
+
+
+class Dashes:
+    """Newton's method tried now and then from the best point, where that costs little.
+
+    Sweeps and ADMM gain ever less near the solution, Newton's method ever more, once hardly a
+    contact changes between open, stick and slip. What a dash costs in vain is not counted as work.
+    `cost`: of one, in seconds.
+    """
+
+    def __init__(self, task: Task, cost: float) -> None:
+        self.task = task
+        self.cost = cost
+        self.due = 0.0
+        self.states = np.zeros(task.blocks.contacts, np.int8)
+        self.looked_at: Vector | None = None
+        self.begun_at: Vector | None = None
+        self.settled = False
+
+    def run(self, instead: float = 0.0) -> None:
+        """Dash if it is time; `instead`: seconds of what would come next, which count as well."""
+        task, b = self.task, self.task.blocks
+        if task.over or task.r is self.begun_at:
+            return
+        if task.r is not self.looked_at:
+            changed = jit.function(count_changes)(b.tangent, b.mu, task.r, self.states)
+            self.settled = changed <= CHANGES * b.contacts + 1.0
+            self.looked_at = task.r
+        spent = task.work if self.settled and task.work >= self.due else 0.0
+        if self.cost <= SHARE * max(spent, instead):
+            self.begun_at = task.r
+            newton.Proximal(task, newton.DASH_ALPHA).dash()
+            self.due = 2.0 * task.work
+
+    def polish(self) -> None:
+        """Make a solution better, where that costs little."""
+        task = self.task
+        if task.distance > newton.WELL and self.cost <= SHARE * task.work and not task.late:
+            newton.Proximal(task, newton.DASH_ALPHA).dash(PATIENCE)
+
+
 def run(task: Task) -> None:
     """Solve with whatever works (AUTO)."""
     if not task.history:
         sweeps.nsgs(task, *first_sweeps(task.blocks.contacts))
     if task.over:
         return
+    costs = _costs(task)
+    dashes = Dashes(task, BEGIN_DASH + costs.newton)
     if task.blocks.rolling:
-        _rolling(task)
-        return
-    _solve(task)
-    if not task.late:
-        _dash(task)
+        _rolling(task, costs, dashes)
+    else:
+        _solve(task, costs, dashes)
+    dashes.polish()
 
 
-def _solve(task: Task) -> None:
+def _solve(task: Task, costs: Costs, dashes: Dashes) -> None:
     """Solve with sweeps, ADMM and Newton's method."""
-    _sweep(task, BEGIN)
-    if not task.over:
-        _dash(task)
-    if task.over:
-        return
-    newton_work, splitting_work, factor_work = _costs(task)
-    finish = FINISH * newton_work
-    if task.blocks.contacts >= STACKS and task.error > SETTLED:
-        trial = BEGIN + factor_work + 2.0 * RESTED * splitting_work
-        _sweep(task, trial)
+    _sweep(task, BEGIN, dashes)
+    finish = FINISH * costs.newton
+    if not task.over and task.blocks.contacts >= STACKS and task.distance > SETTLED / task.tol:
+        trial = BEGIN + costs.factor + 2.0 * RESTED * costs.splitting
+        _sweep(task, trial, dashes)
+        dashes.run(trial)
         if not task.over:
-            _try_splitting(task, splitting_work, finish)
-    _sweep(task, finish, near=True)
+            _try_splitting(task, costs, finish, dashes)
+    dashes.run(finish)
+    _sweep(task, finish, dashes, near=True)
     if not task.over:
         _finish(task)
 
 
-def _dash(task: Task) -> None:
-    """Try Newton's method from the best point, where that takes little against the work so far.
-
-    Sweeps and ADMM gain ever less near the solution, Newton's method ever more: it makes what is
-    only just good enough good. What it takes in vain is not counted as work.
-    """
-    polished = task.error <= task.tol and task.error_q <= POLISHED * task.tol_q
-    if polished or task.work < task.dash_at or task.blocks.contacts <= FEW:
-        return
-    if not task.dash_at:
-        task.dash_at = (BEGIN_DASH + _costs(task)[0]) / SHARE
-        if task.work < task.dash_at:
-            return
-    newton.Proximal(task, newton.DASH_ALPHA).dash()
-    task.dash_at = 2.0 * task.work
-
-
-def _costs(task: Task) -> tuple[float, float, float]:
-    """Return the estimated seconds of a Newton iteration, an ADMM iteration and its factors."""
+def _costs(task: Task) -> Costs:
+    """Estimate what the methods cost."""
     b = task.blocks
     d = 1 + len(b.tangent) + len(b.rolling)
     symbolic = jit.function(analyse)(b.contacts, b.ptr, b.col, d)
     flops = jit.function(elimination_flops)(symbolic, d)
     entries = float(symbolic[5][-1])
-    factor = 2.5e-10 * flops + 3e-8 * len(b.col)
-    once = 1.2e-9 * entries + 2.5e-7 * b.contacts
-    return factor + once, once + 5e-9 * len(b.col), factor
+    factor = 1.2e-10 * flops + 3e-8 * len(b.col)
+    once = 1e-9 * entries + 1.2e-7 * b.contacts
+    step = math.inf if b.rolling else factor + once
+    return Costs(step, once + 5e-9 * len(b.col), factor)
 
 
-def _rolling(task: Task) -> None:
+def _rolling(task: Task, costs: Costs, dashes: Dashes) -> None:
     """Go on with sweeps; rolling friction has no Newton's method here, but ADMM."""
-    _, splitting_work, factor_work = _costs(task)
-    _sweep(task, factor_work + TRIAL * splitting_work)
+    trial = TRIAL * costs.splitting
+    _sweep(task, costs.factor + trial, dashes)
     if not task.over:
-        _try_splitting(task, splitting_work, 20.0 * TRIAL * splitting_work)
+        _try_splitting(task, costs, 20.0 * trial, dashes)
     if not task.over:
         sweeps.run(task)
 
@@ -143,13 +181,14 @@ def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
     return float(math.log(wanted) / rate)
 
 
-def _sweep(task: Task, work: float, *, near: bool = False) -> None:
+def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> None:
     """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
 
     `near`: sweep as well to get near enough for the proximal method.
     """
     cost = sweeps.sweep_work(task.blocks)
     spent = task.work
+    dashes.run()
     while not task.over and task.work - spent < 2.0 * work:
         rows = task.history[-1][1]
         left = _remaining(rows, task)
@@ -164,11 +203,14 @@ def _sweep(task: Task, work: float, *, near: bool = False) -> None:
         sweeps.nsgs(task, chunk)
         if task.r is best:
             return  # the next ones would be the same
-        _dash(task)
+        dashes.run()
 
 
-def _try_splitting(task: Task, cost: float, finish: float) -> None:
-    """Give ADMM a trial, and more while it is predicted to end before another method would."""
+def _try_splitting(task: Task, costs: Costs, finish: float, dashes: Dashes) -> None:
+    """Give ADMM a trial, and more while it is predicted to end before another method would.
+
+    `finish`: what another method would take.
+    """
     run = splitting.Splitting(task, warm=False)
     run.penalise(splitting.RESTING)
     spent = task.work
@@ -181,8 +223,8 @@ def _try_splitting(task: Task, cost: float, finish: float) -> None:
     limit = TRIAL
     while run.advance(limit) and not task.over:
         left = _remaining(task.history[-1][1], task)
-        _dash(task)
-        if task.over or left * cost > finish or task.work - spent > 2.0 * finish:
+        dashes.run()
+        if task.over or left * costs.splitting > finish or task.work - spent > 2.0 * finish:
             return
         limit = 30
 

@@ -36,8 +36,10 @@ RHO = 10.0
 MOST, EARLY, HOPELESS = 15, 8, 0.3
 #: Newton iterations of the step that makes a solution found a better one.
 FINAL = 4
+#: A dash ends at this share of the goal.
+WELL = 0.01
 #: Iterations and alpha of a dash, which ends where one leaves more than a share of the error.
-MOST_DASH, DASH_ALPHA, GAIN = 6, 1e-9, 0.3
+MOST_DASH, DASH_ALPHA, GAIN = 6, 1e-11, 0.3
 #: Trial steps of the line search, and how many earlier norms it compares with.
 HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
@@ -47,8 +49,9 @@ SMALLEST_ALPHA = 1e-12
 # places in `state`, what a later call needs to go on
 (
     ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH, DASH,
-) = range(13)  # fmt: skip
-STATE = 13
+    PATIENCE,
+) = range(14)  # fmt: skip
+STATE = 14
 
 
 @jitable
@@ -275,12 +278,12 @@ def proximal_newton(
             aim *= 0.5 * POLISHED
             most = FINAL
         if state[DASH] > 0.0:
-            aim = 0.0
+            aim = WELL * final
             most = int(state[DASH])
         recent[:] = size_f
         newtons = 0
         good = False
-        reached = state[BEST]
+        reached, misses = state[BEST], 0.0
         while newtons < most:
             # Newton's direction
             same = newtons + spent > 0
@@ -319,7 +322,7 @@ def proximal_newton(
                     solve(d, symbolic, factors, exchange, rhs, part)
             newtons += 1
             # seconds on a usual processor: a measure of work that does not depend on the clock
-            state[WORK] += 2.5e-10 * flops + 1e-9 * symbolic[5][-1] + 3e-8 * len(col) + 1e-7 * nc
+            state[WORK] += 1.2e-10 * flops + 1e-9 * symbolic[5][-1] + 3e-8 * len(col) + 1e-7 * nc
             if not sound:
                 break
             for k in range(m):
@@ -376,9 +379,10 @@ def proximal_newton(
                 good = True
                 break
             if state[DASH] > 0.0:
-                if near > GAIN * reached:
+                misses = misses + 1.0 if near > GAIN * reached else 0.0
+                if misses > state[PATIENCE]:
                     break
-                reached = near
+                reached = min(near, reached)
             if newtons >= EARLY and size_f > HOPELESS * begin:
                 break
         spent += newtons
@@ -504,13 +508,14 @@ class Proximal:
         task.note("NSN" if state[ALPHA] == 0.0 else "PROX", rows)
         return bool(state[NEWTONS] > newtons)
 
-    def dash(self) -> None:
+    def dash(self, patience: int = 0) -> None:
         """Take Newton steps while each of them gains; offer and count them if they led anywhere.
 
         With every contact in its final state two or three end at rounding, else one shows it.
+        `patience`: steps on end that need not gain.
         """
         task, state = self.task, self.state
-        state[DASH] = MOST_DASH
+        state[DASH], state[PATIENCE] = MOST_DASH, patience
         rows = self._step(1)
         if state[BEST] <= GAIN * task.error and task.offer(self.r, state[BEST], state[BEST_Q]):
             task.work += float(state[WORK])

@@ -82,10 +82,11 @@ def admm(
 ):  # fmt: skip
     """Iterate until the error is small enough or `limit` iterations are done.
 
-    With the goal reached, a quarter of the iterations more may bring a tenth of it (POLISHED).
+    With the goal reached, a tenth of the iterations more may bring a tenth of it (POLISHED).
     `r` holds the best iterate, in and out. z, y, lift (s, one a contact), `room` (with the factors
     of state[FACTORED], a penalty) and `state` are what a later call goes on from; a first call has
-    state[PENALTY], state[NEXT] and state[BEST] set, z at the start. Returns the number of rows in `history` (iterations so far, error, |F|/|q|).
+    state[PENALTY], state[NEXT] and state[BEST] set, z at the start. Returns the number of rows in
+    `history` (iterations so far, error, |F|/|q|).
     """
     nt, nr = len(tangent), len(rolling)
     d = 1 + nt + nr
@@ -117,7 +118,7 @@ def admm(
         penalty = state[PENALTY]
         if penalty != state[FACTORED]:
             # seconds on a usual processor: a measure of work that does not depend on the clock
-            state[WORK] += 2.5e-10 * flops + 3e-8 * len(col)
+            state[WORK] += 1.2e-10 * flops + 3e-8 * len(col)
             for a in range(nc):
                 k = diagonal[a]
                 for s in range(d):
@@ -176,7 +177,7 @@ def admm(
                 for k in range(m):
                     r[k] = z[k]
             if error <= tol and error_q <= tol_q and last == np.inf:
-                last = 1.25 * state[ITERATIONS]
+                last = 1.1 * state[ITERATIONS]
             if not math.isfinite(error):
                 return rows
             if state[BEST] <= tol and state[BEST_Q] <= POLISHED * tol_q:

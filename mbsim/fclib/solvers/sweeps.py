@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Sweeps that |F|/|q| gets at least once the error is small.
 GRACE = 20
+#: POLISHED with few contacts, where a sweep costs next to nothing.
+POLISHED_FEW = 1e-3
 #: With few contacts, sweeps between leaps ahead.
 LEAP = 8
 
@@ -121,7 +123,8 @@ def gauss_seidel(
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
     With the first reached, the second gets as many sweeps again, and `grace` more, at most; with
-    both reached, a third of the sweeps more may bring a tenth of them (POLISHED).
+    both reached, as many sweeps again may bring a tenth of them (POLISHED), with few contacts a
+    thousandth.
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
@@ -158,10 +161,10 @@ def gauss_seidel(
                 history[rows, 2] = error_q
                 rows += 1
             if error <= tol:
-                if error_q <= POLISHED * tol_q:
+                if error_q <= (POLISHED_FEW if every == 1 else POLISHED) * tol_q:
                     break
                 if error_q <= tol_q and len(kept) == 0:
-                    most = min(sweeps, done + 1 + done // (2 if every == 1 else 3))
+                    most = 2 * done
                     kept = r.copy()
                     kept_error, kept_q = error, error_q
                 elif most == sweeps:
@@ -213,8 +216,8 @@ def sweep_work(b: Blocks) -> float:
     if b.rolling:
         return 1e-5 * b.contacts + 2e-8 * len(b.col)
     if len(b.tangent) == 1:
-        return 2e-8 * b.contacts + 2.5e-9 * len(b.col)
-    return 9e-8 * b.contacts + 7e-9 * len(b.col)
+        return 1e-8 * b.contacts + 1.5e-9 * len(b.col)
+    return 3e-8 * b.contacts + 6e-9 * len(b.col)
 
 
 def run(task: Task) -> None:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
     from mbsim.fclib.reduction import Blocks
 
+#: Share of |F|/|q| that is a gain which deserves more work.
+GAINED = 0.7
 #: Growth of |r| that a smaller |F|/|q| is worth.
 GROWTH = 2.0
 #: A method that has reached its goal goes on to this share of it while that costs little: its last
@@ -43,8 +45,8 @@ class Task:
     tol, tol_q
         Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
     strict
-        Whether the second must be reached; else it gets more work, at most twenty times as much and
-        not much more than 50 ms or half as much.
+        Whether the second must be reached; else it gets more work while it gains, at most twenty
+        times as much, or 50 ms and a third, at a time.
     deadline
         Value of `clock` at which to give up.
     """
@@ -59,9 +61,10 @@ class Task:
     error_q: float = np.inf
     #: Estimated seconds, and iterations: what the methods have done so far.
     work: float = 0.0
+    #: Work up to which |F|/|q| may still take, when the first goal was reached, and |F|/|q| then.
     grace: float = np.inf
-    #: Where `work` allows the next dash of Newton's method.
-    dash_at: float = 0.0
+    reached: float = np.inf
+    graced_at: float = np.inf
     iterations: int = 0
     #: (method, rows of iteration, error, |F|/|q|) in the order in which the methods ran.
     history: list[tuple[str, Any]] = field(default_factory=list)
@@ -74,6 +77,11 @@ class Task:
         if self.error > self.tol:
             return False
         return self.error_q <= self.tol_q or (not self.strict and self.work >= self.grace)
+
+    @property
+    def distance(self) -> float:
+        """How many times as large as wanted the errors are, the larger of them."""
+        return max(self.error / self.tol, self.error_q / self.tol_q)
 
     @property
     def late(self) -> bool:
@@ -107,8 +115,13 @@ class Task:
             better = error_q < self.error_q and bool(small)
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
-        if error <= self.tol and self.grace == np.inf:
-            self.grace = self.work + min(20.0 * self.work + 2e-5, 0.05 + 0.5 * self.work)
+        if self.error <= self.tol:
+            if self.grace == np.inf:
+                self.reached = self.work
+            if self.error_q < GAINED * self.graced_at:
+                self.graced_at = self.error_q
+                more = min(20.0 * self.reached + 2e-5, 0.05 + 0.3 * self.reached)
+                self.grace = self.work + more
         return better
 
     def note(self, name: str, rows: Any) -> None:
