@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from mbsim.errors import MbsimError
     from mbsim.fclib.merit import Figures
     from mbsim.fclib.problem import Contents, Global, Local, Matrix
     from mbsim.fclib.solve import Result
@@ -57,17 +58,17 @@ def command() -> None:
 @_JSON
 def info(files: tuple[Path, ...], as_json: bool) -> None:
     """Show what is in FILE: kind, sizes, storage, friction, solution and guesses."""
-    from mbsim.fclib import hdf5
-
-    found = [_about(file, hdf5.read(file)) for file in _expanded(files)]
+    faults: list[MbsimError] = []
+    found = [_about(file, contents) for file, contents in _contents(files, faults)]
     if as_json:
         _print_list(found)
-        return
-    for about in found:
-        click.echo(f"{about.pop('file')}")
-        for name, value in about.items():
-            if value not in (None, ""):
-                click.echo(f"  {name.replace('_', ' '):14s} {_text(value)}")
+    else:
+        for about in found:
+            click.echo(f"{about.pop('file')}")
+            for name, value in about.items():
+                if value not in (None, ""):
+                    click.echo(f"  {name.replace('_', ' '):14s} {_text(value)}")
+    _end(faults)
 
 
 @command.command("merit")
@@ -78,13 +79,12 @@ def merit(files: tuple[Path, ...], as_json: bool) -> None:
 
     Files written by Siconos hold r = 0 as their solution.
     """
-    from mbsim.fclib import hdf5
     from mbsim.fclib.merit import judge
     from mbsim.fclib.reduction import reduce
 
-    found = []
-    for file in _expanded(files):
-        contents = hdf5.read(file)
+    found: list[dict[str, Any]] = []
+    faults: list[MbsimError] = []
+    for file, contents in _contents(files, faults):
         blocks = reduce(contents.problem)
         stored = [("solution", contents.solution)] if contents.solution is not None else []
         stored += [(f"guesses/{k}", guess) for k, guess in enumerate(contents.guesses, 1)]
@@ -96,11 +96,12 @@ def merit(files: tuple[Path, ...], as_json: bool) -> None:
             found.append({"file": str(file), "place": place, **_judged(figures)})
     if as_json:
         _print_list(found)
-        return
-    for entry in found:
-        click.echo(f"{entry.pop('file')} {entry.pop('place')}")
-        for name, value in entry.items():
-            click.echo(f"  {name.replace('_', ' '):26s} {_text(value)}")
+    else:
+        for entry in found:
+            click.echo(f"{entry.pop('file')} {entry.pop('place')}")
+            for name, value in entry.items():
+                click.echo(f"  {name.replace('_', ' '):26s} {_text(value)}")
+    _end(faults)
 
 
 @command.command("solve")
@@ -142,13 +143,15 @@ def solve(
         raise ModelError("-o FILE goes with one problem only")
     named(solver)
     _tell_compiling()
-    found, failed = [], []
-    for file in chosen:
-        contents = hdf5.read(file)
+    found: list[dict[str, Any]] = []
+    faults: list[MbsimError] = []
+    for file, contents in _contents(chosen, faults):
         start = None
         if guess is not None:
             if guess > len(contents.guesses):
-                raise ModelError(f"{file}: guess {guess}: there are {len(contents.guesses)}")
+                there = len(contents.guesses)
+                faults.append(ModelError(f"{file}: guess {guess}: there are {there}"))
+                continue
             start = contents.guesses[guess - 1]
         # the first call loads the compiled code, which is not what is measured
         solve_problem(contents.problem, tol, solver, guess=start, max_seconds=0.01)
@@ -157,15 +160,14 @@ def solve(
         )
         found.append(_solved(file, contents.problem, result))
         if result.reason:
-            failed.append(f"{file}: not solved to {tol:g}: {result.reason}")
+            faults.append(SolverError(f"{file}: not solved to {tol:g}: {result.reason}"))
         if output is not None:
             hdf5.write(output, contents.problem, result.solution, contents.guesses)
         if not as_json:
             _show_solved(found[-1], result.reason)
     if as_json:
         _print_list(found)
-    if failed:
-        raise SolverError("; ".join(failed))
+    _end(faults)
 
 
 @command.command("compare")
@@ -213,6 +215,7 @@ def compare(
 
     Writes DIR/compare.csv and, with matplotlib, DIR/profile.png.
     """
+    from mbsim.errors import ModelError
     from mbsim.fclib import compare as comparing
     from mbsim.fclib import peers
     from mbsim.fclib.solvers.catalog import solver as named
@@ -235,6 +238,8 @@ def compare(
         siconos_seconds=(siconos_time or max_time) if siconos else 0.0,
         say=_say,
     )
+    if not rows:
+        raise ModelError("none of the files could be read")
     comparing.write_csv(rows, output / "compare.csv")
     if comparing.can_draw():
         comparing.draw(rows, tol, output / "profile.png")
@@ -256,6 +261,27 @@ def _expanded(files: Sequence[Path]) -> list[Path]:
     if not found:
         raise ModelError(f"{files[0]}: no .hdf5 file in this folder")
     return found
+
+
+def _contents(files: Sequence[Path], faults: list[MbsimError]) -> Iterator[tuple[Path, Contents]]:
+    """Yield what is in each file; one that cannot be read does not keep the others back."""
+    from mbsim.errors import ModelError
+    from mbsim.fclib import hdf5
+
+    for file in _expanded(files):
+        try:
+            contents = hdf5.read(file)
+        except ModelError as error:
+            faults.append(error)
+        else:
+            yield file, contents
+
+
+def _end(faults: Sequence[MbsimError]) -> None:
+    """Raise what went wrong with any file, all at once; what cannot be read comes first."""
+    if faults:
+        worst = min(faults, key=lambda fault: fault.exit_code)
+        raise type(worst)("\n".join(str(fault) for fault in faults))
 
 
 def _say(text: str) -> None:

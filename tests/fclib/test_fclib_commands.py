@@ -135,6 +135,25 @@ def test_a_performance_profile_counts_ratios_to_the_best():
     assert "0.87 times" in summary[0]  # the root of 1/4 times 3
 
 
+@pytest.mark.parametrize("command", ["info", "merit", "solve"])
+def test_a_file_that_cannot_be_read_does_not_keep_the_others_back(command, file, tmp_path):
+    bad, worse = tmp_path / "bad.hdf5", tmp_path / "worse.hdf5"
+    bad.write_bytes(b"not HDF5")
+    done = run(command, bad, file, worse, "--json")
+    assert done.exit_code == 2
+    assert {entry["file"] for entry in json.loads(done.stdout)} == {str(file)}
+    assert str(bad) in done.stderr
+    assert str(worse) in done.stderr
+
+
+def test_nothing_to_compare_is_an_error(tmp_path):
+    bad = tmp_path / "bad.hdf5"
+    bad.write_bytes(b"not HDF5")
+    done = run("compare", bad, "--no-siconos", "-o", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "bad.hdf5" in done.stderr
+
+
 def test_siconos_solves_what_we_write_for_it():
     if peers.python() is None:
         pytest.skip("Debian's python3-siconos is not installed")
