@@ -33,9 +33,9 @@ STACKS, TRIAL = 50, 30
 SETTLED = 3e-4
 #: Seconds that beginning another method takes, whatever the size.
 BEGIN = 2e-4
-#: Seconds that beginning a dash of Newton's method takes, the share of all work it may take, and
-#: how many of its steps in a row need not gain at the end.
-BEGIN_DASH, SHARE, PATIENCE = 5e-5, 0.4, 2
+#: Seconds that beginning a dash of Newton's method takes, the share of all work or of what would
+#: come next that it may take, and how many of its steps in a row need not gain at the end.
+BEGIN_DASH, SHARE, SHARE_NEXT, PATIENCE = 5e-5, 0.4, 0.25, 2
 #: Share of the contacts, beside one, that may have changed their state where all have settled.
 CHANGES = 0.01
 #: Iterations of ADMM that show whether all bodies rest.
@@ -74,12 +74,13 @@ class Dashes:
 
     Sweeps and ADMM gain ever less near the solution, Newton's method ever more, once hardly a
     contact changes between open, stick and slip. What a dash costs in vain is not counted as work.
-    `cost`: of one, in seconds.
+    `step`: seconds of a Newton iteration.
     """
 
-    def __init__(self, task: Task, cost: float) -> None:
+    def __init__(self, task: Task, step: float) -> None:
         self.task = task
-        self.cost = cost
+        self.step = step
+        self.cost = BEGIN_DASH + step
         self.due = 0.0
         self.states = np.zeros(task.blocks.contacts, np.int8)
         self.looked_at: Vector | None = None
@@ -96,7 +97,7 @@ class Dashes:
             self.settled = changed <= CHANGES * b.contacts + 1.0
             self.looked_at = task.r
         spent = task.work if self.settled and task.work >= self.due else 0.0
-        if self.cost <= SHARE * max(spent, instead):
+        if self.cost <= max(SHARE * spent, SHARE_NEXT * instead):
             self.begun_at = task.r
             newton.Proximal(task, newton.DASH_ALPHA).dash()
             self.due = 2.0 * task.work
@@ -105,7 +106,8 @@ class Dashes:
         """Make a solution better, where that costs little."""
         task = self.task
         if task.distance > newton.WELL and self.cost <= SHARE * task.work and not task.late:
-            newton.Proximal(task, newton.DASH_ALPHA).dash(PATIENCE)
+            most = max(1, int(0.25 * SHARE * task.work / self.step))
+            newton.Proximal(task, newton.DASH_ALPHA).dash(min(most, newton.MOST_DASH), PATIENCE)
 
 
 def run(task: Task) -> None:
@@ -115,7 +117,7 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
-    dashes = Dashes(task, BEGIN_DASH + costs.newton)
+    dashes = Dashes(task, costs.newton)
     if task.blocks.rolling:
         _rolling(task, costs, dashes)
     else:
@@ -133,7 +135,7 @@ def _solve(task: Task, costs: Costs, dashes: Dashes) -> None:
         dashes.run(trial)
         if not task.over:
             _try_splitting(task, costs, finish, dashes)
-    dashes.run(finish)
+    dashes.run(BEGIN)
     _sweep(task, finish, dashes, near=True)
     if not task.over:
         _finish(task)
@@ -198,7 +200,7 @@ def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> No
                 left = 0.0  # nothing known yet
         if left * cost > work:
             return
-        chunk = 25 if task.iterations < 100 else 100
+        chunk = min(max(25, task.iterations // 4), 100)
         best = task.r
         sweeps.nsgs(task, chunk)
         if task.r is best:

@@ -508,14 +508,14 @@ class Proximal:
         task.note("NSN" if state[ALPHA] == 0.0 else "PROX", rows)
         return bool(state[NEWTONS] > newtons)
 
-    def dash(self, patience: int = 0) -> None:
+    def dash(self, most: int = MOST_DASH, patience: int = 0) -> None:
         """Take Newton steps while each of them gains; offer and count them if they led anywhere.
 
         With every contact in its final state two or three end at rounding, else one shows it.
-        `patience`: steps on end that need not gain.
+        `most`: of them; `patience`: steps on end that need not gain.
         """
         task, state = self.task, self.state
-        state[DASH], state[PATIENCE] = MOST_DASH, patience
+        state[DASH], state[PATIENCE] = most, patience
         rows = self._step(1)
         if state[BEST] <= GAIN * task.error and task.offer(self.r, state[BEST], state[BEST_Q]):
             task.work += float(state[WORK])

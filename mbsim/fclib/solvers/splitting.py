@@ -77,15 +77,16 @@ def room_for_factors(d, ptr, col, val):
 
 @jitable
 def admm(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, lift, room, state, accelerate,
-    tol, tol_q, limit, every, history, rows,
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, last_z, last_y, lift, room,
+    state, accelerate, tol, tol_q, limit, every, history, rows,
 ):  # fmt: skip
     """Iterate until the error is small enough or `limit` iterations are done.
 
     With the goal reached, a tenth of the iterations more may bring a tenth of it (POLISHED).
-    `r` holds the best iterate, in and out. z, y, lift (s, one a contact), `room` (with the factors
-    of state[FACTORED], a penalty) and `state` are what a later call goes on from; a first call has
-    state[PENALTY], state[NEXT] and state[BEST] set, z at the start. Returns the number of rows in
+    `r` holds the best iterate, in and out. z, y, what they were before they were accelerated
+    (last_z, last_y), lift (s, one a contact), `room` (with the factors of state[FACTORED], a
+    penalty) and `state` are what a later call goes on from; a first call has state[PENALTY],
+    state[NEXT] and state[BEST] set, z and last_z at the start. Returns the number of rows in
     `history` (iterations so far, error, |F|/|q|).
     """
     nt, nr = len(tangent), len(rolling)
@@ -109,8 +110,6 @@ def admm(
     u = np.empty(m)
     old_z = np.empty(m)
     old_y = np.empty(m)
-    last_z = z.copy()
-    last_y = y.copy()
     work = np.empty(m)
     flops = elimination_flops(symbolic, d)
     last = np.inf
@@ -228,6 +227,7 @@ class Splitting:
         self.accelerate = accelerate
         self.z = task.r.copy() if warm else np.zeros(m)
         self.y = np.zeros(m)
+        self.last_z, self.last_y = self.z.copy(), self.y.copy()
         self.lift = np.zeros(task.blocks.contacts)
         self.state: Any = np.zeros(STATE)
         self.state[PENALTY] = PENALTY_0
@@ -241,6 +241,7 @@ class Splitting:
     def penalise(self, penalty: float) -> None:
         """Go on with another penalty."""
         self.y *= self.state[PENALTY] / penalty
+        self.last_y *= self.state[PENALTY] / penalty
         self.state[PENALTY] = penalty
         self.state[NEXT] = self.state[ITERATIONS] + FIRST_CHANGE
         self.state[INTERVAL] = FIRST_CHANGE
@@ -260,8 +261,8 @@ class Splitting:
         work, before = state[WORK], state[ITERATIONS]
         rows = jit.function(admm)(
             b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
-            self.z, self.y, self.lift, self.room, state, self.accelerate,
-            task.tol, task.tol_q, limit, every, history, 0,
+            self.z, self.y, self.last_z, self.last_y, self.lift, self.room, state,
+            self.accelerate, task.tol, task.tol_q, limit, every, history, 0,
         )  # fmt: skip
         history[:rows, 0] += task.iterations - before
         task.work += float(state[WORK] - work)
