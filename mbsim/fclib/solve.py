@@ -181,9 +181,10 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
         met = error <= tol and (error_q <= tol or not task.strict)
         if met or task.late or not task.done or task.tol < 1e-3 * tol:
             break
-        task.tol *= 0.5 * tol / error if error > tol else 1.0
-        task.tol_q *= 0.5 * tol / error_q if error_q > tol else 1.0
-        task.grace = np.inf
+        task.tighten(
+            0.5 * tol / error if error > tol else 1.0,
+            0.5 * tol / error_q if error_q > tol else 1.0,
+        )
     result = Result(
         problem, solver.upper(), tol, task.strict, task.r, found.u, error, error_q,
         iterations=task.iterations, history=task.history, blocks=task.blocks,

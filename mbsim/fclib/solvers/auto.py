@@ -2,8 +2,9 @@
 
 Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets
 a trial (stacks need few iterations of it), then proximal Newton, which needs a good start but
-finishes. Work is counted in estimated seconds, not measured, so that a run does the same on every
-machine.
+finishes. Between them, once hardly a contact changes its state, a dash: a few steps of Newton's
+method alone, which then end at rounding. Work is counted in estimated seconds, not measured, so
+that a run does the same on every machine.
 """
 
 from __future__ import annotations

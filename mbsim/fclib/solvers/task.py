@@ -93,6 +93,12 @@ class Task:
         """Whether to stop: done, or out of time."""
         return self.done or self.late
 
+    def tighten(self, factor: float, factor_q: float) -> None:
+        """Want smaller errors, by these factors."""
+        self.tol *= factor
+        self.tol_q *= factor_q
+        self.grace = self.graced_at = np.inf
+
     def look(self, r: Vector) -> tuple[float, float]:
         """Return the errors of an iterate."""
         b = self.blocks
