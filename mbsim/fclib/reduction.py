@@ -60,11 +60,14 @@ class Blocks:
 
 @dataclass(eq=False)
 class Equality:
-    """l = multipliers - slopes r_T, r_T the impulses at `rows`."""
+    """R l = -(V' r_T + s), r_T the impulses at `rows`.
+
+    `factors`: (p, p + k + 1) R, V' of these k rows, and s after elimination: the upper triangle of
+    the first p columns is that of R's factors.
+    """
 
     rows: Any
-    slopes: Any
-    multipliers: Vector
+    factors: Any
 
 
 def directions(problem: Local | Global) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -147,42 +150,85 @@ def _eliminate(
     touched = np.flatnonzero(np.abs(v).reshape(size, -1).max(axis=1) > 0.0).astype(np.int32)
     places = (d * touched[:, None] + np.arange(d)).reshape(-1)
     v = np.ascontiguousarray(v[places])
-    right = np.concatenate((v.T, s[:, None]), axis=1)
-    solved = _solve_range(r, right)
-    slopes, multipliers = solved[:, :-1], -solved[:, -1]
+    factors, change, sound = jit.function(without_multipliers)(v, np.ascontiguousarray(r), s)
+    if not sound:
+        right = np.concatenate((v.T, s[:, None]), axis=1)
+        solved = np.linalg.lstsq(r, right, rcond=1e-12)[0]
+        if np.abs(r @ solved - right).max(initial=0.0) > RANGE * np.abs(right).max(initial=0.0):
+            raise ModelError(
+                "equality constraints cannot be eliminated: V' or s is not in the range of R"
+            )
+        factors, change = np.concatenate((np.eye(len(s)), solved), axis=1), -(v @ solved)
     q = q.copy()
-    q[places] += v @ multipliers
-    changed = jit.function(add_clique)(d, *rows, touched, np.ascontiguousarray(-(v @ slopes)))
-    return changed, q, Equality(places, slopes, multipliers)
+    q[places] += change[:, -1]
+    rows = jit.function(add_clique)(d, *rows, touched, np.ascontiguousarray(change[:, :-1]))
+    return rows, q, Equality(places, factors)
 
 
-def _solve_range(r: Any, right: Any) -> Any:
-    """Solve R X = right, R singular or not; refuse right sides outside its range."""
-    with np.errstate(all="ignore"):
-        try:
-            solved = np.linalg.solve(r, right)
-        except np.linalg.LinAlgError:
-            solved = np.full_like(right, np.nan)
-        sizes = np.abs(right).max(initial=0.0)
-        # a nearly singular R gives enormous multipliers with a small residual
-        bound = 1e10 * sizes / max(np.abs(r).max(initial=0.0), 1e-300)
-        if np.isfinite(solved).all() and np.abs(solved).max(initial=0.0) <= bound:
-            if np.abs(r @ solved - right).max(initial=0.0) <= RANGE * sizes:
-                return solved
-    solved = np.linalg.lstsq(r, right, rcond=1e-12)[0]
-    if np.abs(r @ solved - right).max(initial=0.0) > RANGE * sizes:
-        raise ModelError(
-            "equality constraints cannot be eliminated: V' or s is not in the range of R"
-        )
-    return solved
+@jitable
+def without_multipliers(v, r, s):
+    """Eliminate l from [R V' s; V 0 0], v: (k, p).
+
+    Returns the rows of R after elimination (`Equality`), -V R^-1 [V' s] (k, k + 1), and whether R
+    is regular: a nearly singular one gives enormous solutions, with a small residual or not. This
+    is looked at with two right sides, sums of V' and s with signs that follow no pattern.
+    """
+    k, p = v.shape
+    matrix = np.zeros((p + k + 1, p + k + 1))
+    for i in range(p):
+        for j in range(p):
+            matrix[i, j] = r[i, j]
+        for j in range(k):
+            matrix[i, p + j] = v[j, i]
+            matrix[p + j, i] = v[j, i]
+        matrix[i, p + k] = s[i]
+    largest, size = 0.0, 0.0
+    for i in range(p):
+        for j in range(p):
+            largest = max(largest, abs(r[i, j]))
+        for j in range(p, p + k + 1):
+            size = max(size, abs(matrix[i, j]))
+    sound = partial_lu(matrix, p, np.empty(p, np.int32))
+    signs = np.empty(k + 1)
+    state = 1
+    for _ in range(2):
+        for j in range(k + 1):
+            state = (1103515245 * state + 12345) % 2147483648
+            signs[j] = 1.0 if state > 1073741824 else -1.0
+        found = upper_solution(matrix, p, signs)
+        for i in range(p):
+            missing = -signs[k] * s[i]
+            for j in range(k):
+                missing -= signs[j] * v[j, i]
+            for j in range(p):
+                missing += r[i, j] * found[j]
+            if not (abs(missing) <= RANGE * size and abs(found[i]) * largest <= 1e10 * size):
+                sound = False
+    return matrix[:p].copy(), matrix[p : p + k, p:].copy(), sound
+
+
+@jitable
+def upper_solution(factors, p, weights):
+    """Return U^-1 Y w, U the upper triangle of the first p columns and Y those after them."""
+    found = np.empty(p)
+    for i in range(p - 1, -1, -1):
+        row = factors[i]
+        total = 0.0
+        for j in range(len(weights)):
+            total += row[p + j] * weights[j]
+        for j in range(i + 1, p):
+            total -= row[j] * found[j]
+        found[i] = total / row[i]
+    return found
 
 
 def multipliers(blocks: Blocks, r: Vector) -> Vector | None:
     """Return l (p,) that goes with r, or None without equality constraints."""
     if blocks.equality is None:
         return None
-    equality = blocks.equality
-    found: Vector = equality.multipliers - equality.slopes @ r[equality.rows]
+    factors = blocks.equality.factors
+    weights = -np.append(r[blocks.equality.rows], 1.0)
+    found: Vector = jit.function(upper_solution)(factors, len(factors), weights)
     return found
 
 
