@@ -162,19 +162,37 @@ def symmetric_pattern(size, ptr, col):
 
 
 @jitable
+def add_row(tangent, rolling, col, val, r, begin, end, out, first):
+    """Add blocks begin:end of a row times r to `out` from place `first` on."""
+    d = 1 + len(tangent) + len(rolling)
+    if d == 3:
+        # sums in registers: a store for each block would hold up the next one
+        s0, s1, s2 = out[first], out[first + 1], out[first + 2]
+        for k in range(begin, end):
+            b = d * col[k]
+            r0, r1, r2 = r[b], r[b + 1], r[b + 2]
+            s0 += val[k, 0, 0] * r0 + val[k, 0, 1] * r1 + val[k, 0, 2] * r2
+            s1 += val[k, 1, 0] * r0 + val[k, 1, 1] * r1 + val[k, 1, 2] * r2
+            s2 += val[k, 2, 0] * r0 + val[k, 2, 1] * r1 + val[k, 2, 2] * r2
+        out[first], out[first + 1], out[first + 2] = s0, s1, s2
+        return
+    for k in range(begin, end):
+        b = d * col[k]
+        for row in range(d):
+            total = 0.0
+            for c in range(d):
+                total += val[k, row, c] * r[b + c]
+            out[first + row] += total
+
+
+@jitable
 def product(tangent, rolling, ptr, col, val, q, r, u):
     """Write u = W r + q."""
     d = 1 + len(tangent) + len(rolling)
     for a in range(len(ptr) - 1):
         for row in range(d):
             u[d * a + row] = q[d * a + row]
-        for k in range(ptr[a], ptr[a + 1]):
-            b = d * col[k]
-            for row in range(d):
-                total = 0.0
-                for c in range(d):
-                    total += val[k, row, c] * r[b + c]
-                u[d * a + row] += total
+        add_row(tangent, rolling, col, val, r, ptr[a], ptr[a + 1], u, d * a)
 
 
 @jitable

@@ -133,6 +133,10 @@ def test_a_performance_profile_counts_ratios_to_the_best():
     summary = compare.summary(rows)
     assert "solved   3 of 3" in summary[0]
     assert "0.87 times" in summary[0]  # the root of 1/4 times 3
+    condensed_by_us = [row("d", "Siconos NSGS", "solved", 1.0)]
+    alone = row("d", "Siconos GLOBAL_ADMM", "solved", 2.0)
+    assert compare.best_peer(condensed_by_us) is condensed_by_us[0]
+    assert compare.best_peer([*condensed_by_us, alone]) is alone
 
 
 @pytest.mark.parametrize("command", ["info", "merit", "solve"])

@@ -9,6 +9,7 @@ import numpy as np
 from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import (
+    add_row,
     block_rows,
     compressed_rows,
     diagonal_places,
@@ -42,14 +43,8 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
         own = diagonal[a]
         for row in range(d):
             work[row] = q[first + row]
-        for k in range(ptr[a], ptr[a + 1]):
-            if k != own:
-                b = d * col[k]
-                for row in range(d):
-                    total = 0.0
-                    for c in range(d):
-                        total += val[k, row, c] * r[b + c]
-                    work[row] += total
+        add_row(tangent, rolling, col, val, r, ptr[a], own, work, 0)
+        add_row(tangent, rolling, col, val, r, own + 1, ptr[a + 1], work, 0)
         for row in range(d):
             work[d + row] = r[first + row]
         if len(rolling) > 0:
