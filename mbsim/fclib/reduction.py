@@ -239,11 +239,7 @@ def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> 
         forces = forces + problem.G.apply(l)
     assert blocks.mass is not None
     v = np.empty(len(forces))
-    # lists of sparse factors are slow to hand over, and most problems have none
-    if len(blocks.mass[6]) == 1:
-        jit.function(full_mass_solve)(*blocks.mass[:6], forces, v)
-    else:
-        jit.function(mass_solve)(*blocks.mass, forces, v)
+    jit.function(mass_solve)(*blocks.mass, forces, v)
     return v
 
 
@@ -520,12 +516,9 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
         many += 1 if size > FULL else 0
     dense = np.zeros(sizes[count])
     exchange = np.empty(n, np.int32)
-    big_symbolic = [
-        analyse_late(0, np.zeros(1, np.int32), np.zeros(0, np.int32), 1, np.zeros(0, np.bool_))
-    ]
-    big_factors = [np.empty(0)]
-    big_size = [1]
-    big_of = np.full(count, -1, np.int32)
+    # of large parts: where their analysis and factors begin, unknowns of a node
+    big = np.full((count, 3), -1, np.int64)
+    analyses, big_factors = np.empty(0, np.int64), np.empty(0)
     local = np.empty(nodes, np.int32)
     sound = True
     solved = np.empty(n)
@@ -563,10 +556,9 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
                 size, mine, inside, mp, mi, mx, kp, swaps
             )
             sound = okay and sound
-            big_of[c] = len(big_symbolic)
-            big_symbolic.append(symbolic)
-            big_factors.append(factors)
-            big_size.append(of_node)
+            big[c, 0], big[c, 1], big[c, 2] = len(analyses), len(big_factors), of_node
+            analyses = np.concatenate((analyses, _packed(symbolic)))
+            big_factors = np.concatenate((big_factors, factors)) if len(big_factors) else factors
             begin = len(symbolic[2])
             for j in range(size):
                 a = mine[j]
@@ -604,7 +596,8 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
     for a in range(n):
         for k in range(kp[a], kp[a + 1]):
             free[ki[k]] += kx[k] * solved[a]
-    mass = (row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size)
+    # arrays, for lists take long to hand over
+    mass = (row_ptr, rows, sizes, dense, exchange, big, analyses, big_factors)
     return (sound, ptr, col, val, free), mass
 
 
@@ -724,39 +717,43 @@ def _add_part(d, size, mine, wide, touched, kp, ki, kx, local, x, ptr, col, val)
 
 
 @jitable
-def full_mass_solve(row_ptr, rows, sizes, dense, exchange, big_of, forces, v):
-    """Write M^-1 times a vector at the rows of small parts, with the factors of `condense`."""
-    for c in range(len(row_ptr) - 1):
-        if big_of[c] >= 0:
-            continue
-        mine = rows[row_ptr[c] : row_ptr[c + 1]]
-        size = len(mine)
-        x = np.empty(size)
-        for j in range(size):
-            x[j] = forces[mine[j]]
-        lu = dense[sizes[c] : sizes[c + 1]].reshape(size, size)
-        _full_solve(lu, exchange[row_ptr[c] : row_ptr[c + 1]], x.reshape(size, 1))
-        for j in range(size):
-            v[mine[j]] = x[j]
+def _packed(symbolic):
+    """Return what `solve` needs of an analysis as one array, sizes first."""
+    front_ptr, nodes, pivots, _, _, factor_ptr, room = symbolic
+    sizes = np.array([len(pivots), len(nodes), room[0]])
+    return np.concatenate((sizes, front_ptr, nodes, pivots, factor_ptr))
 
 
 @jitable
-def mass_solve(
-    row_ptr, rows, sizes, dense, exchange, big_of, big_symbolic, big_factors, big_size, forces, v
-):
+def _unpacked(packed):
+    """Return the widest front, and what `solve` takes as `symbolic`."""
+    fronts, entries, widest = packed[0], packed[1], packed[2]
+    at = 3
+    front_ptr = packed[at : at + fronts + 1]
+    at += fronts + 1
+    nodes = packed[at : at + entries]
+    at += entries
+    pivots = packed[at : at + fronts]
+    at += fronts
+    factor_ptr = packed[at : at + fronts + 1]
+    return widest, (front_ptr, nodes, pivots, pivots, pivots, factor_ptr, pivots)
+
+
+@jitable
+def mass_solve(row_ptr, rows, sizes, dense, exchange, big, analyses, big_factors, forces, v):
     """Write M^-1 times a vector, with the factors of `condense`."""
-    full_mass_solve(row_ptr, rows, sizes, dense, exchange, big_of, forces, v)
     for c in range(len(row_ptr) - 1):
-        if big_of[c] < 0:
-            continue
         mine = rows[row_ptr[c] : row_ptr[c + 1]]
+        swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
         size = len(mine)
         x = np.empty(size)
         for j in range(size):
             x[j] = forces[mine[j]]
-        k = big_of[c]
-        symbolic = big_symbolic[k]
-        swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
-        solve(big_size[k], symbolic, big_factors[k], swaps, x, np.empty(symbolic[6][0]))
+        if big[c, 0] < 0:
+            lu = dense[sizes[c] : sizes[c + 1]].reshape(size, size)
+            _full_solve(lu, swaps, x.reshape(size, 1))
+        else:
+            widest, symbolic = _unpacked(analyses[big[c, 0] :])
+            solve(big[c, 2], symbolic, big_factors[big[c, 1] :], swaps, x, np.empty(widest))
         for j in range(size):
             v[mine[j]] = x[j]
