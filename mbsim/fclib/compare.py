@@ -15,7 +15,6 @@ from mbsim.fclib.merit import completed, judge
 from mbsim.fclib.reduction import reduce
 from mbsim.fclib.solve import solve
 from mbsim.fclib.solvers.catalog import SOLVERS
-from mbsim.fclib.solvers.task import clock
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Global, Local
@@ -111,10 +110,8 @@ def _ours(
 def _siconos(
     name: str, problem: Local | Global, tol: float, repeats: int, max_seconds: float
 ) -> list[Row]:
-    """Return the rows of Siconos' solvers, our condensation included where they need it."""
-    began = clock()
+    """Return the rows of Siconos' solvers."""
     blocks = reduce(problem)
-    condensed = clock() - began if problem.kind != "local" or problem.equalities else 0.0
     rows = []
     for run in peers.run(problem, blocks, tol, max_seconds, repeats):
         if run.r is None:
@@ -125,8 +122,7 @@ def _siconos(
             # its own test stands on the same error, but of the condensed problem
             met = judged.error <= 2.0 * tol
             figures = (
-                "solved" if met else "not_solved",
-                run.seconds + (condensed if run.condensed else 0.0), run.iterations,
+                "solved" if met else "not_solved", run.seconds, run.iterations,
                 judged.error, judged.error_q, judged.merit1, judged.impulse_norm,
             )  # fmt: skip
         rows.append(Row(name, problem.kind, problem.contacts, run.solver, *figures))
@@ -154,15 +150,14 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join([*lines, "", *summary(rows)])
 
 
-def best_peer(rows: Sequence[Row]) -> Row | None:
+def best_peer(rows: Sequence[Row], *, own: bool = False) -> Row | None:
     """Return the fastest row of Siconos that solved its problem.
 
-    Where a solver of its own takes the problem as it is, those that got our condensation do not
-    count: nobody has that without us.
+    `own`: of global problems only by its global solvers, where these solve it.
     """
     theirs = [row for row in rows if row.solver.startswith("Siconos") and row.solved]
-    alone = [row for row in theirs if "GLOBAL" in row.solver]
-    theirs = alone or theirs
+    if own:
+        theirs = [row for row in theirs if "GLOBAL" in row.solver] or theirs
     return min(theirs, key=lambda row: row.seconds, default=None)
 
 
@@ -172,17 +167,26 @@ def summary(rows: Sequence[Row]) -> list[str]:
     lines = []
     for solver in dict.fromkeys(row.solver for row in rows):
         mine = [row for row in rows if row.solver == solver]
-        ratios = []
-        for row in mine:
-            best = best_peer([other for other in rows if other.problem == row.problem])
-            if row.solved and best is not None and best.seconds >= TOO_SHORT:
-                ratios.append(math.log(row.seconds / best.seconds))
         line = f"{solver:24s} solved {sum(row.solved for row in mine):3d} of {len(problems)}"
-        if ratios and solver.startswith("mbsim"):
-            mean = math.exp(sum(ratios) / len(ratios))
-            line += f", {mean:.2f} times the best Siconos (geometric mean over {len(ratios)})"
+        if solver.startswith("mbsim"):
+            line += _mean(rows, mine, own=False, words="times the best Siconos")
+            if any("GLOBAL" in row.solver for row in rows):
+                line += _mean(rows, mine, own=True, words="with its global solvers alone")
         lines.append(line)
     return lines
+
+
+def _mean(rows: Sequence[Row], mine: Sequence[Row], *, own: bool, words: str) -> str:
+    """Return the geometric mean of time ratios with words about it, or nothing."""
+    ratios = []
+    for row in mine:
+        best = best_peer([other for other in rows if other.problem == row.problem], own=own)
+        if row.solved and best is not None and best.seconds >= TOO_SHORT:
+            ratios.append(math.log(row.seconds / best.seconds))
+    if not ratios:
+        return ""
+    mean = math.exp(sum(ratios) / len(ratios))
+    return f", {mean:.2f} {words} (geometric mean over {len(ratios)})"
 
 
 def _time(seconds: float) -> str:

@@ -1,9 +1,9 @@
 """Debian's python3-siconos beside ours: the same problem, the same clock, our error.
 
-Its local solvers get the problem as our condensation leaves it (they take no equality constraints
-and no masses), so their time is that of the solver and of our condensation. A global problem
-without equality constraints goes to its global solvers as well, as it is. Its Python need not be
-ours: it is asked through files.
+Its local solvers take no equality constraints and no masses. They get what our condensation leaves,
+and to their time comes that which SciPy takes for the same, in Siconos' Python: what one would do
+there. A global problem without equality constraints goes to its global solvers as well, as it is.
+Its Python need not be ours: it is asked through files.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -35,16 +35,12 @@ _PYTHONS = ("/usr/bin/python3", "python3")
 
 
 class Run(NamedTuple):
-    """One run of a Siconos solver: its r (None if it was stopped), iterations, seconds.
-
-    `condensed`: it got W and q, so condensation is not in its seconds.
-    """
+    """One run of a Siconos solver: its r (None if it was stopped), iterations, seconds."""
 
     solver: str
     r: Vector | None
     iterations: int
     seconds: float
-    condensed: bool
 
 
 @functools.cache
@@ -73,8 +69,9 @@ def run(
     with tempfile.TemporaryDirectory() as folder:
         _write(blocks, Path(folder) / "local.dat")
         names = SOLVERS[d]
+        if problem.kind == "global" or problem.equalities:
+            _write_parts(problem, Path(folder) / "parts.npz")
         if problem.kind == "global" and not problem.equalities and d == 3:
-            _write_global(cast("Global", problem), Path(folder) / "global.npz")
             names += GLOBAL_SOLVERS
         script = Path(__file__).with_name("siconos_runs.py")
         command = [found, str(script), folder, repr(tol), repr(seconds), str(repeats), *names]
@@ -93,22 +90,25 @@ def _outcome(line: dict[str, Any], folder: Path) -> Run:
     name, seconds = str(line["solver"]), float(line["seconds"])
     file = folder / f"{name}.npy"
     r = np.load(file) if file.is_file() and math.isfinite(seconds) else None
-    condensed = name not in GLOBAL_SOLVERS
-    return Run(f"Siconos {name}", r, int(line["iterations"]), seconds, condensed)
+    return Run(f"Siconos {name}", r, int(line["iterations"]), seconds)
 
 
-def _write_global(problem: Global, path: Path) -> None:
-    """Write a global problem's matrices by columns, and its vectors."""
+def _write_parts(problem: Local | Global, path: Path) -> None:
+    """Write a problem's matrices by columns, and its vectors."""
     from scipy import sparse
 
-    arrays: dict[str, Any] = {"f": problem.f, "w": problem.w, "mu": problem.mu}
-    for name in ("M", "H"):
-        stored = sparse.csc_array(getattr(problem, name).csr())
-        stored.sort_indices()
-        arrays |= {
-            f"{name}_data": stored.data, f"{name}_indices": stored.indices,
-            f"{name}_indptr": stored.indptr, f"{name}_shape": np.array(stored.shape),
-        }  # fmt: skip
+    arrays: dict[str, Any] = {}
+    for name in ("W", "V", "R", "M", "H", "G", "q", "s", "f", "w", "b", "mu"):
+        part = getattr(problem, name, None)
+        if isinstance(part, np.ndarray):
+            arrays[name] = part
+        elif part is not None:
+            stored = sparse.csc_array(part.csr())
+            stored.sort_indices()
+            arrays |= {
+                f"{name}_data": stored.data, f"{name}_indices": stored.indices,
+                f"{name}_indptr": stored.indptr, f"{name}_shape": np.array(stored.shape),
+            }  # fmt: skip
     np.savez(path, **arrays)
 
 
