@@ -210,6 +210,8 @@ def proximal_newton(
     `r` holds the best iterate, in and out; `centre` and `state` what a later call goes on from (a
     first call has state[ALPHA] > 0, state[BEST] the error of r, and the centre at r).
     With the goal reached, one more step, of at most FINAL iterations, is taken to a tenth of it.
+    With state[DASH] it is one step of so many iterations at most, which ends when more than
+    state[PATIENCE] of them in a row leave more than GAIN of the error, or at WELL times the goal.
     Returns the number of rows in `history` (Newton iterations so far, error, |F|/|q|).
     """
     nt = len(tangent)
