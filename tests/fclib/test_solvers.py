@@ -392,7 +392,7 @@ def perturbed(problem, seed):
     "name",
     ["Gen_capsules-nc582-s260", "Gen_chute-nc787-s200", "Gen_chute-nc1035-s350",
      "Gen_kapla-nc1204-s40", "Gen_pyramid-nc1061-s20", "OneObject-i100000-316",
-     "fc2d_granularflowonwall_02020_00213"],
+     "Gen_boxwall-nc1058-s20", "fc2d_granularflowonwall_02020_00213"],
 )  # fmt: skip
 def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
     problem = perturbed(hdf5.read(problem_file(name)).problem, seed)
