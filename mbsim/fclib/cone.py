@@ -10,6 +10,18 @@ import math
 
 from mbsim.core.jitable import jitable
 
+#: Rounding errors of a natural map over its largest terms, of which there are a few.
+NOISE = 8.0 * 2.0**-53
+#: Share of the largest |q| of a contact that rounding may excuse.
+EXCUSED = 1e-8
+#: A scale-free residual where there is no scale.
+LARGEST = 1e10
+#: Times the tolerance that the scale-free residual and the velocity error may be: 10, less what
+#: rho is uncertain by.
+FREE = 9.9
+#: Growth of |r| that every gain is worth.
+GROWTH = 2.0
+
 
 @jitable
 def cone_height(normal, slide, roll, mu, mu_r):
@@ -76,6 +88,28 @@ def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
 
 
 @jitable
+def bring_into_cones(tangent, mu, r, out):
+    """Write r with pulls made 0 and friction cut to mu r_N.
+
+    A method that keeps neither to the last bit leaves weak contacts outside by more than their own
+    size allows.
+    """
+    d = 1 + len(tangent)
+    for a in range(len(mu)):
+        first = d * a
+        normal = max(r[first], 0.0)
+        square = 0.0
+        for k in range(len(tangent)):
+            square += r[first + 1 + k] ** 2
+        keep = 1.0
+        if square > (mu[a] * normal) ** 2:
+            keep = mu[a] * normal / math.sqrt(square)
+        out[first] = normal
+        for k in range(len(tangent)):
+            out[first + 1 + k] = keep * r[first + 1 + k]
+
+
+@jitable
 def residual(tangent, rolling, mu, mu_r, u, r, out):
     """Write the natural map (rho = 1) of every contact and return its Euclidean norm."""
     d = 1 + len(tangent) + len(rolling)
@@ -95,13 +129,93 @@ def norm(vector):
 
 
 @jitable
-def relative_errors(tangent, rolling, mu, mu_r, q, u, r, work):
-    """Return the error |F| / max(|q|, |r|, |u|) and |F| / |q|; not divided by a scale of 0."""
+def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
+    """Return three figures of the natural maps F_i with each contact's own `rho`, free of units.
+
+    rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
+
+    * The error |F| / max(|rho q|, |r|, |rho u|).
+    * The scale-free residual, the largest |F_i| / max(|r_i|, rho_i |q_i|) of a contact, at most
+      LARGEST.
+    * The velocity error |F / rho| / |q|: the other two fall while impulses grow, and this does not.
+
+    In the last two an |F_i| within the rounding of its own terms |r_i|, rho_i |q_i| and
+    rho_i |W_ij| |r_j| counts as nothing. That excuses no more than EXCUSED of rho_i times the
+    largest |q_j|, whatever the impulses.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    fastest = 0.0
+    for a in range(len(mu)):
+        square, push = 0.0, 0.0
+        for k in range(d * a, d * a + d):
+            square += r[k] ** 2
+            push += q[k] ** 2
+        fastest = max(fastest, push)
+        impulse += square
+    fastest = EXCUSED * math.sqrt(fastest)
+    free = 0.0
+    for a in range(len(mu)):
+        own = rho[a]
+        square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
+        missing += square
+        size, push = 0.0, 0.0
+        for k in range(d * a, d * a + d):
+            size += r[k] ** 2
+            push += q[k] ** 2
+            moved += (own * u[k]) ** 2
+        bound += push
+        given += own**2 * push
+        size, push = math.sqrt(size), own * math.sqrt(push)
+        square = math.sqrt(square)
+        if square <= own * fastest:
+            terms = 0.0
+            for j in range(ptr[a], ptr[a + 1]):
+                for row in range(d):
+                    for k in range(d):
+                        terms += abs(val[j, row, k] * r[d * col[j] + k])
+            if square <= NOISE * (size + push + own * terms):
+                continue
+        if square > 0.0:
+            speeds += (square / own) ** 2
+            size = max(size, push)
+            free = max(free, square / size if square < LARGEST * size else LARGEST)
+    missing = math.sqrt(missing)
+    scale = math.sqrt(max(given, impulse, moved))
+    speeds = math.sqrt(speeds)
+    return (
+        missing / scale if scale > 0.0 else missing,
+        free,
+        speeds / math.sqrt(bound) if bound > 0.0 else speeds,
+    )
+
+
+@jitable
+def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
+    """Return how far an iterate is from the first goal and from the second one.
+
+    The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
+    contact's own rho: in some units the one is small long before the other. The second is the
+    largest of |F| / |q|, MERIT_1 and, over FREE, the scale-free residual and the velocity error
+    (`own_errors`). A scale of 0 does not divide.
+    """
     missing = residual(tangent, rolling, mu, mu_r, u, r, work)
     bound = norm(q)
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
-    return error, (missing / bound if bound > 0.0 else missing)
+    own, free, speeds = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
+    second = max(missing / bound if bound > 0.0 else missing, missing / (1.0 + math.sqrt(bound)))
+    return max(error, own), max(second, free / FREE, speeds / FREE)
+
+
+@jitable
+def improves(second, size, before, size_before):
+    """Return whether an iterate within the first goal is better than the one before.
+
+    Its second figure decides. Impulses that grow beyond GROWTH must bring as much as they grow: in
+    a wedge the figures fall a little as they run away.
+    """
+    return second * max(1.0, size / (GROWTH * size_before) if size_before > 0.0 else 1.0) < before
 
 
 @jitable

@@ -18,6 +18,15 @@ PANEL = 8
 
 
 @jitable
+def factor_work(flops, blocks):
+    """Return the estimated seconds of a factorisation: a measure that does not depend on a clock.
+
+    `flops` is what `ordering.elimination_flops` says, `blocks` the number of blocks.
+    """
+    return 1.2e-10 * flops + 3e-8 * blocks
+
+
+@jitable
 def transposed_places(size, ptr, col):
     """Return for every block (a, b) of a symmetric pattern, columns rising, where (b, a) is."""
     place = ptr[:size].copy()

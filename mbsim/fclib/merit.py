@@ -10,6 +10,12 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
   `error_q` too.
 * `error_q`: |F| / |q|, the same with the scale of the data alone (of the condensed q in a global
   problem).
+* `own_error`: |F| / max(|rho q|, |r|, |rho u|), the first with rho_i = 1 / lambda_max(W_ii) for
+  each contact in place of 1; W, q are condensed. Units do not matter to it.
+* `scale_free`: max_i |F_i| / max(|r_i|, rho_i |q_i|) with these rho_i: no contact, light ones among
+  heavy ones included, may be wrong by more.
+* `velocity_error`: |F / rho| / |q|. As impulses grow without bound all others but `error_q` fall,
+  and that depends on units.
 * `merit1`: FCLIB's MERIT_1 as its code has it,
   |F| / (1 + sqrt(|q|)) + |V' r + R l + s| / (1 + |s|).
   The *square root of the norm* is a slip (|q| is a norm already) that every published figure has.
@@ -24,13 +30,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.fclib.blocks import product_of_stored, transposed_product_of_stored
-from mbsim.fclib.cone import residual
+from mbsim.fclib.clock import compiled
+from mbsim.fclib.cone import FREE, own_errors, residual
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import directions, multipliers, reduce, velocities
 
@@ -40,6 +46,8 @@ if TYPE_CHECKING:
 
 #: A contact at the edge of its cone that is slower than this share of |q| or |u| sticks.
 AT_REST = 1e-7
+#: Times the tolerance from which a velocity error is no small one.
+FAR = 100.0
 #: States of a contact.
 OPEN, STICK, SLIP = 0, 1, 2
 STATES = ("open", "stick", "slip")
@@ -51,7 +59,7 @@ class Figures:
 
     Parameters
     ----------
-    error, error_q, merit1, merit1_corrected
+    error, error_q, own_error, scale_free, velocity_error, merit1, merit1_corrected
         As the module says.
     dynamics, equalities
         Relative residuals of M v = H r + G l + f and of the equality constraints (0 without).
@@ -71,6 +79,9 @@ class Figures:
 
     error: float
     error_q: float
+    own_error: float
+    scale_free: float
+    velocity_error: float
     merit1: float
     merit1_corrected: float
     dynamics: float
@@ -107,17 +118,15 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
 
     Multipliers and velocities that the solution does not have are computed from r.
     """
-    if isinstance(problem, Global):
-        blocks = reduce(problem) if blocks is None else blocks
-        q = blocks.q
-    else:
-        q = problem.q
+    blocks = reduce(problem) if blocks is None else blocks
+    q = blocks.q if isinstance(problem, Global) else problem.q
     found = _whole(problem, solution, blocks)
     error, missing, u, dynamics, equalities, absolute = _error(problem, found)
     bound = _norm(q)
     return Figures(
         error,
         _over(missing, bound),
+        *_own(blocks, u, found.r),
         missing / (1.0 + math.sqrt(bound)) + absolute,
         missing / (1.0 + bound) + absolute,
         dynamics,
@@ -126,10 +135,47 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
     )
 
 
-def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> tuple[float, float]:
-    """Return `error` and `error_q` alone, which is quicker."""
-    error, missing, *_ = _error(problem, solution)
-    return error, _over(missing, _norm(problem.q if isinstance(problem, Local) else blocks.q))
+class Errors(NamedTuple):
+    """What decides whether a problem is solved (`Figures`)."""
+
+    error: float
+    error_q: float
+    own_error: float
+    scale_free: float
+    velocity_error: float
+
+    def status(self, tol: float) -> str:
+        """Return `solved`, `solved_relative` or `not_solved`.
+
+        `solved_relative`: only the published error is met, in the units given and in the contacts'
+        own; some contact may be far off. It is not met where it is small only against impulses that
+        run away, and velocities are FAR off.
+        """
+        if not max(self.error, self.own_error, self.velocity_error / FAR) <= tol:
+            return "not_solved"
+        free = max(self.scale_free, self.velocity_error)
+        return "solved" if free <= FREE * tol else "solved_relative"
+
+
+def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> Errors:
+    """Return the figures that decide alone, which is quicker."""
+    error, missing, u, *_ = _error(problem, solution)
+    bound = _norm(problem.q if isinstance(problem, Local) else blocks.q)
+    return Errors(error, _over(missing, bound), *_own(blocks, u, solution.r))
+
+
+def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float]:
+    """Return own_error, scale_free and velocity_error."""
+    b = blocks
+    found: tuple[float, float, float] = compiled(own_errors)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r, np.empty_like(r)
+    )
+    return found
+
+
+def judged(figures: Figures) -> Errors:
+    """Return the figures that decide."""
+    return Errors(*(getattr(figures, name) for name in Errors._fields))
 
 
 def _whole(problem: Local | Global, solution: Solution, blocks: Blocks | None) -> Solution:
@@ -149,7 +195,7 @@ def _error(
     tangent, rolling = directions(problem)
     mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
     missing = float(
-        jit.function(residual)(
+        compiled(residual)(
             tangent, rolling, problem.mu, mu_r, u, solution.r, np.empty_like(solution.r)
         )
     )
@@ -160,14 +206,14 @@ def _error(
 def _times(a: Matrix, vector: Vector) -> Vector:
     """Return A times a vector, from the entries as they are stored."""
     found = np.zeros(a.m)
-    jit.function(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    compiled(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
     return found
 
 
 def _transposed_times(a: Matrix, vector: Vector) -> Vector:
     """Return the transpose of A times a vector."""
     found = np.zeros(a.n)
-    jit.function(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    compiled(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
     return found
 
 

@@ -44,18 +44,36 @@ class Run(NamedTuple):
 
 
 @functools.cache
-def python() -> str | None:
-    """Return a Python that has Siconos, or None."""
+def _found() -> tuple[str | None, str]:
+    """Return a Python that has all that `siconos_runs` imports, or None and why there is none."""
+    reason = "Siconos is not installed; Debian's python3-siconos has it"
     for candidate in _PYTHONS:
         found = shutil.which(candidate)
-        if found is None:
+        if found is None or not _imports(found, "siconos.numerics"):
             continue
-        asked = subprocess.run(
-            [found, "-c", "import siconos.numerics"], capture_output=True, check=False
-        )
-        if asked.returncode == 0:
-            return found
-    return None
+        if _imports(found, "scipy.sparse.linalg"):
+            return found, ""
+        reason = f"{found} has Siconos but no SciPy, which it needs; Debian's python3-scipy has it"
+    return None, reason
+
+
+def _imports(interpreter: str, module: str) -> bool:
+    """Return whether a Python can import a module; ours must not lend it any."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    asked = subprocess.run(
+        [interpreter, "-c", f"import {module}"], capture_output=True, check=False, env=environment
+    )
+    return asked.returncode == 0
+
+
+def python() -> str | None:
+    """Return a Python that can run Siconos' solvers, or None."""
+    return _found()[0]
+
+
+def why_not() -> str:
+    """Return why no Python can run Siconos' solvers; nothing if one can."""
+    return _found()[1]
 
 
 def run(

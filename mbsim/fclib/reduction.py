@@ -16,10 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.errors import ModelError
-from mbsim.fclib.blocks import block_rows, compressed_rows, diagonal_places, symmetric_pattern
+from mbsim.fclib.blocks import (
+    block_rows,
+    compressed_rows,
+    diagonal_places,
+    own_units,
+    symmetric_pattern,
+)
+from mbsim.fclib.clock import compiled
 from mbsim.fclib.factor import factorise, partial_lu, solve, solve_many, transposed_places
 from mbsim.fclib.ordering import analyse_late
 from mbsim.fclib.problem import Global, Local, Matrix, matrix
@@ -37,7 +43,8 @@ RANGE = 1e-9
 class Blocks:
     """u = W r + q, W in blocks (`blocks.block_rows`), and how to get l and v from r.
 
-    `tangent` and `rolling` are the tuples whose lengths compiled code looks at.
+    `tangent` and `rolling` are the tuples whose lengths compiled code looks at; `rho` (nc,) turns a
+    contact's velocity into the impulse that it is worth (`blocks.own_units`).
     """
 
     tangent: tuple[int, ...]
@@ -49,6 +56,7 @@ class Blocks:
     q: Vector
     mu: Vector
     mu_r: Vector
+    rho: Vector
     equality: Equality | None = None
     mass: tuple[Any, ...] | None = None
 
@@ -90,15 +98,16 @@ def _blocks(
 ) -> Blocks:
     """Return blocks with what every problem has."""
     tangent, rolling = directions(problem)
-    diagonal = jit.function(diagonal_places)(rows[0], rows[1])
+    diagonal = compiled(diagonal_places)(rows[0], rows[1])
     mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
     ptr, col, val = rows
-    return Blocks(tangent, rolling, ptr, col, val, diagonal, q, problem.mu, mu_r, equality)
+    rho = compiled(own_units)(val, diagonal)
+    return Blocks(tangent, rolling, ptr, col, val, diagonal, q, problem.mu, mu_r, rho, equality)
 
 
 def _rows(stored: Matrix) -> tuple[Any, ...]:
     """Return a stored matrix as compressed rows."""
-    rows: tuple[Any, ...] = jit.function(compressed_rows)(
+    rows: tuple[Any, ...] = compiled(compressed_rows)(
         stored.m, stored.n, stored.nz, stored.p, stored.i, stored.x
     )
     return rows
@@ -107,11 +116,11 @@ def _rows(stored: Matrix) -> tuple[Any, ...]:
 def _reduce_local(problem: Local) -> Blocks:
     """Return a local problem in blocks."""
     d, nc = problem.spacedim, problem.contacts
-    rows = jit.function(block_rows)(d, nc, *_rows(problem.W))
+    rows = compiled(block_rows)(d, nc, *_rows(problem.W))
     if problem.V is None or problem.R is None or problem.s is None:
         return _blocks(problem, rows, problem.q, None)
-    v = jit.function(full)(problem.V.m, problem.V.n, *_rows(problem.V))
-    r = jit.function(full)(problem.R.m, problem.R.n, *_rows(problem.R))
+    v = compiled(full)(problem.V.m, problem.V.n, *_rows(problem.V))
+    r = compiled(full)(problem.R.m, problem.R.n, *_rows(problem.R))
     rows, q, equality = _eliminate(d, rows, problem.q, v, r, problem.s)
     return _blocks(problem, rows, q, equality)
 
@@ -122,17 +131,17 @@ def _reduce_global(problem: Global) -> Blocks:
     n, m = problem.M.m, problem.H.n
     h = _rows(problem.H)
     if problem.G is not None:
-        h = jit.function(beside)(n, m, *h, *_rows(problem.G))
+        h = compiled(beside)(n, m, *h, *_rows(problem.G))
     p = problem.equalities
     extra = -(-p // d)
-    done, mass = jit.function(condense)(d, nc + extra, n, *_rows(problem.M), *h, problem.f)
+    done, mass = compiled(condense)(d, nc + extra, n, *_rows(problem.M), *h, problem.f)
     if not done[0]:
         raise ModelError("M is singular: a part of it cannot be factorised")
     ptr, col, val, free = done[1:]
     q = free[:m] + problem.w
     equality = None
     if p and problem.b is not None:
-        ptr, col, val, v, r = jit.function(split)(d, nc, extra, ptr, col, val)
+        ptr, col, val, v, r = compiled(split)(d, nc, extra, ptr, col, val)
         rows, q, equality = _eliminate(
             d, (ptr, col, val), q, v[:, :p], r[:p, :p], free[m : m + p] + problem.b
         )
@@ -150,7 +159,7 @@ def _eliminate(
     touched = np.flatnonzero(np.abs(v).reshape(size, -1).max(axis=1) > 0.0).astype(np.int32)
     places = (d * touched[:, None] + np.arange(d)).reshape(-1)
     v = np.ascontiguousarray(v[places])
-    factors, change, sound = jit.function(without_multipliers)(v, np.ascontiguousarray(r), s)
+    factors, change, sound = compiled(without_multipliers)(v, np.ascontiguousarray(r), s)
     if not sound:
         right = np.concatenate((v.T, s[:, None]), axis=1)
         solved = np.linalg.lstsq(r, right, rcond=1e-12)[0]
@@ -161,7 +170,7 @@ def _eliminate(
         factors, change = np.concatenate((np.eye(len(s)), solved), axis=1), -(v @ solved)
     q = q.copy()
     q[places] += change[:, -1]
-    rows = jit.function(add_clique)(d, *rows, touched, np.ascontiguousarray(change[:, :-1]))
+    rows = compiled(add_clique)(d, *rows, touched, np.ascontiguousarray(change[:, :-1]))
     return rows, q, Equality(places, factors)
 
 
@@ -228,7 +237,7 @@ def multipliers(blocks: Blocks, r: Vector) -> Vector | None:
         return None
     factors = blocks.equality.factors
     weights = -np.append(r[blocks.equality.rows], 1.0)
-    found: Vector = jit.function(upper_solution)(factors, len(factors), weights)
+    found: Vector = compiled(upper_solution)(factors, len(factors), weights)
     return found
 
 
@@ -239,7 +248,7 @@ def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> 
         forces = forces + problem.G.apply(l)
     assert blocks.mass is not None
     v = np.empty(len(forces))
-    jit.function(mass_solve)(*blocks.mass, forces, v)
+    compiled(mass_solve)(*blocks.mass, forces, v)
     return v
 
 
@@ -249,9 +258,9 @@ def local(problem: Global) -> Local:
     n, m, p = problem.M.m, problem.H.n, problem.equalities
     h = _rows(problem.H)
     if problem.G is not None:
-        h = jit.function(beside)(n, m, *h, *_rows(problem.G))
+        h = compiled(beside)(n, m, *h, *_rows(problem.G))
     extra = -(-p // d)
-    done, _ = jit.function(condense)(d, nc + extra, n, *_rows(problem.M), *h, problem.f)
+    done, _ = compiled(condense)(d, nc + extra, n, *_rows(problem.M), *h, problem.f)
     if not done[0]:
         raise ModelError("M is singular: a part of it cannot be factorised")
     ptr, col, val, free = done[1:]

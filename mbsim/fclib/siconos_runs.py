@@ -68,8 +68,8 @@ def condense(parts, full):
         wide = sparse.hstack([parts["H"], parts["G"]]) if "G" in parts else parts["H"]
         wide = wide.tocsc()
         left = wide.T.tocsr()
+        right = np.column_stack((wide.toarray(), parts["f"]))
         if full:
-            right = np.column_stack((wide.toarray(), parts["f"]))
             solved = np.linalg.solve(parts["M"].toarray(), right)
         else:
             # SuperLU's way for symmetric matrices
@@ -77,7 +77,6 @@ def condense(parts, full):
                 parts["M"], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01,
                 options={"SymmetricMode": True},
             )  # fmt: skip
-            right = np.column_stack((wide.toarray(), parts["f"]))
             solved = factors.solve(right)
         whole = left @ solved
         m = len(parts["w"])

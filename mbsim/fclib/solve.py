@@ -1,27 +1,28 @@
 """One call for every solver: from arrays in memory to a solution that has been checked.
 
-"Solved" is said only of an error recomputed from the problem as it was given, by the definition in
+"Solved" is said only of errors recomputed from the problem as it was given, by the definitions in
 `merit`; what a solver believes does not count.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.errors import ModelError
-from mbsim.fclib.merit import Figures, completed, errors, judge
+from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.cone import FREE
+from mbsim.fclib.infeasible import is_infeasible
+from mbsim.fclib.merit import FAR, Errors, Figures, completed, errors, judge
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
 from mbsim.fclib.solvers.catalog import solver as named
 from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, sweep_work
-from mbsim.fclib.solvers.task import Task, clock
+from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -48,9 +49,11 @@ class Result:
     iterations
         Of all methods together.
     history
-        (method, rows of iteration, error, |F|/|q|) in order.
+        (method, rows of iteration and the two figures of `cone.relative_errors`) in order.
+    status
+        `solved`, `solved_relative` or `not_solved` (`merit.Errors.status`).
     reason
-        Empty if solved; else why not.
+        Empty if solved; else why not, or what is left over.
     """
 
     problem: Local | Global
@@ -65,13 +68,9 @@ class Result:
     condense_s: float = 0.0
     iterations: int = 0
     history: list[tuple[str, Any]] | tuple[()] = ()
+    status: str = "solved"
     reason: str = ""
     blocks: Blocks | None = None
-
-    @property
-    def status(self) -> str:
-        """`solved` or `not_solved`."""
-        return "not_solved" if self.reason else "solved"
 
     @cached_property
     def solution(self) -> Solution:
@@ -106,9 +105,9 @@ def solve(
     guess
         Where to start; its r is enough. Default: r = 0.
     strict
-        |F| / |q| must be at most `tol`, too.
+        |F| / |q| must be at most `tol`, too, and so hard is it tried to meet what is free of units.
     max_seconds
-        Give up after this long.
+        Give up after this long; compiling and loading do not count.
     """
     began = clock()
     if not tol > 0.0:
@@ -123,7 +122,7 @@ def solve(
     method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
     condensed = clock()
-    task = Task(blocks, r, tol, _second(blocks.q, tol), strict, began + max_seconds)
+    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
     error, error_q = task.look(r)
     if guess is not None or error == 0.0:
         # that r = 0 happens to be near enough makes it no solution
@@ -143,19 +142,20 @@ def _solve_plain(
     sweeps, every = first_sweeps(nc)
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
-    check = np.empty(2)
-    tol_q = _second(problem.q, tol)
-    ptr, col, val, diagonal, u, done, error, error_q, rows = jit.function(local_sweeps)(
-        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol_q, sweeps, every, GRACE,
+    check = np.empty(5)
+    ptr, col, val, diagonal, rho, u, done, error, error_q, rows = compiled(local_sweeps)(
+        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol, sweeps, every, GRACE,
         history, check,
     )  # fmt: skip
-    if check[0] <= tol and check[1] <= tol_q:
-        return Result(
-            problem, "AUTO", tol, strict, r, u, float(check[0]), float(check[1]),
-            clock() - began, 0.0, done, [("NSGS", history[:rows])],
-        )  # fmt: skip
-    blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc))
-    task = Task(blocks, r, tol, tol_q, strict, began + max_seconds)
+    blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc), rho)
+    if error <= tol and error_q <= tol:
+        found = Errors(*check.tolist())
+        if found.status(tol) == "solved":
+            return Result(
+                problem, "AUTO", tol, strict, r, u, found.error, found.error_q, clock() - began,
+                0.0, done, [("NSGS", history[:rows])], blocks=blocks,
+            )  # fmt: skip
+    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
     task.work, task.iterations = done * sweep_work(blocks), done
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
@@ -164,57 +164,61 @@ def _solve_plain(
     return result
 
 
-def _second(q: Vector, tol: float) -> float:
-    """Return the |F|/|q| with which MERIT_1, |F| / (1 + sqrt(|q|)), is at most `tol` as well."""
-    size = math.sqrt(float(q @ q))
-    return tol * min(1.0, (1.0 + math.sqrt(size)) / size) if size > 0.0 else tol
-
-
 def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Result:
-    """Run a solver until the error of the problem as given is small enough."""
+    """Run a solver until the errors of the problem as given are small enough."""
     tol = task.tol
     for _ in range(ROUNDS):
         if not task.done:
             method(task)
         found = completed(problem, task.r, task.blocks)
-        error, error_q = errors(problem, found, task.blocks)
-        met = error <= tol and (error_q <= tol or not task.strict)
-        if met or task.late or not task.done or task.tol < 1e-3 * tol:
+        left = errors(problem, found, task.blocks)
+        status = _status(left, task, tol)
+        if status == "solved" or task.late or not task.done or task.tol < 1e-3 * tol:
             break
+        error = max(left.error, left.own_error)
+        if error <= tol and task.error_q > task.tol_q:
+            break
+        second = max(left.error_q, left.scale_free / FREE, left.velocity_error / FREE)
         task.tighten(
-            0.5 * tol / error if error > tol else 1.0,
-            0.5 * tol / error_q if error_q > tol else 1.0,
+            0.5 * tol / error if error > tol else 1.0, 0.5 * tol / second if second > tol else 1.0
         )
     result = Result(
-        problem, solver.upper(), tol, task.strict, task.r, found.u, error, error_q,
-        iterations=task.iterations, history=task.history, blocks=task.blocks,
+        problem, solver.upper(), tol, task.strict, task.r, found.u, left.error, left.error_q,
+        iterations=task.iterations, history=task.history, status=status, blocks=task.blocks,
     )  # fmt: skip
     result.__dict__["solution"] = found
-    result.reason = _reason(task, tol, error, error_q)
+    result.reason = _reason(status, left, task, tol)
     return result
 
 
-def _reason(task: Task, tol: float, error: float, error_q: float) -> str:
-    """Return why a problem counts as not solved, or nothing."""
-    jammed = _looks_jammed(task)
-    if error <= tol and (error_q <= tol or not task.strict):
-        if jammed and error_q > 100.0 * tol:
-            return (
-                "jammed or infeasible: impulses grow without bound, and the error is small "
-                "only against them"
-            )
+def _status(left: Errors, task: Task, tol: float) -> str:
+    """Return what may be said of an iterate."""
+    if task.strict and left.error_q > tol:
+        return "not_solved"
+    return left.status(tol)
+
+
+def _reason(status: str, left: Errors, task: Task, tol: float) -> str:
+    """Return why a problem counts as not solved, or what is left over, or nothing."""
+    if status == "solved":
         return ""
-    if jammed:
-        return "jammed or infeasible: impulses grow without bound while |F|/|q| stalls"
-    if error < 1e-13 or task.error < 1e-13:
+    if status == "solved_relative":
+        return (
+            f"only the relative error is met: scale-free residual {left.scale_free:.1e}, "
+            f"velocity error {left.velocity_error:.1e}"
+        )
+    met = max(left.error, left.own_error) <= tol
+    if left.velocity_error > FAR * tol and (met or _looks_jammed(task)):
+        if is_infeasible(task.blocks):
+            return "jammed, and infeasible: no impulses at all keep every contact from closing"
+        return "jammed: nothing bounded was found, the error is small only against large impulses"
+    if left.error < 1e-13 or task.error < 1e-13:
         return "stagnates at rounding"
-    if task.late:
-        return "out of time"
-    return "stagnates"
+    return "out of time" if task.late else "stagnates"
 
 
 def _looks_jammed(task: Task) -> bool:
-    """Return whether |r| grew tenfold while |F|/|q| did not fall to a third."""
+    """Return whether |r| grew tenfold while the second figure did not fall to a third."""
     if not task.sizes:
         return False
     last_q, last_r = task.sizes[-1]

@@ -160,7 +160,7 @@ def test_nothing_to_compare_is_an_error(tmp_path):
 
 def test_siconos_solves_what_we_write_for_it():
     if peers.python() is None:
-        pytest.skip("Debian's python3-siconos is not installed")
+        pytest.skip(peers.why_not())
     from mbsim.fclib.reduction import reduce
 
     for d in (2, 3):
@@ -174,7 +174,7 @@ def test_siconos_solves_what_we_write_for_it():
 
 def test_siconos_gets_global_problems_as_they_are():
     if peers.python() is None:
-        pytest.skip("Debian's python3-siconos is not installed")
+        pytest.skip(peers.why_not())
     from mbsim.fclib.reduction import reduce
 
     problem = some_global()
@@ -186,10 +186,33 @@ def test_siconos_gets_global_problems_as_they_are():
         assert np.allclose(run.r, wanted.r, atol=1e-5), name
 
 
+@pytest.mark.parametrize(
+    ("there", "reason"),
+    [
+        ((), "Siconos is not installed"),
+        (("siconos.numerics",), "has Siconos but no SciPy"),
+        (("siconos.numerics", "scipy.sparse.linalg"), ""),
+    ],
+)
+def test_compare_says_why_it_lists_no_siconos(there, reason, file, tmp_path, monkeypatch):
+    monkeypatch.setattr(peers, "_imports", lambda interpreter, module: module in there)
+    peers._found.cache_clear()
+    try:
+        assert (peers.python() is None) == bool(reason)
+        assert reason in peers.why_not()
+        if reason:
+            done = run("compare", file, "--solver", "NSGS", "--repeats", "1", "-o", tmp_path)
+            assert done.exit_code == 0
+            assert "Siconos is not compared" in done.stderr
+            assert reason in done.stderr
+    finally:
+        peers._found.cache_clear()
+
+
 @pytest.mark.parametrize("masses", [False, True])
 def test_siconos_pays_for_the_condensation_that_scipy_does_there(masses):
     if peers.python() is None:
-        pytest.skip("Debian's python3-siconos is not installed")
+        pytest.skip(peers.why_not())
     from mbsim.fclib.reduction import local, reduce
 
     problem = some_global(2)

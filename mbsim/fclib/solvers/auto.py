@@ -3,8 +3,9 @@
 Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets
 a trial (stacks need few iterations of it), then proximal Newton, which needs a good start but
 finishes. Between them, once hardly a contact changes its state, a dash: a few steps of Newton's
-method alone, which then end at rounding. Work is counted in estimated seconds, not measured, so
-that a run does the same on every machine.
+method alone, which then end at rounding. Where all that fails a few contacts in the plane get every
+combination of their states. Work is counted in estimated seconds, not measured, so that a run does
+the same on every machine.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.core import jit
+from mbsim.fclib.clock import compiled
 from mbsim.fclib.cone import count_changes
+from mbsim.fclib.factor import factor_work
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers import newton, splitting, sweeps
+from mbsim.fclib.solvers import newton, splitting, states, sweeps
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -94,7 +96,7 @@ class Dashes:
         if task.over or task.r is self.begun_at:
             return
         if task.r is not self.looked_at:
-            changed = jit.function(count_changes)(b.tangent, b.mu, task.r, self.states)
+            changed = compiled(count_changes)(b.tangent, b.mu, task.r, self.states)
             self.settled = changed <= CHANGES * b.contacts + 1.0
             self.looked_at = task.r
         spent = task.work if self.settled and task.work >= self.due else 0.0
@@ -118,11 +120,15 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
+    task.newton = costs.newton
     dashes = Dashes(task, costs.newton)
     if task.blocks.rolling:
         _rolling(task, costs, dashes)
     else:
         _solve(task, costs, dashes)
+    if task.distance > 1.0 and len(task.blocks.tangent) == 1 and not task.blocks.rolling:
+        if task.blocks.contacts <= states.FEW:
+            states.run(task)
     dashes.polish()
 
 
@@ -130,7 +136,7 @@ def _solve(task: Task, costs: Costs, dashes: Dashes) -> None:
     """Solve with sweeps, ADMM and Newton's method."""
     _sweep(task, BEGIN, dashes)
     finish = FINISH * costs.newton
-    if not task.over and task.blocks.contacts >= STACKS and task.distance > SETTLED / task.tol:
+    if not task.over and task.blocks.contacts >= STACKS and task.error > max(SETTLED, task.tol):
         trial = BEGIN + costs.factor + 2.0 * RESTED * costs.splitting
         _sweep(task, trial, dashes)
         dashes.run(trial)
@@ -146,10 +152,10 @@ def _costs(task: Task) -> Costs:
     """Estimate what the methods cost."""
     b = task.blocks
     d = 1 + len(b.tangent) + len(b.rolling)
-    symbolic = jit.function(analyse)(b.contacts, b.ptr, b.col, d)
-    flops = jit.function(elimination_flops)(symbolic, d)
+    symbolic = compiled(analyse)(b.contacts, b.ptr, b.col, d)
+    flops = compiled(elimination_flops)(symbolic, d)
     entries = float(symbolic[5][-1])
-    factor = 1.2e-10 * flops + 3e-8 * len(b.col)
+    factor = compiled(factor_work)(flops, len(b.col))
     once = 1e-9 * entries + 1.2e-7 * b.contacts
     step = math.inf if b.rolling else factor + once
     return Costs(step, once + 5e-9 * len(b.col), factor)

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
-from mbsim.fclib.cone import natural_map, norm, relative_errors
-from mbsim.fclib.factor import factorise, solve, transposed_places
+from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.cone import bring_into_cones, improves, norm, own_errors, relative_errors
+from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
+from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -45,13 +45,15 @@ HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
+#: More Newton iterations than any call takes.
+MANY = 10**9
 
 # places in `state`, what a later call needs to go on
 (
     ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH, DASH,
-    PATIENCE,
-) = range(14)  # fmt: skip
-STATE = 14
+    PATIENCE, LAST,
+) = range(15)  # fmt: skip
+STATE = 15
 
 
 @jitable
@@ -203,7 +205,7 @@ def _linear_system(tangent, ptr, col, val, mu, rho, shift, u, r, slip, number, n
 
 @jitable
 def proximal_newton(
-    tangent, ptr, col, val, diagonal, q, mu, r, centre, state, tol, tol_q, limit, history, rows
+    tangent, ptr, col, val, diagonal, q, mu, own, r, centre, state, tol, tol_q, limit, history, rows
 ):
     """Take proximal steps until the error is small enough or `limit` Newton iterations are spent.
 
@@ -212,6 +214,7 @@ def proximal_newton(
     With the goal reached, one more step, of at most FINAL iterations, is taken to a tenth of it.
     With state[DASH] it is one step of so many iterations at most, which ends when more than
     state[PATIENCE] of them in a row leave more than GAIN of the error, or at WELL times the goal.
+    No more than state[LAST] Newton iterations are begun.
     Returns the number of rows in `history` (Newton iterations so far, error, |F|/|q|).
     """
     nt = len(tangent)
@@ -254,10 +257,9 @@ def proximal_newton(
     rhs = np.empty(m)
     recent = np.empty(MEMORY)
     spent = 0
-    bound = norm(q)
     flops = 0.0
     finishing = False
-    while spent < limit or finishing:
+    while (spent < limit or finishing) and spent < state[LAST]:
         alpha = state[ALPHA]
         shift = alpha * mean
         for a in range(nc):
@@ -282,6 +284,8 @@ def proximal_newton(
         if state[DASH] > 0.0:
             aim = WELL * final
             most = int(state[DASH])
+        if most > state[LAST] - spent:
+            most = int(state[LAST] - spent)
         recent[:] = size_f
         newtons = 0
         good = False
@@ -323,8 +327,7 @@ def proximal_newton(
                 if sound:
                     solve(d, symbolic, factors, exchange, rhs, part)
             newtons += 1
-            # seconds on a usual processor: a measure of work that does not depend on the clock
-            state[WORK] += 1.2e-10 * flops + 1e-9 * symbolic[5][-1] + 3e-8 * len(col) + 1e-7 * nc
+            state[WORK] += factor_work(flops, len(col)) + 1e-9 * symbolic[5][-1] + 1e-7 * nc
             if not sound:
                 break
             for k in range(m):
@@ -372,11 +375,7 @@ def proximal_newton(
                 recent[k] = recent[k + 1]
             recent[MEMORY - 1] = size_f
             # natural map of the proximal problem
-            missing = 0.0
-            for a in range(nc):
-                missing += natural_map(tangent, (), mu[a], 0.0, u, x, d * a, 1.0, work)
-            scale = max(bound, norm(x), norm(u))
-            near = math.sqrt(missing) / (scale if scale > 0.0 else 1.0)
+            near = own_errors(tangent, (), ptr, col, val, mu, mu_r, own, q, u, x, work)[0]
             if near <= aim:
                 good = True
                 break
@@ -391,8 +390,11 @@ def proximal_newton(
         state[NEWTONS] += newtons
         state[STEPS] += 1
         # the error of the problem itself
-        product(tangent, (), ptr, col, val, q, x, plain)
-        error, error_q = relative_errors(tangent, (), mu, mu_r, q, plain, x, work)
+        bring_into_cones(tangent, mu, x, trial)
+        product(tangent, (), ptr, col, val, q, trial, plain)
+        error, error_q = relative_errors(
+            tangent, (), ptr, col, val, mu, mu_r, own, q, plain, trial, work
+        )
         if rows < len(history):
             history[rows, 0] = state[NEWTONS]
             history[rows, 1] = error
@@ -402,14 +404,13 @@ def proximal_newton(
         better = error < state[BEST]
         done = error <= tol and error_q <= tol_q
         if error <= tol and state[BEST] <= tol:
-            # the other figure decides, and impulses must not run away for it
-            better = error_q < state[BEST_Q] and norm(x) <= GROWTH * norm(r)
+            better = improves(error_q, norm(trial), state[BEST_Q], norm(r))
         if better:
             state[STALLED] = 0.0 if error < 0.9 * state[BEST] else state[STALLED] + 1.0
             state[BEST] = error
             state[BEST_Q] = error_q
             for k in range(m):
-                r[k] = x[k]
+                r[k] = trial[k]
         else:
             state[STALLED] += 1.0
         if finishing or state[DASH] > 0.0:
@@ -432,13 +433,13 @@ def proximal_newton(
             if alpha > 0.0:
                 state[ALPHA] = max(min(lower, alpha), SMALLEST_ALPHA)
         else:
-            if alpha == 0.0 and error >= before:
-                break  # Newton's method alone, and it failed
+            if alpha == 0.0 and state[STALLED] > MEMORY:
+                break  # Newton's method alone, and it fails
             state[FAILED_AT] = alpha
             state[SINCE] = 0.0
             state[ALPHA] = min(4.0 * alpha, 1e6)
-            if error < before:
-                state[ERROR] = error
+            if error < before or alpha == 0.0:
+                state[ERROR] = min(error, before)
                 for k in range(m):
                     centre[k] = x[k]
     return rows
@@ -500,6 +501,8 @@ class Proximal:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
         work, newtons = state[WORK], state[NEWTONS]
+        if not self._affords():
+            return False
         rows = self._step(limit)
         rows[:, 0] += task.iterations - newtons
         self.total += self.centre
@@ -518,23 +521,39 @@ class Proximal:
         """
         task, state = self.task, self.state
         state[DASH], state[PATIENCE] = most, patience
+        if not self._affords():
+            return
         rows = self._step(1)
-        if state[BEST] <= GAIN * task.error and task.offer(self.r, state[BEST], state[BEST_Q]):
+        within = state[BEST] <= task.tol and task.error <= task.tol
+        gained = state[BEST_Q] <= GAIN * task.error_q if within else False
+        if (gained or state[BEST] <= GAIN * task.error) and task.offer(
+            self.r, state[BEST], state[BEST_Q]
+        ):
             task.work += float(state[WORK])
             task.iterations += int(state[NEWTONS])
             rows[:, 0] = task.iterations
             task.note("NSN", rows)
 
+    def _affords(self) -> bool:
+        """Set how many Newton iterations there is time for; return whether there are any."""
+        state = self.state
+        step = self.newton_work or self.task.newton
+        last = self.task.affordable("Newton", step, MANY) if step > 0.0 else MANY
+        state[LAST] = last
+        return last > 0
+
     def _step(self, limit: int) -> Any:
         """Spend about `limit` Newton iterations and return rows for the history."""
+        work, began = float(self.state[WORK]), clock()
         b, task = self.task.blocks, self.task
         r = self.r.copy()
         history = np.empty((ROWS, 3))
-        rows = jit.function(proximal_newton)(
-            b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, r, self.centre, self.state,
-            task.tol, task.tol_q, limit, history, 0,
+        rows = compiled(proximal_newton)(
+            b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.rho, r, self.centre,
+            self.state, task.tol, task.tol_q, limit, history, 0,
         )  # fmt: skip
         self.r = r
+        task.took("Newton", float(self.state[WORK]) - work, began)
         return history[:rows]
 
 
@@ -554,5 +573,5 @@ def _until(task: Task, proximal: Proximal) -> None:
     while not task.done and not task.late:
         if not proximal.advance(chunk) or proximal.stalled > 100:
             return
-        if proximal.state[ALPHA] == 0.0 and proximal.stalled > 0:
+        if proximal.state[ALPHA] == 0.0 and proximal.stalled > MEMORY:
             return

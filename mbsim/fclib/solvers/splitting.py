@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
-from mbsim.fclib.cone import cone_height, norm, relative_errors
-from mbsim.fclib.factor import factorise, solve, transposed_places
+from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.cone import cone_height, improves, norm, relative_errors
+from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
+from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
 
 # places in `state`, what a later call needs to go on
 (
@@ -77,8 +77,8 @@ def room_for_factors(d, ptr, col, val):
 
 @jitable
 def admm(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, z, y, last_z, last_y, lift, room,
-    state, accelerate, tol, tol_q, limit, every, history, rows,
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, own, r, z, y, last_z, last_y, lift,
+    room, state, accelerate, tol, tol_q, limit, every, history, rows,
 ):  # fmt: skip
     """Iterate until the error is small enough or `limit` iterations are done.
 
@@ -116,8 +116,7 @@ def admm(
     for _ in range(limit):
         penalty = state[PENALTY]
         if penalty != state[FACTORED]:
-            # seconds on a usual processor: a measure of work that does not depend on the clock
-            state[WORK] += 1.2e-10 * flops + 3e-8 * len(col)
+            state[WORK] += factor_work(flops, len(col))
             for a in range(nc):
                 k = diagonal[a]
                 for s in range(d):
@@ -160,7 +159,9 @@ def admm(
         state[WORK] += 1e-9 * len(factors) + 1e-7 * nc + 1e-8 / every * len(col)
         if state[ITERATIONS] % every == 0.0:
             product(tangent, rolling, ptr, col, val, q, z, u)
-            error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, z, work)
+            error, error_q = relative_errors(
+                tangent, rolling, ptr, col, val, mu, mu_r, own, q, u, z, work
+            )
             if rows < len(history):
                 history[rows, 0] = state[ITERATIONS]
                 history[rows, 1] = error
@@ -168,8 +169,7 @@ def admm(
                 rows += 1
             better = error < state[BEST]
             if error <= tol and state[BEST] <= tol:
-                # the other figure decides, and impulses must not run away for it
-                better = error_q < state[BEST_Q] and norm(z) <= GROWTH * norm(r)
+                better = improves(error_q, norm(z), state[BEST_Q], norm(r))
             if better:
                 state[BEST] = error
                 state[BEST_Q] = error_q
@@ -236,7 +236,11 @@ class Splitting:
         self.state[MOMENTUM] = 1.0
         b = task.blocks
         d = 1 + len(b.tangent) + len(b.rolling)
-        self.room = jit.function(room_for_factors)(d, b.ptr, b.col, b.val)
+        self.room = compiled(room_for_factors)(d, b.ptr, b.col, b.val)
+        symbolic, factors = self.room[0], self.room[3]
+        flops = compiled(elimination_flops)(symbolic, d)
+        self.factor = float(compiled(factor_work)(flops, len(b.col)))
+        self.step = 1e-9 * len(factors) + 1e-7 * b.contacts + 1e-8 * len(b.col)
 
     def penalise(self, penalty: float) -> None:
         """Go on with another penalty."""
@@ -256,16 +260,21 @@ class Splitting:
         """Iterate at most `limit` times; return whether anything was done."""
         task, state = self.task, self.state
         b = task.blocks
-        r = task.r.copy()
+        r, began = task.r.copy(), clock()
+        # the penalty may change on the way
+        limit = task.affordable("ADMM", self.step, limit, 2.0 * self.factor)
+        if limit == 0:
+            return False
         history = np.empty((min(ROWS, limit), 3))
         work, before = state[WORK], state[ITERATIONS]
-        rows = jit.function(admm)(
-            b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
-            self.z, self.y, self.last_z, self.last_y, self.lift, self.room, state,
+        rows = compiled(admm)(
+            b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r,
+            b.rho, r, self.z, self.y, self.last_z, self.last_y, self.lift, self.room, state,
             self.accelerate, task.tol, task.tol_q, limit, every, history, 0,
         )  # fmt: skip
         history[:rows, 0] += task.iterations - before
         task.work += float(state[WORK] - work)
+        task.took("ADMM", float(state[WORK] - work), began)
         task.iterations += int(state[ITERATIONS] - before)
         if np.isfinite(state[BEST]):
             task.offer(r, state[BEST], state[BEST_Q])

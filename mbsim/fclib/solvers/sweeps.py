@@ -6,19 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import (
     add_row,
     block_rows,
     compressed_rows,
     diagonal_places,
+    own_units,
     product,
     product_of_stored,
 )
-from mbsim.fclib.cone import norm, relative_errors
+from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.cone import improves, norm, own_errors, relative_errors, residual
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
-from mbsim.fclib.solvers.task import GROWTH, POLISHED, ROWS, Task
+from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -72,20 +73,29 @@ def local_sweeps(
 ):
     """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
 
-    `check` gets the errors with the stored W. Returns the blocks and what `gauss_seidel` does.
+    `check` gets the figures of the verdict, with the stored W: |F| / max(|q|, |r|, |u|), |F| / |q|,
+    and those of `own_errors`. Returns the blocks, u, and what `gauss_seidel` does.
     """
     d = 1 + len(tangent)
     ptr, col, val = block_rows(d, len(mu), *compressed_rows(m, m, nz, p, i, x))
     diagonal = diagonal_places(ptr, col)
+    rho = own_units(val, diagonal)
     # without rolling directions the numbers of mu_r do not matter
     done, error, error_q, rows = gauss_seidel(
-        tangent, (), ptr, col, val, diagonal, q, mu, mu, r, tol, tol_q, sweeps, every, grace,
+        tangent, (), ptr, col, val, diagonal, q, mu, mu, rho, r, tol, tol_q, sweeps, every, grace,
         history,
     )  # fmt: skip
     u = q.copy()
     product_of_stored(m, nz, p, i, x, r, u)
-    check[0], check[1] = relative_errors(tangent, (), mu, mu, q, u, r, np.empty(m))
-    return ptr, col, val, diagonal, u, done, error, error_q, rows
+    work = np.empty(m)
+    missing, bound = residual(tangent, (), mu, mu, u, r, work), norm(q)
+    scale = max(bound, norm(r), norm(u))
+    check[0] = missing / scale if scale > 0.0 else missing
+    check[1] = missing / bound if bound > 0.0 else missing
+    check[2], check[3], check[4] = own_errors(
+        tangent, (), ptr, col, val, mu, mu, rho, q, u, r, work
+    )
+    return ptr, col, val, diagonal, rho, u, done, error, error_q, rows
 
 
 @jitable
@@ -112,8 +122,8 @@ def _leap(r, old, older, trial):
 
 @jitable
 def gauss_seidel(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, tol, tol_q, sweeps, every, grace,
-    history,
+    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, tol_q, sweeps, every,
+    grace, history,
 ):  # fmt: skip
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
@@ -149,7 +159,9 @@ def gauss_seidel(
         if done % every == 0 or small or done == most:
             looked = done
             product(tangent, rolling, ptr, col, val, q, r, u)
-            error, error_q = relative_errors(tangent, rolling, mu, mu_r, q, u, r, missing)
+            error, error_q = relative_errors(
+                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, missing
+            )
             if rows < len(history):
                 history[rows, 0] = done
                 history[rows, 1] = error
@@ -175,7 +187,7 @@ def gauss_seidel(
                     sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, work)
                     product(tangent, rolling, ptr, col, val, q, trial, u)
                     leapt, leapt_q = relative_errors(
-                        tangent, rolling, mu, mu_r, q, u, trial, missing
+                        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, missing
                     )
                     done += 1
                     if leapt < error:
@@ -183,7 +195,7 @@ def gauss_seidel(
                         error, error_q = leapt, leapt_q
                         if error <= tol and error_q <= tol_q:
                             break
-    if len(kept) > 0 and not (error <= tol and error_q < kept_q and norm(r) <= GROWTH * norm(kept)):
+    if len(kept) > 0 and not (error <= tol and improves(error_q, norm(r), kept_q, norm(kept))):
         r[:] = kept
         error, error_q = kept_error, kept_q
     return done, error, error_q, rows
@@ -193,14 +205,19 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
     """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
     b = task.blocks
     r: Vector = (task.r if start is None else start).copy()
+    cost, began = sweep_work(b), clock()
+    sweeps = task.affordable("NSGS", cost, sweeps)
+    if sweeps == 0:
+        return r
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
-    done, error, error_q, rows = jit.function(gauss_seidel)(
-        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, r,
+    done, error, error_q, rows = compiled(gauss_seidel)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
         task.tol, task.tol_q, sweeps, every, GRACE, history,
     )  # fmt: skip
     history[:rows, 0] += task.iterations
     task.iterations += done
-    task.work += done * sweep_work(b)
+    task.work += done * cost
+    task.took("NSGS", done * cost, began)
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     return r

@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.core import jit
 from mbsim.fclib.blocks import product
-from mbsim.fclib.cone import relative_errors
+from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.cone import improves, relative_errors
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
     from mbsim.fclib.reduction import Blocks
 
-#: Share of |F|/|q| that is a gain which deserves more work.
+#: Share of the second figure that is a gain which deserves more work.
 GAINED = 0.7
-#: Growth of |r| that a smaller |F|/|q| is worth.
-GROWTH = 2.0
 #: A method that has reached its goal goes on to this share of it while that costs little: its last
 #: iterations gain most for their work, and what is only just good enough serves nobody well.
 POLISHED = 0.1
+#: Seconds over those estimated that a method is thought to take before it has run.
+UNKNOWN = 4.0
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
-
-
-def clock() -> float:
-    """Return seconds, those spent compiling left out: a machine compiles a solver once."""
-    return time.perf_counter() - jit.compile_seconds
 
 
 @dataclass(eq=False)
 class Task:
     """One problem on its way to a solution.
+
+    Two figures of an iterate (`cone.relative_errors`) are wanted small. `error` is the published
+    error, in the units given and in the contacts' own. `error_q` is what a solution without scales
+    needs as well.
 
     Parameters
     ----------
@@ -43,7 +41,7 @@ class Task:
     r
         (m,) the start; then the best iterate so far.
     tol, tol_q
-        Wanted: |F| / max(|q|, |r|, |u|) <= tol and |F| / |q| <= tol_q.
+        Wanted: error <= tol and error_q <= tol_q.
     strict
         Whether the second must be reached; else it gets more work while it gains, at most twenty
         times as much, or 50 ms and a third, at a time.
@@ -61,15 +59,20 @@ class Task:
     error_q: float = np.inf
     #: Estimated seconds, and iterations: what the methods have done so far.
     work: float = 0.0
-    #: Work up to which |F|/|q| may still take, when the first goal was reached, and |F|/|q| then.
+    #: Work up to which error_q may still take, when the first goal was reached, and error_q then.
     grace: float = np.inf
     reached: float = np.inf
     graced_at: float = np.inf
     iterations: int = 0
-    #: (method, rows of iteration, error, |F|/|q|) in the order in which the methods ran.
+    #: (method, rows of iteration, error, error_q) in the order in which the methods ran.
     history: list[tuple[str, Any]] = field(default_factory=list)
-    #: Size of r where |F|/|q| was looked at, to see impulses that grow without bound.
+    #: error_q and the size of r where these were looked at: impulses may grow without bound.
     sizes: list[tuple[float, float]] = field(default_factory=list)
+    #: Estimated seconds of a Newton iteration, where a method knows it.
+    newton: float = 0.0
+    #: Seconds that a method took over those estimated, and whether there is no time for any more.
+    pace: dict[str, float] = field(default_factory=dict)
+    expired: bool = False
 
     @property
     def done(self) -> bool:
@@ -85,13 +88,33 @@ class Task:
 
     @property
     def late(self) -> bool:
-        """Whether the time is over; compiling does not count."""
-        return clock() > self.deadline
+        """Whether the time is over, or too short for what would come next."""
+        return self.expired or clock() > self.deadline
 
     @property
     def over(self) -> bool:
         """Whether to stop: done, or out of time."""
         return self.done or self.late
+
+    def affordable(self, name: str, step: float, limit: int, once: float = 0.0) -> int:
+        """Return how many iterations of a method there is time for, at most `limit`.
+
+        `step`, `once`: estimated seconds of an iteration and of beginning.
+        """
+        if self.deadline == np.inf:
+            return limit
+        pace = self.pace.get(name, UNKNOWN)
+        room = ((self.deadline - clock()) / pace - once) / step
+        self.expired = not room >= 1.0
+        if self.expired:
+            return 0
+        # a machine's pace changes: at the end half of what is left, then half of that
+        return limit if 2 * limit <= room else max(1, min(limit, int(0.5 * room)))
+
+    def took(self, name: str, work: float, began: float) -> None:
+        """Learn from a method that began at a value of `clock` and was estimated to take `work`."""
+        if work > 0.0:
+            self.pace[name] = max(clock() - began, 1e-9) / work
 
     def tighten(self, factor: float, factor_q: float) -> None:
         """Want smaller errors, by these factors."""
@@ -103,22 +126,32 @@ class Task:
         """Return the errors of an iterate."""
         b = self.blocks
         u = np.empty_like(r)
-        jit.function(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
-        errors: tuple[float, float] = jit.function(relative_errors)(
-            b.tangent, b.rolling, b.mu, b.mu_r, b.q, u, r, np.empty_like(r)
+        compiled(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
+        errors: tuple[float, float] = compiled(relative_errors)(
+            b.tangent,
+            b.rolling,
+            b.ptr,
+            b.col,
+            b.val,
+            b.mu,
+            b.mu_r,
+            b.rho,
+            b.q,
+            u,
+            r,
+            np.empty_like(r),
         )
         return errors
 
     def offer(self, r: Vector, error: float, error_q: float) -> bool:
         """Take an iterate if it is better, and return whether it was.
 
-        Within the tolerance |F|/|q| decides, and impulses must not grow for it: in a wedge the
-        error falls as they run away.
+        Within the first goal the second figure decides (`cone.improves`).
         """
         better = error < self.error
         if error <= self.tol and self.error <= self.tol:
-            small = np.linalg.norm(r) <= GROWTH * np.linalg.norm(self.r)
-            better = error_q < self.error_q and bool(small)
+            size, before = float(np.linalg.norm(r)), float(np.linalg.norm(self.r))
+            better = bool(improves(float(error_q), size, self.error_q, before))
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
         if self.error <= self.tol:
