@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
@@ -336,16 +337,36 @@ def test_the_table_of_dop853_is_the_published_one():
 
 
 def test_the_table_of_dop853_meets_the_conditions_of_its_order():
-    A, C, B = dop853.A, dop853.C, dop853.A[12]
-    np.testing.assert_allclose(A.sum(axis=1), C, rtol=0, atol=2e-14)
+    # exactly, in rational numbers; what is left over is what rounding each coefficient leaves
+    def exactly(row):
+        return [Fraction(float(x)) for x in row]
+
+    half = Fraction(1, 2**53)
+    A, C = [exactly(row) for row in dop853.A], exactly(dop853.C)
+    B = A[12]
+    for row, c in zip(A, C, strict=True):
+        assert abs(sum(row) - c) <= half * (sum(map(abs, row)) + abs(c))
     for k in range(8):
-        assert B @ C**k == pytest.approx(1.0 / (k + 1.0), abs=1e-15)
-    for k in range(7):
+        powers = [c**k for c in C]
+        terms = [b * power for b, power in zip(B, powers, strict=True)]
+        assert abs(sum(terms) - Fraction(1, k + 1)) <= half * (k + 1) * sum(map(abs, terms))
+        if k == 7:
+            break
         # sum b_i a_ij c_j^k = 1 / ((k+1) (k+2)): the trees of height 2 up to order 8
-        assert B @ A @ C**k == pytest.approx(1.0 / ((k + 1.0) * (k + 2.0)), abs=1e-15)
+        terms = [
+            b * a * power
+            for b, row in zip(B, A, strict=True)
+            for a, power in zip(row, powers, strict=True)
+        ]
+        missing = abs(sum(terms) - Fraction(1, (k + 1) * (k + 2)))
+        assert missing <= half * (k + 2) * sum(map(abs, terms))
     # an error estimate is blind to what its lower order integrates exactly
-    assert [dop853.E5[0] @ C[:12] ** k for k in range(5)] == pytest.approx([0.0] * 5, abs=1e-15)
-    assert [dop853.E3[0] @ C[:12] ** k for k in range(3)] == pytest.approx([0.0] * 3, abs=1e-15)
+    for weights, orders in ((dop853.E5[0], 5), (dop853.E3[0], 3)):
+        for k in range(orders):
+            terms = [e * c**k for e, c in zip(exactly(weights), C[:12], strict=True)]
+            # the weights themselves are differences from b
+            room = sum(abs(b) * c**k for b, c in zip(B[:12], C[:12], strict=True))
+            assert abs(sum(terms)) <= half * ((k + 1) * sum(map(abs, terms)) + room)
 
 
 def test_error_of_dop853_joins_both_estimates():
