@@ -9,8 +9,13 @@ arrays:
   polyhedron (`model.hull`);
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
-  and its share of the law's force (1 unless a manifold splits the force of one corner over
-  several points, so that the sum does not jump when a corner passes over an edge).
+  its share of the law's force (1 unless a manifold splits the force of one corner over
+  several points, so that the sum does not jump when a corner passes over an edge), and the
+  couple on I for a unit of the law's energy where the share turns with the shapes
+  (`geometry.crossing`), else 0.
+
+The elastic energy of a pair is the sum of share E(depth) over its points: forces and couples are
+its slopes.
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
@@ -30,8 +35,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
 
-#: Numbers of one candidate: depth, point, normal, share.
-POINT = 8
+#: Numbers of one candidate: depth, point, normal, share, couple.
+POINT = 11
+COUPLE = 8
 #: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
 #: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
 #: points' part of the force about the incident, in `plane_axes`.
@@ -88,6 +94,13 @@ def put_point(row, depth, p, n, share=1.0):
     row[1], row[2], row[3] = p[0], p[1], p[2]
     row[4], row[5], row[6] = n[0], n[1], n[2]
     row[7] = share
+    row[8] = row[9] = row[10] = 0.0
+
+
+@jitable
+def put_couple(row, couple):
+    """Give a candidate the couple on I for a unit of its energy."""
+    row[8], row[9], row[10] = couple[0], couple[1], couple[2]
 
 
 @jitable

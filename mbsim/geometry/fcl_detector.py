@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.geometry.hull_overlap import Hull, Solid, hull_of, least_overlap, touching_point
 from mbsim.geometry.mesh_contact import (
     Surface,
     against_convex,
@@ -61,6 +62,7 @@ class FclDetector:
         self._graphics = graphics
         self._objects: dict[tuple[int, int], Any] = {}
         self._surfaces: dict[int, Surface] = {}
+        self._hulls: dict[int, Hull] = {}
         self._fcl: Any = None
         self.failure: BaseException | None = None
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._answer)
@@ -161,6 +163,8 @@ class FclDetector:
         first = int(scene.pairs.slot[pair])
         last = first + int(scene.kinds.slots[kind])
         meshes = "MESH" in (self._graphics[i].shape, self._graphics[j].shape)
+        if meshes and self._put_hull(i, j, scene.work.points[first]):
+            return
         most = _MESH_CONTACTS if meshes else last - first
         request = fcl.CollisionRequest(num_max_contacts=most, enable_contact=True)
         result = fcl.CollisionResult()
@@ -187,7 +191,7 @@ class FclDetector:
             points[slot, 0] = depth
             points[slot, 1:4] = p
             points[slot, 4:7] = sign * n
-            points[slot, 7] = 1.0
+            points[slot, 7], points[slot, 8:] = 1.0, 0.0
 
     def _surface(self, g: int) -> Surface:
         """Return the mesh of graphic g with its normals and neighbours."""
@@ -198,6 +202,29 @@ class FclDetector:
             convex = graphic.hull is not None
             self._surfaces[g] = Surface(graphic.vertices, graphic.faces, convex)
         return self._surfaces[g]
+
+    def _put_hull(self, i: int, j: int, row: Any) -> bool:
+        """Fill the row of a convex mesh on a round solid; False where the pair is another one."""
+        turned = self._graphics[j].shape != "MESH"
+        mesh, other = (i, j) if turned else (j, i)
+        shape = self._graphics[other].shape
+        if shape not in ("CYLINDER", "FRUSTUM", "ELLIPSOID") or self._graphics[mesh].hull is None:
+            return False
+        if mesh not in self._hulls:
+            surface = self._surface(mesh)
+            self._hulls[mesh] = hull_of(
+                surface.vertices, surface.faces, surface.normals, surface.beside
+            )
+        hull = self._hulls[mesh]
+        (p, R), (p_o, R_o) = self._frame(mesh), self._frame(other)
+        size = self._scene.graphics.size[other]
+        solid = Solid(shape, size, R.T @ (p_o - p), R.T @ R_o)
+        depth, n = least_overlap(hull, solid)
+        row[0], row[7], row[8:] = max(depth, -0.0), 1.0, 0.0
+        if depth > 0.0:
+            row[1:4] = p + R @ touching_point(hull, solid, depth, n)
+            row[4:7] = -(R @ n) if turned else R @ n
+        return True
 
     def _put_mesh(self, i: int, j: int, contacts: list[Any], row: Any) -> None:
         """Fill the row of a pair with a mesh from the triangles in contact."""
@@ -216,7 +243,7 @@ class FclDetector:
         row[0] = depth if depth > 0.0 else -0.0
         row[1:4] = p + R @ at
         row[4:7] = -(R @ n) if turned else R @ n
-        row[7] = 1.0
+        row[7], row[8:] = 1.0, 0.0
 
     def _on_mesh(self, i: int, j: int, contacts: list[Any]) -> tuple[float, Any, Any]:
         """Return (depth, point, normal) of two meshes in J's axes."""

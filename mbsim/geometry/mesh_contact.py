@@ -59,7 +59,7 @@ class Surface:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         self.normals: Array = normals / np.where(length > 0.0, length, 1.0)
         self.size = float(np.abs(vertices).max())
-        self._beside = self._neighbours()
+        self.beside = self._neighbours()
         order = np.argsort(faces.ravel(), kind="stable")
         self._at_vertex = order // 3
         self._first = np.searchsorted(faces.ravel()[order], np.arange(len(vertices) + 1))
@@ -104,7 +104,7 @@ class Surface:
             left.remove(seed)
             group, k = [seed], 0
             while k < len(group):
-                for f in self._beside[group[k]].tolist():
+                for f in self.beside[group[k]].tolist():
                     if f in left:
                         left.remove(f)
                         group.append(f)
@@ -129,7 +129,7 @@ class Surface:
             left.remove(seed)
             piece, refused, k = [seed], set(), 0
             while k < len(piece):
-                for f in self._beside[piece[k]].tolist():
+                for f in self.beside[piece[k]].tolist():
                     if f not in left or f in refused:
                         continue
                     so_far, new = np.array(piece), np.array([f])
@@ -270,7 +270,8 @@ def against_convex(
     depth, n, patch = best
     corners = surface.vertices[np.unique(surface.faces[patch])]
     along = corners @ n
-    highest = corners[along >= along.max() - 0.5 * depth]
+    # what FCL saw touching may be apart when measured: then the support points alone count
+    highest = corners[along >= along.max() - 0.5 * max(depth, 0.0)]
     return depth, place(highest, lowest_side(shape, n, depth), n), n
 
 
@@ -460,7 +461,7 @@ def _of_patches(
             from_i or surface_i.allows(int(corners_i[bottom]), -R.T @ n)
         ):
             depth = float(points_j[top] @ n - points_i[bottom] @ n)
-            near = 0.5 * depth
+            near = 0.5 * max(depth, 0.0)
             highest = points_j[high[:, k] >= high[top, k] - near]
             lowest = points_i[low[:, k] <= low[bottom, k] + near]
             return depth, place(highest, lowest, n), n
@@ -499,8 +500,11 @@ def place(high: Array, low: Array, n: Array) -> Array:
 
 
 def lowest_side(shape: Any, n: Array, depth: float) -> Array:
-    """Return points of a convex shape that are lowest along n, to half the depth, shape (k, 3)."""
+    """Return points of a convex shape that are lowest along n, to half the depth, shape (k, 3).
+
+    Apart (depth < 0) it is the support point alone.
+    """
     ways = -(n + _AROUND @ np.array(_across(n))) / np.sqrt(1.0 + 4.0 * SLOPE**2)
     points = np.array([shape(-n), *(shape(d) for d in ways)])
     heights = points @ n
-    return points[heights <= heights.min() + 0.5 * depth]
+    return points[heights <= heights.min() + 0.5 * max(depth, 0.0)]

@@ -17,10 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, put_point
+from mbsim.geometry.catalog import axis, put_couple, put_point
+from mbsim.geometry.crossing import (
+    EDGES_MEET,
+    FACE_OF_I,
+    FACE_OF_J,
+    LEAST_SHARE,
+    middle_of_lines,
+    share_of_crossing,
+    turning,
+)
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.model.hull import (
     AT_CORNERS,
@@ -42,9 +50,6 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 PARALLEL = 1e-16
 #: Two edges must overlap less than a face by this part, as between boxes.
 FACES_FIRST = 1e-6
-#: A point with a smaller share is none: it would be an incident without force.
-LEAST_SHARE = 1e-6
-FACE_OF_J, FACE_OF_I, EDGES_MEET = range(3)
 #: Rows of two polyhedra at most, and pairs of their edges; larger ones go through FCL.
 HULL_SLOTS = 64
 MOST_EDGE_PAIRS = 4096
@@ -185,20 +190,6 @@ def face_at_edge(hull, k, n):
 
 
 @jitable
-def turned_over(hull, f, other, u, n):
-    """Return how far face f has given way to `other`, the face beyond its edge along u, 0 to 1/2.
-
-    `n` is what the polyhedron looks along, `u` the edge with f to its left seen from outside.
-    Where n is as far from both normals, both faces are alike.
-    """
-    m, beyond = plane(hull, f), plane(hull, other)
-    side = cross(u, m)
-    whole = math.atan2(dot(beyond, side), dot(beyond, m))
-    tilt = math.atan2(dot(n, side), dot(n, m))
-    return 0.5 * step(tilt / whole, 0.11, 0.0, 0.5, 1.0)
-
-
-@jitable
 def overlapping(a, hull_j, frame_j, points):
     """Write the points of two polyhedra (a is I in J's axes); return a gap, or 0 in overlap."""
     least, fj, low = faces_overlap(hull_j, a)
@@ -215,8 +206,13 @@ def overlapping(a, hull_j, frame_j, points):
     other, edge_i, edge_j, g = edges_overlap(a, hull_j)
     if other <= 0.0:
         return -other
+    u = e = n
     if other < (1.0 - FACES_FIRST) * least:
         kind, n = EDGES_MEET, g
+        at = int(a[AT_EDGES]) + 4 * edge_i
+        u = sub(corner(a, a[at + 1]), corner(a, a[at]))
+        at = int(hull_j[AT_EDGES]) + 4 * edge_j
+        e = sub(corner(hull_j, hull_j[at + 1]), corner(hull_j, hull_j[at]))
     against = scale(-1.0, n)
     if kind == FACE_OF_J:
         fi = face_at_corner(a, low, against)
@@ -224,13 +220,16 @@ def overlapping(a, hull_j, frame_j, points):
         fj = face_at_corner(hull_j, top, n)
     else:
         fi, fj = face_at_edge(a, edge_i, against), face_at_edge(hull_j, edge_j, n)
-    common_polygon(a, fi, hull_j, fj, n, frame_j, points)
+    common_polygon(a, fi, hull_j, fj, n, turning(kind, n, u, e), frame_j, points)
     return 0.0
 
 
 @jitable
-def common_polygon(a, fi, b, fj, n, frame_j, points):
-    """Write the vertices of two faces' common polygon, seen along n, into their rows."""
+def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
+    """Write the vertices of two faces' common polygon, seen along n, into their rows.
+
+    `turn` says how n turns with I.
+    """
     starts_i, loops_i = int(a[AT_STARTS]), int(a[AT_LOOPS])
     starts_j, loops_j = int(b[AT_STARTS]), int(b[AT_LOOPS])
     end_i = int(a[starts_i + fi + 1])
@@ -266,14 +265,14 @@ def common_polygon(a, fi, b, fj, n, frame_j, points):
     if count == 0:
         return
 
-    against = scale(-1.0, n)
     far = corner(a, a[loops_i + 2 * (end_i - 1)])
     before = int(polygon[count - 1, TAG])
     for k in range(count):
         after = int(polygon[k, TAG])
         # the point of J's face, and how far I's face is below it along n
-        p = add(origin, add(scale(polygon[k, X], along), scale(polygon[k, Y], across)))
-        depth = dot(m, sub(p, far)) / dot(m, n)
+        on_j = add(origin, add(scale(polygon[k, X], along), scale(polygon[k, Y], across)))
+        depth = dot(m, sub(on_j, far)) / dot(m, n)
+        on_i, couple = sub(on_j, scale(depth, n)), (0.0, 0.0, 0.0)
         at_i = end_i - 1 - (after if after < count_i else (before + 1) % count_i)
         name_i = int(a[loops_i + 2 * at_i])
         if before >= count_i and after >= count_i:
@@ -281,10 +280,14 @@ def common_polygon(a, fi, b, fj, n, frame_j, points):
             data = int(b[AT_DATA]) + 3 * name
             row = 2 * int(a[COLOURS]) + int(b[data + 1])
             g, share = scale(-1.0, m), b[data]
+            d = depth * dot(g, n)
+            middle = sub(on_j, scale(0.5 * d, g))
         elif before < count_i and after < count_i:
             data = int(a[AT_DATA]) + 3 * name_i
             row = 2 * int(a[data + 1])
             g, share = nj, a[data]
+            d = depth * dot(g, n)
+            middle = add(on_i, scale(0.5 * d, g))
         else:
             ends = before < count_i
             edge, side = (before, after - count_i) if ends else (after, before - count_i)
@@ -301,13 +304,18 @@ def common_polygon(a, fi, b, fj, n, frame_j, points):
                 corner(b, b[loops_j + 2 * (first_j + side)]),
             )
             e = scale(1.0 / norm(e), e)
-            share = crossing_share(
+            beyond_i, beyond_j = (
+                int(a[loops_i + 2 * start + 1]),
+                int(b[loops_j + 2 * (first_j + side) + 1]),
+            )
+            share, couple = share_of_crossing(
                 u,
                 e,
                 n,
                 ends,
-                turned_over(a, fi, int(a[loops_i + 2 * start + 1]), scale(-1.0, u), against),
-                turned_over(b, fj, int(b[loops_j + 2 * (first_j + side) + 1]), e, n),
+                (m, plane(a, beyond_i)),
+                (nj, plane(b, beyond_j)),
+                turn,
             )
             g = cross(u, e)
             square = dot(g, g)
@@ -315,34 +323,14 @@ def common_polygon(a, fi, b, fj, n, frame_j, points):
                 g = n
             else:
                 g = scale((1.0 if dot(g, n) >= 0.0 else -1.0) / math.sqrt(square), g)
+            d = depth * dot(g, n)
+            middle = middle_of_lines(on_i, u, e, g, scale(depth, n), d)
         before = after
         if share <= LEAST_SHARE:
             continue
-        middle = sub(p, scale(0.5 * depth, n))
-        put_point(
-            points[row],
-            depth * dot(g, n),
-            add(vector(frame_j), to_global(frame_j, middle)),
-            to_global(frame_j, g),
-            share,
-        )
-
-
-@jitable
-def crossing_share(u, e, n, ends, turned_i, turned_j):
-    """Return the share of a crossing of I's edge along u and J's along e, seen along n.
-
-    It is the exterior angle of the polygon in right angles; towards the middle between faces
-    where the polyhedra meet edge on edge (see `pairs.box_box`).
-    """
-    u, e = sub(u, scale(dot(u, n), n)), sub(e, scale(dot(e, n), n))
-    sin, cos = dot(cross(u, e), n), dot(u, e)
-    exterior = math.atan2(sin if ends else -sin, cos) / (0.5 * math.pi)
-    # rounding may turn parallel edges either way
-    exterior = exterior + 4.0 if exterior <= -1.0 else max(0.0, exterior)
-    exterior = min(2.0, exterior)
-    other = turned_i + turned_j - 2.0 * turned_i * turned_j
-    return (1.0 - other) * exterior + other * (2.0 - exterior)
+        p = add(vector(frame_j), to_global(frame_j, middle))
+        put_point(points[row], d, p, to_global(frame_j, g), share)
+        put_couple(points[row], to_global(frame_j, couple))
 
 
 @jitable

@@ -8,7 +8,9 @@ that lies flat (`whole`),
     force   = law(depth) sum w_i d_i / depth
 
 over points with d_i > 0. Its elastic energy is S U(depth), so force and place follow from a
-potential: what a tilt moves the place by, the torque of the points does too. Of a linear law
+potential: what a tilt moves the place by, the torque of the points does too. Where shares turn
+with the shapes (`geometry.crossing`), or normals differ, a couple is left, for a unit of the
+law's force. Of a linear law
 force and torque are those of the points in every pose; of others they are where the depth is
 even. Damping has the rate of the place, which tilting hardly moves; what the points' dampers do
 against tilting is a couple (`dynamics.contact.tilting`) with the moments of their parts of the
@@ -28,12 +30,15 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
     AREA,
+    COUPLE,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
+    POINT,
     REGION_ROWS,
     axis,
     plane_axes,
+    put_couple,
     put_point,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
@@ -58,7 +63,7 @@ def sum_points(rows, whole, area):
         Of the contact, seen along the normal [L^2].
     """
     square, weight, deepest = 0.0, 0.0, REGION_ROWS
-    p, push = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    p, push, couple = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(REGION_ROWS, len(rows)):
         depth = rows[k, 0]
         if depth > rows[deepest, 0]:
@@ -69,8 +74,9 @@ def sum_points(rows, whole, area):
             weight += w
             p = add(p, scale(w, vector(rows[k, 1:4])))
             push = add(push, scale(w, vector(rows[k, 4:7])))
+            couple = add(couple, scale(0.5 * rows[k, 0] ** 2, vector(rows[k, COUPLE:])))
     if square <= 0.0:
-        for c in range(8):
+        for c in range(POINT):
             rows[0, c] = rows[1, c] = rows[deepest, c]
         rows[1, AREA] = 0.0
         return
@@ -86,6 +92,9 @@ def sum_points(rows, whole, area):
     p = add(p, scale(1.0 / force, cross(n, torque)))
     depth = math.sqrt(square / whole)
     put_point(rows[0], depth, p, n, force / depth)
+    # where shares turn with the shapes, and what the place cannot take
+    couple = add(couple, scale(dot(torque, n), n))
+    put_couple(rows[0], scale(1.0 / depth, couple))
     put_point(rows[1], 0.0, (0.0, 0.0, 0.0), n, 0.0)
     rows[1, AREA] = area
     x, y = plane_axes(n)

@@ -12,7 +12,9 @@ pytest.importorskip("fcl")
 
 from test_pairs import random_rotation
 
+from mbsim.geometry.catalog import POINT
 from mbsim.geometry.fcl_detector import FclDetector
+from mbsim.geometry.mesh_contact import Surface, against_convex, lowest_side
 from mbsim.geometry.support import support
 from mbsim.model.elements import Graphic
 from mbsim.model.hull import polyhedron_of
@@ -96,7 +98,7 @@ class Asked:
         graphics = [graphic(name_i), graphic(name_j)]
         self.size = np.array([SIZES.get(name, (0.0, 0.0, 0.0)) for name in self.names])
         one = np.zeros(1, dtype=np.int64)
-        self.points = np.zeros((slots, 8))
+        self.points = np.zeros((slots, POINT))
         self.frames = np.zeros((2, 12))
         scene = SimpleNamespace(
             graphics=SimpleNamespace(size=self.size, reach=np.array([0.6, 0.6])),
@@ -245,3 +247,23 @@ def test_a_ball_of_twisted_squares_on_a_flat_side(floor):
         assert len(rows) == 1
         assert rows[0, 0] == pytest.approx(depth, rel=0.01)
         assert rows[0, 4:7] @ world[:, 2] > 1.0 - 1e-5
+
+
+def test_shapes_that_fcl_sees_touch_and_are_apart_have_support_points():
+    # FCL is given a polyhedron around a frustum: measured, the frustum may still be apart
+    size, n = np.array(SIZES["FRUSTUM"]), np.array([0.0, 0.0, 1.0])
+    points = lowest_side(lambda d: support("FRUSTUM", size, np.zeros(3), np.eye(3), d), n, -1e-3)
+    assert len(points) >= 1
+    assert points[:, 2].max() == pytest.approx(-0.35, abs=1e-9)
+    vertices, faces = MESHES["FINE"]
+    surface = Surface(vertices, faces, convex=True)
+    touched = np.flatnonzero(surface.normals[:, 2] > 0.9)
+    depth, _, out = against_convex(
+        surface,
+        touched,
+        surface.normals[touched],
+        lambda d: support("BOX", np.array([0.1, 0.1, 0.1]), np.array([0, 0, 0.301]), np.eye(3), d),
+        np.vstack([np.eye(3), -np.eye(3)]),
+    )
+    assert depth == pytest.approx(-1e-3, abs=1e-12)
+    assert out[2] == pytest.approx(1.0)

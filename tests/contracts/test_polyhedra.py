@@ -17,7 +17,7 @@ from decks_io import GROUND, contact, write_deck
 from test_pairs import frame, random_rotation
 
 import mbsim
-from mbsim.geometry.catalog import PAIRS, POINT
+from mbsim.geometry.catalog import COUPLE, PAIRS, POINT
 from mbsim.model import hull as packed
 from mbsim.model.hull import polyhedron_of
 from mbsim.system.contacts import pair_address
@@ -166,7 +166,9 @@ def test_boxes_are_symmetric_under_exchange():
     for (half_i, frame_i), (half_j, frame_j) in poses(500, 3):
         i, j = box(half_i), box(half_j)
         one, two = points_of(i, frame_i, j, frame_j), points_of(j, frame_j, i, frame_i)
+        # normal and couple are those of I
         two[:, 4:7] *= -1.0
+        two[:, COUPLE:] *= -1.0
         if one[:, 0].max() < 0.0:
             np.testing.assert_allclose(one[:, 0], two[:, 0], atol=1e-12)
             continue

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import mbsim
+from mbsim.geometry.hull_overlap import Solid, hull_of, least_overlap
+from mbsim.geometry.mesh_contact import Surface
 
 pytest.importorskip("fcl")
 
@@ -68,3 +70,28 @@ def test_a_body_rests_on_the_pole_of_a_fine_ball(tmp_path, shape):
     part, aside = (0.02, 1e-5) if shape == "Sphere" else (0.1, 0.02)
     assert height[2] == pytest.approx(0.6 - depth, abs=part * depth)
     np.testing.assert_allclose(height[:2], 0.0, atol=aside)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-6, 0.0, -1e-6, -1e-3])
+def test_an_ellipsoid_meets_a_vertex_where_it_reaches_it(gap):
+    """A vertex's normal, between those of its faces, is the ellipsoid's at the nearest point."""
+    nodes, faces = ball()
+    surface = Surface(np.array(nodes, float), np.array(faces), True)
+    hull = hull_of(surface.vertices, surface.faces, surface.normals, surface.beside)
+    rng = np.random.default_rng(4)
+    for size in ([0.3, 0.3, 0.3], [0.1, 0.2, 0.4]):
+        for k in (0, 1, 150, 190, len(nodes) - 1):
+            n = surface.normals[(surface.faces == k).any(axis=1)].sum(axis=0)
+            n /= np.linalg.norm(n)
+            axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+            half = np.linalg.norm(axes.T @ n * size)
+            lowest = -axes @ (np.square(size) * (axes.T @ n)) / half
+            centre = surface.vertices[k] + gap * n - lowest
+            f, way = least_overlap(hull, Solid("ELLIPSOID", np.array(size), centre, axes))
+            if gap > 0.0:
+                # apart by `gap`: some direction parts them, and none by more than that
+                assert -gap - 1e-12 <= f < 0.0
+            else:
+                # the support points' rounding is 1e-16
+                assert f == pytest.approx(-gap, abs=1e-12)
+                np.testing.assert_allclose(way, n, atol=1e-6)

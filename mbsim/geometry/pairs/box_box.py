@@ -10,7 +10,7 @@ direction n along which the boxes are looked at; axes of edges have to be less b
 
 The face of each box that looks most against the other is projected along n. The vertices of the
 two faces' common polygon are the points; each keeps the normal and the depth of the features
-that meet there, so that its force has a potential:
+that meet there and lies on the line along which they push, so that its force has a potential:
 
     corner of I on J's face   normal of J's face, depth below that face
     corner of J on I's face   the same with I's face
@@ -28,10 +28,18 @@ import math
 
 import numpy as np
 
-from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point, region
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.geometry.catalog import axis, pair, put_couple, put_point, region
+from mbsim.geometry.crossing import (
+    EDGES_MEET,
+    FACE_OF_I,
+    FACE_OF_J,
+    LEAST_SHARE,
+    middle_of_lines,
+    share_of_crossing,
+    turning,
+)
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.geometry.region import polygon_area
 
@@ -45,8 +53,6 @@ BOX_BOX_SLOTS = 12
 FACES_FIRST = 1e-6
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
-#: A point with a smaller share is none: it would be an incident without force.
-LEAST_SHARE = 1e-6
 #: Vertices a scratch polygon holds: 8, and some for what rounding may add.
 CAPACITY = 12
 # scratch: R (9), t (3), the overlap along each axis (15)
@@ -180,16 +186,24 @@ def _corner_of_j(k, sign, side):
 
 
 @jitable
-def _edge_normal(u, side, na, nb, nn):
-    """Return the unit normal of an edge along u and a side of J, on the side of n."""
-    # sides 0 and 2 run along b, 1 and 3 along a
-    g = (-u[2], 0.0, u[0]) if side == 0 or side == 2 else (0.0, u[2], -u[1])
-    length = norm(g)
-    along = g[0] * na + g[1] * nb + g[2] * nn
-    if length * length <= PARALLEL:
+def _edge_normal(u, e, n):
+    """Return the unit normal of an edge along u and one along e, on the side of n."""
+    g = cross(u, e)
+    square = dot(g, g)
+    if square <= PARALLEL:
         # edges that lie on each other have no share either
-        return (na, nb, nn)
-    return scale((1.0 if along >= 0.0 else -1.0) / length, g)
+        return n
+    return scale((1.0 if dot(g, n) >= 0.0 else -1.0) / math.sqrt(square), g)
+
+
+@jitable
+def _turning(s, a, n, m, o, k, sign):
+    """Return how the axis a of the 15 turns as I does, along a, b and J's normal."""
+    if a < 6:
+        return turning(FACE_OF_J if a < 3 else FACE_OF_I, n, n, n)
+    i, j = 3 * ((a - 6) // 3), (a - 6) % 3
+    e = (1.0 if j == m else 0.0, sign if j == o else 0.0, sign if j == k else 0.0)
+    return turning(EDGES_MEET, n, (s[i + m], sign * s[i + o], sign * s[i + k]), e)
 
 
 @jitable
@@ -202,30 +216,6 @@ def _to_global(frame_j, d, m, o, k, sign):
 
 
 @jitable
-def _turned_over(slope):
-    """Return how far a face has given way to its neighbour beyond an edge, 0 to 1/2.
-
-    `slope` is the tangent of the angle by which the face is tilted towards that neighbour; at
-    45 degrees (1) both are alike. Up to 10 degrees the face is alone.
-    """
-    return 0.5 * step(slope, 0.18, 0.0, 1.0, 1.0)
-
-
-@jitable
-def _crossing_share(exterior, turned_i, turned_j):
-    """Return the share of a crossing from the exterior angle of the polygon, in right angles.
-
-    With the neighbouring face of one box in place of the face, the same crossing has the angle
-    2 - exterior. Where faces meet faces only their angle counts; at an edge on an edge with
-    both boxes tilted by 45 degrees the four choices are alike and the share is 1.
-    """
-    exterior -= 4.0 * math.floor(0.25 * (exterior + 1.0))
-    exterior = max(0.0, min(2.0, exterior))
-    other = turned_i + turned_j - 2.0 * turned_i * turned_j
-    return (1.0 - other) * exterior + other * (2.0 - exterior)
-
-
-@jitable
 def _apart(points, frame_j, distance):
     """Write the same lower bound of the distance into every row."""
     for row in range(BOX_BOX_SLOTS):
@@ -233,10 +223,11 @@ def _apart(points, frame_j, distance):
 
 
 @jitable
-def _manifold(frame_j, hi, hj, s, n, points, with_area):
+def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
     """Write the vertices of the two faces' common polygon, seen along n, into their rows.
 
-    Return the area of what overlaps of it, seen along n, if that is asked for.
+    n is the axis `best` of the 15. Return the area of what overlaps of the polygon, seen along n,
+    if that is asked for.
     """
     # the faces that look at each other: J's along n, I's against it
     kj = _steepest(n[0], n[1], n[2])
@@ -255,7 +246,7 @@ def _manifold(frame_j, hi, hj, s, n, points, with_area):
     mi, oi = (ki + 1) % 3, (ki + 2) % 3
     si = -1.0 if ni[ki] > 0.0 else 1.0
     # I's face has the axes p = i_m, q = -si i_o: counter-clockwise seen along n like a, b
-    np_, nq, nm = ni[mi], -si * ni[oi], si * ni[ki]
+    nm = si * ni[ki]
     P, Q = hi[mi], hi[oi]
     # components of p, q, I's outward normal m and the middle of I's face along a, b, J's normal
     pa, pb, pk = s[3 * mi + mj], sj * s[3 * mi + oj], sj * s[3 * mi + kj]
@@ -288,24 +279,30 @@ def _manifold(frame_j, hi, hj, s, n, points, with_area):
     count = clip(polygon, count, other, -1.0, 0.0, A, 6.0)
     count = clip(other, count, polygon, 0.0, -1.0, B, 7.0)
 
-    # the angle from a to p about n that fits both p, q on a, b, in right angles
-    cos = pa + qb - np_ * na - nq * nb
-    sin = pb - qa - np_ * nb + nq * na
-    twist = math.atan2(sin, cos) / (0.5 * math.pi)
+    # all along a, b and J's normal
+    way, out_j, out_i = (na, nb, nn), (0.0, 0.0, 1.0), (ma, mb, mk)
+    turn = _turning(s, best, way, mj, oj, kj, sj)
 
     before = int(polygon[count - 1, TAG])
     for k in range(count):
         x, y, after = polygon[k, X], polygon[k, Y], int(polygon[k, TAG])
         depth = depth_0 + slope_x * x + slope_y * y
-        share = 1.0
+        # the points of J's and I's surface that lie on each other
+        on_j = (x, y, hj[kj])
+        on_i = sub(on_j, scale(depth, way))
+        share, couple = 1.0, (0.0, 0.0, 0.0)
         if before >= 4 and after >= 4:
             row = 8 + _corner_of_j(kj, sj, before - 4)
             # against I's face
-            g = (-ma, -mb, -mk)
+            g = scale(-1.0, out_i)
+            d = depth * dot(g, way)
+            middle = sub(on_j, scale(0.5 * d, g))
         elif before < 4 and after < 4:
             row = 2 * _corner_of_i(ki, si, (before + 1) % 4)
             # against J's face
-            g = (0.0, 0.0, 1.0)
+            g = out_j
+            d = depth * nn
+            middle = add(on_i, scale(0.5 * d, g))
         else:
             edge, side = (before, after - 4) if before < 4 else (after, before - 4)
             # an edge of I comes to its end where edge before + 1 begins
@@ -313,27 +310,25 @@ def _manifold(frame_j, hi, hj, s, n, points, with_area):
             corner = (before + 1) % 4 if ends else after
             row = 2 * _corner_of_i(ki, si, corner) + (0 if ends else 1)
             u = (pa, pb, pk) if edge == 0 or edge == 2 else (qa, qb, qk)
-            g = _edge_normal(u, side, na, nb, nn)
-            # side 0 of J runs along b: a right angle from a
-            angle = twist + edge - (side + 1.0)
-            # outward of I's edges: -q, p, q, -p; of J's sides: a, b, -a, -b
-            tilt_i = nq if edge == 0 or edge == 2 else np_
-            tilt_i = -tilt_i if edge == 1 or edge == 2 else tilt_i
-            tilt_j = na if side == 0 or side == 2 else nb
-            tilt_j = -tilt_j if side >= 2 else tilt_j
-            share = _crossing_share(
-                -angle if ends else angle,
-                _turned_over(tilt_i / -nm),
-                _turned_over(tilt_j / nn),
+            u = scale(-1.0 if edge >= 2 else 1.0, u)
+            # side 0 of J runs along b, side 1 back along a
+            e = (
+                (0.0, 1.0 - side, 0.0)
+                if side == 0 or side == 2
+                else (-1.0 if side == 1 else 1.0, 0.0, 0.0)
             )
+            g = _edge_normal(u, e, way)
+            share, couple = share_of_crossing(
+                u, e, way, ends, (out_i, cross(out_i, u)), (out_j, cross(e, out_j)), turn
+            )
+            d = depth * dot(g, way)
+            middle = middle_of_lines(on_i, u, e, g, scale(depth, way), d)
         before = after
         if share <= LEAST_SHARE:
             continue
-        # the midpoint, from J's centre in J's axes
-        middle = (x - 0.5 * depth * na, y - 0.5 * depth * nb, hj[kj] - 0.5 * depth * nn)
-        depth *= g[0] * na + g[1] * nb + g[2] * nn
         p = add(vector(frame_j), _to_global(frame_j, middle, mj, oj, kj, sj))
-        put_point(points[row], depth, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
+        put_point(points[row], d, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
+        put_couple(points[row], _to_global(frame_j, couple, mj, oj, kj, sj))
     if not with_area:
         return 0.0
     count = clip(polygon, count, other, -slope_x, -slope_y, depth_0, 8.0)
@@ -351,13 +346,14 @@ def _box_on_box(frame_i, size_i, frame_j, size_j, points, with_area):
     if least <= 0.0:
         _apart(points, frame_j, -least)
         return 0.0
-    n = _direction(s, _least(s))
+    best = _least(s)
+    n = _direction(s, best)
     j0, j1, j2 = axis(frame_j, 0), axis(frame_j, 1), axis(frame_j, 2)
     normal = add(scale(n[0], j0), add(scale(n[1], j1), scale(n[2], j2)))
     for row in range(BOX_BOX_SLOTS):
         # overlapping boxes have no distance: a row without a point says 0
         put_point(points[row], 0.0, vector(frame_j), normal)
-    return _manifold(frame_j, size_i, size_j, s, n, points, with_area)
+    return _manifold(frame_j, size_i, size_j, s, best, n, points, with_area)
 
 
 @pair("BOX", "BOX", slots=BOX_BOX_SLOTS, regroups=True)

@@ -12,10 +12,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point, region
+from mbsim.geometry.crossing import LEAST_SHARE
 from mbsim.geometry.polyhedron import (
     CUBE,
     HULL_SLOTS,
-    LEAST_SHARE,
     hull_slots,
     moved,
     overlapping,
