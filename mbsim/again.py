@@ -100,7 +100,7 @@ class Again:
 
     def __init__(self, results: Results) -> None:
         from mbsim.reader.xml import read_model
-        from mbsim.results.recorder import made_of
+        from mbsim.results.identity import Identity
         from mbsim.settings import settle
         from mbsim.system import arrays as a
         from mbsim.system.build import build
@@ -113,15 +113,14 @@ class Again:
         self.settings = settle(model, float(named["end_time"]), float(named["print_interval"]))
         plugins = [Path(file) for file in _lines(named["plugins"])]
         interpret, detector = bool(named["interpret_plugins"]), str(named["detector"])
-        self.system: System = build(
-            model, float(named["end_time"]), plugins, interpret, detector, lambda line: None
-        )
+        self.system: System = build(model, plugins, interpret, detector, lambda line: None)
         self._changes()
+        digests = Identity(self.system).digests
         for name, what in (
             ("subroutines_sha256", "a user subroutine"),
             ("system_sha256", "what the model is made of"),
         ):
-            if made_of(self.system)[name] != named[name]:
+            if digests[name] != named[name]:
                 raise ModelError(f"{results.path}: {what} has changed since the run")
         scene = self.system.scene
         scene.world.fixed_step[0] = int(named["integrator"] == "VERLET")
@@ -239,7 +238,7 @@ class Again:
             "area": float(row[-a.INC_REGION]) if self.region else 0.0,
         }
         kept = int(contacts.memory[c])
-        for k in range(kept if contacts.size[c] == 0.0 else 0):
+        for k in range(kept if contacts.carried[c] < kept else 0):
             signals[f"state{k}"] = float(given[FRICTION_INPUTS + k])
         if rubs and id in self.system.user_friction:
             signals |= self._espied(id, given)

@@ -12,6 +12,7 @@ from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import FIRST_PATIENCE
 from mbsim.system import tangent
+from mbsim.system.arrays import AUDIT_EVERY
 from mbsim.system.tangent import MOST_BODIES as MOST_LINEARISED
 
 if TYPE_CHECKING:
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 #: Bodies of the largest model for which AUTO looks whether it is stiff.
 MOST_BODIES = 300
+#: Steps from one sample of `dynamics.audit` to the next, of explicit methods, those with more than
+#: FEW bodies, and implicit ones: what samples cost is then about 1 % of the steps, or less.
+EVERY, EVERY_OF_MANY, EVERY_IMPLICIT = 8.0, 16.0, 1.0
+FEW = 16
 
 
 class Methods:
@@ -28,8 +33,9 @@ class Methods:
     AUTO's two methods have their arrays in common, so that one goes on where the other ends.
     """
 
-    def __init__(self, system: System, name: str, start: float) -> None:
+    def __init__(self, system: System, name: str, start: float, timed: bool = False) -> None:
         from mbsim.dynamics.hooks import mechanism
+        from mbsim.system.timetable import ROWS
 
         self.system = system
         changing = name == catalog.AUTO
@@ -37,11 +43,13 @@ class Methods:
         self.other = catalog.load(catalog.IMPLICIT) if changing else None
         bodies = len(system.body_ids)
         held = scheme.both(self.explicit, self.other) if self.other else self.explicit
-        self.arrays = scheme.make(held, system.y0, start, bodies)
+        self.arrays = scheme.make(held, system.y0, start, bodies, ROWS if timed else 1)
         # where a contact may close or stick, Newton's iteration that fails with what held at the
         # step's begin is what finds it
         touches = len(system.scene.contacts.id) > 0
         self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
+        length, speed = system.scene.world.scale[:2]
+        self.arrays.memory[scheme.OWN_TIME] = length / speed
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem
@@ -75,6 +83,8 @@ class Methods:
 
             made = implicit_hooks(self.system.scene, self.problem, running.pair)
             self.problem, self._tangent = made
+        every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
+        self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
         self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
 
@@ -111,7 +121,12 @@ class Methods:
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0
         memory[scheme.GROWTH] = math.inf
-        memory[scheme.BEGUN], memory[scheme.PACE] = memory[scheme.TIME], 0.0
+        memory[scheme.BEGUN] = memory[scheme.TIME]
+        if stiff:
+            memory[scheme.COSTLY] = memory[scheme.PACE]
+        # one over the length of the steps that were too short
+        often = max(memory[scheme.PACE], 1.0 / memory[scheme.STEP])
+        memory[scheme.PACE] = often if stiff else 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
         if stiff:

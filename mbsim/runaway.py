@@ -1,6 +1,6 @@
 """When a run makes no progress: a motion that runs off to a pole is told, not followed for hours.
 
-A watch looks between calls of compiled code, and gives up where either holds:
+A watch looks every `core.problem.WATCH_EVERY` steps, and gives up where either holds:
 
 * the last STALLED steps were on average shorter than a SLIVER of the time that has passed;
 * at the pace of the last FEW steps HOPELESS more are to come, while the fastest body is FAST times
@@ -10,6 +10,7 @@ A watch looks between calls of compiled code, and gives up where either holds:
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -32,6 +33,14 @@ class Pace:
     def __init__(self, start: float, end: float) -> None:
         self.start, self.end = start, end
         self.seen: deque[tuple[int, float, float]] = deque()
+
+    def saved(self) -> dict[str, Any]:
+        """Return what a resumed run needs: it gives up where the straight one does."""
+        return {"pace/seen": np.array(self.seen, dtype=np.float64).reshape(-1, 3)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go back to a checkpoint of the same Simulate."""
+        self.seen = deque((int(n), float(t), float(v)) for n, t, v in saved["pace/seen"])
 
     def watch(self, system: System, y: Any, t: float, steps: int) -> None:
         """Note where the run is at time t; raise SolverError where it gets nowhere."""

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
-from mbsim.model.elements import Model, Simulation
+from mbsim.model.elements import ASIDE, Model, Simulation
 from mbsim.model.names import element_name, is_adams
 
 DEFAULT_TOL = 1e-5
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
+#: What tol is of `integr_tol`: MotionSolve's default, 1e-3, is then the default.
+PER_TOL = 100.0
 INTEGRATORS = tuple(METHODS)
 #: MotionSolve's names, and the method that runs them.
 _MOTIONSOLVE_NAMES = {
@@ -36,6 +38,8 @@ class Stage:
     h_max: float
     h_min: float
     h0_max: float  # 0 if not given
+    # who says tol, in words
+    tol_from: str = field(default="", metadata={ASIDE: True})
 
     @property
     def is_static(self) -> bool:
@@ -49,7 +53,7 @@ class Settings:
 
     stages: tuple[Stage, ...]
     integrator: str
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = field(metadata={ASIDE: True})
 
     @property
     def end_time(self) -> float:
@@ -60,6 +64,18 @@ class Settings:
     def tol(self) -> float:
         """Tolerance of the first simulation."""
         return self.stages[0].tol
+
+    @property
+    def tolerances(self) -> str:
+        """What tol each simulation has and who says so, in words; once where all have the same."""
+        said: list[str] = []
+        for stage in self.stages:
+            one = f"{stage.tol:g}, {stage.tol_from}"
+            if not said:
+                said.append(one)
+            elif not said[-1].endswith(one):
+                said.append(f"from time {stage.simulation.start_time:g} on {one}")
+        return "; ".join(said)
 
 
 def _checked(name: str, value: float, low: float, high: float) -> float:
@@ -109,6 +125,28 @@ def _simulations(
         _checked("print_interval", print_interval, 0.0, math.inf)
         planned = [replace(s, print_interval=print_interval) for s in planned]
     return tuple(planned)
+
+
+def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple[float, str]:
+    """Return tol of one Simulate, checked, and who says it: the caller, the deck or nobody."""
+    adams = is_adams(model.file)
+    if tol is not None:
+        return _checked("tol", tol, 1e-15, 0.1), "as the command line says"
+    for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
+        if source is None or source.integr_tol is None:
+            continue
+        place = f"{model.file}:{source.source.line}"
+        if adams:
+            # the reader has made it of ERROR
+            name, said, chosen = "tol", f"1e-5 of INTEGRATOR/ERROR ({place})", source.integr_tol
+        else:
+            name, chosen = "integr_tol", source.integr_tol / PER_TOL
+            said = f"{1.0 / PER_TOL:g} of integr_tol {source.integr_tol:g} in {part} ({place})"
+        try:
+            return _checked("tol", chosen, 1e-15, 0.1), said
+        except ModelError as error:
+            raise ModelError(f"{place}: Param_Transient: {name}: {error}") from None
+    return DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL, "the default"
 
 
 def _asked_method(model: Model, sources: Any, integrator: str | None) -> tuple[str, str]:
@@ -237,9 +275,6 @@ def settle(
     notes = []
     stages = []
     asked: dict[str, str] = {}
-    from_deck = set()
-    adams = is_adams(model.file)
-    usual = DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -250,15 +285,12 @@ def settle(
 
         method, where = _asked_method(model, sources, integrator)
         asked.setdefault(method, where)
-        chosen = tol if tol is not None else said("integr_tol")
-        if tol is None and chosen is not None:
-            name = "INTEGRATOR/ERROR times 1e-5" if adams else "integr_tol"
-            from_deck.add(f"{name}, {chosen:g}, is used as the dimensionless tol")
-        chosen = usual if chosen is None else _checked("tol", float(chosen), 1e-15, 0.1)
+        chosen, who = _tolerance(model, simulation, tol)
         h_max = said("h_max") or math.inf
         if motionsolve:
             h_max = min(h_max, simulation.print_interval)
-        stages.append(Stage(simulation, chosen, h_max, said("h_min") or 0.0, said("h0_max") or 0.0))
+        h_min, h0_max = said("h_min") or 0.0, said("h0_max") or 0.0
+        stages.append(Stage(simulation, chosen, h_max, h_min, h0_max, who))
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
     method, said_of_names = _method(asked)
@@ -267,7 +299,8 @@ def settle(
         notes += _creeps(model)
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
-    return Settings(tuple(stages), method, (*notes, *said_of_names, *sorted(from_deck)))
+    settings = Settings(tuple(stages), method, (*notes, *said_of_names))
+    return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 
 
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:

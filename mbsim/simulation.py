@@ -27,14 +27,26 @@ from mbsim.settings import Settings, Stage, output_times, settle
 
 if TYPE_CHECKING:
     from mbsim.dumping import ContactProblems
+    from mbsim.results.audit import Audit
     from mbsim.results.reading import Results
     from mbsim.system.build import System
     from mbsim.system.changes import Parameters
+    from mbsim.system.timetable import Timetable
 
 #: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
 #: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
 RETURN_SECONDS = 0.1
 FIRST_BUDGET = 200
+
+
+def next_budget(budget: int, done: int, elapsed: float) -> int:
+    """Return for how many evaluations to call next, after one that did so many in `elapsed` [s].
+
+    At most four times as many as before: the first calls also compile or load code.
+    """
+    wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
+    return int(min(max(wanted, 1.0), 4.0 * budget))
+
 
 Progress = Callable[[float, float, float], None]
 Notify = Callable[[str], None]
@@ -47,6 +59,8 @@ class Active(NamedTuple):
     skyline: Any
     quality: Any
     size: Any
+    kept_at: Any
+    kept_a: Any
 
 
 class Runner:
@@ -62,16 +76,21 @@ class Runner:
         changes: list[Parameters] | None = None,
     ) -> None:
         from mbsim.core import jit
-        from mbsim.integrators import driver
+        from mbsim.integrators import driver, scheme
         from mbsim.methods import Methods
         from mbsim.sensing import Sensing
+        from mbsim.system.arrays import AUDIT_TOL
+        from mbsim.system.timetable import follows_time
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
         self.detector = self._open_fcl_door()
+        system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
-        self.methods = Methods(system, settings.integrator, start)
+        self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
+        self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
+        self.method.counts[scheme.NEXT_WATCH] = 0
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
@@ -79,6 +98,7 @@ class Runner:
         )
         self.changes = changes or []  # parameters of every Simulate, where some differ
         self.stage = 0  # which Simulate
+        self.pace = Pace(start, start)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
         self.interrupted = False
@@ -316,8 +336,11 @@ class Runner:
                 scene.sweep.skyline,
                 scene.sweep.quality,
                 scene.sweep.size,
+                scene.sweep.kept_at,
+                scene.sweep.kept_a,
             ),
             "log": scene.log,
+            "audit": scene.audit,
             "method": self.method,
         }
 
@@ -331,7 +354,7 @@ class Runner:
         }
         arrays["stage"] = np.array(self.stage)
         arrays["time"] = np.array(self.method.memory[0])
-        return arrays | self.methods.saved() | self.sensing.saved()
+        return arrays | self.methods.saved() | self.sensing.saved() | self.pace.saved()
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
@@ -342,6 +365,13 @@ class Runner:
         self.methods.restore(saved)
         self.stage = int(saved["stage"])
         self.sensing.restore(saved)
+        self.pace = self._pace()
+        self.pace.restore(saved)
+
+    def _pace(self) -> Pace:
+        """Return what looks whether the current Simulate gets anywhere."""
+        simulation = self.settings.stages[self.stage].simulation
+        return Pace(simulation.start_time, simulation.end_time)
 
     def run(self, progress: Progress | None, resumed: bool) -> None:
         """Run all Simulate statements from the current stage on."""
@@ -404,10 +434,28 @@ class Runner:
         self.recorder.take()
         return goes_on
 
+    def _look_ahead(self, stage: Stage, fresh: bool) -> None:
+        """Find out what of this Simulate follows from the time alone."""
+        from mbsim.integrators import scheme
+        from mbsim.system.timetable import Timetable
+
+        method, methods = self.method, self.methods
+        schemes = [methods.explicit] + ([methods.other] if methods.other else [])
+        samples = max(each.samples for each in schemes)
+        estimates = methods.explicit.order > 0.0
+        span = stage.simulation.end_time - stage.simulation.start_time
+        self.timetable = Timetable(self.system, stage.tol, span, estimates, samples)
+        if fresh:
+            memory = method.memory
+            memory[scheme.ROW_ENDS] = -np.inf if self.timetable.timed else np.inf
+            memory[scheme.REACH] = np.inf
+            method.counts[scheme.ROW] = len(method.timetable)
+
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
         from mbsim.core import problem
         from mbsim.integrators import scheme
+        from mbsim.system.arrays import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
 
         method, scene, simulation = self.method, self.system.scene, stage.simulation
         # the last change so far holds; a resumed run may have missed an earlier one
@@ -415,22 +463,30 @@ class Runner:
             if passed.simulation.gravity is not None:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
+        scene.world.scale[TOLERANCE] = stage.tol
         self._change()
+        plan = scene.audit.plan
+        plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time
         budget = FIRST_BUDGET if self.dump is None else 1
-        pace = Pace(simulation.start_time, simulation.end_time)
+        if fresh:
+            self.pace = self._pace()
         if fresh or stage.is_static:
+            if self.stage > 0:
+                # the statement may have changed what acts
+                scene.audit.tally[ANEW] = 1.0
             if not self._begin_stage(stage):
                 return
         elif not self.system.model.sensors:
             last = self.stage == len(self.settings.stages) - 1
             self.sensing.begin(output_times(simulation, last), stage.h_max)
+        self._look_ahead(stage, fresh)
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
                 self.methods.steps,
                 simulation.end_time,
                 stage.tol,
-                self.sensing.h_max,
+                min(self.sensing.h_max, self.timetable.longest),
                 stage.h_min,
                 self.sensing.times,
                 budget,
@@ -438,9 +494,7 @@ class Runner:
             elapsed = time.perf_counter() - began
             self.loop_seconds += elapsed
             done = int(method.counts[scheme.EVALUATIONS]) - before
-            wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
-            # at most four times as many: the first calls also compile or load code
-            budget = int(min(max(wanted, 1.0), 4.0 * budget))
+            budget = next_budget(budget, done, elapsed)
             self.recorder.take()
             if self.dump is not None and outcome != problem.FAILED:
                 # after every step
@@ -458,7 +512,12 @@ class Runner:
                     method.memory[scheme.TIME],
                 )
             now, steps = float(method.memory[scheme.TIME]), int(method.counts[scheme.STEPS])
-            pace.watch(self.system, method.y, now, steps)
+            if outcome == problem.WATCH_DUE:
+                self.pace.watch(self.system, method.y, now, steps)
+            if outcome == problem.TABLE_OVER:
+                now = float(method.memory[scheme.TIME])
+                self.timetable.write(method.timetable, now, simulation.end_time)
+                method.counts[scheme.ROW] = 0
             if outcome == problem.CHANGES_OVER:
                 self.log.line(self.methods.change_over())
             if outcome == problem.STEP_TOO_SMALL and self.methods.retreat():
@@ -474,6 +533,15 @@ class Runner:
             if progress is not None:
                 h = float(method.memory[scheme.STEP])
                 progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
+
+    def audit(self) -> Audit | None:
+        """Return what the run found out about itself, None where it took no step."""
+        from mbsim.integrators import scheme
+        from mbsim.results.audit import audit_of
+
+        memory = self.method.memory
+        left, when = float(memory[scheme.LEFT_OVER]), float(memory[scheme.LEFT_TIME])
+        return audit_of(self.system, left, when)
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run."""
@@ -603,7 +671,11 @@ def simulate(
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
     said: list[str] = []
-    system = build(model, settings.end_time, files, interpret_plugins, detector, said.append)
+    system = build(model, files, interpret_plugins, detector, said.append)
+    for note in said:
+        # what a script will probably fail at is for the terminal too
+        if ": warning: " in note:
+            tell(note)
     changes = _parameters(system, settings)
     for note in settings.notes:
         tell(note)
@@ -628,6 +700,7 @@ def simulate(
         "units": f"{model.units.force} {model.units.mass} {model.units.length} {model.units.time}",
         "integrator": settings.integrator,
         "tol": settings.tol,
+        "tol_from": settings.tolerances,
         "end_time": settings.end_time,
         "print_interval": settings.stages[-1].simulation.print_interval,
         "detector": detector,
@@ -636,7 +709,8 @@ def simulate(
         "plugins": "\n".join(map(str, files)),
         "interpret_plugins": int(interpret_plugins),
     }
-    recorder = Recorder(system, attributes, None if output is None else Path(output), resume)
+    folder = None if output is None else Path(output)
+    recorder = Recorder(system, attributes, folder, resume, settings)
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
@@ -670,6 +744,9 @@ def simulate(
     finally:
         recorder.take()
         stats = runner.stats(time.perf_counter() - began, jit.compile_seconds - compiled_before)
+        audit = runner.audit()
+        for warning in audit.warnings if audit is not None else ():
+            tell(f"warning: {warning}")
         try:
             if recorder.empty and recorder.directory is not None:
                 # it ended before its first row: an earlier result in that folder stays
@@ -677,9 +754,9 @@ def simulate(
             else:
                 if status != "finished":
                     recorder.flush(runner.checkpoint())
-                results = recorder.close(status, stats, system.scene.log.contacts)
+                results = recorder.close(status, stats, system.scene.log.contacts, audit)
         finally:
-            log.close(status, stats, recorder.watch)
+            log.close(status, stats, recorder.watch, audit)
             if any(user.language == "Octave" for _, user in system.user_laws):
                 from mbsim.plugins.subroutine import end_run
 

@@ -72,7 +72,7 @@ class Kept:
 def run(model, tol=1e-9, integrator=None):
     """Run a model; return its rows by field, and the runner."""
     settings = settle(model, None, None, integrator, tol)
-    system = build(model, settings.end_time)
+    system = build(model)
     kept = Kept(system.scene.rows)
     runner = Runner(system, settings, kept, None, print)
     runner.settle_contacts(False)

@@ -432,8 +432,13 @@ def screw(pitch):
 
 
 def constant_velocity(I, J, t):
-    """Common origin; relative spin about the bisector of the shafts (z-axes) is none."""
-    axis = I.z + J.z
+    """Common origin; relative spin about the bisector of the shafts (z-axes) is none.
+
+    The joint is a half turn about J's z and one about the bisector n, so that I.x - J.x and
+    I.y - J.y lie along n as well: one of them is long where shafts that fold back leave I.z + J.z
+    short.
+    """
+    axis = max((I.z + J.z, I.x - J.x, I.y - J.y), key=lambda sum: sum.v @ sum.v)
     w = I.w - J.w
     # rate of the constraint: w . axis = 0; its derivative is linear in the accelerations
     second = axis.v @ w.a

@@ -224,8 +224,10 @@ def _largest(results: Results) -> dict[str, Any]:
 
 def _about_results(results: Results) -> dict[str, Any]:
     """Return what a result file holds."""
+    from mbsim.results.audit import facts
     from mbsim.results.reading import end_state, finite
 
+    audit = results.audit
     time, largest = results["time"], _largest(results)
     about = {
         "kind": "results",
@@ -250,6 +252,7 @@ def _about_results(results: Results) -> dict[str, Any]:
             for id in results.ids("contacts")
         },
         **largest,
+        "audit": facts(audit) if audit is not None else {},
         "stats": results.stats,
         "signals": results.keys(),
     }

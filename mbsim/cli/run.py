@@ -51,7 +51,7 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     "--tol",
     type=float,
     metavar="X",
-    help="Local error of a step, dimensionless; default: the deck's integr_tol, else 1e-5.",
+    help="Local error of a step, dimensionless.  [default: 0.01 of the deck's integr_tol, or 1e-5]",
 )
 @click.option("--end-time", type=float, metavar="T", help="Instead of the deck's.")
 @click.option("--print-interval", type=float, metavar="DT", help="Between output rows.")
@@ -153,15 +153,17 @@ def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None
 def _print_json(results: Results, result_file: Path) -> None:
     """Print the documented JSON object."""
     from mbsim.cli.messages import print_json
+    from mbsim.results.audit import facts
     from mbsim.results.reading import end_state, finite
 
-    time = results["time"]
+    time, audit = results["time"], results.audit
     print_json(
         {
             "status": results.status,
             "result_file": str(result_file),
             "end_time": finite(float(time[-1])) if len(time) else None,
             "stats": finite(results.stats),
+            "audit": finite(facts(audit)) if audit is not None else None,
             "bodies": finite(end_state(results)),
         }
     )
@@ -177,3 +179,6 @@ def _print_summary(results: Results, result_file: Path) -> None:
         f"{stats.get('wall_s', 0.0):.2f} s"
         + (f" ({stats['compile_s']:.1f} s of it compiling)" if stats.get("compile_s") else "")
     )
+    audit = results.audit
+    if audit is not None:
+        click.echo(audit.line)

@@ -15,7 +15,9 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 | norm   | local error, y              | largest error over its scale, dimensionless; h = 0:   |
 |        |                             | of a difference of two states that is no step's error,|
 |        |                             | with what it changes of friction over normal forces;  |
-|        |                             | h = FRICTION_ALONE: only that                         |
+|        |                             | h = FRICTION_ALONE: only that; h = IMPACTS_ALONE: what |
+|        |                             | it changes of speeds in impacts, over what these        |
+|        |                             | changed by in the step, t being its length             |
 | check  | y new, -                    | 1, or the part of the step to take instead            |
 | commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
 |        |                             | rows are full; 4 `stable` must be asked again; 8 the  |
@@ -97,8 +99,8 @@ class Problem(NamedTuple):
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
 
-#: What `norm` is given for h where only friction counts.
-FRICTION_ALONE = -1.0
+#: What `norm` is given for h where only friction counts, and where only impacts do.
+FRICTION_ALONE, IMPACTS_ALONE = -1.0, -2.0
 
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0
@@ -113,7 +115,11 @@ SINGULAR = 51
 AT_ONCE = 100
 
 # what `advance` returns
-DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER = range(7)
+DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_DUE = range(8)
+#: The rows of the timetable are over: it is to be filled from here on.
+TABLE_OVER = 8
+#: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.
+WATCH_EVERY = 5000
 
 # what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads
 #: What `commit` adds where the motion is held otherwise from here on.

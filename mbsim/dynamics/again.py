@@ -14,10 +14,11 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact import add_contact
 from mbsim.dynamics.kinematics import place_bodies
 from mbsim.dynamics.output import fill_contacts
-from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.system.arrays import (
     AGAIN,
     CONTACT_COLUMNS,
+    INC_COUPLE,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -51,6 +52,7 @@ def put_back(scene, row):
     point[0], point[7] = row[INC_DEPTH], row[INC_SHARE]
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
+        point[COUPLE + k] = row[INC_COUPLE + k]
         state.t[s, k] = row[INC_TANGENT + k]
     if scene.kinds.whole[pairs.kind[pair]] > 0.0:
         numbers, at = work.points[s + 1], len(row) - INC_REGION

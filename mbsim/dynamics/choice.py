@@ -14,19 +14,25 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.equations import (
     CONTRADICTION,
+    FOLDING,
     RESIDUAL,
+    SOUND,
     active_count,
     fill_equation,
     fill_equations,
     fill_matrix,
     is_active,
     is_friction,
+    keep_accelerations,
+    near_fold,
     side_place,
 )
 from mbsim.laws.catalog import STICK
 from mbsim.system.arrays import (
     CHOSEN,
+    KEPT,
     NEAR_FOLD,
+    PIVOT,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -42,8 +48,8 @@ IMPLIED = 1e-12
 LEVER = 1e-4
 #: A choice is made anew when its least pivot falls below this part of what it was.
 _WORN = 0.1
-#: A state is near a position in which a loop can fold below this part of the usual pivots.
-_NEAR = 0.01
+#: Another choice is better if its least pivot makes up for half of that.
+_BETTER = 2.0
 #: Residual of an implied equation, over its unit, from which it is asked whether it still is
 #: implied, as in a position that folds it is, and from which it contradicts the others.
 _DOUBT, _APART = 1e-11, 1e-6
@@ -187,16 +193,6 @@ def choose(scene, t, y):
 
 
 @jitable
-def least_pivot(scene):
-    """Return the least pivot of the factor at hand over what its equation would have alone."""
-    least = 1.0
-    for r in range(active_count(scene)):
-        pivot = scene.sweep.A[r, r] / scene.sweep.size[scene.equations.active[r]]
-        least = min(least, pivot * pivot)
-    return least
-
-
-@jitable
 def implied_residual(scene, t, y):
     """Return the largest residual of the equations not in use, over its unit, and whose it is."""
     largest, worst = 0.0, -1
@@ -210,18 +206,44 @@ def implied_residual(scene, t, y):
 
 
 @jitable
+def choose_better(scene, t, y, least):
+    """Choose anew, and keep to what was chosen if no other equations are better than those.
+
+    `least` is their least pivot. Where a loop can fold it vanishes whatever is chosen.
+    """
+    active, chosen, last = scene.equations.active, scene.sweep.chosen, len(scene.sweep.chosen) - 1
+    for r in range(last + 1):
+        chosen[r] = active[r]
+    choose(scene, t, y)
+    same = active[last] == chosen[last]
+    for r in range(active[last]):
+        same = same and active[r] == chosen[r]
+    if same:
+        return
+    worse = _BETTER * scene.sweep.quality[CHOSEN] < least / _WORN
+    if active[last] < chosen[last] or (active[last] == chosen[last] and worse):
+        for r in range(last + 1):
+            active[r] = chosen[r]
+        fill_skyline(scene)
+
+
+@jitable
 def keep_choice(scene, t, y):
     """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
     sweep, count = scene.sweep, active_count(scene)
     if count == 0:
         return 0
-    least = least_pivot(scene)
-    sweep.quality[NEAR_FOLD] = 1.0 if least < _NEAR * sweep.quality[USUAL] else 0.0
+    least = sweep.quality[PIVOT]
+    sweep.quality[NEAR_FOLD] = 1.0 if near_fold(scene) else 0.0
+    if least > sweep.quality[USUAL]:
+        sweep.quality[KEPT] = 0.0
+    elif least > SOUND * FOLDING * sweep.quality[USUAL]:
+        keep_accelerations(scene, t)
     if count == len(scene.equations.active) - 1:
         return 0
     apart, worst = implied_residual(scene, t, y)
     if apart > _DOUBT or least < _WORN * sweep.quality[CHOSEN]:
-        choose(scene, t, y)
+        choose_better(scene, t, y, least)
     if not apart <= _APART and active_count(scene) <= count:
         scene.work.trouble[1] = worst
         return CONTRADICTION

@@ -30,15 +30,21 @@ from mbsim.core.rotation import (
     vector,
 )
 from mbsim.dynamics.kinematics import position
-from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
+from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
 from mbsim.laws.abi import (
+    BRANCH_OUT,
     FRICTION_INPUTS,
     FROZEN,
+    GROWTH,
+    LIMIT_RATE,
     MEMORY_OUT,
+    MODE_OUT,
+    NORMAL_RATE,
     NORMAL_STIFFNESS,
     SLIDING_LIMIT,
     SLIPPING_MASS,
-    USUAL_SIZE,
+    STORED_OUT,
+    UNIT_OUT,
 )
 from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
@@ -72,6 +78,15 @@ FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 STIFFNESS, HELD, MODE = 12, 13, 14
 # of a pair that is one incident: its area, and how its normal force damps tilting
 PATCH, TILTING = 15, 16
+# of friction with memory: its branch, the velocity as which an error of 1 in what it integrates
+# counts, its force along x and y of the incident marker; growth of STIFFNESS over itself, the
+# user's own friction of sliding
+BRANCH, UNIT, ALONG_X, ALONG_Y, STIFFENS, LIMIT = range(17, 23)
+# the rates of normal force and of that, as found at a time; both as they were there
+NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN = range(23, 28)
+
+# part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
+CHANGES = 1e-9
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -195,14 +210,17 @@ def slipping_mass(scene, s):
 @jitable
 def remember(scene, y, s, c, given):
     """Give a friction law what it kept, and what only laws with memory look at."""
-    state, at, z = scene.state, FRICTION_INPUTS, scene.slots.z[s]
+    state, at, z, row = scene.state, FRICTION_INPUTS, scene.slots.z[s], scene.work.slot[s]
+    carried = scene.contacts.carried[c]
     given[FROZEN] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
-    given[NORMAL_STIFFNESS] = scene.work.slot[s, STIFFNESS]
+    given[NORMAL_STIFFNESS], given[GROWTH] = row[STIFFNESS], row[STIFFENS]
     given[SLIPPING_MASS] = slipping_mass(scene, s)
     given[SLIDING_LIMIT] = math.nan
-    given[USUAL_SIZE] = scene.contacts.size[c]
+    known = row[FOUND_AT] == given[0]
+    given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
+    given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
     for k in range(scene.contacts.memory[c]):
-        if z >= 0:
+        if k < carried:
             given[at + k] = y[z + k]
         elif scene.world.past[0] != NOW:
             given[at + k] = state.before[s, k]
@@ -213,13 +231,13 @@ def remember(scene, y, s, c, given):
 @jitable
 def keep(scene, dy, s, c, out):
     """Keep what a friction law with memory made of it."""
-    row, z = scene.work.slot[s], scene.slots.z[s]
-    row[HELD], row[MODE] = out[5], out[6]
-    for k in range(scene.contacts.memory[c]):
-        if z >= 0:
-            dy[z + k] = out[MEMORY_OUT + k]
-        else:
-            scene.work.memory[s, k] = out[MEMORY_OUT + k]
+    row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
+    row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
+    row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[0], out[1]
+    for k in range(n):
+        scene.work.memory[s, k] = out[MEMORY_OUT + k]
+    for k in range(scene.contacts.carried[c]):
+        dy[z + k] = out[MEMORY_OUT + n + k]
 
 
 @jitable
@@ -259,7 +277,7 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
         code = call_int(contacts.sliding_law[c], call)
         if code != 0:
             return code
-        given[SLIDING_LIMIT] = math.hypot(out[0], out[1])
+        given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[0], out[1])
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 
@@ -391,18 +409,22 @@ def add_contact(scene, t, h, y, dy, s):
     share = point[7]
     normal, elastic, stored = share * out[0], share * out[1], share * out[2]
     lost = (normal - elastic) * rate
-    row[HELD] = row[MODE] = 0.0
+    # of shares that turn with the shapes
+    couple = scale(out[1] if whole > 0.0 else out[2], vector(point[COUPLE:]))
+    row[HELD] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
         row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
+        over = elastic * depth / stored - 2.0 if stored > 0.0 else 0.0
+        row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
     if whole > 0.0:
         # see geometry.region
         stored = whole * out[2]
-        code, couple, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
+        code, torque, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
         if code != 0:
             return code
-        torque = couple
         lost += damped
+    torque = add(torque, couple)
 
     force = scale(normal, n)
     if contacts.friction_law[c] != 0:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.kinematics import place_graphics
+from mbsim.geometry.catalog import COUPLE
 from mbsim.system.arrays import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
 
 #: Code of a trial point too far away for the list of near pairs; the step has to be shorter.
@@ -38,8 +39,9 @@ def measure_pair(scene, pair):
     )
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
-            for k in range(4, 7):
-                work.points[s, k] = -work.points[s, k]
+            for k in range(3):
+                work.points[s, 4 + k] = -work.points[s, 4 + k]
+                work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
     return True
 
 

@@ -22,16 +22,27 @@ from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.angles import followed_angle
 from mbsim.dynamics.expressions import gradient, jet
 from mbsim.dynamics.kinematics import position
-from mbsim.dynamics.markers import marker_arm, marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.markers import (
+    marker_arm,
+    marker_axis,
+    marker_point,
+    marker_quaternion,
+    marker_velocity,
+)
 from mbsim.dynamics.tree import load, origin, put, respond
 from mbsim.system.arrays import (
     ANGLE,
+    ASKED,
     GENERAL,
+    KEPT,
+    KEPT_PIVOT,
     OFFSET,
     PERP,
+    PIVOT,
     PLACE_HELD,
     RIGID_DOOR,
     TOUCHING,
+    TWIST,
     USUAL,
     Scene,
 )
@@ -43,8 +54,19 @@ RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 CONTRADICTION = 9
 
 #: Pivots of about this part of the usual ones are those of a position in which a loop can fold:
-#: there an equation fades out, and behind it comes in again.
-FOLDING = 1e-8
+#: there an equation fades out, and behind it comes in again. A loop whose lengths are wrong by a
+#: rounding error e moves along with (e/pivot) of its speed beside what it should.
+FOLDING = 1e-5
+#: Below this part of the usual pivots a state is near such a position.
+NEAR = 0.01
+#: Accelerations are kept where no pivot is below so many times the part at which equations fade.
+SOUND = 10.0
+#: Below this part of the usual pivots what is foreseen begins to count.
+FADES = 100.0 * FOLDING
+#: They are foreseen over at most so many times the time over which they were kept. A motion that
+#: stays near a fold for longer is slow: rounding leads it less astray, and equations fade later.
+REACH = 3.0
+UNFORESEEN = 1e-8
 
 
 @jitable
@@ -129,6 +151,30 @@ def angle_term(scene, y, i, j, slot, G):
 
 
 @jitable
+def twist_term(scene, y, i, j, G):
+    """Return value, rate and second rate of 2 z of the quaternion from J to I; fill its gradient.
+
+    With q = (w, x, y, z), W = w_I - w_J and J's axes e: q' = (0, W) q/2 in these axes, so that
+    2 z' = n . W, n = w e_z + y e_x - x e_y, |n|^2 = 1 - z^2, and where no body is accelerated
+    2 z'' = -z W^2/2 - n . (w_J x w_I).
+    """
+    a, b = marker_quaternion(scene, y, j), marker_quaternion(scene, y, i)
+    # conj(a) b
+    w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    qx = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]
+    qy = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1]
+    qz = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
+    e_x, e_y = marker_axis(scene, j, 0), marker_axis(scene, j, 1)
+    n = add(scale(w, marker_axis(scene, j, 2)), sub(scale(qy, e_x), scale(qx, e_y)))
+    w_i = vector(scene.work.w[scene.markers.body[i]])
+    w_j = vector(scene.work.w[scene.markers.body[j]])
+    turning = sub(w_i, w_j)
+    fill_turn(scene, y, i, j, n, G)
+    second = -0.5 * qz * dot(turning, turning) - dot(n, cross(w_j, w_i))
+    return 2.0 * qz, dot(n, turning), second
+
+
+@jitable
 def distance_term(scene, y, i, j, G):
     """Return value, rate and second rate of the distance of I and J, and fill its gradient."""
     at_i, at_j = marker_point(scene, y, i), marker_point(scene, y, j)
@@ -207,6 +253,8 @@ def fill_equation(scene, t, y, e):
             g, dg, ddg = perp_term(scene, y, i, j, eq.axis[k, 0], eq.axis[k, 1], G)
         elif kind == ANGLE:
             g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
+        elif kind == TWIST:
+            g, dg, ddg = twist_term(scene, y, i, j, G)
         else:
             g, dg, ddg = distance_term(scene, y, i, j, G)
         value += factor * g
@@ -350,26 +398,31 @@ def fill_matrix(scene):
 
 
 @jitable
-def factor_matrix(scene):
+def factor_matrix(scene, t):
     """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier.
 
-    A pivot d stands as d + f^2/d, f a part of the usual pivots: itself where d is large,
-    infinite where it is 0, smooth between.
+    A pivot d stands as d (1 + 1/x^8), x being d over a part of the usual ones: itself where d
+    is large, infinite where it is 0, smooth between.
     """
     A, first, n = scene.sweep.A, scene.sweep.skyline, active_count(scene)
-    usual = FOLDING * scene.sweep.quality[USUAL]
+    usual, least = scene.sweep.quality[USUAL], 1.0
+    folding = FOLDING if foreseeable(scene, t) else UNFORESEEN
     for i in range(n):
-        fold = usual * scene.sweep.size[scene.equations.active[i]] ** 2
+        size = scene.sweep.size[scene.equations.active[i]] ** 2
         for j in range(first[i], i + 1):
             total = A[i, j]
             for k in range(max(first[i], first[j]), j):
                 total -= A[i, k] * A[j, k]
             if j < i:
                 A[i, j] = total / A[j, j]
-            elif total > 0.0:
-                A[i, i] = math.sqrt(total + fold * fold / total)
-            else:
+                continue
+            least = min(least, total / size)
+            part = total / (folding * usual * size) if usual > 0.0 else math.inf
+            if part < 1e-4:
                 A[i, i] = math.inf
+            else:
+                A[i, i] = math.sqrt(total * (1.0 + part**-8) if part < 100.0 else total)
+    scene.sweep.quality[PIVOT] = least
 
 
 @jitable
@@ -397,21 +450,21 @@ def hold(scene, t, y):
         return
     fill_equations(scene, t, y)
     fill_matrix(scene)
-    factor_matrix(scene)
-    impose(scene)
+    factor_matrix(scene, t)
+    impose(scene, t)
 
 
 @jitable
-def hold_again(scene):
+def hold_again(scene, t):
     """Fill the accelerations anew after forces changed; all else is as `hold` left it."""
     load(scene)
     respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
     if active_count(scene) > 0:
-        impose(scene)
+        impose(scene, t)
 
 
 @jitable
-def impose(scene):
+def impose(scene, t):
     """Bend accelerations of the tree alone to those that the equations allow."""
     sweep, active = scene.sweep, scene.equations.active
     nt, n = len(scene.tree.body), active_count(scene)
@@ -419,10 +472,107 @@ def impose(scene):
         e = active[r]
         sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, e)
     solve_matrix(scene)
+    # what is foreseen stands in for what equations that fade out no longer ask for
+    ahead = sweep.quality[PIVOT] < FADES * sweep.quality[USUAL] and foreseeable(scene, t)
+    if ahead:
+        foresee(scene, t)
+        for r in range(n):
+            sweep.wanted[r] = sweep.multiplier[r]
+            sweep.rhs[r] = along(scene, active[r], sweep.answer, -1)
+        solve_matrix(scene)
     load(scene)
     for r in range(n):
-        add_wrench(scene, active[r], sweep.multiplier[r])
+        if ahead:
+            add_wrench(scene, active[r], sweep.wanted[r] - sweep.multiplier[r])
+            sweep.multiplier[r] = sweep.wanted[r]
+        else:
+            add_wrench(scene, active[r], sweep.multiplier[r])
     respond(scene, 0, nt, 1, sweep.a)
+    if ahead:
+        for p in range(nt):
+            for c in range(6):
+                sweep.a[p, c] += sweep.answer[p, c]
+
+
+@jitable
+def near_fold(scene):
+    """Return whether the factor at hand is of a state near a position in which a loop can fold."""
+    quality = scene.sweep.quality
+    return quality[PIVOT] < NEAR * quality[USUAL]
+
+
+@jitable
+def foreseeable(scene, t):
+    """Return whether enough was kept to foresee what multipliers do at t."""
+    when, last = scene.sweep.kept_at, int(scene.sweep.quality[KEPT]) - 1
+    return last > 0 and t - when[0] < REACH * (when[0] - when[last])
+
+
+@jitable
+def foresee(scene, t):
+    """Fill `answer` with what multipliers do to accelerations, if that goes on as it did.
+
+    It goes on as the polynomial through what was kept does (Lagrange's form); it counts fully
+    where equations fade, and not at all where they hold.
+    """
+    sweep, nt = scene.sweep, len(scene.tree.body)
+    quality, when = sweep.quality, sweep.kept_at
+    count, part = int(quality[KEPT]), quality[PIVOT] / quality[USUAL]
+    s = min(max((FADES - part) / (FADES - SOUND * FOLDING), 0.0), 1.0)
+    counts = s * s * (3.0 - 2.0 * s)
+    for p in range(nt):
+        for c in range(6):
+            sweep.answer[p, c] = 0.0
+    for i in range(count):
+        part = counts
+        for j in range(count):
+            if j != i:
+                part *= (t - when[j]) / (when[i] - when[j])
+        for p in range(nt):
+            for c in range(6):
+                sweep.answer[p, c] += part * sweep.kept_a[i, p, c]
+
+
+@jitable
+def keep_accelerations(scene, t):
+    """Keep what multipliers do to accelerations at the committed state.
+
+    Their square, in the norm of the inertia, is w = m' A m. Where a loop passes through a fold it
+    stays as it is while the least pivot d falls; where the loop cannot be closed beyond, what is
+    asked of it stays, and w grows as 1/d at least. From 1/sqrt(d) on nothing is foreseen.
+    """
+    sweep, nt, most = scene.sweep, len(scene.tree.body), len(scene.sweep.kept_at)
+    quality, when = sweep.quality, sweep.kept_at
+    count = int(quality[KEPT])
+    if count > 0 and not t > when[0]:
+        count = 0
+    if count > 1 and t - when[0] < 0.1 * (when[0] - when[1]):
+        # too near to tell how they change
+        return
+    for i in range(min(count, most - 1), 0, -1):
+        when[i] = when[i - 1]
+        for p in range(nt):
+            for c in range(6):
+                sweep.kept_a[i, p, c] = sweep.kept_a[i - 1, p, c]
+    when[0] = t
+    for p in range(nt):
+        for c in range(6):
+            sweep.p[p, c] = 0.0
+    for r in range(active_count(scene)):
+        add_wrench(scene, scene.equations.active[r], sweep.multiplier[r])
+    respond(scene, 0, nt, 0, sweep.answer)
+    for p in range(nt):
+        for c in range(6):
+            sweep.kept_a[0, p, c] = sweep.answer[p, c]
+    square = 0.0
+    for r in range(active_count(scene)):
+        along_answer = along(scene, scene.equations.active[r], sweep.answer, -1)
+        square += sweep.multiplier[r] * along_answer
+    asked, fell = square * math.sqrt(quality[PIVOT]), quality[PIVOT] < quality[KEPT_PIVOT]
+    if near_fold(scene) and fell and asked > quality[ASKED]:
+        count = 0
+    quality[ASKED], quality[KEPT_PIVOT] = asked, quality[PIVOT]
+    quality[KEPT] = min(count + 1, most)
 
 
 @jitable

@@ -9,18 +9,37 @@ from numba import carray, types
 
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
-from mbsim.core.problem import ALONG, BEGIN_ANEW, BY_CHECK, FRICTION_ALONE, HOOK, Problem
+from mbsim.core.problem import (
+    ALONG,
+    BEGIN_ANEW,
+    BY_CHECK,
+    FRICTION_ALONE,
+    HOOK,
+    IMPACTS_ALONE,
+    Problem,
+)
+from mbsim.dynamics.audit import examine
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.limits import longest_step
-from mbsim.dynamics.output import blame, friction_left, no_room, scaled_error, write_row
+from mbsim.dynamics.output import (
+    blame,
+    friction_left,
+    impact_left,
+    no_room,
+    scaled_error,
+    write_row,
+)
+from mbsim.dynamics.scales import take_speeds
 from mbsim.dynamics.stability import stable_step
 from mbsim.system.arrays import (
     ALONG_JOINTS,
     BODY_SIZE,
     DRY_DOOR,
+    ERROR_NOW,
     EVALUATE_DOOR,
+    HELD_OTHERWISE,
     HOLD_AGAIN,
     JOINTS_DOOR,
     KEEP,
@@ -34,8 +53,6 @@ from mbsim.system.arrays import (
 
 PAUSE_FOR_EVENTS = 2.0
 STEP_IS_STALE = 4.0
-#: What `commit` returns where equations were taken into use or out of it.
-HELD_OTHERWISE = 2
 
 
 def _rhs(context, t, h, a, b):
@@ -65,9 +82,14 @@ def _norm(context, t, h, a, b):
     """The scaled local error."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
+    if h == IMPACTS_ALONE:
+        return impact_left(scene, t, carray(a, (n,)), carray(b, (n,)))
     if h == FRICTION_ALONE:
         return friction_left(scene, carray(a, (n,)), carray(b, (n,)))
-    return scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
+    error = scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
+    if h > 0.0:
+        scene.audit.tally[ERROR_NOW] = error
+    return error
 
 
 def _check(context, t, h, a, b):
@@ -90,7 +112,10 @@ def _commit(context, t, h, a, b):
         code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
         if code != 0:
             return -float(code)
-    changed = commit(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
+    y = carray(a, (scene.rows.y.shape[1],))
+    take_speeds(scene, y, scene.state.fastest)
+    changed = commit(scene, t, h, y)
+    examine(scene, t, h, y)
     word = (1.0 if changed > 0 else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
     if changed == HELD_OTHERWISE:
         word += BEGIN_ANEW

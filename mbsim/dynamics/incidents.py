@@ -12,9 +12,9 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.contact import (
+    BRANCH,
     DEPTH,
     FORCE,
-    MODE,
     NORMAL,
     RATE,
     SLIP,
@@ -34,6 +34,7 @@ from mbsim.system.arrays import (
     DRY_DOOR,
     ENERGY_LOST,
     FIRST_TOUCH,
+    HELD_OTHERWISE,
     KEEP_DRY,
     LEAVE,
     LIVE,
@@ -285,23 +286,32 @@ def another_point(scene, y, h, s):
 
 
 @jitable
-def commit_memory(scene, t, s, fresh):
-    """Keep what friction in slot s makes of the step, anew if `fresh`; return 1 if f changed."""
-    state, work = scene.state, scene.work
+def commit_memory(scene, t, y, s, fresh):
+    """Keep what friction in slot s makes of the step, anew if `fresh`.
+
+    Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
+    """
+    state, work, z = scene.state, scene.work, scene.slots.z[s]
     for k in range(state.memory.shape[1]):
         state.before[s, k] = state.memory[s, k]
         state.memory[s, k] = 0.0 if fresh else work.memory[s, k]
-    mode = 0.0 if fresh else work.slot[s, MODE]
-    if mode != state.mode[s] and mode > 0.0 and state.mode[s] > 0.0:
+    branch = 0.0 if fresh else work.slot[s, BRANCH]
+    if branch == catalog.UNDECIDED or branch == state.mode[s]:
+        return 0
+    mode, before = branch % catalog.BRANCHES, state.mode[s] % catalog.BRANCHES
+    if mode != before and mode > 0.0 and before > 0.0:
         record_event(scene, t, STICK if mode == catalog.STICK else SLIP_EVENT, s)
-    changed = 1 if mode != state.mode[s] else 0
-    state.mode[s] = mode
-    return changed
+    if mode != before:
+        # which decides what the carried numbers are
+        for k in range(scene.contacts.carried[contact_of(scene, s)]):
+            y[z + k] = state.memory[s, k]
+    state.mode[s] = branch
+    return HELD_OTHERWISE if mode != before else 1
 
 
 @jitable
 def commit_slot(scene, t, h, y, s):
-    """Write the incident of slot s for the accepted point; return 1 if y changed under contact."""
+    """Write the incident of slot s for the accepted point; return what `commit` does."""
     state, work = scene.state, scene.work
     now, before = work.touching[s], state.touching[s]
     changed = 0
@@ -321,13 +331,12 @@ def commit_slot(scene, t, h, y, s):
         for k in range(3):
             if x >= 0:
                 y[x + k] = 0.0
-        for k in range(scene.contacts.memory[contact_of(scene, s)]):
-            if z >= 0:
-                y[z + k] = 0.0
+        for k in range(scene.contacts.carried[contact_of(scene, s)]):
+            y[z + k] = 0.0
     else:
         changed = 0
     if scene.contacts.memory[contact_of(scene, s)] > 0:
-        changed = max(changed, commit_memory(scene, t, s, fresh and not begins))
+        changed = max(changed, commit_memory(scene, t, y, s, fresh and not begins))
     state.touching[s] = now
     if now == 1:
         state.depth[s] = work.slot[s, DEPTH]
@@ -343,7 +352,7 @@ def commit_slot(scene, t, h, y, s):
 
 @jitable
 def commit_incidents(scene, t, h, y):
-    """Write the incident table for the accepted point; return 1 if y changed under contact."""
+    """Write the incident table for the accepted point; return what `commit` does."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     old, new, last = state.hit, work.hit, len(work.hit) - 1
     changed = 0
@@ -380,7 +389,10 @@ def commit_gaps(scene):
 
 @jitable
 def commit(scene, t, h, y):
-    """Take the point evaluated last as accepted; return 1 if y changed so that f did."""
+    """Take the point evaluated last as accepted.
+
+    Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.
+    """
     state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
     changed = commit_incidents(scene, t, h, y)
     if scene.world.doors[DRY_DOOR] != 0:

@@ -174,7 +174,7 @@ def settle_friction(scene, t, y, stresses):
         for f in range(len(applied.kind)):
             if applied.connection[f] >= 0:
                 add_force(scene, f, step * rub[f, MISS])
-        hold_again(scene)
+        hold_again(scene, t)
     return JAMMED
 
 
@@ -188,7 +188,7 @@ def add_friction(scene, t, y, dy):
     stresses = 0
     if active_count(scene) < len(scene.equations.program):
         stresses = fill_stresses(scene, t, y)
-        hold_again(scene)
+        hold_again(scene, t)
     code = settle_friction(scene, t, y, stresses)
     if code != 0:
         return code

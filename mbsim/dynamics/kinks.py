@@ -15,11 +15,25 @@ from mbsim.core.address import call_float, call_int, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, LOAD, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
-from mbsim.dynamics.contact import MODE
+from mbsim.dynamics.contact import (
+    BRANCH,
+    DEPTH,
+    FOUND_AT,
+    LIMIT,
+    LIMIT_SLOPE,
+    LIMIT_THEN,
+    NORMAL,
+    NORMAL_SLOPE,
+    NORMAL_THEN,
+    RATE,
+    STIFFNESS,
+    slipping_mass,
+)
 from mbsim.dynamics.dry_friction import STATIC, holding_force, is_dry, side_of_dry
 from mbsim.dynamics.equations import is_friction
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
+from mbsim.laws.catalog import UNDECIDED
 from mbsim.system.arrays import (
     ASK_HELD,
     EVALUATE_DOOR,
@@ -35,6 +49,12 @@ from mbsim.system.arrays import (
 
 #: Each change of side heats by 1, each step takes a tenth of the heat.
 COOLING = 0.9
+#: Modes of contacts are many: four points of a block come to rest and slip again one by one. With a
+#: change in every step heat rises to 10.
+HOT_MODES = 8.0
+#: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
+#: time in which it would be left.
+AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 
 
 @jitable
@@ -56,9 +76,51 @@ def modes(scene):
     """Return a number that tells what the incidents that go on do: stick or slip."""
     total, hit = 0.0, scene.work.hit
     for k in range(hit[len(hit) - 1]):
-        if scene.state.touching[hit[k]] == 1:
-            total += (1.0 + hit[k]) * scene.work.slot[hit[k], MODE]
+        s = hit[k]
+        if scene.state.touching[s] == 1:
+            branch = scene.work.slot[s, BRANCH]
+            total += (1.0 + s) * (scene.state.mode[s] if branch == UNDECIDED else branch)
     return total
+
+
+@jitable
+def leaves_branch(scene):
+    """Return whether an incident that goes on asks for another branch than it is committed to."""
+    hit, state = scene.work.hit, scene.state
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        branch = scene.work.slot[s, BRANCH]
+        if state.touching[s] == 1 and branch != UNDECIDED and branch != state.mode[s]:
+            return True
+    return False
+
+
+@jitable
+def decide(scene, context, t, y):
+    """Evaluate again with the rates of normal forces, where a branch depends on them."""
+    hit, work, h = scene.work.hit, scene.work, math.inf
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row = work.slot[s]
+        if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
+            swings = math.sqrt(row[STIFFNESS] / slipping_mass(scene, s))
+            h = min(h, AHEAD / swings, BEFORE_LEAVE * row[DEPTH] / max(abs(row[RATE]), 1e-300))
+    if math.isinf(h) or h == 0.0:
+        return
+    for k in range(hit[len(hit) - 1]):
+        row = work.slot[hit[k]]
+        row[NORMAL_THEN], row[LIMIT_THEN] = row[NORMAL], row[LIMIT]
+        row[FOUND_AT] = t
+    for i in range(len(y)):
+        work.ahead[0, i] = y[i] + h * work.idle[i]
+    there, then = work.ahead[0], work.ahead[1]
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t + h, 0.0, there, then))
+    for s in range(len(work.slot)):
+        row = work.slot[s]
+        if row[FOUND_AT] == t:
+            row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
+            row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
 
 
 @jitable
@@ -124,6 +186,8 @@ def watch(scene, context, t, y, what):
     if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
         # what friction does follows from all the rest
         call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+        if what == ASK and len(scene.work.ahead) > 0:
+            decide(scene, context, t, y)
     else:
         place_bodies(scene, y)
     for k in range(len(scene.kinks.program)):
@@ -132,9 +196,10 @@ def watch(scene, context, t, y, what):
         f = scene.kinks.limit[k]
         dry = f >= 0 and is_dry(scene.applied.kind[f])
         # friction with a memory of its own is on the side that it keeps
-        leaves = now != scene.state.dry[f, SLIDES] if dry else other
-        if leaves and sides[k, HEAT] <= HOT:
-            differs = max(differs, 2.0 if dry else 1.0)
+        exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
+        leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
+        if leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
+            differs = max(differs, 2.0 if exact else 1.0)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
@@ -142,12 +207,12 @@ def watch(scene, context, t, y, what):
     if scene.world.doors[RIGID_DOOR] != 0:
         differs = max(differs, watch_held(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
-    hottest = sides[last, HEAT]
+    hot = sides[last, HEAT] > HOT_MODES
     for k in range(last):
         f = scene.kinks.limit[k]
         if f >= 0 and is_dry(scene.applied.kind[f]):
-            hottest = max(hottest, sides[k, HEAT])
-    scene.state.frozen[0] = 1 if hottest <= HOT else 0
+            hot = hot or sides[k, HEAT] > HOT
+    scene.state.frozen[0] = 0 if hot else 1
     return differs
 
 

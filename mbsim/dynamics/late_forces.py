@@ -266,7 +266,7 @@ def settle(scene, t, y, stresses):
             update_secant(scene)
         next_step(scene)
         add_to_all(scene, y)
-        hold_again(scene)
+        hold_again(scene, t)
     return JAMMED if scene.applied.late[at, 1] == RUBBING else UNSETTLED
 
 
@@ -296,7 +296,7 @@ def add_late(scene, t, y, dy):
     stresses = 0
     if active_count(scene) < len(scene.equations.program):
         stresses = fill_stresses(scene, t, y)
-        hold_again(scene)
+        hold_again(scene, t)
     code = failure_or(scene, settle(scene, t, y, stresses))
     if code != 0:
         return code

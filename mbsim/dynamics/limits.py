@@ -15,12 +15,40 @@ from mbsim.dynamics.contact import contact_of, sides, velocity_at
 from mbsim.dynamics.detection import measure_pair
 from mbsim.dynamics.incidents import deepest_of_impact, effective_mass
 from mbsim.dynamics.kinematics import place_body, place_graphic
-from mbsim.system.arrays import BODY_SIZE, LIVE
+from mbsim.system.arrays import AUDIT_TOL, BODY_SIZE, LIVE
 
 #: Halvings of the way out in which a force is looked for, and of where it ends.
 SHALLOWEST = 12
+#: How long before a touch a step ends, over the next one, which meets it, and the same over tol: a
+#: kink in the midst of a step makes wrong what its error hardly shows.
+BEFORE, BEFORE_OVER_TOL = 1e-4, 100.0
+#: A step that begins or ends where a force d^e does is wrong by this part of force times step, at
+#: most, where e is no whole number: what the weights and nodes of DOPRI5 and RADAU5 make of t^e,
+#: those of DOP853 a third of it. Their error estimates see a hundredth to a half of that.
+BLIND = 5e-4
+#: What such a step may make wrong of a velocity, over tol: too little for it to add up.
+BLIND_SHARE = 0.1
+#: The longest step towards the end of a force, over the time until then, whose error is seen.
+SEEN = 0.6
 #: Part of the scene's length below which a depth is rounding.
 ROUNDING = 1e-13
+
+
+@jitable
+def seen_part(scene, c, depth, per_mass):
+    """Return the part of the way out from a depth, or in to it, that may be one step; 1 for all.
+
+    The spring of contact c is F ~ d^e there, e + 1 = F d/E, so that a step over the part x of this
+    way, next to the surface, makes wrong x^(e + 1) of BLIND F h/m. `per_mass` is h/m of the whole.
+    """
+    out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    if not out[2] > 0.0:
+        return 1.0
+    e = out[1] * depth / out[2] - 1.0
+    wrong = min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0))) * BLIND * out[1] * per_mass
+    allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
+    return (allowed / wrong) ** (1.0 / (e + 1.0)) if wrong > allowed > 0.0 else 1.0
 
 
 @jitable
@@ -47,7 +75,8 @@ def step_to_leave(scene, f, s, h):
     """Return the step that ends where the force of the parting slot s ends or comes back.
 
     A step across such a place is one whose error estimate may vanish by chance, and those
-    that do are the ones that are taken. d + d' t + d'' t^2 / 2 = 0 when it leaves; the force
+    that do are the ones that are taken; one that ends there may be too long to see its error, and
+    ends sooner then, as `seen_part` has it. d + d' t + d'' t^2 / 2 = 0 when it leaves; the force
     falls on the way, so this is too soon at first and exact at last. The damper of a fast
     separation can outweigh the spring: then the force is 0 sooner, and as the damper fades with
     depth it comes back just before the shapes part.
@@ -62,8 +91,14 @@ def step_to_leave(scene, f, s, h):
         return math.inf
     leave = 2.0 * depth / (math.sqrt(square) - rate)
     pushes = state.normal[s] > 0.0
+    if pushes and leave < 2.0 * h:
+        m = scene.bodies.mass
+        inverse = (1.0 / m[bi] if bi < len(m) else 0.0) + (1.0 / m[bj] if bj < len(m) else 0.0)
+        last = seen_part(scene, c, depth, leave * inverse)
+        if last < 0.9:
+            h = min(h, max(min(SEEN, 1.0 - last) * leave, ROUNDING * scene.world.scale[0] / -rate))
     if leave > h and pushes_at(scene, c, h, depth, rate, bend) == pushes:
-        return math.inf
+        return h
     before, part = 0.0, 1.0
     for _ in range(SHALLOWEST):
         part *= 0.5
@@ -149,7 +184,13 @@ def step_to_touch(scene, y, f, pair, h):
     first = contact_time / 80.0
     if ramp > 0.01 * first:
         first = min(first, ramp)
-    return t + first if t < first else (1.0 - 1e-6) * t
+    if scene.kinds.kernel[pairs.kind[pair]] == 0:
+        # found by iterations, which leave more than rounding
+        return t + first if t < first else (1.0 - 1e-6) * t
+    first *= seen_part(scene, contact_of(scene, s), first * speed, first / mass)
+    part = min(BEFORE, BEFORE_OVER_TOL * scene.audit.plan[AUDIT_TOL])
+    before = max(part * first, ROUNDING * scene.world.scale[0] / speed)
+    return t + first if t < 10.0 * before else t - before
 
 
 @jitable

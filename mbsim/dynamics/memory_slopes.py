@@ -26,7 +26,7 @@ from mbsim.core.rotation import add, scale, sub
 from mbsim.dynamics.contact import contact_of, in_marker, sides
 from mbsim.dynamics.newton_matrix import FACTOR, RECOVER, RIGHT, times_rate
 from mbsim.dynamics.stiffness import ask_friction
-from mbsim.laws.abi import MEMORY_OUT
+from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT
 from mbsim.system.arrays import MEMORY_DOOR, MEMORY_PAIR_DOOR, TANGENT_DOOR, Scene
 from mbsim.system.tangent import Tangent
 
@@ -51,7 +51,7 @@ def place_of(scene, s, j):
 def carried(scene, s):
     """Return how many numbers slot s carries in y."""
     count = 3 if scene.slots.x[s] >= 0 else 0
-    return count + (scene.contacts.memory[contact_of(scene, s)] if scene.slots.z[s] >= 0 else 0)
+    return count + scene.contacts.carried[contact_of(scene, s)]
 
 
 @jitable
@@ -66,8 +66,9 @@ def ask_at(scene, y, s, around, given, out):
         out[5], out[6], out[7] = given[0], given[1], given[4]
         at = 8
     if scene.slots.z[s] >= 0:
-        for k in range(scene.contacts.memory[c]):
-            out[at + k] = law_out[MEMORY_OUT + k]
+        n = scene.contacts.memory[c]
+        for k in range(scene.contacts.carried[c]):
+            out[at + k] = law_out[MEMORY_OUT + n + k]
     return code
 
 
@@ -79,7 +80,8 @@ def push_of(scene, y, s, given, column):
         if scene.slots.x[s] >= 0 and j < 3:
             length = scene.world.scale[0] if j < 2 else 1.0
             return _PUSH_X * (length + abs(y[place_of(scene, s, j)]))
-        return _PUSH * scene.contacts.size[contact_of(scene, s)]
+        size = scene.work.law_out[SIZE_OUT]
+        return _PUSH * (size if size > 0.0 else 1.0)
     if column < 2:
         return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1]
     if column < 5:

@@ -8,26 +8,34 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
 from mbsim.dynamics.contact import (
+    ALONG_X,
+    ALONG_Y,
     DEPTH,
     FORCE,
     HELD,
     MODE,
     NORMAL,
+    RATE,
     SLIP,
     STORED,
     TORQUE,
+    UNIT,
     contact_of,
     patch,
     sides,
     whole_of,
 )
+from mbsim.dynamics.incidents import effective_mass
 from mbsim.dynamics.kinematics import position
-from mbsim.geometry.catalog import AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY
-from mbsim.laws.catalog import STICK
+from mbsim.dynamics.scales import fill_squares
+from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.laws.catalog import BRANCHES, STICK
+from mbsim.laws.catalog import SLIP as SLIDING
 from mbsim.system.arrays import (
     BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
+    INC_COUPLE,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -50,6 +58,10 @@ from mbsim.system.arrays import (
     STORED_ENERGY,
     VALUES_DOOR,
 )
+
+#: From this part of its group's V on an impact counts, slower ones having little of the energy;
+#: what counts least of its own speed.
+FAST, SLIGHT = 0.4, 5e-4
 
 
 @jitable
@@ -115,6 +127,7 @@ def fill_incidents(scene, h, y):
         for j in range(3):
             row[INC_POINT + j] = work.points[s, 1 + j]
             row[INC_NORMAL + j] = work.points[s, 4 + j]
+            row[INC_COUPLE + j] = work.points[s, COUPLE + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
         row[INC_DEPTH] = work.slot[s, DEPTH]
@@ -237,16 +250,66 @@ def friction_left(scene, e, y):
 
 
 @jitable
+def impact_left(scene, h, e, y):
+    """Return the largest change of a closing speed that e causes, over that in the step h.
+
+    Of impacts: contacts whose force is what changes the motion along the normal, which, with what
+    is stored of it, is one of its group's. There the errors of very many steps add up, though
+    none is large. What hardly changes, as just behind a touch, counts as SLIGHT of that motion.
+    """
+    work, state, largest = scene.work, scene.state, 0.0
+    for k in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[k]
+        mass, rate, point = effective_mass(scene, y, s), work.slot[s, RATE], work.points[s]
+        change = abs(rate - state.rate[s])
+        if state.touching[s] == 0 or mass * change < 0.5 * h * work.slot[s, NORMAL]:
+            continue
+        speed = math.sqrt(rate * rate + 2.0 * max(0.0, work.slot[s, STORED]) / mass)
+        usual = math.sqrt(work.squares[scene.scales.of_contact[contact_of(scene, s)]])
+        if speed < FAST * usual:
+            continue
+        gi, gj = sides(scene, s)
+        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        v = sub(
+            speed_change(scene, e, y, scene.graphics.body[gi], p),
+            speed_change(scene, e, y, scene.graphics.body[gj], p),
+        )
+        change = max(change, SLIGHT * speed)
+        if not abs(dot(v, n)) <= largest * change:
+            largest = abs(dot(v, n)) / change
+    return largest
+
+
+@jitable
+def carried_error(scene, e, s):
+    """Return the velocity as which e in what friction in slot s integrates counts.
+
+    Where it slips that is the way of slip over the spring's length, which acts only across the
+    force.
+    """
+    row, at = scene.work.slot[s], scene.slots.z[s]
+    if scene.state.mode[s] % BRANCHES == SLIDING:
+        force = math.hypot(row[ALONG_X], row[ALONG_Y])
+        across = row[ALONG_X] * e[at + 1] - row[ALONG_Y] * e[at]
+        return row[UNIT] * across / force if force > 0.0 else 0.0
+    square = 0.0
+    for j in range(scene.contacts.carried[contact_of(scene, s)]):
+        square += e[at + j] * e[at + j]
+    return row[UNIT] * math.sqrt(square)
+
+
+@jitable
 def scaled_error(scene, h, e, y):
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
-    Detection that is exact only to a given noise makes forces uncertain; what the noise of a
-    step can do to a velocity is not chased. With h = 0, `e` is no step's error, and what it does
-    to friction, over the normal force, counts as well. The worst body
+    L and V are those of the group of connected bodies (`dynamics.scales`), the energy is that of
+    its heaviest body at V. Detection that is exact only to a given noise makes forces uncertain;
+    what the noise of a step can do to a velocity is not chased. With h = 0, `e` is no step's error,
+    and what it does to friction, over the normal force, counts as well. The worst body
     is left in `trouble[0]`.
     """
-    length, speed = scene.world.scale[0], scene.world.scale[1]
-    largest, worst = 0.0, -1
+    scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
+    fill_squares(scene, y)
     for b in range(len(scene.bodies.mass)):
         at = BODY_SIZE * b
         dx = e[at] ** 2 + e[at + 1] ** 2 + e[at + 2] ** 2
@@ -254,10 +317,12 @@ def scaled_error(scene, h, e, y):
         dv = e[at + 7] ** 2 + e[at + 8] ** 2 + e[at + 9] ** 2
         dw = e[at + 10] ** 2 + e[at + 11] ** 2 + e[at + 12] ** 2
         dv, dw = beyond_noise(scene, b, h, dv, dw)
+        g = scales.group[b]
+        area, fast = scales.length[g] ** 2, squares[g]
         # |dtheta| = 2 |dq| for a unit quaternion
         square = max(
-            max(dx / (length * length), 4.0 * dq),
-            max(dv / (speed * speed), dw * (length / speed) ** 2),
+            max(dx / area, 4.0 * dq),
+            max(dv / fast, dw * area / fast),
         )
         if not square <= largest:
             largest, worst = square, b
@@ -266,19 +331,22 @@ def scaled_error(scene, h, e, y):
         for k in range(hit[len(hit) - 1]):
             at = scene.slots.x[hit[k]]
             if at >= 0 and scene.contacts.reads_x[contact_of(scene, hit[k])] == 1:
-                square = (e[at] ** 2 + e[at + 1] ** 2) / (length * length)
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                square = (e[at] ** 2 + e[at + 1] ** 2) / scales.length[g] ** 2
                 largest = max(largest, max(square, e[at + 2] ** 2))
-            at, memory = scene.slots.z[hit[k]], scene.contacts.memory[contact_of(scene, hit[k])]
-            if at >= 0:
-                size = scene.contacts.size[contact_of(scene, hit[k])]
-                for j in range(memory):
-                    largest = max(largest, (e[at + j] / size) ** 2)
+            if scene.slots.z[hit[k]] >= 0:
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                largest = max(largest, carried_error(scene, e, hit[k]) ** 2 / squares[g])
     # the energy balance closes as well as the motion
-    first = len(e) - max(1, len(scene.contacts.id))
+    first, most = len(e) - max(1, len(scene.contacts.id)), 0.0
+    for c in range(len(scene.contacts.id)):
+        g = scales.of_contact[c]
+        largest = max(largest, (e[first + c] / (scales.mass[g] * squares[g])) ** 2)
+    for g in range(len(squares)):
+        most = max(most, scales.mass[g] * squares[g])
     for kept in scene.world.ledger:
-        first -= 1 if kept >= 0 else 0
-    for c in range(first, len(e)):
-        largest = max(largest, (e[c] / scene.world.scale[2]) ** 2)
+        if kept >= 0:
+            largest = max(largest, (e[kept] / most) ** 2)
     states = scene.states
     for k in range(len(states.place)):
         at = states.place[k]

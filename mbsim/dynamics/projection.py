@@ -16,6 +16,7 @@ from mbsim.dynamics.equations import (
     factor_matrix,
     fill_equations,
     fill_matrix,
+    near_fold,
     solve_matrix,
 )
 from mbsim.dynamics.kinematics import place_bodies
@@ -26,6 +27,8 @@ from mbsim.system.arrays import BODY_SIZE, DRIFT, DRIFTER
 #: Newton ends when no residual is above this part of its unit, or after so many rounds.
 CLOSED = 2e-14
 MOST_ROUNDS = 8
+#: The same near a position in which a loop can fold: what is left leads astray there.
+ROUNDED = 1e-15
 #: A residual, over its unit, whose square is rounding.
 SMALL = 1e-8
 #: What of the way back onto the constraints counts as a step's error: its own estimate is to
@@ -116,6 +119,25 @@ def note_drift(scene, level, column, part):
 
 
 @jitable
+def note_gap(scene):
+    """Note as drift, over `SMALL`, a residual that Newton has left: the step is to be refused.
+
+    A motion that asked for more than that of the step keeps its name: it is the cause.
+    """
+    quality = scene.sweep.quality
+    asked, worst = quality[DRIFT], 0.0
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        gap = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
+        if scene.equations.level[e] >= 2 and gap > max(SMALL, worst):
+            worst = gap
+            if asked <= SMALL:
+                quality[DRIFTER] = e
+    if worst > 0.0:
+        quality[DRIFT] = max(asked, worst / SMALL)
+
+
+@jitable
 def prepare_equations(scene, t, y):
     """Fill all that follows from y: bodies, tree, equations."""
     place_bodies(scene, y)
@@ -133,10 +155,10 @@ def close_loops(scene, t, y):
     prepare_equations(scene, t, y)
     note_drift(scene, 2, RESIDUAL, FORGIVEN)
     fill_matrix(scene)
-    factor_matrix(scene)
+    factor_matrix(scene, t)
     for _ in range(MOST_ROUNDS):
         size = largest_residual(scene, 2, RESIDUAL)
-        if size <= CLOSED:
+        if size <= (ROUNDED if near_fold(scene) else CLOSED):
             return
         correct(scene, 2, RESIDUAL)
         displace(scene, y)
@@ -145,7 +167,8 @@ def close_loops(scene, t, y):
             return
         prepare_equations(scene, t, y)
         fill_matrix(scene)
-        factor_matrix(scene)
+        factor_matrix(scene, t)
+    note_gap(scene)
 
 
 @jitable

@@ -4,8 +4,10 @@ As `dynamics.rigid_friction`, which takes equations into use and out of it, and 
 for contacts here, behind one door. The equations are those of `equations.touching_term`; how the
 contact point and its normal move is found by differences of the closed form along the velocities
 of both bodies. Where equations follow from others (four points of a block) multipliers are not
-known point by point: those are taken whose sum of f^2/(mu_s N)^2 over all points is least, so that
-a block that is pushed begins to slip at all points together.
+known point by point: forces are taken whose largest part of mu_s N is least (`dynamics.cones`).
+Where it is above 1 no forces can hold what sticks, and only there something begins to slip: what
+then moves, and where to, follows from the accelerations of all that is at rest, by Gauss's
+principle. A slot that those that stick hold sticks too: it cannot move.
 
 What a slot keeps is in `State.memory`, see `laws.friction.stiction.rigid`.
 """
@@ -17,18 +19,16 @@ import math
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.dynamics.choice import sticks
+from mbsim.dynamics.choice import LEVER, fill_size, sticks
+from mbsim.dynamics.cones import CAPACITY, LOAD, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.cones import FORCE as HELD_BY
 from mbsim.dynamics.contact import FORCE, NORMAL, contact_of, sides, tangent, velocity_at
 from mbsim.dynamics.dry_friction import AT_REST, ROUNDING
 from mbsim.dynamics.equations import (
-    GAMMA,
     active_count,
     add_wrench,
     along,
-    along_motion,
     fill_equation,
-    is_active,
-    solve_matrix,
 )
 from mbsim.dynamics.incidents import record_event
 from mbsim.dynamics.kinematics import place_body, place_graphic
@@ -36,18 +36,18 @@ from mbsim.dynamics.tree import respond
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.system.arrays import (
-    AIM_HELD,
     ASK_HELD,
     BEGIN_HELD,
     BODY_SIZE,
     CHANGED_HELD,
+    CONE_ROWS,
     EVALUATE_DOOR,
-    HOT,
     LOAD_HELD,
     PLACE_HELD,
     RECORD_HELD,
     RELEASE_HELD,
     SHARE_HELD,
+    TOLERANCE,
 )
 from mbsim.system.arrays import SLIP as SLIP_EVENT
 from mbsim.system.arrays import STICK as STICK_EVENT
@@ -58,9 +58,18 @@ MOMENT = 1e-5
 #: What of a second difference, over the model's length, is no jump of the point from one place to
 #: another.
 SMOOTH = 1e-8
-#: Directions of slip that begins are good to so much, or are not sought any longer: the first step
-#: finds the rest.
-AIMED, MOST_TURNS = 1e-4, 50
+#: A slip that turns below this part of the tolerance, over the model's speed, has come to rest.
+SETTLED = 0.1
+#: Slip whose part against the way it had is larger than this part of it goes back, and has not only
+#: turned.
+BACK = 0.7
+#: What presses less than this part of what presses most counts as that: no limit is 0.
+LEAST_PART = 1e-9
+#: Slots that slip are sought with limits that are lower by this part: where they are just reached
+#: accelerations are 0, and do not tell the way.
+OVER = 1e-5
+# last rows of `Sweep.cone`, by slots that stick: what they hold and rub with, and their equation
+STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
 
 
 @jitable
@@ -180,28 +189,42 @@ def first_of_slots(scene):
 
 
 @jitable
-def self_stress(scene, t, y, e, row):
-    """Fill a row of `Sweep.share`: a unit multiplier of equation e and what that asks of others.
+def fill_slip(scene, t, y, e, first, row):
+    """Fill row e of S of `dynamics.cones`, from the equation in use `first` on.
 
-    Multipliers and p are lost.
+    Of A = L L' of the equations in use and b how they act on e, it is the end of L^-1 b. Returns
+    what is left of e, of a slip that they do not imply. p is lost.
     """
-    sweep, active, first = scene.sweep, scene.equations.active, first_of_slots(scene)
-    nt, n = len(scene.tree.body), active_count(scene)
+    sweep, active = scene.sweep, scene.equations.active
+    nt, n, z = len(scene.tree.body), active_count(scene), scene.sweep.rhs
     fill_equation(scene, t, y, e)
     for k in range(nt):
         for i in range(6):
             sweep.p[k, i] = 0.0
     add_wrench(scene, e, 1.0)
     respond(scene, 0, nt, 0, sweep.answer)
-    for r in range(n):
-        sweep.rhs[r] = -along(scene, active[r], sweep.answer, -1)
-    solve_matrix(scene)
-    for k in range(len(row)):
-        row[k] = 0.0
-    row[e - first] = 1.0
-    for r in range(n):
-        if active[r] >= first:
-            row[active[r] - first] = sweep.multiplier[r]
+    left = along(scene, e, sweep.answer, -1)
+    for i in range(n):
+        total = along(scene, active[i], sweep.answer, -1)
+        for k in range(sweep.skyline[i], i):
+            total -= sweep.A[i, k] * z[k]
+        z[i] = total / sweep.A[i, i]
+        left -= z[i] * z[i]
+    for k in range(first, n):
+        row[k - first] = z[k]
+    return left
+
+
+@jitable
+def fill_load(scene, first, m):
+    """Fill what is held of m of `dynamics.cones`: L' times the multipliers."""
+    sweep, n = scene.sweep, active_count(scene)
+    for k in range(first, n):
+        m[k - first] = 0.0
+        for j in range(k, n):
+            # a multiplier of a pivot that is infinite is none
+            if sweep.skyline[j] <= k and sweep.multiplier[j] != 0.0:
+                m[k - first] += sweep.A[j, k] * sweep.multiplier[j]
 
 
 @jitable
@@ -212,75 +235,62 @@ def capacity(scene, s):
 
 
 @jitable
-def weight(scene, k, most):
-    """Return how dear a force of the k-th equation of slots is: 1/(mu_s N)^2."""
-    s = scene.equations.slot[first_of_slots(scene) + k]
-    return (most / max(capacity(scene, s), 1e-9 * most)) ** 2
-
-
-@jitable
-def fill_mix(scene, count, most):
-    """Fill the normal equations of how `count` self-stresses make the forces least."""
-    share, mix, held, first = scene.sweep.share, scene.sweep.mix, scene.work.held, 0
-    first = first_of_slots(scene)
-    for a in range(count):
-        for b in range(count + 1):
-            total = 0.0
-            for k in range(len(share)):
-                if share[a, k] == 0.0:
-                    continue
-                other = share[b, k] if b < count else -held[scene.equations.slot[first + k], k % 2]
-                total += share[a, k] * weight(scene, k, most) * other
-            mix[a, b if b < count else len(share)] = total
-
-
-@jitable
-def solve_mix(scene, count):
-    """Replace the last column of `Sweep.mix` by the solution; the matrix is positive."""
-    mix, last = scene.sweep.mix, len(scene.sweep.share)
-    for a in range(count):
-        for b in range(a + 1, count):
-            part = mix[b, a] / mix[a, a]
-            for k in range(a, count):
-                mix[b, k] -= part * mix[a, k]
-            mix[b, last] -= part * mix[a, last]
-    for a in range(count - 1, -1, -1):
-        for b in range(a + 1, count):
-            mix[a, last] -= mix[a, b] * mix[b, last]
-        mix[a, last] /= mix[a, a]
-
-
-@jitable
-def spread(scene, t, y):
-    """Share multipliers in `Work.held` out over all slots that stick."""
-    sweep, held, first = scene.sweep, scene.work.held, first_of_slots(scene)
-    slot, count, most = scene.equations.slot, 0, 0.0
-    for e in range(first, len(slot), 2):
+def most_capacity(scene):
+    """Return what the slot that sticks best holds at most."""
+    slot, most = scene.equations.slot, 0.0
+    for e in range(first_of_slots(scene), len(slot), 2):
         if sticks(scene, e):
             most = max(most, capacity(scene, slot[e]))
-    if most == 0.0:
-        return
+    return most
+
+
+@jitable
+def fill_cones(scene, t, y, most):
+    """Fill limits, slips and load of all slots that stick; return rows and equations in use.
+
+    p and multipliers stay.
+    """
+    sweep, slot, active = scene.sweep, scene.equations.slot, scene.equations.active
+    first, begin, count, n = first_of_slots(scene), 0, 0, active_count(scene)
+    while begin < n and active[begin] < first:
+        begin += 1
+    fill_load(scene, begin, sweep.cone[LOAD])
     for k in range(len(sweep.p)):
         for i in range(6):
             sweep.kept_p[k, i] = sweep.p[k, i]
-    for r in range(active_count(scene)):
-        sweep.kept[r] = sweep.multiplier[r]
-    for e in range(first, len(slot)):
-        if sticks(scene, e) and not is_active(scene, e):
-            self_stress(scene, t, y, e, sweep.share[count])
-            count += 1
-    if count > 0:
-        fill_mix(scene, count, most)
-        solve_mix(scene, count)
-    for a in range(count):
-        part = sweep.mix[a, len(sweep.share)]
-        for k in range(len(sweep.share)):
-            held[slot[first + k], k % 2] += part * sweep.share[a, k]
+    for e in range(first, len(slot), 2):
+        if sticks(scene, e):
+            sweep.cone[WHICH, count // 2] = e
+            sweep.cone[CAPACITY, count // 2] = max(capacity(scene, slot[e]), LEAST_PART * most)
+            fill_slip(scene, t, y, e, begin, sweep.share[count])
+            fill_slip(scene, t, y, e + 1, begin, sweep.share[count + 1])
+            count += 2
     for k in range(len(sweep.p)):
         for i in range(6):
             sweep.p[k, i] = sweep.kept_p[k, i]
-    for r in range(active_count(scene)):
-        sweep.multiplier[r] = sweep.kept[r]
+    return count, n - begin
+
+
+@jitable
+def is_loaded(scene, r):
+    """Return whether anything is to be held."""
+    for k in range(r):
+        if scene.sweep.cone[LOAD, k] != 0.0:
+            return True
+    return False
+
+
+@jitable
+def spread(scene, t, y, most):
+    """Share what is held out over all slots that stick, in `Work.held`."""
+    sweep, slot = scene.sweep, scene.equations.slot
+    count, r = fill_cones(scene, t, y, most)
+    if not is_loaded(scene, r):
+        return
+    level, _ = solve_cones(sweep.share, count, r, sweep.cone, sweep.mix, SHARED)
+    for k in range(count):
+        s = slot[int(sweep.cone[WHICH, k // 2])]
+        scene.work.held[s, k % 2] = sweep.cone[HELD_BY, k] / level
 
 
 @jitable
@@ -297,8 +307,9 @@ def share_held(scene, t, y):
         if active[r] >= first:
             held[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
             count -= 1
-    if count > 0:
-        spread(scene, t, y)
+    most = most_capacity(scene)
+    if count > 0 and most > 0.0:
+        spread(scene, t, y, most)
     for e in range(first, len(slot), 2):
         if sticks(scene, e) and scene.work.touching[slot[e]] == 1:
             show_held(scene, slot[e])
@@ -331,10 +342,28 @@ def slip_of(scene, y, s):
 
 
 @jitable
-def passes(scene, s):
-    """Return whether slot s, which sticks, would have to hold more than it can."""
-    held = scene.work.held[s]
-    return math.hypot(held[0], held[1]) > capacity(scene, s)
+def settled(scene):
+    """Return what slip is none to the tolerance."""
+    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[1]
+
+
+@jitable
+def held_part(scene):
+    """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
+
+    What presses next to nothing has no limit of its own: the least is a part of the largest.
+    """
+    slot, part, least = scene.equations.slot, 0.0, LEAST_PART * most_capacity(scene)
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if not sticks(scene, e):
+            continue
+        held, able = scene.work.held[slot[e]], max(capacity(scene, slot[e]), least)
+        force = math.hypot(held[0], held[1])
+        if able > 0.0:
+            part = max(part, force / able)
+        elif force > 0.0:
+            return math.inf
+    return part
 
 
 @jitable
@@ -354,31 +383,21 @@ def rest(scene):
 @jitable
 def ask_held(scene, y):
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
+    if held_part(scene) > 1.0:
+        return 1
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
-        mode = scene.state.memory[s, KEPT_MODE]
-        if scene.work.touching[s] == 0 or mode == BEGUN:
-            continue
-        if mode == STICK:
-            if passes(scene, s):
+        if scene.work.touching[s] == 1 and scene.state.memory[s, KEPT_MODE] == SLIP:
+            if onward(scene, s, slip_of(scene, y, s)) < -rest(scene):
                 return 1
-        elif onward(scene, s, slip_of(scene, y, s)) < -rest(scene):
-            return 1
     return 0
 
 
 @jitable
 def load_held(scene):
     """Return the largest force that holds a slot, in millionths of what holds at most."""
-    slot, most = scene.equations.slot, 0.0
-    for e in range(first_of_slots(scene), len(slot), 2):
-        s = slot[e]
-        able = capacity(scene, s)
-        if able > 0.0 and sticks(scene, e):
-            held = scene.work.held[s]
-            most = max(most, math.hypot(held[0], held[1]) / able)
-    return int(1e6 * min(most, 1e6))
+    return int(1e6 * min(held_part(scene), 1e6))
 
 
 @jitable
@@ -398,19 +417,18 @@ def let_stick(scene, s):
 
 @jitable
 def begin_slot(scene, y, s):
-    """Set the mode of slot s that the point evaluated last asks for; return 1 where it turns."""
+    """Set the mode of slot s, which does not stick; return 1 where it turns.
+
+    What turns at a speed that the tolerance explains has come to rest, and so has what went back:
+    where that is is not located, or not so well.
+    """
     kept, v = scene.state.memory[s], slip_of(scene, y, s)
     speed = math.hypot(v[0], v[1])
-    if kept[KEPT_MODE] == STICK:
-        if passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
-        return 0
     turns, rests = 0, speed <= AT_REST * rest(scene)
     if kept[KEPT_MODE] == SLIP:
         along = onward(scene, s, v)
         turns = 1 if along < -rest(scene) else 0
-        # where such points are not located, it came to rest within the step
-        rests = rests or (scene.state.heat[0] > HOT and -along > 0.7 * speed)
+        rests = rests or (turns == 1 and speed <= settled(scene)) or -along > BACK * speed
     if not rests:
         let_slip(scene, s, v[0], v[1], speed)
     elif kept[KEPT_MODE] == BEGUN or turns == 1:
@@ -419,26 +437,46 @@ def begin_slot(scene, y, s):
 
 
 @jitable
+def came_to_rest(scene, pair):
+    """Return whether a slot of a pair sticks that did not."""
+    slot = scene.equations.slot
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        if scene.slots.pair[s] == pair and scene.state.memory[s, KEPT_MODE] == STICK:
+            if not was_held(scene, s):
+                return True
+    return False
+
+
+@jitable
 def begin_held(scene, y):
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
-    What comes to rest is first taken to stick, then whatever else rests as well.
+    What is at rest is first taken to stick wherever something changes, and what is as good as at
+    rest beside what comes to rest: what of it slips is found for all together (`release_held`).
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
-    changed = 0
+    changed, held, begun = 1 if held_part(scene) > 1.0 else 0, 0, 0
     for e in range(first, len(slot), 2):
-        if state.touching[slot[e]] == 1:
-            changed = max(changed, begin_slot(scene, y, slot[e]))
-        if (state.memory[slot[e], KEPT_MODE] == STICK) != was_held(scene, slot[e]):
+        s = slot[e]
+        mode = state.memory[s, KEPT_MODE]
+        if state.touching[s] == 1 and mode != STICK:
+            begun = max(begun, 1 if mode == BEGUN else 0)
+            changed = max(changed, begin_slot(scene, y, s))
+        mode = state.memory[s, KEPT_MODE]
+        held = max(held, 1 if mode == STICK else 0)
+        if (mode == STICK) != was_held(scene, s):
             changed = 1
-    if changed == 0:
+    # what begins to touch beside what sticks may be held by that
+    if changed == 0 and (held == 0 or begun == 0):
         return 0
     for e in range(first, len(slot), 2):
         s = slot[e]
-        slips = state.memory[s, KEPT_MODE] == SLIP and state.before[s, KEPT_MODE] == SLIP
-        if slips and state.touching[s] == 1:
-            v = slip_of(scene, y, s)
-            if math.hypot(v[0], v[1]) <= AT_REST * rest(scene):
+        if state.memory[s, KEPT_MODE] == SLIP and state.touching[s] == 1:
+            v, least = slip_of(scene, y, s), AT_REST * rest(scene)
+            if came_to_rest(scene, scene.slots.pair[s]):
+                least = max(least, settled(scene))
+            if math.hypot(v[0], v[1]) <= least:
                 let_stick(scene, s)
     return 1
 
@@ -450,93 +488,88 @@ def was_held(scene, s):
 
 
 @jitable
-def release_held(scene, t, y):
-    """Let slip what sticks and would have to hold more than it can; return how many do."""
-    share_held(scene, t, y)
-    slot, count = scene.equations.slot, 0
-    for e in range(first_of_slots(scene), len(slot), 2):
-        s = slot[e]
-        if scene.state.memory[s, KEPT_MODE] == STICK and passes(scene, s):
-            let_slip(scene, s, -scene.work.held[s, 0], -scene.work.held[s, 1], 0.0)
-            count += 1
-    return count
+def hold_implied(scene, t, y):
+    """Let all slots stick whose slip those that stick imply: they move by rounding at most.
 
-
-@jitable
-def begins_to_slip(scene, y, s):
-    """Return whether slot s slips from here on, from rest."""
-    if scene.state.touching[s] == 0 or scene.state.memory[s, KEPT_MODE] != SLIP:
-        return False
-    v = slip_of(scene, y, s)
-    return math.hypot(v[0], v[1]) <= AT_REST * rest(scene)
-
-
-@jitable
-def turn_aim(scene, t, y):
-    """Turn all that begins to slip towards where it is accelerated; return by how much at most.
-
-    By a part of the acceleration, over how fast accelerations turn with directions: with less than
-    that they would run away from what is sought.
+    What has been released for this very change does slip.
     """
-    slot, first, aim = scene.equations.slot, first_of_slots(scene), scene.work.aim
-    steepest, fastest, most = 0.0, 0.0, 0.0
-    for e in range(first, len(slot), 2):
-        row = aim[slot[e]]
-        if row[0] == 0.0:
-            continue
-        x = along_motion(scene, e) + scene.sweep.rate[e, GAMMA]
-        z = along_motion(scene, e + 1) + scene.sweep.rate[e + 1, GAMMA]
-        way = math.hypot(row[1] - row[3], row[2] - row[4])
-        if way > 0.0:
-            steepest = max(steepest, math.hypot(x - row[5], z - row[6]) / way)
-        fastest = max(fastest, math.hypot(x, z))
-        row[5], row[6] = x, z
-    for e in range(first, len(slot), 2):
-        row = aim[slot[e]]
-        if row[0] == 0.0 or fastest == 0.0:
-            continue
-        part = 1.0 / (steepest + fastest)
-        x, z = row[1] + part * row[5], row[2] + part * row[6]
-        size = math.hypot(x, z)
-        row[3], row[4] = row[1], row[2]
-        if size > 0.0:
-            row[1], row[2] = x / size, z / size
-            let_slip(scene, slot[e], x, z, 0.0)
-        most = max(most, math.hypot(row[1] - row[3], row[2] - row[4]))
-    return most
-
-
-@jitable
-def aim_held(scene, t, y):
-    """Let what begins to slip do so where friction lets it go, not against what held it.
-
-    The two differ where a force at a point does not accelerate it along itself. Directions are
-    sought for which friction against them leaves accelerations along them.
-    """
-    slot, first, aim, count = scene.equations.slot, first_of_slots(scene), scene.work.aim, 0
+    slot, first = scene.equations.slot, first_of_slots(scene)
     moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
     for e in range(first, len(slot), 2):
-        s = slot[e]
-        row, kept = aim[s], scene.state.memory[s]
-        row[0] = 1.0 if begins_to_slip(scene, y, s) else 0.0
-        if row[0] == 0.0:
+        s, implied = slot[e], True
+        kept = scene.state.memory[s]
+        released = kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0
+        if scene.state.touching[s] == 0 or kept[KEPT_MODE] == STICK or released:
             continue
-        count += 1
         look_around(scene, y, scene.slots.pair[s], moment)
         fill_hold(scene, y, s, moment)
-        fill_equation(scene, t, y, e)
-        fill_equation(scene, t, y, e + 1)
-        size = math.hypot(kept[KEPT_X], kept[KEPT_Y])
-        row[1] = row[3] = kept[KEPT_X] / size
-        row[2] = row[4] = kept[KEPT_Y] / size
-        row[5] = row[6] = 0.0
-    for _ in range(MOST_TURNS if count > 0 else 0):
-        turned = turn_aim(scene, t, y)
-        door = scene.world.doors[EVALUATE_DOOR]
-        if call_float(door, (scene, t, 0.0, y, scene.work.idle)) != 0.0 or turned < AIMED:
-            break
-    if count > 0:
+        for q in (e, e + 1):
+            left = fill_slip(scene, t, y, q, active_count(scene), scene.sweep.share[0])
+            fill_size(scene, q)
+            implied = implied and left <= LEVER * scene.sweep.size[q] ** 2
+        if implied:
+            let_stick(scene, s)
+
+
+@jitable
+def fill_sliding(scene, t, y, count):
+    """Fill what friction would be where the slots of so many rows slid against what holds them."""
+    cone = scene.sweep.cone
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        x, z = scene.work.held[s, 0], scene.work.held[s, 1]
+        let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0)
+    call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
+        n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+        rubs = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
+        cone[SLIDING, k] = rubs if scene.work.touching[s] == 1 else 0.0
+        let_stick(scene, s)
+
+
+@jitable
+def solve_slips(scene, count, r):
+    """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
+    cone, most, grows = scene.sweep.cone, 0.0, True
+    for k in range(count // 2):
+        cone[STATIC, k] = cone[CAPACITY, k]
+        most = max(most, cone[CAPACITY, k])
+    eps = 0.0
+    while grows:
+        grows = False
+        for k in range(count // 2):
+            cone[CAPACITY, k] = max((1.0 - OVER) * cone[STATIC, k], LEAST_PART * most)
+        _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SLIPPING)
+        for k in range(count // 2):
+            slips = math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]) > MOVES * eps
+            if slips and cone[STATIC, k] != cone[SLIDING, k]:
+                cone[STATIC, k] = cone[SLIDING, k]
+                grows = True
+    return MOVES * eps
+
+
+@jitable
+def release_held(scene, t, y):
+    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
+    hold_implied(scene, t, y)
+    share_held(scene, t, y)
+    if held_part(scene) <= 1.0:
+        return 0
+    count, r = fill_cones(scene, t, y, most_capacity(scene))
+    fill_sliding(scene, t, y, count)
+    released, least, cone = 0, solve_slips(scene, count, r), scene.sweep.cone
+    for k in range(count // 2):
+        x, z = cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]
+        if math.hypot(x, z) > least:
+            let_slip(scene, scene.equations.slot[int(cone[WHICH, k])], -x, -z, 0.0)
+            released += 1
+    if released == 0:
+        # sliding would rub more than sticking holds: it goes on to stick
+        call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
         share_held(scene, t, y)
+    return released
 
 
 @jitable
@@ -587,8 +620,6 @@ def serve_held(scene, what, t, y):
         return begin_held(scene, y)
     elif what == RELEASE_HELD:
         return release_held(scene, t, y)
-    elif what == AIM_HELD:
-        aim_held(scene, t, y)
     elif what == RECORD_HELD:
         record_held(scene, t)
     elif what == CHANGED_HELD:

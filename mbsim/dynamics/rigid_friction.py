@@ -26,11 +26,11 @@ from mbsim.dynamics.dry_friction import (
 )
 from mbsim.laws.dry import rigid_mode
 from mbsim.system.arrays import (
-    AIM_HELD,
     BEGIN_HELD,
     CHANGED_HELD,
     CHOOSE,
     EVALUATE_DOOR,
+    HELD_OTHERWISE,
     JOINTS_DOOR,
     KEEP_DRY,
     PROJECT,
@@ -44,9 +44,6 @@ from mbsim.system.arrays import (
     SLIP,
     STICK,
 )
-
-#: What `commit_rigid` returns where equations were taken into use or out of it.
-HELD_OTHERWISE = 2
 
 
 @jitable
@@ -112,9 +109,9 @@ def commit_rigid(scene, t, y):
         return 0
     # one more slides each time, so this ends
     while hold_sticking(scene, t, y) == 0.0:
-        if release(scene) + ask_contacts(scene, RELEASE_HELD, t, y) == 0:
+        # contacts are asked for all of theirs at once, under what the rest does
+        if release(scene) == 0 and ask_contacts(scene, RELEASE_HELD, t, y) == 0:
             break
-    ask_contacts(scene, AIM_HELD, t, y)
     ask_contacts(scene, RECORD_HELD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]

@@ -13,6 +13,8 @@ these are taken as they are.
 
 from __future__ import annotations
 
+import math
+
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -40,6 +42,7 @@ from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
 from mbsim.dynamics.subroutines import user_result
 from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.laws.abi import DFLAG
+from mbsim.laws.friction.stiction import KEPT_SPEED
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
     AXIS_FORCE,
@@ -62,8 +65,13 @@ from mbsim.system.programs import USER
 _PART, _PART_OF_SPEED = 1e-6, 1e-8
 #: Row of `basis` with how the force of one incident for many points changes.
 PRESS = 6
-#: Slip, over the model's speed, below which directions of rigid friction need not converge.
+#: Slip, over the model's speed, below which directions of rigid friction converge only as far as
+#: slip does that is so fast: its part across may be as large as there.
 SLOW = 1e-3
+#: Least difference of slip over the usual one: what is slower is at rest.
+AT_REST = 1e-4
+#: Differences of slip that is rigid, as a part of what it was at the committed state.
+_PART_OF_SLIP = 1e-3
 #: What `memory_slopes` is asked to keep.
 FILL = 0
 #: Differences of the state for user subroutines, as parts of length or speed, and radians.
@@ -136,10 +144,19 @@ def ask_friction(scene, t, h, y, s, c, around, given):
 
 
 @jitable
+def rigid_slip(scene, s, c):
+    """Return how fast slot s of contact c slipped at the committed state if it is rigid, else 0."""
+    return scene.state.memory[s, KEPT_SPEED] if scene.contacts.rigid[c] == 1 else 0.0
+
+
+@jitable
 def friction_slopes(scene, t, h, y, s, c, around, given, table):
     """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
     out, least = scene.work.law_out, _PART_OF_SPEED * scene.world.scale[1]
-    base, code = table[:, 6:11], 0
+    base, code, speed = table[:, 6:11], 0, rigid_slip(scene, s, c)
+    if speed > 0.0:
+        # it turns over a way in velocities as short as itself
+        least = min(least, max(_PART_OF_SLIP * speed, AT_REST * least))
     for column in range(6):
         size = _PART * abs(given[column])
         if column < 5:
@@ -315,11 +332,14 @@ def add_contact_slopes(scene, T, t, h, y, s):
     code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
     if code != 0:
         return code
-    # of rigid friction that nearly rests slopes are as large as one likes, and tell nothing
-    least = SLOW * scene.world.scale[1]
-    begins = contacts.rigid[c] == 1 and abs(given[0]) + abs(given[1]) <= least
+    # of rigid friction slopes grow as slip gets slow, and tell nothing where it begins. But errors
+    # of its direction, whichever way, take from what rubs along the slip: what nearly rests creeps
+    counts = 1.0
+    if contacts.rigid[c] == 1:
+        slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
+        counts = min(1.0, slow / (SLOW * scene.world.scale[1]))
     for k in range(4):
-        work.grip[s, k] = 0.0 if begins else L.law[k // 2, k % 2]
+        work.grip[s, k] = counts * L.law[k // 2, k % 2]
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

@@ -8,8 +8,9 @@ twice running, it costs less.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
-Friction that turns sign from step to step within the tolerance hides its rate: a run with very
-many steps ahead tries the implicit method now and then all the same.
+Friction that turns sign from step to step within the tolerance hides its rate. That is mostly seen
+all the same (`dopri5.stiffness`); else a run that takes as many steps a time as when it was found
+stiff before, or has very many steps ahead, tries the implicit method now and then.
 Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
@@ -23,6 +24,7 @@ from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import (
     BEGUN,
     CALM_STEPS,
+    COSTLY,
     EXPLICIT_STEPS,
     IMPLICIT_STEPS,
     LAST_ERROR,
@@ -45,8 +47,9 @@ WINDOW = 200
 WORTH = 2000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
-#: Implicit steps between trials of an explicit one, and how many good ones change back.
-TRY_EVERY, TRIALS = 20, 2
+#: Implicit steps between trials of an explicit one, and how many good ones change back: more of
+#: them, over WINDOW steps, where it would be shorter than what the explicit method took before.
+TRY_EVERY, TRIALS, TRIALS_OF_SHORT = 20, 2, 10
 
 
 @jitable
@@ -68,7 +71,9 @@ def is_stiff(m, t_end):
         m.memory[BEGUN] = t
     # steps that grow, as from a start, are not yet those to come
     ahead = min((t_end - t) * m.memory[PACE], (t_end - t) / m.memory[STEP])
-    if m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
+    # as many steps a time as when it was stiff: it is so again, though nothing else may show it
+    again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
+    if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return ahead > WORTH
     return ahead > MANY and steps >= m.memory[PATIENCE]
 
@@ -91,9 +96,11 @@ def is_calm(p, m, steps, t_end):
         part = 0.9 * max(error, 1e-4) ** -0.2
         if m.memory[STIFFNESS] > 0.0:
             part = min(part, WITHIN / m.memory[STIFFNESS])
-    # a short step, as after a change or a kink, is good for either method
     m.memory[CALM_STEPS] = m.memory[CALM_STEPS] + 1.0 if part >= 0.5 else 0.0
-    if m.memory[CALM_STEPS] < TRIALS:
+    # a short step, as after a change or a kink, is good for either method: one that is shorter
+    # than before the model was found stiff tells less
+    short = min(1.0, part) * h * m.memory[PACE] < 1.0
+    if m.memory[CALM_STEPS] < (TRIALS_OF_SHORT if short else TRIALS):
         return False
     m.memory[STEP] = min(1.0, part) * h
     return True

@@ -62,9 +62,12 @@ def quantised(h):
 
 
 @jitable
-def smallest_step(t, t_end, h_min):
-    """Return the step below which time itself does not advance cleanly, or the deck's h_min."""
-    return max(h_min, 16.0 * 2.2e-16 * max(abs(t), 1e-3 * abs(t_end)))
+def smallest_step(t, own, h_min):
+    """Return the step below which time itself does not advance cleanly, or the deck's h_min.
+
+    `own` is the problem's own time: what the step is measured by at time 0.
+    """
+    return max(h_min, 16.0 * 2.2e-16 * max(abs(t), 1e-3 * own))
 
 
 @jitable

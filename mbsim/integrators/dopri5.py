@@ -42,6 +42,10 @@ E1, E3, E4, E5, E6, E7 = (
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 
+#: From so many times the change of f over a step, between its last two stages, a rate is hidden,
+#: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
+HIDES, SHOWN, BOUNDS = 4.0, 2.5, 0.01
+
 
 @jitable
 def attempt(p, m, t, h):
@@ -97,20 +101,29 @@ def attempt(p, m, t, h):
 
 @jitable
 def stiffness(m, h):
-    """Return the step times the rate of f between the last two stages.
+    """Return the step times the rate of f between the last two stages, inf where that is hidden.
 
     Of bodies alone, where there are some: what is summed up beside them has other units.
+
+    The last two stages are at the same time. Where f between them differs by HIDES times what it
+    changes over the step, the stages fly about a motion that does not need such short steps. A
+    force that is bounded, as friction, does so at its bounds, where the rate between the stages
+    says nothing of the rate at the motion. For f = -r y the two are as much apart at h r = 2,
+    near the bound of stability at 3.3. An error that is far below what is allowed bounds no step.
     """
     k = m.k
     n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(m.y)
-    above, below = 0.0, 0.0
+    above, below, over = 0.0, 0.0, 0.0
     for i in range(n):
-        rise = k[6, i] - k[5, i]
+        rise, change = k[6, i] - k[5, i], k[6, i] - k[0, i]
         way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
         way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
         above += rise * rise
         below += way * way
-    return math.sqrt(above / below) if below > 0.0 else 0.0
+        over += change * change
+    rate = math.sqrt(above / below) if below > 0.0 else 0.0
+    hidden = above > HIDES * HIDES * over and m.memory[LAST_ERROR] > BOUNDS
+    return math.inf if hidden and rate < SHOWN else rate
 
 
 @jitable

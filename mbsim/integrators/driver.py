@@ -31,6 +31,9 @@ from mbsim.core.problem import (
     SETTLE,
     STABLE_EVERY,
     STEP_TOO_SMALL,
+    TABLE_OVER,
+    WATCH_DUE,
+    WATCH_EVERY,
 )
 from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
@@ -43,10 +46,14 @@ from mbsim.integrators.control import (
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
+    CHANGE_DUE,
     CODE,
+    CORRECTION,
+    CUT_FROM,
     ERROR_BEFORE,
     EVALUATIONS,
     EVENT_DUE,
+    FAILED_AT,
     FAILURES,
     FIRST_MAX,
     FRESH,
@@ -59,20 +66,29 @@ from mbsim.integrators.scheme import (
     LAST_REASON,
     LAST_STEP,
     LAST_TIME,
+    LEFT_OVER,
+    LEFT_TIME,
     NEXT_OUTPUT,
+    NEXT_WATCH,
     OUTPUTS,
+    OWN_TIME,
+    REACH,
     REJECTED,
+    REST,
     RETRY,
+    ROW,
+    ROW_ENDS,
     STALE,
     STEP,
     STEPS,
     TIME,
     TOL,
+    WAS_CUT,
     WATCH,
     on_bench,
 )
 
-#: An event is located to so much of a time unit, or of the time where that is larger.
+#: An event is located to so much of the problem's own time, or of the time where that is larger.
 LOCATED = 1e-11
 #: A step is looked into for events at so many points, and at one more for each row within it,
 #: up to so many.
@@ -85,14 +101,20 @@ MOST_RETAKES = 40
 NEAR_KINK = 1e-4
 #: The same where what goes on is another motion, which begins there: friction that sticks or slips.
 NEAR_CHANGE = 1e-9
+#: The same over the smallest step: one that ends there may be rejected and tried shorter.
+NEAR_FLOORS = 100.0
 #: So often at most a step is taken again to end at a kink.
 MOST_CUTS = 3
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol),
 #: and how often a step is shortened for that.
 BENT, MOST_SHORT = 2.0, 20
 
-#: A hook that fails is tried again at a tenth of the step, so many times.
-MOST_FAILURES = 8
+#: A hook that fails is tried again at a tenth of the step, so many times; one whose numbers are
+#: not finite may be so for a trial far out of reach.
+MOST_FAILURES, MOST_NOT_FINITE = 5, 20
+#: A step that ends behind the last failure takes so much from the count of failures. Until then
+#: nothing shows that the hook gives numbers there: before it a step may be too short to ask.
+FORGIVEN = 0.1
 
 
 @jitable
@@ -112,8 +134,8 @@ def first_step(p, m, t, span, order):
     """Return a first step from f and a small explicit Euler probe."""
     n = len(m.y)
     rate = call_float(p.norm, (p.context, t, 0.0, m.k[0], m.y))
-    probe = 1e-4 / rate if rate > 1e-4 / span else span
-    probe = min(probe, 1e-3 * span)
+    # how long the run lasts only cuts it: what is found by it is of the motion
+    probe = min(1e-4 / rate if rate > 0.0 else 1e-3 * m.memory[OWN_TIME], span)
     for i in range(n):
         m.trial[i] = m.y[i] + probe * m.k[0, i]
     m.counts[EVALUATIONS] += 1
@@ -171,7 +193,7 @@ def length(p, m, steps, t, t_end, h_max, floor):
         limit = call_float(p.limit, (p.context, t, h, m.y, m.k[0]))
         if steps.implicit:
             # in a shorter one velocities are rounding errors of positions over h
-            limit = max(limit, LOCATED * max(1.0, abs(t)))
+            limit = max(limit, LOCATED * max(m.memory[OWN_TIME], abs(t)))
         h = min(quantised(h), limit)
     h = max(h, floor)
     # no sliver of a step before the end
@@ -179,21 +201,64 @@ def length(p, m, steps, t, t_end, h_max, floor):
 
 
 @jitable
-def reject(p, m, t, h, reason):
-    """Count a rejected step, tell the problem, and note the length h to try instead."""
+def reject(p, m, t, h, reason, cut_from):
+    """Count a rejected step, tell the problem, and note the length h to try instead.
+
+    `cut_from` is how long the step was meant to be, where nothing but its end is at fault, else 0.
+    """
     m.counts[REJECTED] += 1
     m.counts[LAST_REASON] = reason
     call_float(p.reject, (p.context, t, float(reason), m.y, m.error))
     m.memory[STEP] = h
+    m.memory[CUT_FROM] = cut_from
 
 
 @jitable
-def gives_up(m, code, h, floor):
-    """Return whether a hook's failure ends the run; else it is tried again nearer."""
-    # a trial far ahead may be where no law was meant for: come nearer before giving up
-    m.counts[FAILURES] += 1
-    tried = m.counts[FAILURES] > MOST_FAILURES or h <= floor
-    return code != NOT_FINITE and code != NOT_CONVERGED and (tried or code >= AT_ONCE)
+def gives_up(m, code, t, h, floor):
+    """Return whether the failure of a hook in the step from t ends the run.
+
+    Else it is tried again nearer: a trial far ahead may be where no law was meant for.
+    """
+    if code == NOT_CONVERGED:
+        return False
+    m.memory[FAILURES] += 1.0
+    m.memory[FAILED_AT] = t + h
+    most = MOST_NOT_FINITE if code == NOT_FINITE else MOST_FAILURES
+    spent = m.memory[FAILURES] > most or h <= floor
+    return code >= AT_ONCE or spent
+
+
+@jitable
+def forgive(m):
+    """Count fewer failures after a step that ends behind the last of them."""
+    if m.memory[FAILURES] > 0.0 and m.memory[TIME] >= m.memory[FAILED_AT]:
+        m.memory[FAILURES] = max(0.0, m.memory[FAILURES] - FORGIVEN)
+
+
+@jitable
+def look_up(m, t):
+    """Go to the row of the timetable in which t is; return whether there is one.
+
+    A row from which no step may go is a switch: a force jumps within it.
+    """
+    row, table = m.counts[ROW], m.timetable
+    while row < len(table) and table[row, 0] <= t:
+        row += 1
+    m.counts[ROW] = row
+    if row == len(table):
+        return False
+    m.memory[ROW_ENDS], m.memory[REACH] = table[row, 0], table[row, 1]
+    return True
+
+
+@jitable
+def arrive_at(m, t, h, bounded, t_end):
+    """Note the time at which a step from t ends; one that was bounded ends there exactly."""
+    if bounded:
+        m.memory[TIME] = m.memory[REACH]
+    # a switch at the end is not gone behind
+    if t + h >= t_end or t_end - m.memory[TIME] <= smallest_step(t_end, m.memory[OWN_TIME], 0.0):
+        m.memory[TIME] = t_end
 
 
 @jitable
@@ -263,7 +328,8 @@ def side_at(p, m, t, h, s, what):
 def first_kink(p, m, t, h, whole):
     """Return the length of the fitted step up to its first kink that matters, h for none.
 
-    `whole` is its length before it was cut. The problem is left evaluated at the trial point.
+    `whole` is its length before it was cut, or more where that is little. The problem is left
+    evaluated at the trial point.
     """
     low, high, near = NEAR_KINK, 1.0, NEAR_KINK
     side_at(p, m, t, h, low, SETTLE)
@@ -352,6 +418,8 @@ def attempt(p, m, steps, t, h, times):
     if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
         return code, 1.0, -1.0, False, 1.0
     asked, kinked, begin, reach = -1.0, False, -1.0, 1.0
+    # one that ends before a switch at the end is taken for the end
+    until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
         if part < 1.0:
@@ -361,7 +429,7 @@ def attempt(p, m, steps, t, h, times):
         kinked = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0
         if not kinked:
             begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
-    if asked >= 0.0 or kinked or begin >= 0.0 or p.happens != 0 or output_within(m, times, t + h):
+    if asked >= 0.0 or kinked or begin >= 0.0 or p.happens != 0 or output_within(m, times, until):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     if begin >= 0.0 and code == 0.0:
         reach = reach_of(p, m, t, h, begin)
@@ -377,8 +445,10 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     the state there is no interpolated one; where that ends before the event after all, it is
     tried a little longer.
     """
-    near, nudge = LOCATED * max(1.0, abs(t)), 1e-3 * LOCATED * max(1.0, abs(t))
-    shortened, retakes, cuts, short, whole = False, 0, 0, 0, h
+    near = LOCATED * max(m.memory[OWN_TIME], abs(t))
+    nudge = 1e-3 * near
+    shortened, retakes, cuts, short = False, 0, 0, 0
+    whole = max(h, m.memory[CUT_FROM], NEAR_FLOORS / NEAR_CHANGE * floor)
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
         code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
@@ -438,6 +508,9 @@ def accept(p, m, steps, t, h, asked):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
     if steps.implicit:
+        left = m.memory[REST] * m.memory[CORRECTION]
+        if left > m.memory[LEFT_OVER]:
+            m.memory[LEFT_OVER], m.memory[LEFT_TIME] = left, t + h
         for j in range(len(m.kept)):
             for i in range(len(m.y)):
                 m.kept[j, i] = m.ahead[j, i]
@@ -487,13 +560,15 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
 
     `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
     and method are taken from the bench: a group is one word wherever it is handed on.
+
+    `m.timetable` bounds steps by time alone: in the row of t none goes beyond its reach. It bounds
+    nothing while memory[ROW_ENDS] and memory[REACH] are infinite.
+
+    When it stops, and how often, changes nothing of the run: all that follows from a step is
+    decided behind it, and kept where the caller has to be told of something else first.
     """
     p, m = on_bench(steps.context)
     m.memory[TOL] = tol
-    code = begin(p, m, steps, m.memory[TIME], t_end, h_max)
-    if code != 0.0:
-        m.counts[CODE] = int(code)
-        return FAILED
     # rows of the last step that found the table full
     if m.memory[LAST_STEP] > 0.0:
         full = outputs(p, m, steps, times)
@@ -503,43 +578,66 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0
             return HAPPENED
+    if m.memory[CHANGE_DUE] == 1.0:
+        m.memory[CHANGE_DUE] = 0.0
+        return CHANGES_OVER
     stop_at = m.counts[EVALUATIONS] + budget
     while m.memory[TIME] < t_end:
         if m.counts[EVALUATIONS] >= stop_at:
             return PAUSED
+        if m.counts[STEPS] >= m.counts[NEXT_WATCH]:
+            m.counts[NEXT_WATCH] = m.counts[STEPS] + WATCH_EVERY
+            return WATCH_DUE
+        if m.memory[TIME] >= m.memory[ROW_ENDS]:
+            if not look_up(m, m.memory[TIME]):
+                return TABLE_OVER
+            if m.memory[REACH] < m.memory[TIME]:
+                # behind the switch all is known anew
+                m.memory[TIME] = min(m.memory[ROW_ENDS], t_end)
+                m.memory[HAVE_F] = 0.0
+                continue
         t = m.memory[TIME]
-        floor = smallest_step(t, t_end, h_min)
-        if steps.order == 0.0 and m.counts[FAILURES] == 0 and bound_is_due(m):
+        if m.memory[HAVE_F] == 0.0 or m.memory[STEP] == 0.0:
+            code = begin(p, m, steps, t, t_end, h_max)
+            if code != 0.0:
+                m.counts[CODE] = int(code)
+                return FAILED
+        floor = smallest_step(t, m.memory[OWN_TIME], h_min)
+        if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
             m.memory[STALE] = 0.0
         whole = length(p, m, steps, t, t_end, h_max, floor)
+        most = min(whole, max(m.memory[REACH] - t, floor))
 
         # try
-        code, part, asked, h = attempt_to_event(p, m, steps, t, whole, times, floor)
+        code, part, asked, h = attempt_to_event(p, m, steps, t, most, times, floor)
         error = m.memory[LAST_ERROR]
         if code != 0.0:
-            if gives_up(m, code, h, floor):
+            ends = gives_up(m, code, t, h, floor)
+            if ends and code != NOT_FINITE:
                 m.counts[CODE] = int(code)
                 return FAILED
             unsolved = code == NOT_CONVERGED
             shrink, reason = (m.memory[RETRY], BY_NEWTON) if unsolved else (0.1, BY_NOT_FINITE)
-            reject(p, m, t, max(shrink * h, floor), reason)
+            reject(p, m, t, max(shrink * h, floor), reason, 0.0)
             m.memory[AFTER_REJECTION] = 1.0
-            if h <= floor:
+            if ends or h <= floor:
                 return STEP_TOO_SMALL
             continue
-        m.counts[FAILURES] = 0
         if not error <= 1.0:
             shrink = 0.2
             if math.isfinite(error):
                 shrink = next_factor(error, 1.0, steps.order, steps.memory, True)
-            reject(p, m, t, max(shrink * h, floor), BY_ERROR)
+            reject(p, m, t, max(shrink * h, floor), BY_ERROR, 0.0)
             m.memory[AFTER_REJECTION] = 1.0
             if h <= floor:
                 return STEP_TOO_SMALL
             continue
         if part < 1.0:
-            reject(p, m, t, max(part * h, floor), BY_CHECK)
+            # one that was cut at a kink is as long again behind it: what is behind kinks is told
+            # from what lies before them by steps of some length, shorter ones are all rounding
+            cut_from = max(whole, m.memory[CUT_FROM]) if h < most else m.memory[CUT_FROM]
+            reject(p, m, t, max(part * h, floor), BY_CHECK, cut_from)
             if h <= floor:
                 return STEP_TOO_SMALL
             continue
@@ -547,11 +645,16 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         # take
         choose_next(m, steps, h, h_max)
         if h < whole:
-            # it was good enough, and ended for an event
-            m.memory[STEP] = max(m.memory[STEP], whole)
+            # it was good enough, and ended for an event; where those follow each other, as when
+            # stick and slip take turns, whole steps have to outgrow what they alternate in
+            grows = 2.0 if m.memory[WAS_CUT] == 1.0 and steps.order > 0.0 else 1.0
+            m.memory[STEP] = max(m.memory[STEP], grows * whole)
+        m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
+        m.memory[CUT_FROM] = 0.0
+        m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
-        if t + h >= t_end:
-            m.memory[TIME] = t_end
+        arrive_at(m, t, h, h < whole and h == m.memory[REACH] - t, t_end)
+        forgive(m)
         if word < 0.0:
             m.counts[CODE] = int(-word)
             return FAILED
@@ -568,11 +671,14 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             if code != 0.0:
                 m.counts[CODE] = int(code)
                 return FAILED
+        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, t_end):
+            m.memory[CHANGE_DUE] = 1.0
         if full > 0.0 or word >= 2.0:
             return ROWS_FULL
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0
             return HAPPENED
-        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, t_end):
+        if m.memory[CHANGE_DUE] == 1.0:
+            m.memory[CHANGE_DUE] = 0.0
             return CHANGES_OVER
     return DONE

@@ -33,13 +33,17 @@ import numpy as np
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import FRICTION_ALONE
+from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE
+from mbsim.core.rotation import norm
 from mbsim.integrators.newton import (
     GO_ON,
+    LEFT,
+    OFF,
     QUARTER,
     SOLVED,
     as_failure,
     begin,
+    is_rate,
     judge,
     linearise,
     may_help,
@@ -81,6 +85,10 @@ PART = 0.2
 #: so friction that saturates on the wrong side would chatter.
 ROUGH = 1e-3
 
+#: And by so many times tol of what a speed changes by in an impact: its steps are the more the
+#: smaller tol is, and the impact as a whole is to be off by some tol.
+OF_IMPACT = 12.0
+
 #: Corrections in one step at most: with an old linearisation, which another may better, with one
 #: of this step, and with a linearisation and a line search for each.
 MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
@@ -89,8 +97,6 @@ MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
 LATE = 3.0
 #: The least part of a correction that a line search takes.
 LEAST_PART = 1.0 / 128.0
-#: A step's velocities may be off by this part of its error for what f at its end is not.
-OFF = 0.2
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
 #: A turn across an angular velocity, over that, which is none but for rounding.
@@ -103,12 +109,6 @@ PROBE = 0.05
 F, R, D, D_NEXT, A0, A1, A_BEFORE, LAST = range(1, 9)
 # rows of `kept`: a and v' at the end of the last step, and the mean v'' of that step
 ALGORITHMIC, DOT, SLOPE = range(3)
-
-
-@jitable
-def is_rate(i, end):
-    """Return whether y[i] is a velocity of a body or a state of first order."""
-    return i >= end or i % BODY_SIZE >= 7
 
 
 @jitable
@@ -402,6 +402,12 @@ def iterate_damped(p, m, t, h):
             m.memory[RATE] = 0.0
             return 0.0
         code = search(p, m, t, h, size)
+        if code == -1.0 and size <= LEFT * m.memory[TOL]:
+            # nothing is better: what is left is rounding
+            for i in range(len(m.y)):
+                m.k[A1, i] = m.k[A_BEFORE, i]
+            m.memory[RATE] = 0.0
+            return 0.0
         if code != 0.0:
             return code
     return -1.0
@@ -500,13 +506,21 @@ def estimate_error(p, m, t, h):
         a = 0.5 * position_error(m, h, at + 10)
         b = 0.5 * position_error(m, h, at + 11)
         c = 0.5 * position_error(m, h, at + 12)
+        # a uniform turn is exact at the end, but not between: its polynomial is off by this
+        spin = norm((w[at + 10], w[at + 11], w[at + 12]))
+        bow = PART * (0.5 * h) ** 4 * spin**3 / 384.0
+        a += math.copysign(bow * w[at + 10], a)
+        b += math.copysign(bow * w[at + 11], b)
+        c += math.copysign(bow * w[at + 12], c)
         qw, qx, qy, qz = w[at + 3], w[at + 4], w[at + 5], w[at + 6]
         e[at + 3] = -qx * a - qy * b - qz * c
         e[at + 4] = qw * a + qy * c - qz * b
         e[at + 5] = qw * b + qz * a - qx * c
         e[at + 6] = qw * c + qx * b - qy * a
     error = call_float(p.norm, (p.context, t, h, e, w)) / (PART * m.memory[TOL])
-    return max(error, call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH)
+    rough = call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH
+    lost = call_float(p.norm, (p.context, h, IMPACTS_ALONE, e, w)) / (OF_IMPACT * m.memory[TOL])
+    return max(error, max(rough, lost))
 
 
 @jitable
@@ -561,4 +575,5 @@ SCHEME = Scheme(
     order=3.0,
     implicit=True,
     carried=3,
+    samples=4,
 )

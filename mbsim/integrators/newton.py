@@ -29,6 +29,8 @@ from mbsim.integrators.scheme import (
 GO_ON, SOLVED, HOPELESS = range(3)
 #: What is left unsolved of a step's equations may be this part of its error, or less.
 LEFT = 0.03
+#: A step's velocities may be off by this part of its error for what f at its end is not.
+OFF = 0.2
 #: No correction need be smaller than this.
 ROUNDING = 1e-14
 #: Hope for the first correction ends here: what was linear a step ago may press on something now.
@@ -92,6 +94,12 @@ def put_along(p, m, t, y, r, w):
 
 
 @jitable
+def is_rate(i, end):
+    """Return whether y[i] is a velocity of a body or a state of first order, bodies' end given."""
+    return i >= end or i % BODY_SIZE >= 7
+
+
+@jitable
 def note(m, size):
     """Note the size of a correction, for what is said of an iteration that does not end."""
     m.memory[CORRECTION_BEFORE] = m.memory[CORRECTION]
@@ -145,6 +153,16 @@ def judge(m, iteration, most, size, before, rate_before, late):
     if m.memory[REST] * size <= goal or size == 0.0:
         return SOLVED, rate
     return (GO_ON if iteration < most else HOPELESS), rate
+
+
+@jitable
+def is_good_enough(m, size, rate):
+    """Return whether what a correction of `size` leaves is a small part of the step's error.
+
+    Where corrections end in rounding, above what is asked for, no better linearisation or shorter
+    step makes them smaller.
+    """
+    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * m.memory[TOL]
 
 
 @jitable

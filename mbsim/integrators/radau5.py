@@ -24,20 +24,23 @@ import numpy as np
 
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
     HOPELESS,
+    OFF,
     SOLVED,
     as_failure,
     begin,
+    is_good_enough,
+    is_rate,
     judge,
     linearise,
     may_help,
     put_along,
 )
 from mbsim.integrators.scheme import (
-    AFTER_REJECTION,
     EVALUATIONS,
     FACTORED_STEP,
     FACTORIZATIONS,
@@ -48,6 +51,7 @@ from mbsim.integrators.scheme import (
     LAST_ERROR,
     LAST_STEP,
     RATE,
+    REST,
     RETRY,
     TOL,
     WHERE,
@@ -84,11 +88,21 @@ TI = np.array((
     (-0.502872634945786875, 2.57192694985560543, -0.596039204828224932),
 ))
 # fmt: on
+#: Last row of the matrix's inverse: what stages do to h times the collocation's slope at its end.
+SLOPE = np.array(
+    (
+        (1.0 - C[1]) / (C[0] * (C[0] - C[1]) * (C[0] - 1.0)),
+        (1.0 - C[0]) / (C[1] * (C[1] - C[0]) * (C[1] - 1.0)),
+        5.0,
+    )
+)
 #: Error of order 3: weights of the stages.
 E = np.array((-(13.0 + 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 / 3.0))
 
-#: Corrections in one step at most.
-MOST = 7
+#: Corrections in one step at most, and linearisations at its end.
+MOST, MOST_ANEW = 7, 3
+#: A correction that makes a residual smaller than this part of it tells of its own linearisation.
+CONTRACTED = 0.5
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.01
 #: The second correction may be so many times the first.
@@ -99,8 +113,9 @@ GOOD_RATE = 0.2
 FARTHEST = 1e5
 
 # rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
-# and solutions of the real system and of the pair, f at the trial point
-F, Z, W, REAL, REAL_D, PAIR, PAIR_D, LAST = 1, 4, 7, 10, 11, 12, 14, 16
+# and solutions of the real system and of the pair, f at the trial point, what the last stage's
+# equation left before the last correction
+F, Z, W, REAL, REAL_D, PAIR, PAIR_D, LAST, UNSOLVED = 1, 4, 7, 10, 11, 12, 14, 16, 17
 
 
 @jitable
@@ -181,6 +196,14 @@ def evaluate_stages(p, m, t, h):
 
 
 @jitable
+def unsolved(m, h, f, i):
+    """Return what the last stage's equation leaves of y[i], with f there in row `f`."""
+    k = m.k
+    slope = SLOPE[0] * k[Z, i] + SLOPE[1] * k[Z + 1, i] + SLOPE[2] * k[Z + 2, i]
+    return h * k[f, i] - slope
+
+
+@jitable
 def correct(p, m, t, h):
     """Correct the stages once; return a code, and the largest correction in the error's norm."""
     k = m.k
@@ -193,6 +216,7 @@ def correct(p, m, t, h):
         real[i] = TI[0, 0] * f0 + TI[0, 1] * f1 + TI[0, 2] * f2 - g * w0
         pair[0, i] = TI[1, 0] * f0 + TI[1, 1] * f1 + TI[1, 2] * f2 - (re * w1 - im * w2)
         pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
+        k[UNSOLVED, i] = unsolved(m, h, F + 2, i)
     if m.bodies[0] > 0:
         for r in (real, pair[0], pair[1]):
             put_along(p, m, t, m.y, r, m.trial)
@@ -215,19 +239,29 @@ def correct(p, m, t, h):
 
 
 @jitable
-def iterate(p, m, t, h):
+def place(m, t, h):
+    """Return the time at which a step of length h is linearised."""
+    return t if m.memory[FRESH] == 1.0 or is_short(m, h) else t + m.memory[WHERE] * h
+
+
+@jitable
+def iterate(p, m, t, h, anew):
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution.
 
-    The second correction may be larger than the first, which the foretold stages made small: it
-    holds what projections undid of the first. The third shows whether the iteration converges.
+    It begins where the last step's polynomial has them, `anew` where they are. The second
+    correction may be larger than the first, which the foretold stages made small: it holds what
+    projections undid of the first. The third shows whether the iteration converges.
     """
     begin(m)
-    foretell(m, h)
-    for j in range(3):
-        for i in range(len(m.y)):
-            m.error[i] = 0.0
-        project_stage(p, m, t, h, j)
-    transform(m)
+    if anew:
+        m.memory[REST] = 1.0
+    else:
+        foretell(m, h)
+        for j in range(3):
+            for i in range(len(m.y)):
+                m.error[i] = 0.0
+            project_stage(p, m, t, h, j)
+        transform(m)
     before, rate, slowest, word, iteration = 0.0, 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -247,13 +281,9 @@ def iterate(p, m, t, h):
         before = size
     m.memory[RATE] = rate
     m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
+    if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == place(m, t, h)):
+        return 0.0 if is_good_enough(m, before, rate) else -1.0
     return 0.0 if word == SOLVED else -1.0
-
-
-@jitable
-def place(m, t, h):
-    """Return the time at which a step of length h is linearised."""
-    return t if m.memory[FRESH] == 1.0 or is_short(m, h) else t + m.memory[WHERE] * h
 
 
 @jitable
@@ -304,7 +334,7 @@ def solve_stages(p, m, t, h):
         else:
             code = 0.0
         if code == 0.0:
-            code = iterate(p, m, t, h)
+            code = iterate(p, m, t, h, False)
             if code == 0.0:
                 return 0.0
         if m.memory[JACOBIAN_TIME] == place(m, t, h) or not may_help(code):
@@ -313,39 +343,34 @@ def solve_stages(p, m, t, h):
 
 
 @jitable
-def estimate(p, m, t, h, base):
-    """Write the filtered error into m.error from f in row `base`; return its norm over tol."""
-    k, r = m.k, m.k[REAL]
-    for i in range(len(m.y)):
-        r[i] = k[base, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
-    if m.bodies[0] > 0:
-        put_along(p, m, t, m.y, r, m.error)
-    if call_float(p.solve, (p.context, t, h, r, m.error)) != 0.0:
-        return math.inf
-    # last, for the norm sees what was put right
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
-    return call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
+def led(m, i, last):
+    """Return the mean of f of y[i] over the step, with f at its end in row `last`."""
+    return A[2, 0] * m.k[F, i] + A[2, 1] * m.k[F + 1, i] + A[2, 2] * m.k[last, i]
 
 
 @jitable
 def estimate_error(p, m, t, h):
-    """Write the error over tol; one that would reject a doubtful step is filtered once more.
+    """Write the filtered error into m.error and, over tol, into memory.
 
-    Returns a code.
+    Stages are where joints and motions have them, so these take out what accelerations do not
+    lead to, as a jump of a motion's velocity. The norm sees what is put right last: the velocities
+    that f at the stages leads to.
     """
-    error = estimate(p, m, t, h, 0)
-    m.memory[LAST_ERROR] = error
-    doubtful = m.memory[FRESH] == 1.0 or m.memory[AFTER_REJECTION] == 1.0
-    if error < 1.0 or not doubtful or not error < math.inf:
-        return 0.0
+    k, r, w, end = m.k, m.k[REAL], m.k[PAIR], BODY_SIZE * m.bodies[0]
     for i in range(len(m.y)):
-        m.error[i] += m.y[i]
-    m.counts[EVALUATIONS] += 1
-    code = call_float(p.rhs, (p.context, t, 0.0, m.error, m.k[F]))
-    if code == 0.0:
-        m.memory[LAST_ERROR] = estimate(p, m, t, h, F)
-    # the first estimate stands where the second cannot be had
-    return 0.0 if may_help(code) else code
+        r[i] = k[0, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
+    if m.bodies[0] > 0:
+        put_along(p, m, t, m.y, r, m.error)
+    error = math.inf
+    if call_float(p.solve, (p.context, t, h, r, m.error)) == 0.0:
+        for i in range(len(m.y)):
+            w[i] = m.trial[i]
+            if i < end and is_rate(i, end):
+                w[i] = m.y[i] + h * led(m, i, F + 2)
+        # the last stage, which the trial point is, has been projected
+        call_float(p.project, (p.context, t + h, h, w, w))
+        error = call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
+    m.memory[LAST_ERROR] = error
 
 
 @jitable
@@ -364,19 +389,74 @@ def keep_polynomial(m):
 
 
 @jitable
-def attempt(p, m, t, h):
-    """Solve for the stages, fill trial point and error; return a code."""
-    code = solve_stages(p, m, t, h)
-    if code != 0.0:
-        return code
+def is_off(p, m, t, h):
+    """Return whether f at the trial point says that the stages are not solved for after all.
+
+    Corrections of a linearisation in touch are small where nothing is touched any more, however
+    large a residual they leave. What is truly stiff leaves one too, but the correction made that
+    smaller: only what it did not counts. And so does what joints have across them, of which the
+    method's sum over f of all stages has next to nothing: it matters where that sum is off, too.
+    """
+    end, most = BODY_SIZE * m.bodies[0], OFF * m.memory[TOL]
+    for i in range(len(m.y)):
+        left = unsolved(m, h, LAST, i) if is_rate(i, end) else 0.0
+        m.error[i] = left if abs(left) > CONTRACTED * abs(m.k[UNSOLVED, i]) else 0.0
+    if call_float(p.norm, (p.context, t, h, m.error, m.trial)) <= most:
+        return False
+    for i in range(len(m.y)):
+        m.error[i] = h * led(m, i, LAST) - m.k[Z + 2, i] if is_rate(i, end) else 0.0
+    return not call_float(p.norm, (p.context, t, h, m.error, m.trial)) <= most
+
+
+@jitable
+def arrive(p, m, t, h):
+    """Fill trial point, error and, where that is good enough, f at the trial point.
+
+    Returns a code.
+    """
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + m.k[Z + 2, i]
-    code = estimate_error(p, m, t, h)
-    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code
-    keep_polynomial(m)
+    estimate_error(p, m, t, h)
+    if not m.memory[LAST_ERROR] <= 1.0:
+        return 0.0
     m.counts[EVALUATIONS] += 1
     return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+
+
+@jitable
+def solve_anew(p, m, t, h):
+    """Solve for the stages, from where they are, with a linearisation at the trial point.
+
+    Returns a code.
+    """
+    code = linearise(p, m, t + h, h, m.trial, m.k[LAST])
+    if code == 0.0:
+        code = factor(p, m, t, h)
+        m.memory[RETRY] = HALF
+        if code == 0.0:
+            code = iterate(p, m, t, h, True)
+            if code == 0.0:
+                return 0.0
+    return as_failure(code)
+
+
+@jitable
+def attempt(p, m, t, h):
+    """Solve for the stages, fill trial point and error; return a code.
+
+    What f at the trial point does not agree with is solved again with linearisations there.
+    """
+    code, anew = solve_stages(p, m, t, h), 0
+    while code == 0.0:
+        code = arrive(p, m, t, h)
+        if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+            return code
+        if anew == MOST_ANEW or not is_off(p, m, t, h):
+            keep_polynomial(m)
+            return 0.0
+        anew += 1
+        code = solve_anew(p, m, t, h)
+    return code
 
 
 @jitable
@@ -404,7 +484,7 @@ def _fit_dense(context, t, h, a, b):
 SCHEME = Scheme(
     _attempt,
     _fit_dense,
-    stages=LAST + 1,
+    stages=UNSOLVED + 1,
     last=LAST,
     dense=4,
     order=4.0,

@@ -54,11 +54,27 @@ HAVE_JACOBIAN, JACOBIAN_TIME, FACTORED_STEP, RATE, REST, FRESH, RETRY = range(14
 WATCH, STIFFNESS, STIFF_STEPS, CALM_STEPS, PATIENCE = range(21, 26)
 EXPLICIT_STEPS, IMPLICIT_STEPS, STIFF, PACE, BEGUN = range(26, 31)
 CORRECTION, CORRECTION_BEFORE, GROWTH, WHERE = range(31, 35)
-MEMORY = 35
-# counts
-STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS, FAILURES = range(8)
-JACOBIANS, FACTORIZATIONS = range(8, 10)
-COUNTS = 10
+# whether AUTO has decided to change over, and the caller is to be told
+CHANGE_DUE = 35
+# how often hooks failed of late, and the end of the step whose hook failed last
+FAILURES, FAILED_AT = range(36, 38)
+# the problem's own time, L/V, beside which shorter ones are rounding: 1 unless the caller gives it
+OWN_TIME = 38
+# the most that Newton's iteration left of a step that was taken, in the norm of the error, and when
+LEFT_OVER, LEFT_TIME = range(39, 41)
+# of the timetable: where the row ends that holds now, and how far a step may go until then
+ROW_ENDS, REACH = range(41, 43)
+# of AUTO: steps a time when the explicit method was last found to take too many, inf before that
+COSTLY = 43
+# how long the step was meant to be that was cut at a kink or event and rejected then; else 0
+CUT_FROM = 44
+# 1 where the last step that was taken was cut at a kink or event
+WAS_CUT = 45
+MEMORY = 46
+# counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
+STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
+JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
+COUNTS = 11
 
 
 class Scheme(NamedTuple):
@@ -74,6 +90,7 @@ class Scheme(NamedTuple):
     implicit: bool = False  # solves with the problem's linearisation
     carried: int = 0  # rows of `kept`
     pair: bool = False  # solves with complex coefficients as well
+    samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
 
 
 class Method(NamedTuple):
@@ -89,6 +106,7 @@ class Method(NamedTuple):
     bodies: I1  # (1,) how many bodies begin y, for methods that know positions from velocities
     kept: F2  # (carried, n) what the method needs of the step before; saved with the state
     ahead: F2  # (carried, n) the same of the step that was tried last
+    timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
 
 
 class Bench(NamedTuple):
@@ -111,13 +129,20 @@ class Steps(NamedTuple):
     probe: int  # `attempt` of the explicit method where AUTO may change back to it, else 0
 
 
-def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
-    """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies."""
+def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> Method:
+    """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies.
+
+    Its timetable has room for so many rows, and bounds nothing.
+    """
     n = len(y0)
     memory = np.zeros(MEMORY)
     memory[TIME] = t0
-    memory[ERROR_BEFORE] = 1.0
+    memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
+    memory[FAILED_AT] = t0
+    memory[ROW_ENDS] = memory[REACH] = memory[COSTLY] = math.inf
+    counts = np.zeros(COUNTS, dtype=np.int64)
+    counts[NEXT_WATCH] = np.iinfo(np.int64).max  # nobody watches
     return Method(
         np.array(y0, dtype=np.float64),
         np.zeros((scheme.stages, n)),
@@ -125,10 +150,11 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0) -> Method:
         np.zeros(n),
         np.zeros((scheme.dense, n)),
         memory,
-        np.zeros(COUNTS, dtype=np.int64),
+        counts,
         np.array([bodies], dtype=np.int64),
         np.zeros((scheme.carried, n)),
         np.zeros((scheme.carried, n)),
+        np.full((rows, 2), math.inf),
     )
 
 

@@ -9,6 +9,8 @@ says that a sum of rows stays what it is. With P the origins, x, y, z the axes o
 | `perp(a, b)`       | a_I . b_J                          [-]   |
 | `angle()`          | of I's x about J's z from J's x    [rad] |
 | `spin()`           | angle of I about its own z, against J [rad], 0 as assembled |
+| `twist()`          | 2 cos(b/2) sin(t/2) of the turn t about J's z and the bend b after it that |
+|                    | take J to I [-], t = 0 as assembled |
 | `distance()`       | abs(P_I - P_J)                     [L]   |
 
 An equation of one offset or perp row is 0; other sums keep the value that they have as
@@ -60,6 +62,11 @@ def angle() -> Row:
 def spin() -> Row:
     """Return the angle of I about its own z against J, 0 as assembled, whole turns counted."""
     return Row("spin")
+
+
+def twist() -> Row:
+    """Return twice z of the quaternion from J to I, J turned about its z to have none at first."""
+    return Row("twist")
 
 
 def distance() -> Row:

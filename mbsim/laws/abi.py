@@ -4,8 +4,8 @@ Normal law      int64 f(double depth, double rate, const double *par, double out
                 out: force [F], force at rate 0 [F], stored energy [F L]
 Friction law    int64 f(int64 id, const double *in, const double *par, double *out)
                 in: the FRICTION_INPUTS fields of `FrictionInput` in order, then the law's memory;
-                out: Fx, Fy, Mx, My, Tz on I; of a law with memory then the energy stored, its mode,
-                and its new memory or the rates of that, from MEMORY_OUT on
+                out: Fx, Fy, Mx, My, Tz on I; of a law with memory then the energy stored, mode,
+                branch, size and unit, and from MEMORY_OUT on its new memory and rates of that
 
 `id` is the Force_Contact's. The result is 0, or a code that stops the run: 1 says that an
 interpreted user function raised (the guard in `plugins` holds the exception), 2 that a
@@ -27,13 +27,12 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
-FRICTION_INPUTS = 25
+FRICTION_INPUTS = 27
 #: Places of the last of them, which only derivatives and laws with memory look at.
-DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, USUAL_SIZE = range(
-    19, FRICTION_INPUTS
-)
-#: Fields of a law's output before its memory: force, torques, stored energy, mode.
-MEMORY_OUT = 7
+DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19, 25)
+NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
+#: Fields of a law's output before its memory: force, torques, and those named here.
+STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
 RAISED_INTERPRETED = 1
 RAISED_COMPILED = 2
 STOPPED_BY_USER = AT_ONCE
@@ -63,6 +62,8 @@ def friction_input(a):
         a[22],
         a[23],
         a[24],
+        a[25],
+        a[26],
     )
 
 
@@ -99,18 +100,19 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     return entry
 
 
-def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int) -> Any:
+def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int, carried: int) -> Any:
     """Return `force` of `count` parameters and so many numbers of memory as a C function."""
+    given = memory + carried
 
     def entry(element, inputs, par, out):
         values = to_fixed_tuple(carray(par, (count,)), count)
         a = carray(inputs, (FRICTION_INPUTS + memory,))
         kept = to_fixed_tuple(a[FRICTION_INPUTS:], memory)
-        result = carray(out, (MEMORY_OUT + memory,))
+        result = carray(out, (MEMORY_OUT + given,))
         found, new = force(friction_input(a), kept, *values)
         for k in range(MEMORY_OUT):
             result[k] = found[k]
-        for k in range(memory):
+        for k in range(given):
             result[MEMORY_OUT + k] = new[k]
         return 0
 
@@ -128,7 +130,7 @@ def friction_address(law: FrictionLaw) -> int:
     """Return the address of a friction law behind `FRICTION_SIGNATURE`."""
     count = len(law.parameters)
     if law.memory:
-        adapted = _adapt_with_memory(law.force, count, law.memory)
+        adapted = _adapt_with_memory(law.force, count, law.memory, law.carried)
     else:
         adapted = _adapt_friction(law.force, count)
     return jit.address(adapted, FRICTION_SIGNATURE)

@@ -10,12 +10,20 @@ the deck gives, ``constants(*parameters)`` makes them once, before the run. A la
 with its source; nothing in it is about arrays, XML or compilation.
 
 A friction law with memory is ``force(inputs, memory, *parameters)``, `memory` being its own numbers
-at the committed state, and returns ``(Fx, Fy, Mx, My, Tz, stored, mode), memory``: the energy that
-it will give back, STICK or SLIP, and its numbers at the point asked for, which the host keeps if
-the step is accepted. They are 0 at touch. A law that is ``integrated`` gets the numbers
-at the point itself and returns their rates instead, which the integrator carries; its
-``size(load, *parameters)`` says how large they are under a usual load, by which their error is
-judged.
+at the committed state, and returns
+
+    (Fx, Fy, Mx, My, Tz, stored, mode, branch, size, unit), memory
+
+the energy that it will give back, STICK or SLIP, and its numbers at the point asked for, which the
+host keeps if the step is accepted. They are 0 at touch. Of these the first ``carried`` are
+integrated: the law gets them at the point itself, and their rates follow behind the numbers to
+keep. `size` is a usual size of what is integrated, `unit` the velocity as which an error of 1 in it
+counts (the square root of stiffness over mass makes one of a stretch: the same energy).
+A law with ``modes`` keeps to the committed `branch` within a step that is ``frozen``, and says
+which branch the point asks for: `mode` and 4 times a number of its own. Steps end where that
+changes, and what is integrated is then set to what the law keeps. Where the branch depends on how
+fast N changes, which only the end of a step can tell, it says UNDECIDED, and is asked again with
+that.
 """
 
 from __future__ import annotations
@@ -60,8 +68,15 @@ class Parameter(NamedTuple):
 BEGUN, STICK, SLIP = 0.0, 1.0, 2.0
 
 
-#: Part of the usual size below which what a law integrates does not follow any faster.
-LEAST = 1e-3
+#: Of `branch`: it depends on rates that were not given; times what a law's own number counts.
+UNDECIDED, BRANCHES = -1.0, 4
+
+#: What a law integrates follows no faster than so many times as fast as the mass that slips
+#: would swing on it.
+FASTEST = 1e3
+#: An error of bristles counts as so many times the velocity of the same energy: where they do not
+#: slip it is not forgotten.
+LASTS = 8.0
 
 
 class FrictionLaw(NamedTuple):
@@ -72,7 +87,7 @@ class FrictionLaw(NamedTuple):
     parameters: tuple[str, ...]
     own: tuple[Parameter, ...] = ()  # which of these are its own
     memory: int = 0  # numbers that it keeps
-    size: Callable[..., float] | None = None  # given: it gives their rates; see above
+    carried: int = 0  # how many of these are integrated
     uses_x: bool = False  # whether it looks at X
     takes_function: bool = False  # whether a user's function may give its friction of sliding
     modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
@@ -97,7 +112,9 @@ class FrictionInput(NamedTuple):
     stiffness: float  # of the normal force, by depth [F/L]; this and the next only with memory
     mass: float  # that slips, 1/(1/m_I + 1/m_J), a part for each point [M, such that F = m a]
     limit: float  # friction of the user's own function in sliding [F], NaN where there is none
-    size: float  # of what an integrated law keeps under a usual load, 0 of other laws
+    growth: float  # of that stiffness, over itself [1/T]
+    nforce_rate: float  # of the normal force [F/T], NaN where it is not known
+    limit_rate: float  # of `limit`, likewise
 
 
 NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")
@@ -124,7 +141,7 @@ def friction_law(
     name: str,
     *parameters: str | Parameter,
     memory: int = 0,
-    size: Callable[..., float] | None = None,
+    carried: int = 0,
     uses_x: bool = False,
     takes_function: bool = False,
     modes: bool = False,
@@ -137,7 +154,7 @@ def friction_law(
         names = tuple(getattr(each, "name", each) for each in parameters)
         made = jitable(force)
         law = FrictionLaw(
-            name, made, names, own, memory, size, uses_x, takes_function, modes, rigid
+            name, made, names, own, memory, carried, uses_x, takes_function, modes, rigid
         )
         FRICTION_LAWS.put(name, law)
         return force

@@ -38,9 +38,8 @@ class Sample(NamedTuple):
     #: Of inputs and memory: forces and torques and what follows them, and new memory or its rates.
     ask: Callable[[FrictionInput, Memory], tuple[Sequence[float], Memory]]
     memory: int = 0
-    integrated: bool = False
+    carried: int = 0  # how many numbers of memory are integrated
     way: float = 0.0  # over which friction builds up
-    size: float = 0.0  # of what an integrated law keeps under a usual load
 
 
 def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sample:
@@ -58,8 +57,7 @@ def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sam
         stiffness = 0.8 * at.stiffness
     most = max(values.get("mu_static", 0.0), values.get("mu_dynamic", 0.0))
     way = most * at.nforce / stiffness if law.memory else 0.0
-    size = law.size(at.nforce, *par) if law.size is not None else 0.0
-    return Sample(law.name, ask, law.memory, law.size is not None, way, size)
+    return Sample(law.name, ask, law.memory, law.carried, way)
 
 
 class Rub:
@@ -88,32 +86,34 @@ class Rub:
             stiffness=at.stiffness,
             mass=at.mass,
             limit=math.nan,
-            size=self.sample.size,
+            growth=0.0,
+            nforce_rate=math.nan,
+            limit_rate=math.nan,
         )
         return self.sample.ask(inputs, memory)
 
     def go(self, dt: float, v: float, dx: float) -> float:
         """Go on by a time and a way to where the slip velocity is v; return the force there."""
-        x = self.x + dx
-        if self.sample.integrated:
-            self.memory = self._integrated(dt, v)
-            force, _ = self._ask(dt, v, x, self.memory)
-        else:
-            force, self.memory = self._ask(dt, v, x, self.memory)
+        x, sample = self.x + dx, self.sample
+        memory = self._integrated(dt, v) if sample.carried > 0 else self.memory
+        force, kept = self._ask(dt, v, x, memory)
+        self.memory = kept[: sample.memory]
         self.time += dt
         self.x = x
         return float(force[0])
 
     def _integrated(self, dt: float, v: float) -> Memory:
         """Return the memory after a time, by the classical method of Runge and Kutta."""
+        n, first = self.sample.memory, self.sample.carried
 
         def moved(by: float, rates: Memory) -> Memory:
-            return tuple(z + by * rate for z, rate in zip(self.memory, rates, strict=True))
+            carried = zip(self.memory[:first], rates, strict=True)
+            return (*(z + by * rate for z, rate in carried), *self.memory[first:])
 
-        a = self._ask(0.0, v, self.x, self.memory)[1]
-        b = self._ask(0.5 * dt, v, self.x, moved(0.5 * dt, a))[1]
-        c = self._ask(0.5 * dt, v, self.x, moved(0.5 * dt, b))[1]
-        d = self._ask(dt, v, self.x, moved(dt, c))[1]
+        a = self._ask(0.0, v, self.x, self.memory)[1][n:]
+        b = self._ask(0.5 * dt, v, self.x, moved(0.5 * dt, a))[1][n:]
+        c = self._ask(0.5 * dt, v, self.x, moved(0.5 * dt, b))[1][n:]
+        d = self._ask(dt, v, self.x, moved(dt, c))[1][n:]
         mean = tuple((p + 2 * q + 2 * r + s) / 6 for p, q, r, s in zip(a, b, c, d, strict=True))
         return moved(dt, mean)
 
@@ -142,7 +142,7 @@ def cycle(sample: Sample, at: Conditions) -> tuple[list[float], list[float]]:
     for k in range(1, 5 * QUARTER + 1):
         there = at.amplitude * math.sin(w * k * dt)
         # the velocity of its middle, as integrated memory takes it
-        v = at.speed * math.cos(w * (k - 0.5 if sample.integrated else k) * dt)
+        v = at.speed * math.cos(w * (k - 0.5 if sample.carried else k) * dt)
         force.append(rub.go(dt, v, there - rub.x) / at.nforce)
         x.append(there)
     return x, force

@@ -18,6 +18,10 @@ from mbsim.expressions import Expression
 
 Array = npt.NDArray[np.float64]
 
+#: Marks a field from which no result follows: where a file is, how a deck says something.
+ASIDE = "aside"
+_ASIDE = {ASIDE: True}
+
 
 @dataclass(frozen=True)
 class Source:
@@ -101,7 +105,7 @@ class Graphic:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     vertices: Array | None = None  # (n, 3)
     faces: npt.NDArray[np.int64] | None = None  # (m, 3), zero-based
-    mesh_file: str = ""
+    mesh_file: str = field(default="", metadata=_ASIDE)
     hull: Array | None = None  # of a convex mesh: its polyhedron, packed as in model.hull
     is_material_inside: bool = True
     source: Source = Source()
@@ -113,8 +117,9 @@ class Subroutine:
 
     par: tuple[float, ...] = ()
     fnc_name: str = ""
-    dll_name: str = ""  # absolute path of a shared library, or empty
-    script_name: str = ""  # absolute path, or empty where --plugin must give it
+    dll_name: str = field(default="", metadata=_ASIDE)  # absolute path of a library, or empty
+    # absolute path, or empty where --plugin must give it
+    script_name: str = field(default="", metadata=_ASIDE)
     interpreter: str = ""
     language: str = ""  # of the library's function: C, FORTRAN, or empty where its name tells
     source: Source = Source()
@@ -214,7 +219,7 @@ class Change:
 
     table: str
     element: Any
-    text: str  # for the log
+    text: str = field(metadata=_ASIDE)  # for the log
 
 
 @dataclass(frozen=True)
@@ -586,9 +591,9 @@ class Request:
 class Model:
     """A whole deck. Dictionaries are keyed by id, in the order of the deck."""
 
-    name: str
-    file: str
-    sha256: str
+    name: str = field(metadata=_ASIDE)
+    file: str = field(metadata=_ASIDE)
+    sha256: str = field(metadata=_ASIDE)
     units: Units
     bodies: dict[int, Body]
     markers: dict[int, Marker]
@@ -618,9 +623,11 @@ class Model:
     simulations: tuple[Simulation, ...] = ()
     requests: dict[int, Request] = field(default_factory=dict)
     compatibility: str = ""
-    notes: tuple[str, ...] = ()  # statements accepted and not acted on, for the log
-    warnings: tuple[str, ...] = ()
-    overrides: tuple[str, ...] = ()  # what was set in the deck before it was read
+    # statements accepted and not acted on, for the log
+    notes: tuple[str, ...] = field(default=(), metadata=_ASIDE)
+    warnings: tuple[str, ...] = field(default=(), metadata=_ASIDE)
+    # what was set in the deck before it was read
+    overrides: tuple[str, ...] = field(default=(), metadata=_ASIDE)
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""

@@ -180,13 +180,21 @@ def _graphic_boxes(model: Model, frames: Mapping[int, Frame]) -> Iterator[tuple[
     """Yield the global bounding box of every graphic that has an extent."""
     for graphic in model.graphics.values():
         frame = frames[graphic.marker_id]
-        if graphic.vertices is not None:
-            points = frame.p + graphic.vertices @ frame.R.T
-            yield points.min(axis=0), points.max(axis=0)
-        elif graphic.shape != "PLANE":
-            centre = frame.p + frame.R @ np.array(graphic.offset)
-            half = _half_extent(graphic, frame.R)
-            yield centre - half, centre + half
+        box = graphic_box(graphic, frame.p, frame.R)
+        if box is not None:
+            yield box
+
+
+def graphic_box(graphic: Graphic, p: Array, R: Array) -> tuple[Array, Array] | None:
+    """Return the global bounding box of a graphic whose marker is at p, R; None of a plane."""
+    if graphic.vertices is not None:
+        points = p + graphic.vertices @ R.T
+        return points.min(axis=0), points.max(axis=0)
+    if graphic.shape == "PLANE":
+        return None
+    centre = p + R @ np.array(graphic.offset)
+    half = _half_extent(graphic, R)
+    return centre - half, centre + half
 
 
 def _half_extent(graphic: Graphic, R: Array) -> Array:

@@ -92,8 +92,8 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
             result[3] = 0.0
             result[4] = force[2]
             # what it stores, if anything, nobody can tell; nor whether it sticks
-            result[5] = 0.0
-            result[6] = 0.0
+            for k in range(5, MEMORY_OUT):
+                result[k] = 0.0
             total = 0.0
             for k in range(states):
                 result[MEMORY_OUT + k] = new[k]

@@ -11,6 +11,8 @@ r = 0 gives f' or f is found by asking the residual at many points, where `kind`
 from __future__ import annotations
 
 import ctypes
+import heapq
+import itertools
 import math
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -38,6 +40,9 @@ from mbsim.plugins.loader import Script, Scripts, find_script, user_function
 
 ARGUMENTS = "x, xdot, f, fdot, t, par"
 _WORDS = ("initial", "scale", "kind")
+#: Jumps are looked for at one in so many of the points at which a residual is asked, in so many
+#: parts; what is left of a change, as a part of the largest number there, is one.
+JUMPS_EVERY, PARTS, LEFT_OF_JUMP = 7, 64, 1e-4
 _EXAMPLE = '{"NAME": {"f": 0.0}}'
 
 
@@ -202,7 +207,9 @@ def load_residual(
         return guard.numbers(asked(given), count)
 
     sizes = _sizes(script, par.tolist())
-    unknowns = _sorted(unknowns, asked, sizes, axes, f"{title}: {name} of {script.path}")
+    who = f"{title}: {name} of {script.path}"
+    unknowns = _sorted(unknowns, asked, sizes, axes, who)
+    _refuse_jumps(unknowns, call, sizes, axes, who)
     address, reason = 0, "--interpret-plugins"
     if not interpret:
         address, reason = _compiled(script, name, par, axes, count, call, sizes)
@@ -291,6 +298,82 @@ def _sorted(
         u if u.kind is not None else replace(u, kind=kind)
         for u, kind in zip(unknowns, kinds, strict=True)
     )
+
+
+def _refuse_jumps(
+    unknowns: tuple[Unknown, ...],
+    call: Callable[[list[float]], list[float]],
+    sizes: list[float],
+    axes: int,
+    who: str,
+) -> None:
+    """Refuse a residual that jumps where an unknown or its rate changes: it may have no zero.
+
+    Raises
+    ------
+    ModelError
+        Saying where, and what to write instead.
+    """
+    count = len(unknowns)
+    first = 1 + 2 * axes + count
+    log, host.log = host.log, lambda line: None
+    try:
+        for given in itertools.islice(_points(sizes, axes, count), 1, None, JUMPS_EVERY):
+            for at in range(first - count, first + count):
+                found = _jump(call, given, at)
+                if found is None:
+                    continue
+                name, rate = unknowns[(at - first) % count].name, "'" if at >= first else ""
+                where, low, high = found
+                raise ModelError(
+                    f"{who}: jumps from {low:.6g} to {high:.6g} where {name}{rate} passes "
+                    f"{where:.6g}, so that it may be 0 nowhere: a residual must be continuous. "
+                    "Write one equation for all modes, as stick and slip in "
+                    "f = clip(f + r (x' - f'/k), -F, F): see userfuncs/dry_friction_element.py"
+                )
+    finally:
+        host.log = log
+
+
+def _jump(
+    call: Callable[[list[float]], list[float]], given: list[float], at: int
+) -> tuple[float, float, float] | None:
+    """Return where a residual jumps as one argument changes, and from what to what, or None.
+
+    The parts over which it changes most are halved down to rounding: what is left of the change of
+    a residual that is continuous goes down with them.
+    """
+    size = abs(given[at]) or 1.0
+    low, high = given[at] - size, given[at] + 1.1 * size
+    try:
+        places = [low + (high - low) * k / PARTS for k in range(PARTS + 1)]
+        values = [call([*given[:at], x, *given[at + 1 :]]) for x in places]
+        whole = max(abs(value) for row in values for value in row)
+        ends = list(zip(places, values, strict=True))
+        parts = [(a, b) for a, b in itertools.pairwise(ends)]
+        while parts[0][1][0] - parts[0][0][0] > 1e-14 * size:
+            parts = heapq.nlargest(4, parts, key=_change)
+            halves = []
+            for one, other in parts:
+                x = 0.5 * (one[0] + other[0])
+                middle = (x, call([*given[:at], x, *given[at + 1 :]]))
+                halves += [(one, middle), (middle, other)]
+            parts = halves
+    except KeyboardInterrupt:
+        raise
+    except (Exception, StopRun):
+        return None  # it was not written for such values
+    (_, before), (where, behind) = max(parts, key=_change)
+    left = [abs(a - b) for a, b in zip(before, behind, strict=True)]
+    row = left.index(max(left))
+    # rounding of what cancels in it may be larger than the interval
+    return (where, before[row], behind[row]) if left[row] > LEFT_OF_JUMP * whole else None
+
+
+def _change(part: Any) -> float:
+    """Return the largest change of a residual from one end of a part to the other."""
+    (_, one), (_, other) = part
+    return float(max(abs(a - b) for a, b in zip(one, other, strict=True)))
 
 
 def _depends(asked: Callable[[list[float]], Any], given: list[float], at: int, count: int) -> bool:

@@ -12,6 +12,7 @@ from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
 from mbsim.model.names import element_name, statement_name
+from mbsim.results.audit import Audit
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
 from mbsim.results.elements import title as title_of
 from mbsim.results.files import replace_text
@@ -97,6 +98,7 @@ class RunLog:
         status: str,
         stats: Mapping[str, Value],
         watch: Watch | None = None,
+        audit: Audit | None = None,
     ) -> None:
         """Add the summary and write the file.
 
@@ -107,6 +109,8 @@ class RunLog:
             Counters and times of the run.
         watch : Watch, optional
             Energies and largest forces (`Recorder.watch`).
+        audit : Audit, optional
+            What the run found out about itself.
 
         Raises
         ------
@@ -115,7 +119,7 @@ class RunLog:
         """
         if self._dropped:
             self.lines.append(f"... and {self._dropped} lines more that are not kept")
-        self.lines += ["", *summary(self.system, status, stats, watch)]
+        self.lines += ["", *summary(self.system, status, stats, watch, audit)]
         self.flush()
 
 
@@ -264,6 +268,7 @@ def summary(
     status: str,
     stats: Mapping[str, Value],
     watch: Watch | None,
+    audit: Audit | None,
 ) -> Iterator[str]:
     """Yield what happened: contacts, forces, rejections, energy, statistics, times."""
     yield f"end: {status}"
@@ -305,6 +310,8 @@ def summary(
         yield fact("none", "")
     if watch is not None:
         yield from _energy_lines(system, watch)
+    if audit is not None:
+        yield from _audit_lines(audit)
     yield ""
     yield "statistics"
     free = freedom(system)
@@ -351,6 +358,24 @@ def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
     first, last = (float(e[:3].sum() - e[3]) for e in (watch.first, watch.last))
     yield fact("balance, change since the start", number(last - first))
     yield fact("  of", what)
+
+
+def _audit_lines(audit: Audit) -> Iterator[str]:
+    """Yield what the run found out about itself."""
+    yield ""
+    yield f"audit: {audit.line}"
+    yield fact("balance worst at time", number(audit.time))
+    for id, share in audit.contacts.items():
+        if share.largest:
+            name = "  without contact" if id is None else f"  under Force_Contact[{id}]"
+            largest = f"{number(share.largest)} at {number(share.time)}"
+            yield fact(name, f"{number(share.change)}, most at once {largest}")
+    for name, entry in audit.entries.items():
+        at = f" at {entry.element}" if entry.element else ""
+        when = f"{number(entry.value)} of {number(entry.allowed)} at time {number(entry.time)}"
+        yield fact(name.replace("_", " "), when + at)
+    for warning in audit.warnings:
+        yield f"  warning: {warning}"
 
 
 def sequence(model: Model) -> Iterator[str]:

@@ -63,7 +63,7 @@ _POSITION = Quantity("Position", length=1)
 _VELOCITY = Quantity("Velocity", length=1, time=-1)
 _ACCELERATION = Quantity("Acceleration", length=1, time=-2)
 _SPIN = Quantity("Angular velocity", time=-1, angle=1)
-_ENERGY = Quantity("Energy", force=1, length=1)
+ENERGY = Quantity("Energy", force=1, length=1)
 _FORCE = Quantity("Force", force=1)
 _TORQUE = Quantity("Torque", force=1, length=1)
 
@@ -82,10 +82,10 @@ _BY_NAME = {
     "incidents": INCIDENTS,
     "value": Quantity("State"),
     "area": Quantity("Contact area", length=2),
-    "kinetic": _ENERGY,
-    "potential": _ENERGY,
-    "dissipated": _ENERGY,
-    "work_of_motions": _ENERGY,
+    "kinetic": ENERGY,
+    "potential": ENERGY,
+    "dissipated": ENERGY,
+    "work_of_motions": ENERGY,
 }
 
 #: By the measure of an expression, where `requests.measures_of` knows it.
@@ -147,7 +147,7 @@ class UnitSystem:
             SYMBOLS.get(name, name.lower()) for name in (self.force, self.length, self.time)
         )
         # torques keep their N m
-        if quantity == _ENERGY and (force, length) == ("N", "m"):
+        if quantity == ENERGY and (force, length) == ("N", "m"):
             return "J"
         powers = [
             (force, quantity.force),

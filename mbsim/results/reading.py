@@ -17,6 +17,8 @@ from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, o
 if TYPE_CHECKING:
     import h5py
 
+    from mbsim.results.audit import Audit
+
 #: What h5py raises where a file is damaged.
 _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
 _Read = TypeVar("_Read", bound=Callable[..., Any])
@@ -98,6 +100,24 @@ class Results:
         if "stats" not in self._open():
             return {}
         return {name: _plain(value) for name, value in self._open()["stats"].attrs.items()}
+
+    @property
+    @_reads
+    def audit(self) -> Audit | None:
+        """What the run found out about itself; None if it was killed, or never took a step."""
+        from mbsim.results.audit import from_attributes
+
+        file = self._open()
+        if "audit" not in file:
+            return None
+        found = {"audit": _facts(file["audit"])}
+
+        def note(name: str, item: Any) -> None:
+            if len(item.attrs):
+                found[f"audit/{name}"] = _facts(item)
+
+        file["audit"].visititems(note)
+        return from_attributes(found)
 
     @_reads
     def keys(self) -> list[str]:
@@ -262,6 +282,11 @@ class Results:
     def _there(self) -> str:
         """Return all signals, with ids taken together, as the end of a message."""
         return f"; there is {', '.join(compact(self.signals())) or 'nothing'}"
+
+
+def _facts(item: Any) -> dict[str, Any]:
+    """Return the attributes of a group."""
+    return {name: _plain(value) for name, value in item.attrs.items()}
 
 
 def _plain(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -12,20 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.errors import ModelError, ResultsError
-from mbsim.expressions import Expression
-from mbsim.model.elements import Model
+from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
-from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, acting, elements_of, facts
+from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import Forces, check_requests
+from mbsim.results.identity import Identity
 from mbsim.results.motion import motion
 from mbsim.results.reading import Results, open_results
 from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch, energies
 from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
-from mbsim.system.pairing import shape_class
 
 if TYPE_CHECKING:
     from mbsim.system.build import System
@@ -39,7 +37,16 @@ EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
 #: Attributes of which digests say whether they matter.
-_SAID_ELSEWHERE = ("model_file", "overrides", "plugins", "interpret_plugins")
+_SAID_ELSEWHERE = ("tol_from", "model_file", "overrides", "plugins", "interpret_plugins")
+#: What a digest that differs says, and of which facts of `Identity` it is.
+_DIGESTS = {
+    "model_sha256": ("the model file has changed", "model"),
+    "system_sha256": ("elements of the model have changed (--set?)", "model"),
+    "settings_sha256": ("how it is run has changed", "settings"),
+    "subroutines_sha256": ("a user subroutine has changed", "subroutines"),
+}
+#: Where a checkpoint says what the run is made of.
+MADE_OF = "made_of"
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
 #: That size is for each so many bodies (and joints, ...): a write opens every signal, 0.3 ms each,
@@ -109,6 +116,8 @@ class Recorder:
         Where ``<model>.h5`` and ``.csv`` go; None keeps everything in memory.
     resume : bool
         Go on from the checkpoint in that folder, then in `checkpoint`.
+    how : dataclass, optional
+        `Settings` of the run, which those of a resumed one must equal.
 
     Raises
     ------
@@ -124,8 +133,10 @@ class Recorder:
         attributes: Mapping[str, Value],
         directory: Path | None,
         resume: bool = False,
+        how: Any = None,
     ) -> None:
         self.system = system
+        self._identity = Identity(system, how)
         self.directory = directory
         self.checkpoint: dict[str, Table] = {}
         #: What the log says of all rows, those before a resume included.
@@ -141,7 +152,7 @@ class Recorder:
         self._target: Path | None = None
         self._posts = ContactPosts(system, system.posts) if system.posts else None
         check_requests(system.model)
-        settings: dict[str, Value] = {**attributes, **_digests(system)}
+        settings: dict[str, Value] = {**attributes, **self._identity.digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -150,7 +161,7 @@ class Recorder:
         self._store = Store(self._target, resume)
         labels = {} if resume else self._labels()
         self._store.update(
-            attributes={"/": {**settings, "status": "running"}, **labels}, remove=["stats"]
+            attributes={"/": {**settings, "status": "running"}, **labels}, remove=["stats", "audit"]
         )
 
     def _resumed(self, settings: Mapping[str, Value]) -> dict[str, Table]:
@@ -161,11 +172,13 @@ class Recorder:
             raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
         try:
             with open_results(self._target) as results:
-                _check_same(self._target, results, settings)
+                _check_same(self._target, results, settings, self._identity)
                 offsets = results["state/incident_offsets"]
                 self._incidents, self._started = int(offsets[-1]), True
                 self.watch.recall(results)
-                return results.tables("checkpoint")
+                tables = results.tables("checkpoint")
+                tables.pop(MADE_OF, None)
+                return tables
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
 
@@ -234,9 +247,8 @@ class Recorder:
         if self._target is None:
             return
         self._write()
-        self._store.update(
-            values={f"checkpoint/{name}": array for name, array in checkpoint.items()}
-        )
+        values = {f"checkpoint/{name}": array for name, array in checkpoint.items()}
+        self._store.update(values=values | {f"checkpoint/{MADE_OF}": self._identity.packed()})
         self._store.publish()
         self._rows_since_flush = 0
         self._published_at = time.monotonic()
@@ -250,7 +262,13 @@ class Recorder:
         """Leave what an earlier run published as it is, and drop this one."""
         self._store.abandon()
 
-    def close(self, status: str, stats: Mapping[str, Value], contact_log: Table) -> Results:
+    def close(
+        self,
+        status: str,
+        stats: Mapping[str, Value],
+        contact_log: Table,
+        audit: Audit | None = None,
+    ) -> Results:
         """Complete the files and return them as results.
 
         Parameters
@@ -260,6 +278,8 @@ class Recorder:
             Attributes of ``/stats``.
         contact_log : ndarray, shape (nc, LOG_COLUMNS)
             `Log.contacts`: largest force, depth and slip over all steps.
+        audit : Audit, optional
+            What the run found out about itself.
 
         Raises
         ------
@@ -272,11 +292,12 @@ class Recorder:
             for row, contact_id in zip(contact_log, self.system.contact_ids, strict=True)
             for name, column in _PEAKS.items()
         }
+        judged = to_attributes(audit) if audit is not None else {}
         # of rows after the checkpoint, a resumed run would record a second copy
         stale = status == "finished" or self._rows_since_flush > 0
         self._store.update(
             values=peaks,
-            attributes={"stats": stats, "/": {"status": status}},
+            attributes={"stats": stats, "/": {"status": status}, **judged},
             remove=["checkpoint"] if stale else [],
         )
         in_memory = self._store.finish()
@@ -365,110 +386,26 @@ def _nothing(system: System) -> Block:
     return _cut(system, 0, 0, 0)
 
 
-def _without_size(graphics: Any) -> list[Table]:
-    """Return the graphics' arrays but `size`, which holds addresses where meshes are."""
-    return [array for array in graphics if array is not graphics.size]
-
-
-def _described(model: Model) -> Iterator[Any]:
-    """Yield what the digest takes as text: constraints, forces, variables and requests."""
-    for statement in (*CONSTRAINTS, *APPLIED):
-        yield from elements_of(model, statement).values()
-    yield from model.variables.values()
-    yield from model.differentials.values()
-    yield from model.splines.values()
-    yield from model.arrays.values()
-    yield from model.sensors.values()
-    yield from model.requests.values()
-
-
-def _said(element: Any) -> str:
-    """Return an element as text, without file and line: its deck may be named by another path."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, Expression):
-            return value.text  # a tree may be deeper than `repr` goes
-        return tuple(map(plain, value)) if isinstance(value, tuple) else value
-
-    said = {f.name: plain(getattr(element, f.name)) for f in fields(element) if f.name != "source"}
-    return f"{type(element).__name__} {said}"
-
-
-def _constants(
-    system: System, par: np.ndarray[Any, Any], users: Mapping[int, Any]
-) -> np.ndarray[Any, Any]:
-    """Return the parameters of laws without the addresses among those of users' laws."""
-    par = par.copy()
-    for k, id in enumerate(system.contact_ids):
-        if id in users:
-            par[k, : len(users[id].hidden)] = 0.0
-    return par
-
-
-def _digests(system: System) -> dict[str, Value]:
-    """Return digests of the model as it is run (--set included) and of users' files."""
-    scene = system.scene
-    arrays = [
-        *scene.bodies,
-        *_without_size(scene.graphics),
-        scene.contacts.id,
-        _constants(system, scene.contacts.normal_par, system.user_normal),
-        _constants(system, scene.contacts.friction_par, system.user_friction),
-        scene.contacts.ignore_deeper,
-        scene.world.gravity,
-        scene.world.scale,
-        system.y0,
-    ]
-    # addresses are left out: they are others in every process
-    text = [f"{c.id} {c.cnf_type} {c.cff_type}" for c in system.model.contacts.values()]
-    text += [repr(system.plans)]
-    text += [f"{g.id} {shape_class(g)} {g.size}" for g in system.model.graphics.values()]
-    given = [system.model.gravity, *(stage.gravity for stage in system.model.simulations)]
-    text += [_said(gravity) for gravity in given if gravity is not None and any(gravity.exprs)]
-    text += [_said(element) for element in _described(system.model)]
-    arrays += [
-        part for place in system.placement.markers.values() for part in (place.p_B, place.R_B)
-    ]
-    model = hashlib.sha256("\n".join(text).encode())
-    for array in arrays:
-        model.update(np.ascontiguousarray(array).tobytes())
-    users = hashlib.sha256()
-    for contact_id, user in system.user_laws:
-        users.update(f"{contact_id} {user.name} {user.compiled}\n".encode())
-        users.update(Path(user.source).read_bytes())
-    for post in system.posts:
-        users.update(f"{post.contact.id} {post.user.fnc_name} {post.user.par}\n".encode())
-        users.update(post.source.read_bytes())
-    for id, residual in system.residuals.items():
-        # kinds decide what is a state
-        users.update(f"Force_Element {id} {residual.name} {residual.unknowns}\n".encode())
-        users.update(residual.source.read_bytes())
-    for element, subroutine in system.subroutines.items():
-        users.update(f"{element} {subroutine.name}\n".encode())
-        users.update(Path(subroutine.source).read_bytes())
-    return {"system_sha256": model.hexdigest(), "subroutines_sha256": users.hexdigest()}
-
-
-def made_of(system: System) -> dict[str, Value]:
-    """Return digests of a model and of users' files, as result files have them."""
-    return _digests(system)
-
-
-def _check_same(path: Path, results: Results, settings: Mapping[str, Value]) -> None:
+def _check_same(
+    path: Path, results: Results, settings: Mapping[str, Value], identity: Identity
+) -> None:
     """Raise `ModelError` unless a run with these settings can go on from a result file."""
     there = results.attributes
     if results.status == "finished":
         raise ModelError(f"--resume: {path}: this run has finished; there is nothing to go on with")
     if not results.has_checkpoint:
         raise ModelError(f"--resume: {path}: no checkpoint in it; start without --resume")
+    made_of = results.tables("checkpoint").get(MADE_OF)
     # what explains a difference comes before the digests that only show it
     for name, value in settings.items():
         if name in _SAID_ELSEWHERE or (name == "subroutines_sha256" and results.status == "failed"):
             continue  # a failed user subroutine may be mended
-        if name not in there or there[name] != value:
-            what = {
-                "model_sha256": "the model file has changed",
-                "system_sha256": "elements of the model have changed (--set?)",
-                "subroutines_sha256": "a user subroutine has changed",
-            }.get(name, f"{name} was {there.get(name, 'not given')} and is {value} now")
-            raise ModelError(f"--resume: {path}: {what}; a run goes on as it began")
+        if name in there and there[name] == value:
+            continue
+        if name in _DIGESTS:
+            what, kind = _DIGESTS[name]
+            found = "" if made_of is None else identity.changes(made_of, kind)
+            what += f": {found}" if found else ""
+        else:
+            what = f"{name} was {there.get(name, 'not given')} and is {value} now"
+        raise ModelError(f"--resume: {path}: {what}; a run goes on as it began")

@@ -104,25 +104,77 @@ KEEP_DRY, HOLD_AGAIN = range(2)
     ASK_HELD,
     BEGIN_HELD,
     RELEASE_HELD,
-    AIM_HELD,
     RECORD_HELD,
     CHANGED_HELD,
     LOAD_HELD,
-) = range(9)
+) = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
 # kinds of terms: `Equations.kind`
-OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING = range(6)
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST = range(7)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left
-# the equations before it was brought back onto them, as a local error, and which equation most
-CHOSEN, USUAL, NEAR_FOLD, DRIFT, DRIFTER = range(5)
+# the equations before it was brought back onto them, as a local error, and which equation most;
+# the least pivot of the factor at hand over its size squared, and
+# how many accelerations `Sweep.kept_a` holds; of the last of those their square in the norm of the
+# inertia, times the square root of the least pivot, and that pivot
+CHOSEN, USUAL, NEAR_FOLD, DRIFT, DRIFTER, PIVOT, KEPT, ASKED, KEPT_PIVOT = range(9)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
+
+# rows of `Audit.found`, one for everything that a run is judged by; `results.audit` has their names
+(
+    ENERGY,  # kinetic + potential + dissipated - work of motions, against what it was at first
+    ENERGY_STEP,  # its change from one sample to the next
+    MOMENTUM,  # of a group of bodies that nothing but its weight acts on from outside
+    SPIN,  # its angular momentum about its cg
+    POSITION,  # residual of an equation of joints and motions over its unit
+    VELOCITY,  # of its rate
+    HELD_SLIP,  # slip where friction holds
+    CONE,  # friction over mu N, as a part of the contact's largest mu N
+    NEWTON,  # what Newton's iteration left of an implicit step
+) = range(9)
+AUDITS = 9
+# its columns, of the sample in which the value was largest over what was allowed
+FOUND_VALUE, FOUND_ALLOWED, FOUND_TIME, FOUND_ELEMENT = range(4)
+
+# entries of `Audit.plan`: steps from one sample to the next, tol, a time at which one is taken
+AUDIT_EVERY, AUDIT_TOL, AUDIT_UNTIL = range(3)
+
+# entries of `Audit.tally`: local error of the step tried last, as the norm gave it; steps, and sum
+# of their errors, since the last sample and in all; incidents and contact at the last sample, and
+# its time; the balance that counts as closed, and the last change from it; potential, dissipated
+# energy and work at first; the largest energy of any kind so far; where the balance was worst, and
+# when; whether what it was is to be taken anew; the largest energy scale of the error norm so far
+(
+    ERROR_NOW,
+    STEPS_SINCE,
+    ERRORS_SINCE,
+    STEPS_ALL,
+    ERRORS_ALL,
+    HITS_THEN,
+    CONTACT_THEN,
+    TIME_THEN,
+    CLOSED_AT,
+    OPEN_BY,
+    POTENTIAL_FIRST,
+    DISSIPATED_FIRST,
+    WORK_FIRST,
+    LARGEST_ENERGY,
+    WORST_OPEN,
+    WORST_TIME,
+    ANEW,
+    USUAL_ENERGY,
+) = range(18)
+TALLIES = 18
+
+#: What `commit` returns where the motion is held otherwise from here on: equations were taken into
+#: use or out of it, or what friction carries became something else.
+HELD_OTHERWISE = 2
 
 # kinds of `Rows.events`
 TOUCH, LEAVE, STICK, SLIP, SENSOR = range(5)
@@ -157,13 +209,19 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
     INC_KIND,
     INC_GRAPHIC_I,  # of the pair
     INC_GRAPHIC_J,
-    INC_MEMORY,  # of friction at the begin of the step, as many as `State.before` has
-) = range(14, 22)
+) = range(14, 21)
+#: The couple for a unit of energy (3), and the memory of friction at the begin of the step, as long
+#: as `State.before` is wide.
+INC_COUPLE, INC_MEMORY = 21, 24
 #: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
 #: xx, xy, yy (see geometry.catalog).
 INC_REGION = 4
 #: Of these, where friction is rigid: what holds along x and y, see laws.friction.stiction.
 INC_HELD = INC_MEMORY + 3
+
+
+#: Entry of `World.scale` that holds the tolerance of a run.
+TOLERANCE = 3
 
 
 class Bodies(NamedTuple):
@@ -255,7 +313,7 @@ class Contacts(NamedTuple):
     interpreted: I1  # (nc,) 1 where the friction law enters Python
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
-    size: F1  # (nc,) a usual size of these where they are part of y, else 0
+    carried: I1  # (nc,) how many of these are part of y
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts
@@ -466,11 +524,23 @@ class World(NamedTuple):
     gravity: F1  # (3,) what of it is constant
     weight: I2  # (1 + .., 3) programs of components that are expressions, -1 for none: those in
     # force, then those of every gravity of the model
-    scale: F1  # (3,) length L, speed V and energy of the error norm
+    scale: F1  # (4,) length L, speed V and energy of the whole model, for difference quotients and
+    # what is rounding, and the tolerance; errors are judged by `Scales`
     doors: I1  # (DOORS,) addresses of what only some scenes need
     fixed_step: I1  # (1,) 1 for a method without error estimate
     past: I1  # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
+
+
+class Scales(NamedTuple):
+    """What errors are judged by, for each of n groups of connected bodies: `system.groups`."""
+
+    group: I1  # (nb,) of a body
+    length: F1  # (n,) L
+    speed: F1  # (n,) the least V, weight left out
+    mass: F1  # (n,) of the heaviest body
+    of_contact: I1  # (nc,) group by which a contact's energy is judged
+    gyration: F1  # (nb,) radius
 
 
 class State(NamedTuple):
@@ -488,7 +558,7 @@ class State(NamedTuple):
     normal: F1  # (ns,) normal force
     memory: F2  # (ns, most) of friction laws
     before: F2  # (ns, most) the same at the begin of the last step
-    mode: F1  # (ns,) of a friction law with memory: STICK, SLIP, or 0
+    mode: F1  # (ns,) branch of a friction law with memory: see laws.catalog
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see the names above
     sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
@@ -496,6 +566,7 @@ class State(NamedTuple):
     dry: F2  # (nf, 4) of dry friction, see the names above
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
+    fastest: F1  # (n,) what the largest speed so far of a group counts: dynamics.scales
     heat: F1  # (2,) of contacts whose friction is rigid: heat as of sides, 1 where one asked for
     # another mode since the committed state: see dynamics.kinks
 
@@ -506,6 +577,22 @@ class Log(NamedTuple):
     contacts: F2  # (nc, LOG_COLUMNS)
     counters: I1  # (COUNTERS,)
     rejections: I2  # (nc + 1, 4)
+
+
+class Audit(NamedTuple):
+    """What a run judges itself by, see dynamics.audit; saved with the state."""
+
+    tied: I1  # (groups,) of `Scales`: 1 where something but a contact ties it to ground
+    cone: F1  # (nc,) largest friction over normal force, inf where the law has none
+    plan: F1  # (3,) see the names above, as for all here
+    tally: F1  # (TALLIES,)
+    momentum: F2  # (groups, 7) linear 3, angular 3, 1 where ground touched it; of the last sample
+    sums: F2  # (groups, 13) scratch, see dynamics.audit
+    first: I1  # (groups,) first body of each
+    contact: F2  # (nc + 1, 4) change of balance while this contact pressed hardest (last row: none
+    # touched), the largest of one sample, and when; largest mu N
+    energy: F1  # (4,) as of `Rows.energy`
+    found: F2  # (AUDITS, 4)
 
 
 class Work(NamedTuple):
@@ -533,18 +620,20 @@ class Work(NamedTuple):
     bound: F1  # (2,) squared frequency and rate of damping, the largest so far
     best: F1  # (4,) pair that gave it: contact, energy at touch, force behind it, inverse mass
     idle: F1  # (ny,) y' at points that are only looked at; (0,) where none is
+    ahead: F2  # (2, ny) y and y' a little later; (0, 0) where no rates of forces are looked for
     law_in: F1  # (FRICTION_INPUTS + most,)
-    law_out: F1  # (MEMORY_OUT + most,)
+    law_out: F1  # (MEMORY_OUT + 2 most,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
     rub: F2  # (nf, 9) of friction: see dynamics.joint_friction
     late: F2  # (nu, 5) of what is settled with the reactions, see dynamics.late_forces
     secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
+    squares: F1  # (n,) V^2 of each group of bodies at the point that an error is judged at
     trouble: I1  # (2,) worst body of the error norm, contact at fault
     hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
     held: F2  # (ns, 2) forces that hold these, along x and y
-    aim: F2  # (ns, 8) of what begins to slip; no rows for the three where none is rigid
-    look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before
+    look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before; no rows
+    # for the three where none is rigid
 
 
 class Sweep(NamedTuple):
@@ -566,6 +655,7 @@ class Sweep(NamedTuple):
     bias: F2  # (nt, 6) force that velocities call for
     answer: F2  # (nt, 6) accelerations by a unit multiplier
     mark: I1  # (nt,) by root: equation for which `answer` was made
+    chosen: I1  # (ne + 1,) `Equations.active` before others are chosen
     G: F2  # (terms, 12) of each term: wrench on I's body and on J's, each about its O
     rate: F2  # (ne, 4) residual, its rate, its second rate by velocities alone, rate of its sum
     A: F2  # (ne, ne) how equations act on each other, then its factor
@@ -573,13 +663,16 @@ class Sweep(NamedTuple):
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
     size: F1  # (ne,) square root of what A would have if the bodies were free
-    quality: F1  # (5,) least pivot over its size squared, see the names above
+    wanted: F1  # (ne,) multipliers of equations alone, near a fold
+    kept_at: F1  # (4,) times of the last committed states that no loop was about to fold in
+    kept_a: F3  # (4, nt, 6) what multipliers did to accelerations then
+    quality: F1  # (9,) least pivot over its size squared, see the names above
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
-    share: F2  # (nh, nh) self-stresses of equations of slots, by rows
-    mix: F2  # (nh, nh + 1) how they are mixed
-    kept_p: F2  # (nt or 0, 6) p and multipliers while others are tried
-    kept: F1  # (ne or 0,)
+    share: F2  # (nh, nh) slips of what sticks, by rows: S of dynamics.cones, and its matrix
+    mix: F2  # (nh, nh)
+    cone: F2  # (CONE_ROWS, nh) its vectors
+    kept_p: F2  # (nt or 0, 6) p while others are tried
 
 
 class Rows(NamedTuple):
@@ -599,7 +692,9 @@ class Rows(NamedTuple):
     used: I1  # (3,) rows, incidents, events
 
 
-SLOT_COLUMNS = 17
+#: Rows of `Sweep.cone`: those of dynamics.cones, and three of dynamics.rigid_contact.
+CONE_ROWS = 12
+SLOT_COLUMNS = 28
 #: What `crowd.put_aside` keeps of a slot, and twice the memory: frames, mode, point, `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
@@ -628,8 +723,10 @@ class Scene(NamedTuple):
     equations: Equations
     connections: Connections
     world: World
+    scales: Scales
     state: State
     log: Log
+    audit: Audit
     work: Work
     sweep: Sweep
     rows: Rows

@@ -21,6 +21,7 @@ from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
 from mbsim.system import arrays as a
 from mbsim.system.acting import acting
+from mbsim.system.audit import audit
 from mbsim.system.contacts import (
     contacts_table,
     crowds_table,
@@ -29,6 +30,7 @@ from mbsim.system.contacts import (
     pairs_table,
 )
 from mbsim.system.grips import grips
+from mbsim.system.groups import Groups, find_groups, natural_speed
 from mbsim.system.kinks import has_modes
 from mbsim.system.markers import MarkerTable
 from mbsim.system.mechanism import sweep
@@ -133,29 +135,24 @@ def _bodies(placement: Placement) -> a.Bodies:
     )
 
 
-def _speed_scale(model: Model, placement: Placement, end_time: float) -> float:
-    """Return V = max(fastest point of a body at the start, sqrt(g L), L / T_end)."""
-    fastest = 0.0
-    for body in placement.bodies.values():
-        gyration = math.sqrt(float(np.trace(body.inertia)) / (2.0 * body.mass))
-        fastest = max(fastest, float(np.linalg.norm(body.v) + np.linalg.norm(body.w) * gyration))
+def _speed_scale(model: Model, groups: Groups) -> float:
+    """Return the largest V of the model's groups; that of standard gravity where nothing moves."""
     g = float(np.linalg.norm(model.gravity.g))
-    length = placement.L
-    return max(fastest, math.sqrt(g * length), length / end_time if end_time > 0.0 else 0.0)
+    largest = max(
+        max(v, math.sqrt(g * length)) for v, length in zip(groups.start, groups.length, strict=True)
+    )
+    return largest if largest > 0.0 else natural_speed(model.units, max(groups.length))
 
 
-def _usual_load(placement: Placement, speed: float) -> float:
-    """Return a force by which friction is judged: m V^2/L of the lightest body, so often m g."""
+def _usual_load(placement: Placement, length: float, speed: float) -> float:
+    """Return a force by which forces are judged: m V^2/L of the lightest body, so often m g."""
     lightest = min((body.mass for body in placement.bodies.values()), default=1.0)
-    V = speed if speed > 0.0 else placement.L
-    return lightest * V * V / placement.L
+    return lightest * speed * speed / length
 
 
-def _scales(placement: Placement, speed: float) -> np.ndarray[Any, Any]:
-    """Return length, speed and energy of the error norm, all above 0."""
-    V = speed if speed > 0.0 else placement.L
-    heaviest = max((body.mass for body in placement.bodies.values()), default=1.0)
-    return np.array([placement.L, V, heaviest * V * V])
+def _scales(groups: Groups, length: float, speed: float) -> np.ndarray[Any, Any]:
+    """Return length, speed and energy of the whole model, all above 0, and a tolerance to set."""
+    return np.array([length, speed, max(groups.mass) * speed * speed, 0.0])
 
 
 def _ledger(works: bool, damps: bool, at: int) -> np.ndarray[Any, Any]:
@@ -307,7 +304,6 @@ def _users(
 
 def build(
     model: Model,
-    end_time: float,
     plugins: Sequence[Path] = (),
     interpret: bool = False,
     detector: str = "auto",
@@ -318,8 +314,6 @@ def build(
     Parameters
     ----------
     model : Model
-    end_time : float
-        Of the whole run [T]; it sets the speed scale of a model that stands still.
     plugins : sequence of Path
         Files given with --plugin.
     interpret : bool
@@ -357,15 +351,16 @@ def build(
     graphics = graphics_table(model, placement, graphic_ids, row, shapes)
     graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
     pairs, ns = pairs_table(plans, kinds, graphic_row)
-    speed = _speed_scale(model, placement, end_time)
-    load = _usual_load(placement, speed)
-    contacts, uses_x = contacts_table(contact_list, user, normal, load)
+    groups = find_groups(model, placement)
+    length, speed = max(groups.length), _speed_scale(model, groups)
+    load = _usual_load(placement, length, speed)
+    contacts, uses_x = contacts_table(contact_list, user, normal)
     most = int(contacts.memory.max(initial=0))
 
     # X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
     wide = np.zeros((ns, 2), dtype=np.int64)
-    each = np.column_stack([3 * uses_x, (contacts.size > 0.0) * contacts.memory])
+    each = np.column_stack([3 * uses_x, contacts.carried])
     for k, plan in enumerate(plans.pairs):
         # of one region the first row alone is an incident
         end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
@@ -377,7 +372,7 @@ def build(
     carried = int(begins[-1]) - a.BODY_SIZE * nb
     x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
 
-    table = MarkerTable(placement, row)
+    table = MarkerTable(placement, row, length)
     first_state = a.BODY_SIZE * nb + carried
     rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
@@ -395,7 +390,7 @@ def build(
     if residuals:
         from mbsim.system.residuals import fill_scales
 
-        fill_scales(held, states, load, placement.L)
+        fill_scales(held, states, load, length)
         y0[held.place[held.place >= 0]] = held.initial[held.place >= 0]
     markers, angles = table.arrays()
     instructions = rows.programs.arrays(mechanism.elements, rows.applied_ids, contact_ids)
@@ -429,11 +424,19 @@ def build(
         world=a.World(
             pulled[0].constant.copy(),
             np.array([pulled[0].program, *(pull.program for pull in pulled)]),
-            _scales(placement, speed),
+            _scales(groups, length, speed),
             np.zeros(a.DOORS, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             ledger,
+        ),
+        scales=a.Scales(
+            np.array(groups.of_body, dtype=np.int64),
+            np.array(groups.length),
+            np.array(groups.speed),
+            np.array(groups.mass),
+            np.array(groups.of_contact, dtype=np.int64),
+            np.array(groups.gyration, dtype=np.float64),
         ),
         state=start_state(
             nb,
@@ -445,8 +448,16 @@ def build(
             most,
             nf,
             (len(held.id), 2, len(held.given)),
+            len(groups.length),
         ),
         log=empty_log(len(contact_ids)),
+        audit=audit(
+            contact_list,
+            set(user),
+            np.array(groups.of_body, dtype=np.int64),
+            (mechanism.connections, mechanism.equations, rows.applied, markers),
+            any((pull.program >= 0).any() for pull in pulled),
+        ),
         work=scratch(
             nb,
             graphics,
@@ -458,7 +469,9 @@ def build(
             nu,
             most,
             looked,
+            len(y0) if looked and contacts.carried.any() else 0,
             int((pairs.last - pairs.slot).max(initial=0)) if held else 0,
+            len(groups.length),
         ),
         sweep=sweep(mechanism),
         rows=empty_rows(

@@ -62,7 +62,7 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     applied = rows.applied
     markers, angles = table.arrays()
     listed = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
-    contacts, _ = contacts_table(listed, system.user_friction, system.user_normal, system.load)
+    contacts, _ = contacts_table(listed, system.user_friction, system.user_normal)
     same = all(
         np.array_equal(x, y)
         for x, y in ((markers.body, scene.markers.body), (markers.p, scene.markers.p))

@@ -264,12 +264,11 @@ def contacts_table(
     contacts: list[Contact],
     user: dict[int, UserFriction],
     user_normal: Mapping[int, UserNormal],
-    load: float,
 ) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
-    """Return the contacts, and for each whether X has to be carried; `load`: a usual force."""
+    """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, size = np.zeros(n, dtype=np.int64), np.zeros(n)
+    memory, carried = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     for k, contact in enumerate(contacts):
         if contact.id in user_normal:
             own = user_normal[contact.id]
@@ -289,8 +288,7 @@ def contacts_table(
             friction.append(abi.friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
-            if friction_law.size is not None:
-                size[k] = friction_law.size(load, *friction[-1])
+            carried[k] = friction_law.carried
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -319,7 +317,7 @@ def contacts_table(
             [c.id in user or memory[k] > 0 for k, c in enumerate(contacts)], dtype=np.int64
         ),
         memory=memory,
-        size=size,
+        carried=carried,
         ignore_deeper=np.array(
             [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
         ),

@@ -21,6 +21,8 @@ class MarkerTable:
 
     placement: Placement
     body_row: dict[int, int]
+    #: What residuals of constraints are measured by [L].
+    length: float = 1.0
     rows: dict[int, int] = field(default_factory=dict)
     angle_rows: dict[tuple[int, int], int] = field(default_factory=dict)
     turned_rows: dict[tuple[int, int], int] = field(default_factory=dict)

@@ -7,6 +7,7 @@ of terms (`dynamics.equations`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -25,6 +26,7 @@ from mbsim.model.elements import (
     Model,
     Motion,
 )
+from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
 from mbsim.system import arrays as a
 from mbsim.system.markers import MarkerTable
@@ -37,6 +39,7 @@ _KINDS = {
     "angle": a.ANGLE,
     "spin": a.ANGLE,
     "distance": a.DISTANCE,
+    "twist": a.TWIST,
 }
 #: What of a rotation is left free by these cosines held at 0 (axis of I, axis of J).
 _TURNS = {
@@ -48,6 +51,8 @@ _TURNS = {
 _LEAST_ROWS = 3
 #: Sine of an angle below which axes are parallel.
 _PARALLEL = 1e-6
+#: Cosine of half the bend of shafts that are folded back: no twist can be told from it.
+_FOLDED = 1e-8
 _LEVELS = {"A": 0, "V": 1, "D": 2}
 #: What a motion's direction means.
 _DIRECTIONS = {
@@ -184,7 +189,7 @@ class _Builder:
 
     def __init__(self, model: Model, markers: MarkerTable, programs: ProgramTable) -> None:
         self.model, self.markers, self.programs = model, markers, programs
-        self.length = markers.placement.L
+        self.length = markers.length
         self.sums = _Sums()
         self.elements: list[tuple[str, int]] = []
         self.pairs: list[tuple[int, int]] = []
@@ -200,6 +205,8 @@ class _Builder:
             return float(R_i[:, _AXES.index(row.i)] @ R_j[:, _AXES.index(row.j)])
         if row.kind == "distance":
             return float(np.linalg.norm(p_i - p_j))
+        if row.kind == "twist":
+            return 0.0
         return self.markers.start_angle(i, j)
 
     def aligned(self, i: int, j: int) -> int:
@@ -209,6 +216,14 @@ class _Builder:
         bodies = list(self.markers.placement.bodies.values())
         R = bodies[body_j].R if body_j < len(bodies) else np.eye(3)
         return self.markers.add(body_j, self.markers.frames[j][1], R.T @ axes)
+
+    def untwisted(self, i: int, j: int) -> int:
+        """Return a new marker row on J's body, J turned about its z so that I is only bent."""
+        w, _, _, z = quaternion(self.markers.frame(j)[1].T @ self.markers.frame(i)[1])
+        twist = 2.0 * math.atan2(z, w) if math.hypot(z, w) > _FOLDED else 0.0
+        c, s = math.cos(twist), math.sin(twist)
+        body, p, R = self.markers.frames[j]
+        return self.markers.add(body, p, R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
 
     # connections
 
@@ -222,6 +237,8 @@ class _Builder:
         """Add a term to the equation being made; return what it is at the start."""
         if row.kind == "spin":
             j = self.aligned(i, j)
+        elif row.kind == "twist":
+            j = self.untwisted(i, j)
         slot = self.markers.angle(i, j) if row.kind in ("angle", "spin") else -1
         axis_i = _AXES.index(row.i) if row.i else 0
         axis_j = _AXES.index(row.j) if row.j else 0
@@ -475,6 +492,7 @@ def _describe(rows: tuple[Row, ...]) -> str:
         "angle": "angle about z",
         "spin": "spin about I's z",
         "distance": "distance",
+        "twist": "twist about the shafts",
     }
     return " with ".join(words[row.kind].format(i=row.i, j=row.j) for row in rows)
 
@@ -556,6 +574,7 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         bias=np.zeros((nt, 6)),
         answer=np.zeros((nt, 6)),
         mark=np.zeros(nt, dtype=np.int64),
+        chosen=np.zeros(ne + 1, dtype=np.int64),
         G=np.zeros((len(mechanism.equations.kind), 12)),
         rate=np.zeros((ne, 4)),
         A=np.zeros((ne, ne)),
@@ -563,11 +582,14 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         rhs=np.zeros(ne),
         skyline=np.zeros(ne, dtype=np.int64),
         size=np.ones(ne),
-        quality=np.zeros(5),
+        wanted=np.zeros(ne),
+        kept_at=np.zeros(4),
+        kept_a=np.zeros((4, nt if ne else 0, 6)),
+        quality=np.zeros(9),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
         share=np.zeros((nh, nh)),
-        mix=np.zeros((nh, nh + 1)),
+        mix=np.zeros((nh, nh)),
+        cone=np.zeros((a.CONE_ROWS, nh)),
         kept_p=np.zeros((nt if nh else 0, 6)),
-        kept=np.zeros(ne if nh else 0),
     )

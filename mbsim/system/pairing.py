@@ -21,6 +21,10 @@ from mbsim.model.elements import Contact, Graphic, Model
 #: Shapes with flat sides: FCL gives several points for two of them, one for all others.
 _FLAT = {"BOX", "PLANE"}
 FCL_SLOTS = 8
+#: Shapes with round sides that are flat at their ends.
+_ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
+#: Points on which a round end rests in a closed form, and a face of a box on one.
+_UNDER_AN_END, _UNDER_A_FACE = 3, 4
 #: Contacts with more pairs than this are crowds. Every pair listed for good costs some 5 ns an
 #: evaluation: in a heap a crowd is cheaper from 30 pairs on, by a sixth at 300. But steps end
 #: where its list does: bodies in free flight take twice as long at 300 pairs
@@ -51,7 +55,16 @@ class Kind:
     def detector(self) -> str:
         """How `mbsim check` names it."""
         one = ", one region" if self.region else ""
-        return f"closed form {self.closed_form}{one}" if self.closed_form else "FCL"
+        if self.closed_form:
+            return f"closed form {self.closed_form}{one}"
+        shapes = {self.shape_i, self.shape_j}
+        if self.slots > 1 or not shapes <= _FLAT | _ROUND_ENDED:
+            return "FCL"
+        points = f"{_UNDER_AN_END} or {_UNDER_A_FACE}" if "BOX" in shapes else f"{_UNDER_AN_END}"
+        return (
+            "FCL, one point: what rests on a flat end may tip, and is n^(1/exponent) times as deep "
+            f"as on the n = {points} points of the closed form"
+        )
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ def start_state(
     memory: int = 0,
     forces: int = 0,
     residual: tuple[int, int, int] = (0, 2, 0),
+    groups: int = 1,
 ) -> a.State:
     """Return the incident table before anything touched."""
     dry = np.zeros((forces, 4))
@@ -55,6 +56,7 @@ def start_state(
         dry=dry,
         # no time: nothing is remembered yet
         residual=np.full(residual, np.nan),
+        fastest=np.zeros(groups),
         heat=np.zeros(2),
     )
 
@@ -83,11 +85,14 @@ def scratch(
     nu: int,
     memory: int,
     looked: int,
+    ahead: int,
     points: int = 0,
+    groups: int = 1,
 ) -> a.Work:
     """Return scratch, with the ground's rows as they stay.
 
-    `points`: most candidates of a pair where friction of contacts is rigid, else 0.
+    `ahead`: numbers of y where rates of normal forces are looked for, else 0; `points`: most
+    candidates of a pair where friction of contacts is rigid, else 0.
     """
     ng = len(graphics.body)
     fixed = graphics.body == nb
@@ -122,17 +127,18 @@ def scratch(
         bound=np.zeros(2),
         best=np.zeros(4),
         idle=np.zeros(looked),
+        ahead=np.zeros((2 if ahead else 0, ahead)),
         law_in=np.zeros(abi.FRICTION_INPUTS + memory),
-        law_out=np.zeros(abi.MEMORY_OUT + memory),
+        law_out=np.zeros(abi.MEMORY_OUT + 2 * memory),
         applied=np.zeros((nf, 8)),
         rub=np.zeros((nf, 9)),
         late=np.zeros((nu, 5)),
         secant=np.zeros((nu, nu)),
         reaction=np.zeros(6 * nj),
+        squares=np.full(groups, np.nan),
         trouble=np.full(2, -1, dtype=np.int64),
         hold=np.zeros((ns if points else 0, 15)),
         held=np.zeros((ns if points else 0, 2)),
-        aim=np.zeros((ns if points else 0, 8)),
         look=np.zeros((3, points, POINT)),
     )
 

@@ -216,7 +216,7 @@ def _carried(scene: Scene) -> tuple[int, int]:
     """Return how many slots carry X or memory in y, and the most numbers that one carries."""
     x, z = scene.slots.x >= 0, scene.slots.z >= 0
     any_slot = int(np.count_nonzero(x | z))
-    most = 3 * int(x.any()) + (int(scene.contacts.memory.max(initial=0)) if z.any() else 0)
+    most = 3 * int(x.any()) + int(scene.contacts.carried.max(initial=0))
     return any_slot, most
 
 

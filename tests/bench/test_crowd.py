@@ -98,7 +98,7 @@ def tree_times(centres, radius):
 def test_cost_of_a_listing(tmp_path, monkeypatch, edge):
     monkeypatch.setattr(pairing, "MOST_LISTED", 0)
     centres = block(edge, 0.2, z=0.1, jitter=0.01)
-    system = build(mbsim.read_model(write_deck(tmp_path, pile(centres, **LAW))), 1.0)
+    system = build(mbsim.read_model(write_deck(tmp_path, pile(centres, **LAW))))
     scene = system.scene
     place_bodies(scene, system.y0)
     place_graphics(scene, system.y0)

@@ -174,7 +174,7 @@ def test_expressions_against_c(tmp_path):
         requests=[Request(1, "EXPRESSION", exprs=tuple(parse(text) for _, text, _ in LAWS))],
         splines=[Spline(1, SPLINE_X, (SPLINE_Y,))],
     )
-    system = build(model, 1.0)
+    system = build(model)
     scene = system.scene
     open_expressions(scene)
     place_bodies(scene, system.y0)

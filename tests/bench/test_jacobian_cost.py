@@ -44,7 +44,7 @@ def costs(folder, count):
     deck.write_text(joint_chain.chain_deck(count, 1.0, 0.3), encoding="utf-8")
     model = mbsim.read_model(deck)
     settings = settle(model)
-    system = build(model, 1.0)
+    system = build(model)
     runner = Runner(system, settings, None, Silent(), lambda text: None)
     runner.assemble()
     problem, _kept = implicit_hooks(system.scene, runner.problem, True)

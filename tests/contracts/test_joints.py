@@ -87,6 +87,10 @@ def value(row, I, J, start):
         return np.arctan2(A[:, 0] @ B[:, 1], A[:, 0] @ B[:, 0])
     if row.kind == "distance":
         return np.linalg.norm(p - q)
+    if row.kind == "twist":
+        # of 2 z of the quaternion to first order, for rotation matrices to first order
+        M = B.T @ A
+        return (M[1, 0] - M[0, 1]) / np.sqrt(1 + np.trace(M))
     assert row.kind == "spin"
     # about its own z, from the attitude at the start; J stays here
     return start[:, 1] @ A[:, 0]

@@ -48,7 +48,7 @@ def scene_of(texts, *bodies, **elements):
     """Return a system whose last programs are these texts, and the number of the first."""
     exprs = tuple(parse(text) for text in texts)
     system = build(
-        free.model(*bodies, requests=[el.Request(1, "EXPRESSION", exprs=exprs)], **elements), 1.0
+        free.model(*bodies, requests=[el.Request(1, "EXPRESSION", exprs=exprs)], **elements)
     )
     open_expressions(system.scene)
     return system, len(system.scene.programs.start) - 1 - len(texts)
@@ -508,7 +508,7 @@ def test_forces_of_contacts(tmp_path):
         for n in (0, 1)
     ]
     model = read(tmp_path, deck(BOX, ("</Model>", "\n".join([*requests, "</Model>"]))))
-    system = build(model, 1.0)
+    system = build(model)
     scene = system.scene
     open_expressions(scene)
     rng = np.random.default_rng(12)

@@ -43,5 +43,5 @@ def test_a_thousand_forces_compile_nothing_that_two_do_not():
 
 
 def test_programs_grow_as_the_deck_does():
-    sizes = [len(build(model_of(count), 0.1).scene.programs.quick) for count in (10, 1000)]
+    sizes = [len(build(model_of(count)).scene.programs.quick) for count in (10, 1000)]
     assert sizes[1] == 100 * sizes[0]

@@ -503,7 +503,10 @@ def test_cam_throws_its_follower_above_a_speed(part, tol, allowed):
     law = (1e7, 1.0, 900.0, 1e-7)
     exact, leaves = hopping_follower(results["time"], w, *CAM, law, CAM_START)
     lift = results["bodies/3/position/z"] - 0.025
-    assert np.abs(lift - exact).max() < allowed * 0.02  # of the stroke
+    # 22 hops that die out twice: at 1e-5, the sixth is there or not with tolerances that are 0.3 %
+    # apart, and so is all behind it (5e-6 to 5e-4 off)
+    sure = results["time"] <= (leaves[4] if part == 1.2 and tol > 1e-6 else np.inf)
+    assert np.abs(lift - exact)[sure].max() < allowed * 0.02  # of the stroke
     # both ends of the line leave
     seen = [event["time"] for event in results["events"] if event["kind"] == "leave"][::2]
     assert (len(seen) > 0) == (part > 1)
@@ -571,7 +574,7 @@ def check_governor(results, governor, allowed):
     kinetic, potential = governor.energy(exact)
     assert np.abs(results["energy/kinetic"] - kinetic).max() < 100 * allowed
     momentum = governor_momentum(results)
-    np.testing.assert_allclose(momentum, governor.h, rtol=min(allowed, 1e-6))
+    np.testing.assert_allclose(momentum, governor.h, rtol=min(allowed, 1e-5))
     parts = [results[f"energy/{part}"] for part in ("kinetic", "potential", "dissipated")]
     total = sum(parts)
     assert np.abs(total - total[0]).max() < 1e3 * allowed
@@ -586,12 +589,12 @@ def test_flyball_governor(tol, allowed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-5), (1e-9, 1e-9)])
+@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-4), (1e-9, 1e-9)])
 def test_flyball_governor_for_ten_seconds(tol, allowed):
     results = run_model("flyball_governor.xml", tol=tol)
     check_governor(results, Governor(), allowed)
-    # what is stiff costs: steps of the default tolerance are those of stability
-    assert tol < 1e-5 or results.stats["steps"] > 15000
+    # a tenth of what stability asks of DOPRI5 (19899): AUTO takes a stiff method for it
+    assert tol < 1e-5 or results.stats["steps"] < 2000
 
 
 def wheel_angle(results):

@@ -23,7 +23,7 @@ MINIMAL = """<Deck><Model>
 <Force_Gravity grav_z="-9.81"/>
 </Model>
 <Command>
-<Param_Transient integr_tol="1e-5"/>
+<Param_Transient integr_tol="1e-3"/>
 <Simulate analysis_type="Transient" end_time="3" print_interval="0.01"/>
 </Command></Deck>
 """

@@ -547,12 +547,12 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         ('start_time="1"', "at 3"),
     ),
     "tolerance": (
-        deck(('integr_tol="1e-5"', 'integr_tol="0"')),
+        deck(('integr_tol="1e-3"', 'integr_tol="0"')),
         TRANSIENT_LINE,
         ("Param_Transient", 'integr_tol="0"', "> 0"),
     ),
     "h_min above h_max": (
-        deck(('integr_tol="1e-5"', 'h_min="1" h_max="0.1"')),
+        deck(('integr_tol="1e-3"', 'h_min="1" h_max="0.1"')),
         TRANSIENT_LINE,
         ('h_min="1"', "h_max (0.1)"),
     ),

@@ -96,7 +96,7 @@ def test_json_is_alone_on_standard_output(model: str, tmp_path: Path, faked: Any
     result = call("run", model, "-o", str(tmp_path / "out"), "--json")
     assert result.exit_code == 0
     said = json.loads(result.stdout)
-    assert set(said) == {"status", "result_file", "end_time", "stats", "bodies"}
+    assert set(said) == {"status", "result_file", "end_time", "stats", "audit", "bodies"}
     assert said["status"] == "finished"
     assert said["result_file"] == str(tmp_path / "out" / "ball.h5")
     assert said["end_time"] == pytest.approx(0.9)
@@ -233,7 +233,7 @@ def test_check_lists_every_fault(tmp_path: Path) -> None:
 
 def test_check_sees_what_a_run_would_refuse(tmp_path: Path) -> None:
     path = tmp_path / "bad.xml"
-    path.write_text(deck(('integr_tol="1e-5"', 'integr_tol="7"')))
+    path.write_text(deck(('integr_tol="1e-3"', 'integr_tol="70"')))
     assert call("check", str(path)).exit_code == 2
 
 

@@ -29,7 +29,7 @@ def scene_of(*texts):
     """Return a scene of which program k is the k-th text."""
     exprs = tuple(parse(text) for text in texts)
     model = free.model(free.body(2), requests=[Request(1, "EXPRESSION", exprs=exprs)])
-    return build(model, 1.0)
+    return build(model)
 
 
 def jet_of(text, t):

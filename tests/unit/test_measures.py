@@ -54,7 +54,7 @@ class Moving:
             requests=[Request(1, "EXPRESSION", exprs=exprs)],
             **elements,
         )
-        system = build(model, 1.0)
+        system = build(model)
         self.scene, self.y0 = system.scene, system.y0
         self.p = rng.normal(size=(2, 3))
         self.v = rng.normal(size=(2, 3))

@@ -25,7 +25,7 @@ HOOK = ctypes.CFUNCTYPE(
 
 def evaluator(path):
     """Return the scene, y0 and a function y -> y'."""
-    system = build(mbsim.read_model(path), 1.0)
+    system = build(mbsim.read_model(path))
     problem, table = mechanism(system.scene)
 
     def rhs(y):

@@ -68,7 +68,7 @@ def shipped(request):
 def coulomb_on(inputs):
     groups = FrictionInput(
         inputs[0], inputs[1], inputs[2:5], inputs[5:8], inputs[8:10], *inputs[10:13],
-        inputs[13:16], inputs[16:19], *6 * [0.0],
+        inputs[13:16], inputs[16:19], *[0.0] * (len(FrictionInput._fields) - 10),
     )  # fmt: skip
     return FRICTION_LAWS["COULOMB_ON"].force(groups, *PAR)
 

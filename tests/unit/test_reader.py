@@ -14,11 +14,13 @@ from decks import MINIMAL, TETRAHEDRON, added, deck, read
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import mbsim
 from mbsim.errors import ModelError
 from mbsim.model.elements import Model
 from mbsim.model.frames import rotation_313
 from mbsim.model.placement import place
 from mbsim.reader import units
+from mbsim.settings import settle
 
 SAMPLE = """<Sample><Model>
  <Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="METER" time_unit="SECOND"/>
@@ -379,7 +381,7 @@ def test_commands_in_sequence(tmp_path: Path) -> None:
     assert second.gravity is not None
     assert second.gravity.g == (1.0, 0.0, -9.81)
     assert second.transient is not None
-    assert (second.transient.integr_tol, second.transient.h_max) == (1e-5, 0.1)
+    assert (second.transient.integr_tol, second.transient.h_max) == (1e-3, 0.1)
 
 
 def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
@@ -494,3 +496,47 @@ def test_damaged_bytes_give_a_model_error(data: bytes, place_of_damage: int) -> 
         parse(damaged, "deck.xml")
     except ModelError as error:
         assert str(error)
+
+
+TRANSIENT = '<Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/>'
+
+
+@pytest.mark.parametrize(
+    ("model", "command", "asked", "tol", "said"),
+    [
+        ("", "", None, 1e-5, "1e-05, the default"),
+        ("", "", 1e-7, 1e-7, "1e-07, as the command line says"),
+        ("1e-3", "", None, 1e-5, "1e-05, 0.01 of integr_tol 0.001 in <Model> ("),
+        ("1e-3", "1e-6", None, 1e-8, "1e-08, 0.01 of integr_tol 1e-06 in <Command> ("),
+        ("1e-3", "1e-6", 1e-4, 1e-4, "0.0001, as the command line says"),
+    ],
+)
+def test_tol_and_who_says_it(
+    tmp_path: Path, model: str, command: str, asked: float | None, tol: float, said: str
+) -> None:
+    """MotionSolve's integr_tol is a hundred tol; the command line's is tol itself."""
+    parts = [f'<Param_Transient integr_tol="{text}"/>' if text else "" for text in (model, command)]
+    ground = '<Body_Rigid id="1" isground="TRUE"/>'
+    path = tmp_path / "deck.xml"
+    path.write_text(
+        f"<Deck><Model>{ground}{parts[0]}</Model>\n<Command>{parts[1]}{TRANSIENT}</Command></Deck>",
+        encoding="utf-8",
+    )
+    settings = settle(mbsim.read_model(path), tol=asked)
+    assert settings.tol == pytest.approx(tol, rel=1e-15)
+    assert settings.tolerances.startswith(said)
+    assert f"tol {settings.tolerances}" in settings.notes
+    if said.endswith("("):
+        assert settings.tolerances.endswith(f"{path}:{2 if command else 1})")
+
+
+def test_each_simulate_says_its_tol(tmp_path: Path) -> None:
+    second = TRANSIENT.replace('end_time="1"', 'end_time="2"')
+    path = tmp_path / "deck.xml"
+    path.write_text(
+        '<Deck><Model><Body_Rigid id="1" isground="TRUE"/></Model><Command>'
+        f'{TRANSIENT}<Param_Transient integr_tol="1e-4"/>{second}</Command></Deck>',
+        encoding="utf-8",
+    )
+    said = settle(mbsim.read_model(path)).tolerances
+    assert said.startswith("1e-05, the default; from time 1 on 1e-06, 0.01 of integr_tol 0.0001 in")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from decks import added
-from fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system
+from fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system, fake_system_of
 
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
@@ -335,9 +336,12 @@ def test_resume_with_other_settings(tmp_path: Path, change: dict[str, Any], said
 
 def test_resume_with_another_friction(tmp_path: Path) -> None:
     interrupted(tmp_path)
-    system = fake_system(tmp_path / "deck")
-    system.scene.contacts.friction_par[0] *= 2.0
-    with pytest.raises(ModelError, match="--set"):
+    model = fake_system(tmp_path / "deck").model
+    contact = replace(model.contacts[301], mu_static=0.9)
+    system = fake_system_of(replace(model, contacts={301: contact}))
+    with pytest.raises(
+        ModelError, match=r"--set.*Force_Contact\[301\].mu_static was .* is 0.9 now"
+    ):
         Recorder(system, SETTINGS, tmp_path, resume=True)
 
 

@@ -89,7 +89,7 @@ def test_slope_is_the_limit_of_differences(text, seed):
         requests=[Request(1, "EXPRESSION", exprs=(parse(text),))],
         differentials=[Differential(1, parse("0"), ic=0.7)],
     )
-    system = build(model, 1.0)
+    system = build(model)
     scene, y = system.scene, system.y0
     program = len(scene.programs.start) - 2
     y[:26] = rng.normal(size=26)

@@ -45,7 +45,7 @@ def scene_of(*texts):
         splines=SPLINES,
         arrays=[ArrayOfNumbers(7, (2.5, -1.0, 1e-3))],
     )
-    return build(model, 1.0)
+    return build(model)
 
 
 def evaluate(text, t):

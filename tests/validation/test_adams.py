@@ -125,7 +125,7 @@ _SIMPLE = """
  time_unit="SECOND"/><Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="{0}" inertia_yy="{1}" inertia_zz="{2}" {ic}/>
 <Reference_Marker id="20" body_id="2" {at}/>{rest}<Force_Gravity grav_z="-9.80665"/>
-<Param_Transient integr_tol="1e-8"/></Model>
+<Param_Transient integr_tol="1e-6"/></Model>
 <Command><Simulate analysis_type="Transient" end_time="5" print_interval="0.01"/></Command>
 """
 XML = {

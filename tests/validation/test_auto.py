@@ -74,6 +74,48 @@ def test_motionsolve_names_run_their_kind(tmp_path):
     assert stiff.stats["jacobians"] > 0
 
 
+def standing(tmp_path, speed):
+    """Return a body on four spheres that stands on a slope by friction that is stiff."""
+    places = [(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)]
+    feet = "".join(
+        f'<Reference_Marker id="{30 + i}" body_id="2" pos_x="{x}" pos_y="{y}" pos_z="0.05"/>'
+        f'<Post_Graphic id="{40 + i}" type="Sphere" center_marker_id="{30 + i}" radius="0.05"/>'
+        for i, (x, y) in enumerate(places)
+    )
+    path = tmp_path / "standing.xml"
+    path.write_text(
+        f"""<MotionSolve><Model><Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1"/><Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.01" inertia_yy="0.02" inertia_zz="0.03"/>
+<Reference_Marker id="20" body_id="2" pos_z="0.1"/>{feet}
+<Force_Contact id="301" num_i_graphics="4" i_graphics_id="40 41 42 43" num_j_graphics="1"
+ j_graphics_id="100" cnf_type="IMPACT" stiffness="20000" exponent="1" damping="200" dmax="1e-4"
+ cff_type="COULOMB_ON" mu_static="0.8" mu_dynamic="0.8" stiction_trans_vel="{speed}"
+ friction_trans_vel="{speed}"/>
+<Force_Gravity grav_x="0.98" grav_z="-9.76"/></Model>
+<Command><Simulate analysis_type="Transient" end_time="2" print_interval="0.1"/></Command>
+</MotionSolve>"""
+    )
+    return mbsim.read_model(path)
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.001])
+def test_looser_is_not_slower_where_friction_hides_its_rate(tmp_path, speed):
+    """Within a loose tolerance friction flies about between its bounds, where its rate is none."""
+    model = standing(tmp_path, speed)
+    counts = {}
+    for tol in (1e-2, 1e-3, 1e-4):
+        auto = mbsim.simulate(model, tol=tol)
+        explicit = mbsim.simulate(model, tol=tol, integrator="DOPRI5")
+        assert auto.stats["method_changes"] == 1
+        counts[tol] = auto.stats["rhs_evaluations"]
+        assert counts[tol] < 0.1 * explicit.stats["rhs_evaluations"]
+    # and what some steps take until 15 of them are found stiff
+    some = 6 * 40
+    assert counts[1e-2] < 1.3 * counts[1e-3] + some
+    assert counts[1e-3] < 1.3 * counts[1e-4] + some
+
+
 RAIL = """<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Reference_Marker id="20" body_id="2"/>

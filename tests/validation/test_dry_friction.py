@@ -266,9 +266,8 @@ def test_auto_says_that_it_runs_the_implicit_method(tmp_path):
 
     settings = settle(mbsim.read_model(write_deck(tmp_path, text)))
     assert settings.integrator == "RADAU5"
-    assert settings.notes[-1] == (
-        "integrator AUTO: RADAU5 from the start, for Force_DryFriction[7] is rigid"
-    )
+    said = "integrator AUTO: RADAU5 from the start, for Force_DryFriction[7] is rigid"
+    assert said in settings.notes
 
 
 @pytest.mark.parametrize(

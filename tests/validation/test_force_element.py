@@ -465,3 +465,51 @@ def test_a_run_goes_on_with_the_script_with_which_it_began(tmp_path, monkeypatch
     script.write_text(script.read_text("utf-8") + "# changed\n", encoding="utf-8")
     with pytest.raises(ModelError, match="a user subroutine has changed"):
         mbsim.simulate(model, output=tmp_path, resume=True)
+
+
+MODES = """ELEMENT_UNKNOWNS = {{"law": {{"f": 0.0}}}}
+
+
+def law(x, xdot, f, fdot, t, par):
+    limit, soft = par[0], par[1]
+    stick = xdot[0] - soft*fdot[0]
+    slip = abs(f[0])/limit - 1
+{body}
+"""
+#: Stick or slip told apart by which of the two residuals is smaller, by the size of f, by a sign.
+JUMPING = {
+    "smaller": "    return [slip if abs(slip) < abs(stick) else stick]",
+    "size": "    return [slip if abs(f[0]) > limit else stick]",
+    "product": "    return [stick if f[0]*fdot[0] < 0 else f[0] - limit]",
+    "sign": "    return [f[0] - limit*copysign(1.0, fdot[0] - xdot[0])]",
+}
+
+
+@pytest.mark.parametrize("name", JUMPING)
+@pytest.mark.parametrize("values", ["0.1,3", "2e4,1e-6", "1e-3,1"])
+def test_a_residual_that_jumps_is_refused(tmp_path, name, values):
+    (tmp_path / "modes.py").write_text(MODES.format(body=JUMPING[name]))
+    model = GROUND + body(2, 1.0, v=1.0) + element("law", values, "modes.py")
+    with pytest.raises(ModelError, match=r"jumps from .* where f'? passes .* must be continuous"):
+        run_deck(tmp_path, model, 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "    return [f[0] - max(-limit, min(limit, f[0] + limit*stick))]",
+        "    return [sqrt(abs(f[0]))*f[0] + soft*fdot[0] - xdot[0]]",
+        "    return [f[0] - limit*tanh(1e4*xdot[0])]",
+        "    return [f[0] - limit*copysign(1.0, xdot[0])]",
+        "    return [fdot[0] - 1e6*abs(xdot[0])*(1 - f[0]/limit*copysign(1.0, xdot[0]))]",
+    ],
+)
+@pytest.mark.parametrize("values", ["0.1,3", "2e4,1e-6", "1e-3,1"])
+def test_kinks_and_steep_residuals_are_taken(tmp_path, line, values):
+    from mbsim.plugins.residual import load_residual
+
+    (tmp_path / "modes.py").write_text(MODES.format(body=line))
+    model = GROUND + body(2, 1.0, v=1.0) + element("law", values, "modes.py")
+    deck = mbsim.read_model(write_deck(tmp_path, model))
+    (given,) = deck.force_elements.values()
+    assert load_residual(given, interpret=True).name == "law"

@@ -144,9 +144,11 @@ def test_a_motion_with_a_pole_ends_with_one_message(expr, tmp_path):
         slide(tmp_path, v=0.0, more=motion)
     message = str(error.value)
     assert message.count("\n") == 0
-    assert message.startswith(("no progress at time 0.49", "no progress at time 0.5"))
+    # what looks at TIME alone is known ahead: steps towards the pole get shorter than rounding
+    assert message.startswith(("no progress at", "the step fell"))
+    assert "time 0.49" in message or "time 0.5" in message
     assert "Motion_Joint[4]" in message
-    assert "velocity" in message
+    assert "velocity" in message or message.startswith("the step fell")
 
 
 def test_sides_survive_commands_between_simulations(tmp_path):

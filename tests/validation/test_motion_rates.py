@@ -24,6 +24,7 @@ import mbsim
 from mbsim.core.address import view
 from mbsim.dynamics import hooks
 from mbsim.dynamics.output import scaled_error
+from mbsim.errors import SolverError
 from mbsim.system import arrays
 
 END = 1.0
@@ -147,3 +148,21 @@ def test_radau5_is_of_order_5(name, tmp_path):
 def test_galpha_is_of_order_2(name, tmp_path):
     order = order_of(tmp_path, name, "GALPHA", 1e-9, (256, 1024))
     assert order == pytest.approx(2.0, abs=0.1)
+
+
+JUMP = """
+<Body_Rigid id="1" isground="TRUE"/>
+<Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="20" body_id="2"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>
+<Motion_Joint id="1" joint_id="1" val_type="V" expr="IF(TIME-0.503: 1, 1, -1)"/>
+"""
+
+
+@pytest.mark.parametrize("method", ["AUTO", "DOPRI5", "RADAU5", "GALPHA"])
+def test_a_jump_of_a_velocity_stops_every_method(tmp_path, method):
+    """It takes a force without bound: RADAU5, whose stages are projected, ran through it."""
+    model = mbsim.read_model(write_deck(tmp_path, JUMP))
+    with pytest.raises(SolverError, match=r"at time 0\.503 .*Body_Rigid\[2\]"):
+        mbsim.simulate(model, integrator=method)

@@ -55,7 +55,7 @@ def mixed(random, shapes, count, spread, giants=0, first=2):
 
 def listed(folder, model):
     """Return the system of a deck after its first listing."""
-    system = build.build(mbsim.read_model(write_deck(folder, model)), 1.0)
+    system = build.build(mbsim.read_model(write_deck(folder, model)))
     place_bodies(system.scene, system.y0)
     place_graphics(system.scene, system.y0)
     crowd.list_pairs(system.scene, system.y0)

@@ -70,3 +70,27 @@ def test_a_spring_that_loses_what_it_must_rebounds_less_at_steep_impacts(tmp_pat
         if 9 < angle < 33
     ]
     assert np.max(off) < 0.03
+
+
+@pytest.mark.parametrize("method", ["DOP853", "DOPRI5", "AUTO"])
+def test_friction_that_turns_round_within_an_impact_is_not_stepped_over(tmp_path, method):
+    """Spin against the slip, stiff ground, slopes of friction from gentle to steep."""
+    rng = np.random.default_rng(3)
+    for _ in range(8):
+        down, slope = 10.0 ** rng.uniform(-1, 0), 10.0 ** rng.uniform(-3.5, -2)
+        along, spin = down * rng.uniform(0, 2), 10 * down * rng.uniform(-3, 3)
+        model = (
+            GROUND
+            + sphere(0.10001, mass=11.3, v=(along, 0.1 * down, -down), w=(0.3 * spin, spin, 1.0))
+            + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="HUNT_CROSSLEY" stiffness="3.3e10" exponent="1.5" damping="7"
+  cff_type="COULOMB_ON" mu_static="0.4" mu_dynamic="0.4" stiction_trans_vel="{slope!r}"
+  friction_trans_vel="{1.5 * slope!r}"/>"""
+        )
+        ends = []
+        for tol, by in ((1e-10, "DOP853"), (1e-5, method)):
+            results = run_deck(tmp_path, model, 0.004, 0.001, integrator=by, tol=tol)
+            v, w = results["bodies/2/velocity"][-1], results["bodies/2/angular_velocity"][-1]
+            ends.append(np.concatenate([v, 0.1 * w]))
+        assert np.abs(ends[1] - ends[0]).max() < 30.0 * 1e-5 * np.abs(ends[0]).max()

@@ -227,3 +227,197 @@ def test_a_ball_lands_with_much_slip_on_bristles(tmp_path, law, method):
     assert v[:2] == pytest.approx(np.array([3.0, 1.0]) * 5 / 7, rel=0.02)
     # the contact is in the middle of the depth
     assert v[:2] == pytest.approx(0.5 * (0.1 + p[2]) * np.array([w[1], -w[0]]), rel=1e-4)
+
+
+def struck(v, w, mu_s, mu_d, k=math.nan, radius=0.1, normal=1e8, inertia=0.004):
+    """Return velocity along the plane and angular velocity of a unit mass behind an impact at 1.
+
+    Phases of stick and slip one after the other, from the equations of `laws.friction.stiction`.
+    """
+    from scipy.integrate import solve_ivp
+
+    share, small = 2.0 * 0.7 / 1.7, 1e-7
+
+    def forces(y):
+        """Return normal force and its rate, the spring's stiffness and its rate over itself."""
+        d = max(y[0], 1e-12)
+        press = normal * d**1.5
+        rate = 1.5 * press / d * y[1]
+        if not math.isnan(k):
+            return press, rate, k, 0.0
+        return press, rate, share * 1.5 * press / d, 0.5 * y[1] / d
+
+    def slip_of(y):
+        arm = radius - y[0] / 2
+        return np.array([y[2] - arm * y[5], y[3] + arm * y[4]])
+
+    def rates(y, press, force, last):
+        arm = radius - y[0] / 2
+        turn = arm / inertia * np.array([force[1], -force[0]])
+        return np.array([y[1], -press, *force, *turn, *last])
+
+    def stick(t, y):
+        (press, _, along, growth), u = forces(y), slip_of(y)
+        force = -along * y[6:8] - 0.4 * math.sqrt(along) * u
+        force *= min(1.0, mu_s * press / max(np.hypot(*force), 1e-300))
+        return rates(y, press, force, u - max(growth, 0.0) * y[6:8])
+
+    def slip(t, y):
+        (press, _, along, _), u = forces(y), slip_of(y)
+        e = y[6:8] / np.hypot(*y[6:8])
+        turn = (u - (u @ e) * e) * along / (mu_d * press)
+        return rates(y, press, -mu_d * press * e, turn)
+
+    def yields(t, y):
+        press, _, along, _ = forces(y)
+        return along * np.hypot(*y[6:8]) - mu_s * press
+
+    def holds(t, y):
+        press, rate, along, growth = forces(y)
+        own = mu_d * (rate - press * min(growth, 0.0)) / along
+        return own - slip_of(y) @ y[6:8] / np.hypot(*y[6:8])
+
+    def leaves(t, y):
+        return small - y[0]
+
+    for event in (yields, holds, leaves):
+        event.terminal, event.direction = True, 1
+    # behind the touch slip and closing speed are constant, so that the spring grows in proportion
+    y, t = np.array([small, 1.0, *v, *w, 0.0, 0.0]), 0.0
+    y[6:8] = slip_of(y) * small / (1.5 if math.isnan(k) else 1.0)
+    sticks = yields(t, y) < 0.0
+    while True:
+        press, _, along, _ = forces(y)
+        if t > 0.0 or not sticks:
+            # z in stick, its direction in slip
+            y[6:8] *= (mu_d * press / along if sticks else 1.0) / np.hypot(*y[6:8])
+        found = solve_ivp(
+            *(stick if sticks else slip, (t, t + 0.01), y), method="LSODA", rtol=1e-10,
+            atol=1e-14, events=(yields if sticks else holds, leaves),
+        )  # fmt: skip
+        t, y, sticks = found.t[-1], found.y[:, -1], not sticks
+        if found.t_events[1].size:
+            return np.array([*y[2:4], *y[4:6]])
+
+
+def strike(folder, v, w, law, method, tol):
+    """Return the same of the deck, as `struck` gives it."""
+    model = (
+        GROUND
+        + sphere(0.1001, v=(*v, -1.0), w=(*w, 0.0), inertia=0.004)
+        + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e8" exponent="1.5" damping="0"
+  cff_type="STICTION" {law}/>"""
+    )
+    results = run_deck(folder, model, 4e-3, 1e-3, integrator=method, tol=tol)
+    velocity, spin = results["bodies/2/velocity"][-1], results["bodies/2/angular_velocity"][-1]
+    return np.array([*velocity[:2], *spin[:2]])
+
+
+SKEW = ((0.3, 0.0), (8.0, 1.0))
+STRAIGHT = ((0.3, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("start", "mu_s", "mu_d", "k"),
+    [
+        (SKEW, 0.3, 0.3, math.nan),
+        (SKEW, 0.3, 0.3, 1e6),
+        (SKEW, 0.35, 0.25, math.nan),
+        (STRAIGHT, 0.3, 0.3, math.nan),
+    ],
+)
+def test_an_impact_of_stick_and_slip_goes_as_its_equations_say(tmp_path, start, mu_s, mu_d, k):
+    law = f'mu_static="{mu_s}" mu_dynamic="{mu_d}"'
+    if not math.isnan(k):
+        law += f' tangential_stiffness="{k}"'
+    right = struck(*start, mu_s, mu_d, k)
+    before = math.inf
+    # what a velocity of 1 makes of an impulse, and of a turn by it
+    size = np.array([1.0, 1.0, 25.0, 25.0])
+    for tol in (1e-5, 1e-7, 1e-9):
+        off = np.abs((strike(tmp_path, *start, law, "DOPRI5", tol) - right) / size).max()
+        # from one phase to the next errors add up; the reference is good to some 1e-9
+        assert off < 100 * tol + 2e-8
+        assert off < 2.0 * before + 2e-8
+        before = off
+
+
+def test_slip_in_two_directions_is_followed_however_long_the_steps_are(tmp_path):
+    # thrown across an incline of which nothing is left but the path: see above for the bound before
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
+        + """
+<Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="1e4"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+    right = thrown_across(1.0)
+    for tol in (1e-5, 1e-7):
+        results = run_deck(tmp_path, model, 1.0, 0.1, integrator="DOPRI5", tol=tol)
+        off = np.abs(results["bodies/2/position"][-1, :2] - right).max()
+        assert off < 10 * tol
+
+
+@pytest.mark.parametrize("law", ["LUGRE", "DAHL", "STICTION"])
+def test_friction_does_not_depend_on_what_is_elsewhere(tmp_path, law):
+    own = {
+        "LUGRE": 'mu_static="0.4" mu_dynamic="0.3" stribeck_vel="0.01" bristle_stiffness="1e3" '
+        'bristle_damping="3"',
+        "DAHL": 'mu_dynamic="0.3" bristle_stiffness="1e3"',
+        "STICTION": 'mu_static="0.4" mu_dynamic="0.3"',
+    }[law]
+    ball = (
+        GROUND
+        + sphere(0.11, v=(0.5, 0.2, -0.3), w=(3.0, 1.0, 2.0))
+        + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e6" exponent="1.5" damping="30" dmax="1e-3"
+  cff_type="{law}" {own}/>
+<Force_Gravity grav_z="-9.81"/>"""
+    )
+    far = '<Reference_Marker id="13" body_id="1" pos_x="1000"/>'
+    light = sphere(5.0, mass=1e-3, radius=0.01, w=(0.0, 0.0, 1500.0), body=3, x=3.0)
+    ends = [
+        run_deck(tmp_path, ball + more, end, 0.03, integrator="DOPRI5", tol=1e-8)
+        for more, end in (("", 0.12), (far, 0.12), (light, 0.12), ("", 0.3))
+    ]
+    for other in ends[1:]:
+        for what, size in (("position", 1.0), ("velocity", 10.0)):
+            there = other[f"bodies/2/{what}"][4] - ends[0][f"bodies/2/{what}"][4]
+            assert np.abs(there).max() < 1e-6 * size
+
+
+@pytest.mark.parametrize("method", ["AUTO", "DOPRI5"])
+def test_a_stack_of_touching_boxes_settles_at_every_tolerance(tmp_path, method):
+    # four points a floor stick and slip one by one while the stack sinks in: no step is to be spent
+    # on each change of mind
+    deck = GROUND + '<Force_Gravity grav_z="-9.81"/>'
+    count, size, mass, k = 6, 0.2, 1.0, 1e5
+    for n in range(count):
+        body = 2 + n
+        deck += (
+            f'<Body_Rigid id="{body}" cg_id="{10 * body}" mass="{mass}" inertia_xx="0.00667" '
+            f'inertia_yy="0.00667" inertia_zz="0.00667"/>'
+            f'<Reference_Marker id="{10 * body}" body_id="{body}" pos_z="{size * (n + 0.5)!r}"/>'
+            f'<Post_Graphic id="{100 * body}" type="BoxDefinedFromCenter" '
+            f'center_marker_id="{10 * body}" length_x="{size}" length_y="{size}" '
+            f'length_z="{size}"/>'
+            f'<Force_Contact id="{301 + n}" num_i_graphics="1" i_graphics_id="{100 * body}" '
+            f'num_j_graphics="1" j_graphics_id="{100 * body - 100}" cnf_type="IMPACT" '
+            f'stiffness="{k}" exponent="1" damping="30" dmax="1e-5" cff_type="STICTION" '
+            'mu_static="0.5" mu_dynamic="0.5"/>'
+        )
+    # each floor sinks by the weight above it over four corners' stiffness
+    sunk = sum((count - n) * mass * 9.81 / (4.0 * k) for n in range(count))
+    right = size * (count - 0.5) - sunk
+    for tol in (1e-3, 3e-4, 1e-4, 3e-5, 1e-5):
+        results = run_deck(tmp_path, deck, 2.0, 0.1, integrator=method, tol=tol)
+        top = results[f"bodies/{1 + count}/position"][-1]
+        assert top[2] == pytest.approx(right, abs=1e-2 * sunk)
+        assert np.abs(top[:2]).max() < 1e-12
+        assert results.stats["steps"] + results.stats["rejected"] < 6000

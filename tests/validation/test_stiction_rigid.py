@@ -174,6 +174,59 @@ def test_a_sphere_rolls_down_an_incline_without_slip(method, tmp_path):
     assert drift(results) < 1e-9
 
 
+@pytest.mark.parametrize(("margin", "slip"), [(0.003, 9.7e-7), (0.01, 2.1e-7)])
+def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(margin, slip, tmp_path):
+    # as deep on all points as it would rest on a plane: it tilts onto its front points at first.
+    # The slip is that of a planar integration; a point let go alone slid 0.7 m in 3 s
+    tilt = math.radians(20.0)
+    depth = 2.0 * G * math.cos(tilt) / 4e6
+    body = f"""
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.02" inertia_yy="0.02" inertia_zz="0.03"/>
+<Reference_Marker id="20" body_id="2" pos_z="{0.05 - depth!r}"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+  length_x="0.3" length_y="0.3" length_z="0.1"/>"""
+    mu = math.tan(tilt) * (1.0 + margin)
+    model = plane(20.0) + body + rub(mu, mu, damping=2e3, dmax=1e-5)
+    results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5")
+    place, turn = results["bodies/2/position"], results["bodies/2/quaternion"]
+    rubs = place[:, 0] - 0.05 * 2.0 * turn[:, 2]  # the middle of its lower face
+    assert -rubs[-1] == pytest.approx(slip, rel=0.05)
+    assert np.ptp(rubs[3:]) < 1e-12
+    assert len(events(results, "slip")) == len(events(results, "stick")) == 1
+
+
+@pytest.mark.parametrize("scale", [1.0, 1000.0], ids=["m", "mm"])
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_a_block_that_slows_down_ever_so_little_stops_and_holds(method, scale, tmp_path):
+    # turned on its incline, so that no axis is that of slip, and put down flat, it tilts onto its
+    # front points and slides on at some 1e-4 m/s, slowed by 2e-4 of what pulls it. Errors of
+    # velocities across, all within the tolerance, took so much from friction that it crept for ever
+    tilt, margin, across = math.radians(30.0), 2e-4, 5.4
+    pull, mu = G * scale * math.sin(tilt), math.tan(tilt) * (1.0 + margin)
+    gx, gy, gz = pull * math.cos(across), pull * math.sin(across), -G * scale * math.cos(tilt)
+    z = 0.05 * scale - 2.0 * G * math.cos(tilt) * scale / 4e6
+    turn = 0.02 * scale**2
+    unit = "METER" if scale == 1.0 else "MILLIMETER"
+    model = f"""
+<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Force_Gravity grav_x="{gx!r}" grav_y="{gy!r}" grav_z="{gz!r}"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="{turn}" inertia_yy="{turn}"
+  inertia_zz="{1.5 * turn}"/>
+<Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="2"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+  length_x="{0.3 * scale}" length_y="{0.3 * scale}" length_z="{0.1 * scale}"/>"""
+    given = {"stiffness": 1e6 / scale, "damping": 2e3 / scale, "dmax": 1e-5 * scale}
+    results = run_deck(tmp_path, model + rub(mu, mu, **given), 1.0, 0.1, integrator=method)
+    place = results["bodies/2/position"] / scale
+    assert len(events(results, "stick")) > 0
+    # GALPHA goes on rocking a little on its springs
+    assert np.ptp(place[-4:], axis=0).max() < (1e-12 if method == "RADAU5" else 1e-9)
+    most = 1e-10 if method == "RADAU5" else 1e-7
+    assert np.abs(results["bodies/2/velocity"][-4:]).max() / scale < most
+
+
 def test_blocks_on_each_other_part_where_the_weaker_friction_gives_way(tmp_path):
     # 2 kg on friction that holds, 1 kg on it by mu = 0.2; the lower is pulled: 4 t - 0.3*3 g drags
     # both from t1 on, the upper one slips from where their common acceleration passes 0.2 g
@@ -233,9 +286,8 @@ def test_explicit_methods_refuse_it_by_name(tmp_path):
 
     settings = settle(model)
     assert settings.integrator == "RADAU5"
-    assert settings.notes[-1] == (
-        "integrator AUTO: RADAU5 from the start, for Force_Contact[301] is rigid"
-    )
+    said = "integrator AUTO: RADAU5 from the start, for Force_Contact[301] is rigid"
+    assert said in settings.notes
 
 
 @pytest.mark.parametrize(

@@ -96,15 +96,17 @@ EXPRESSIONS = """
 """
 
 
-def run(folder, elements, script=SCRIPT, **options):
+def run(folder, elements, script=SCRIPT, h_max="", **options):
     (folder / "sub.py").write_text(script)
     deck = folder / "deck.xml"
-    deck.write_text(BODIES + elements + END)
+    deck.write_text(BODIES + elements + h_max + END)
     return mbsim.simulate(mbsim.read_model(deck), **options)
 
 
 def test_subroutines_do_what_the_same_expressions_do(tmp_path):
-    user, twin = run(tmp_path, USERS), run(tmp_path, EXPRESSIONS)
+    # what a subroutine may do with the time bounds steps: expressions get the same bound
+    h_max = '<Param_Transient h_max="0.01"/>'
+    user, twin = (run(tmp_path, elements, h_max=h_max) for elements in (USERS, EXPRESSIONS))
     assert user.stats["steps"] == twin.stats["steps"]
     assert user.stats["python_calls"] > user.stats["rhs_evaluations"]
     assert twin.stats["python_calls"] == 0
@@ -132,6 +134,7 @@ MARKER/32, PART=3, FLOATING
 ACCGRAV/KGRAV=-9.81
 SFORCE/2, ROTATIONAL, I=21, J=10, FUNCTION=0.1*VARVAL(7)
 REQUEST/1, F2=VARVAL(7)\\F3=2*DZ(20)+TIME
+INTEGRATOR/HMAX=0.01
 {elements}
 END
 """
@@ -169,7 +172,7 @@ def test_subroutines_of_an_adams_deck_do_what_the_same_expressions_do(tmp_path):
         np.testing.assert_allclose(user[name], twin[name], rtol=1e-11, atol=1e-11, err_msg=name)
     # PSI jumps at the start, where body 3 stands upright, so both must take the same steps
     adm = run_adm(tmp_path, ADM_USERS, tol=1e-8)
-    xml = run(tmp_path, EXPRESSIONS, tol=1e-8)
+    xml = run(tmp_path, EXPRESSIONS, h_max='<Param_Transient h_max="0.01"/>', tol=1e-8)
     assert adm.stats["steps"] == xml.stats["steps"]
     np.testing.assert_allclose(adm["bodies/3/position"], xml["bodies/3/position"], rtol=1e-9)
 
@@ -452,7 +455,7 @@ def test_implicit_methods_see_every_result_of_a_subroutine(tmp_path):
 <Force_Vector_TwoBody id="1" type="ForceOnly" i_marker_id="20" j_floating_marker_id="10"
   ref_marker_id="10" """
             + given
-            + """/></Model><Command>
+            + """/><Param_Transient h_max="0.008"/></Model><Command>
 <Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/></Command></Deck>""",
             encoding="utf-8",
         )

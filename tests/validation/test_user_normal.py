@@ -61,11 +61,12 @@ def test_the_built_in_law_written_as_a_users_moves_alike(tmp_path, language):
 @pytest.mark.parametrize("source", ["cnfsub.c", "cnfsub.f90"])
 def test_the_same_law_gives_the_same_motion_in_every_language(tmp_path, source):
     def run(**where):
-        return run_deck(tmp_path, dropped(**USER, **where), 1.0, tol=1e-9)
+        return run_deck(tmp_path, dropped(**USER, **where), 1.0, tol=1e-11)
 
     script = {"script_name": str(USERFUNCS / "cnfsub.py")}
     python, library = run(**script), run(cnf_dll_name=str(example(tmp_path, source)))
-    assert_same(python, library, 1e-12)
+    # steps differ in the last bits of the energy by which those at a touch are bounded
+    assert_same(python, library, 1e-9)
 
 
 @pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5", "VERLET"])

@@ -7,8 +7,9 @@ s0 is `bristle_stiffness`, s1 `bristle_damping`, s2 `viscous_coef`. From slip to
 passive where s1 <= 4 g/|v|; the published set (s1 = sqrt(1e5)) breaks that at high slip. With
 `damping_trans_vel` v_d the damping of the bristles is s1 exp(-(v/v_d)^2), which keeps it.
 Under a load that goes to and fro it drifts: it does not hold like STICTION.
-As N goes to 0 the bristles would follow ever faster; so where g is less than a thousandth of the
-usual one they follow as at that, and give less force in the same ratio: g, in a steady slide.
+As N goes to 0 the bristles would follow ever faster, at s0 |v|/g; they follow at most FASTEST
+times as fast as the mass m that slips would swing on them, sqrt(s0/m): where g is less than
+sqrt(s0 m) |v|/FASTEST as at that, and give less force in the same ratio: g, in a steady slide.
 Sources: C. Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419-425; N. Barabanov,
 R. Ortega, ibid. 45 (2000) 675-686 on passivity.
 """
@@ -17,13 +18,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import LEAST, SLIP, Parameter, friction_law
+from mbsim.laws.catalog import FASTEST, LASTS, SLIP, Parameter, friction_law
 from mbsim.laws.curves import stribeck as falling
-
-
-def _usual(load: float, mu_static: float, mu_dynamic: float, *others: float) -> float:
-    """Return how far bristles bend under a usual load [L]; the third parameter is s0."""
-    return max(mu_static, mu_dynamic, 1e-3) * load / others[1]
 
 
 @friction_law(
@@ -36,7 +32,7 @@ def _usual(load: float, mu_static: float, mu_dynamic: float, *others: float) -> 
     Parameter("viscous_coef", 0.0),
     Parameter("damping_trans_vel", math.inf, positive=True),
     memory=2,
-    size=_usual,
+    carried=2,
 )
 def lugre(
     inputs,
@@ -53,9 +49,9 @@ def lugre(
     z, v = memory, inputs.xdot
     speed = math.hypot(v[0], v[1])
     g = inputs.nforce * falling(speed, mu_static, mu_dynamic, stribeck_vel, 2.0)
-    least = max(g, LEAST * bristle_stiffness * inputs.size)
+    least = max(g, math.sqrt(bristle_stiffness * inputs.mass) * speed / FASTEST)
     if least <= 0.0:
-        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), (0.0, 0.0)
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP, 0.0, 1.0, 0.0), (z[0], z[1], 0.0, 0.0)
     part, wear = g / least, bristle_stiffness * speed / least
     rate = (v[0] - wear * z[0], v[1] - wear * z[1])
     damping = bristle_damping * math.exp(-((speed / damping_trans_vel) ** 2))
@@ -63,4 +59,5 @@ def lugre(
     fx = -part * (bristle_stiffness * z[0] + damping * rate[0]) - viscous * v[0]
     fy = -part * (bristle_stiffness * z[1] + damping * rate[1]) - viscous * v[1]
     stored = 0.5 * part * bristle_stiffness * (z[0] * z[0] + z[1] * z[1])
-    return (fx, fy, 0.0, 0.0, 0.0, stored, SLIP), rate
+    size, unit = least / bristle_stiffness, LASTS * math.sqrt(bristle_stiffness / inputs.mass)
+    return (fx, fy, 0.0, 0.0, 0.0, stored, SLIP, 0.0, size, unit), (z[0], z[1], rate[0], rate[1])

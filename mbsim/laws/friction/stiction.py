@@ -2,16 +2,21 @@
 
 z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
 
-    stick    F = -k z - c v, at most mu_s N     while k |z| <= mu_s N
-    slip     F = -mu_d N z/|z|,  |z| = mu_d N/k   while v goes on along z
+    stick    F = -k z - c v, at most mu_s N,  z' = v       while k |z| <= mu_s N
+    slip     F = -mu_d N e,  z = rho e,  rho = mu_d N/k    while v.e >= rho'
+             e' = (v - (v.e) e)/rho = w - (w.e) e,  w = v/rho
 
-A step of the integrator keeps to one of these and ends where it changes. At the end of a step that
-slips, z is brought back to what the force needs (return mapping). Within it, z/|z| follows the
-direction of slip over the length mu_d N/k, as z' = v - (v.z) z/|z|^2 asks.
+e, a unit vector, is dragged along behind the slip (`laws.tractrix`), and rho' is what the spring
+grows by itself: where it would have to be stretched faster than it is, it sticks.
+z in stick and the integral M of w in slip are integrated with the motion. From e and w at the
+committed state, M and w at the point follows e there: however much shorter than a step the spring
+is, no step is to follow it. A step of the integrator keeps to stick or slip and ends where that
+changes.
 
 k is `tangential_stiffness`, or 2 (1 - nu)/(2 - nu) times the stiffness of the normal force at its
 depth (Mindlin), with nu `poisson_ratio`. Where k grows with the depth the force in the spring
-stays, where it falls z does, so that no energy comes of it (Thornton). With `incremental` FALSE z
+stays, z' = v - z k'/k, where it falls z does, so that no energy comes of it (Thornton): there it
+slips while v.e >= (mu_d N)'/k. With `incremental` FALSE z
 always stays, F = -k z: the rebound of impacts is nearer to measured ones, but a load that comes
 and goes may give energy by it (Elata). c is `tangential_damping`,
 or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more would let it slip late.
@@ -35,41 +40,59 @@ from __future__ import annotations
 import math
 
 from mbsim.core.jitable import jitable
-from mbsim.laws.catalog import BEGUN, SLIP, STICK, FrictionLaw, Parameter, friction_law
+from mbsim.laws.catalog import (
+    BEGUN,
+    BRANCHES,
+    LASTS,
+    SLIP,
+    STICK,
+    UNDECIDED,
+    FrictionLaw,
+    Parameter,
+    friction_law,
+)
+from mbsim.laws.tractrix import dragged
 
 #: Damping over the critical one where none is given.
 DAMPING = 0.2
 
-# what is kept: spring x, y, twist; X then; stiffness then; mode
-_X, _STIFFNESS, _MODE = 3, 6, 7
+#: A spring is taken to be no shorter than slip over so many times the frequency of what slips.
+SHORTEST = 1e6
+#: Slip so many times faster than the spring changes by itself goes on its way, without a look at
+#: how fast that is.
+CLEAR = 100.0
+#: Nearer to its limit than this part of it a spring that sticks slips only if it goes on towards
+#: it: one that has just come to stick is at the limit but for rounding of the normal force.
+NEAR = 1e-6
+
+# what is kept: z, or M; z where it slips, M and its rate then; time then; twist less turn since
+# touch, and the sign of its slip; mode
+_Z, _M, _W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
 
 
 @jitable
-def _direction(zx, zy, kept, v, k, limit):
-    """Return the unit vector against which a slipping spring pulls."""
-    length, speed = math.hypot(zx, zy), math.hypot(v[0], v[1])
-    if zx * v[0] + zy * v[1] > 0.0 and limit > 0.0:
-        # the spring follows the slip over its own length
-        gone = math.hypot(zx - kept[0], zy - kept[1]) * k / limit
-        rest = math.exp(-gone)
-        zx = kept[0] * rest + (1.0 - rest) * limit / k * v[0] / speed
-        zy = kept[1] * rest + (1.0 - rest) * limit / k * v[1] / speed
-        length = math.hypot(zx, zy)
-    if length > 0.0:
-        return zx / length, zy / length
-    return (v[0] / speed, v[1] / speed) if speed > 0.0 else (0.0, 0.0)
+def _turn(inputs, memory, mu, k, damping, radius):
+    """Return the torque about the normal, the twist left, the sign of its slip, and if that is so.
 
-
-@jitable
-def _turn(inputs, memory, mode, mu, k, c, radius):
-    """Return the torque about the normal and what is left of the twist."""
-    twist = memory[2] + inputs.x[2] - memory[_X + 2]
-    torque = -k * twist - (c * radius * radius * inputs.xdot[2] if mode == STICK else 0.0)
-    most = mu * inputs.nforce * radius
+    The last is 0 where the sign follows only from how fast N changes.
+    """
+    twist, sign, sure = memory[_TWIST] + inputs.x[2], memory[_TURNS], 1
+    most, rate = mu * inputs.nforce * radius, inputs.xdot[2]
+    torque = -k * twist - damping * rate
+    if inputs.frozen == 1.0 and sign != 0.0:
+        torque, twist = -sign * most, sign * most / k
+        if math.isnan(inputs.nforce_rate):
+            sure = 0
+        elif sign * rate * k < mu * inputs.nforce_rate * radius:
+            sign = 0.0
+        return torque, twist, sign, sure
     if abs(torque) > most:
         torque = math.copysign(most, torque)
-        twist = -torque / k
-    return torque, twist
+    sign = 0.0
+    if k * abs(twist) > most:
+        sign = math.copysign(1.0, twist)
+        twist = sign * most / k
+    return torque, twist, sign, sure
 
 
 @jitable
@@ -98,20 +121,21 @@ def rigid(inputs, memory, mu_static, mu_dynamic):
     """Return the same where k is infinite; what holds is not told but asked for by equations."""
     mode, dx, dy = memory[KEPT_MODE], memory[KEPT_X], memory[KEPT_Y]
     if mode == STICK:
-        return (memory[HELD_X], memory[HELD_Y], 0.0, 0.0, 0.0, 0.0, mode), memory
+        held = (memory[HELD_X], memory[HELD_Y], 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0)
+        return held, memory
     limit = _dynamic_limit(inputs, mu_dynamic)
     ux, uy = inputs.xdot[0], inputs.xdot[1]
     if mode == BEGUN:
         size = math.hypot(ux, uy)
         part = limit / size if size > 0.0 else 0.0
-        return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode), memory
+        return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0), memory
     rest = math.hypot(dx, dy)
     dx, dy = dx / rest, dy / rest
     along, across = abs(ux * dx + uy * dy) + rest, uy * dx - ux * dy
     sine = across / max(math.hypot(along, across), _least_speed(across, memory[KEPT_SPEED]))
     cosine = math.sqrt(max(0.0, 1.0 - sine * sine))
     fx, fy = -limit * (cosine * dx - sine * dy), -limit * (cosine * dy + sine * dx)
-    return (fx, fy, 0.0, 0.0, 0.0, 0.0, mode), memory
+    return (fx, fy, 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0), memory
 
 
 @friction_law(
@@ -124,7 +148,8 @@ def rigid(inputs, memory, mu_static, mu_dynamic):
     Parameter("rotational_stiffness", 0.0, needs="torsion_radius"),
     Parameter("torsion_radius", 0.0, needs="rotational_stiffness"),
     Parameter("incremental", 1.0, flag=True),
-    memory=8,
+    memory=12,
+    carried=2,
     uses_x=True,
     takes_function=True,
     modes=True,
@@ -144,52 +169,108 @@ def stiction(
     torsion_radius,
     incremental,
 ):
-    """Return (Fx, Fy, Mx, My, Tz, energy of the springs, mode) and what is kept."""
-    k = tangential_stiffness
-    if math.isnan(k):
+    """Return (Fx, ..., energy of the springs, mode, branch, size, unit) and what is kept, rates."""
+    k, growth, of_depth = tangential_stiffness, 0.0, math.isnan(tangential_stiffness)
+    if of_depth:
         k = 2.0 * (1.0 - poisson_ratio) / (2.0 - poisson_ratio) * inputs.stiffness
+        growth = inputs.growth
+    before, time, v = memory[_MODE], inputs.time, inputs.xdot
+    px, py = memory[0], memory[1]
     if k <= 0.0 or inputs.nforce <= 0.0:
-        still = (0.0, 0.0, 0.0, inputs.x[0], inputs.x[1], inputs.x[2], 0.0, SLIP)
-        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP), still
-    c = tangential_damping
+        nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP, SLIP, 1.0, 0.0)
+        kept = (px, py) if before == SLIP else (0.0, 0.0)
+        still = (*kept, memory[_Z], memory[_Z + 1], *kept, 0.0, 0.0, time, -inputs.x[2], 0.0, SLIP)
+        return nothing, (*still, 0.0, 0.0)
+    c, heavy = tangential_damping, math.sqrt(k * inputs.mass)
     if math.isnan(c):
-        c = 2.0 * DAMPING * math.sqrt(k * inputs.mass)
+        c = 2.0 * DAMPING * heavy
+    frozen = inputs.frozen == 1.0
+    # where k grows the force stays, if it is to
+    eases = of_depth and incremental == 1.0
+    ease = max(0.0, growth) if eases else 0.0
+    holds, limit = mu_static * inputs.nforce, _dynamic_limit(inputs, mu_dynamic)
+    stretch = limit / k
+    follows = max(stretch, math.hypot(v[0], v[1]) * heavy / (k * SHORTEST))
+    wx, wy = (v[0] / follows, v[1] / follows) if follows > 0.0 else (0.0, 0.0)
 
-    # the spring as it would be if nothing slipped
-    ease = memory[_STIFFNESS] / k if incremental == 1.0 and 0.0 < memory[_STIFFNESS] < k else 1.0
-    kept = (memory[0] * ease, memory[1] * ease)
-    zx = kept[0] + inputs.x[0] - memory[_X]
-    zy = kept[1] + inputs.x[1] - memory[_X + 1]
-    v = inputs.xdot
-    length = math.hypot(zx, zy)
-    goes_back = zx * v[0] + zy * v[1] < 0.0
-
-    slips = memory[_MODE] == SLIP and (inputs.frozen == 1.0 or not goes_back)
-    if slips:
-        mode = STICK if goes_back else SLIP
-        limit = _dynamic_limit(inputs, mu_dynamic)
-        ux, uy = _direction(zx, zy, kept, v, k, limit)
-        # less where the normal force grew faster than the spring follows; at the slip's begin
-        # that is a kink, of which derivatives are to see the side that lies ahead
-        size = limit if inputs.dflag == 1.0 else min(limit, k * length)
-        fx, fy = -size * ux, -size * uy
-        zx, zy = size / k * ux, size / k * uy
-    else:
-        limit = mu_static * inputs.nforce
-        mode = STICK if k * length <= limit else SLIP
-        if mode == SLIP and (inputs.frozen == 0.0 or memory[_MODE] != STICK):
-            limit = _dynamic_limit(inputs, mu_dynamic)
+    mode, sticks, sure = STICK, before != SLIP, 1
+    zx, zy = px, py
+    if not sticks:
+        # the spring's direction, behind the slip since the committed state
+        since = time - memory[_TIME]
+        mx, my = px - memory[_M], py - memory[_M + 1]
+        long = math.hypot(memory[_Z], memory[_Z + 1])
+        ex, ey = (memory[_Z] / long, memory[_Z + 1] / long) if long > 0.0 else (0.0, 0.0)
+        ax, ay = since * memory[_W], since * memory[_W + 1]
+        ex, ey = dragged(ex, ey, ax, ay, mx, my, since * wx, since * wy)
+        along = v[0] * ex + v[1] * ey
+        mode = SLIP
+        if frozen:
+            change = inputs.nforce_rate * mu_dynamic
+            if not math.isnan(inputs.limit):
+                change = inputs.limit_rate
+            if not math.isnan(change):
+                # how fast z grows by itself, or less where k grows and the force stays
+                own = change / k - stretch * (growth - ease)
+                mode = SLIP if along >= own else STICK
+            elif since > 0.0:
+                own = abs(stretch - long) / since + stretch * abs(growth)
+                sure = 1 if abs(along) > CLEAR * own else 0
+                mode = SLIP if along >= 0.0 or sure == 0 else STICK
+        else:
+            # as if nothing slipped since: it is held again where that is less than the limit
+            length = long * math.exp(-ease * since) + stretch * (mx * ex + my * ey)
+            if abs(length) < stretch:
+                sticks, zx, zy = True, length * ex, length * ey
+            elif length < 0.0:
+                ex, ey = -ex, -ey
+        if not sticks:
+            zx, zy = stretch * ex, stretch * ey
+            fx, fy = -limit * ex, -limit * ey
+    if sticks:
+        if before == BEGUN and eases:
+            # the force is what was integrated
+            zx, zy = px / k, py / k
+        length = math.hypot(zx, zy)
+        mode = STICK if k * length <= holds else SLIP
+        if frozen and before == STICK and holds < k * length <= (1.0 + NEAR) * holds:
+            own = mu_static * inputs.nforce_rate / k - holds / k * (growth - ease)
+            sure = 0 if math.isnan(own) else 1
+            mode = SLIP if zx * v[0] + zy * v[1] > own * length else STICK
+        most = holds if mode == STICK or (frozen and before == STICK) else limit
         fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
         force = math.hypot(fx, fy)
-        if force > limit:
-            fx, fy = fx * limit / force, fy * limit / force
+        if force > most:
+            fx, fy = fx * most / force, fy * most / force
         if mode == SLIP:
-            rest = _dynamic_limit(inputs, mu_dynamic) / (k * length)
-            zx, zy = rest * zx, rest * zy
-    torque, twist = 0.0, 0.0
+            zx, zy = zx * stretch / length, zy * stretch / length
+
+    torque, twist, sign = 0.0, 0.0, 0.0
     if rotational_stiffness > 0.0:
-        mu = mu_dynamic if slips else mu_static
-        torque, twist = _turn(inputs, memory, mode, mu, rotational_stiffness, c, torsion_radius)
+        mu, damping = mu_static, c * torsion_radius * torsion_radius
+        if before == SLIP and not sticks:
+            mu, damping = mu_dynamic, 0.0
+        torque, twist, sign, known = _turn(
+            inputs, memory, mu, rotational_stiffness, damping, torsion_radius
+        )
+        sure = min(sure, known)
+    if sure == 0:
+        mode = before
+    branch = mode + BRANCHES * (sign if sign >= 0.0 else 2.0) if sure == 1 else UNDECIDED
     stored = 0.5 * (k * (zx * zx + zy * zy) + rotational_stiffness * twist * twist)
-    held = (zx, zy, twist, inputs.x[0], inputs.x[1], inputs.x[2], k, mode)
-    return (fx, fy, 0.0, 0.0, torque, stored, mode), held
+
+    # what is integrated: M, force or z
+    if before == SLIP:
+        size, unit, rx, ry = 1.0, LASTS * limit / heavy, wx, wy
+    elif before == BEGUN and eases:
+        size, unit, rx, ry = holds, LASTS / heavy, k * v[0], k * v[1]
+    else:
+        size, unit = holds / k, LASTS * k / heavy
+        rx, ry = v[0] - ease * px, v[1] - ease * py
+    if mode == STICK:
+        px, py = zx, zy
+    elif before != SLIP:
+        px, py = 0.0, 0.0
+    held = (px, py, zx, zy, px, py, wx, wy, time, twist - inputs.x[2], sign, mode)
+    given = (fx, fy, 0.0, 0.0, torque, stored, mode, branch, size, unit)
+    return given, (*held, rx, ry)

@@ -1,0 +1,236 @@
+"""`Audit`: what a run found out about itself; its table of entries is in one place, `ENTRIES`.
+
+Compiled code (`dynamics.audit`) keeps, for every row of `system.arrays.Audit.found`, the value
+that was largest over what the local errors of the steps explain. Here it is said what that is,
+how many times as large it may be, and at which element it was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from mbsim.model.names import element_name
+from mbsim.results.quantities import ENERGY as ENERGY_UNIT
+from mbsim.results.quantities import UnitSystem
+from mbsim.system import arrays as a
+
+if TYPE_CHECKING:
+    from mbsim.results.store import Value
+    from mbsim.system.build import System
+
+
+class Judged(NamedTuple):
+    """One thing that a run is judged by."""
+
+    row: int  # of `Audit.found`
+    name: str  # in result files and in `Audit.entries`
+    says: str  # what is off, for the warning
+    limit: float  # how many times what is explained it may be
+    element: str  # what the row's element is: contact, body, equation, or nothing
+
+
+#: What a run is judged by. How the limits were found is in the README, "A run judges itself".
+ENTRIES = (
+    Judged(
+        a.ENERGY, "energy", "the energy balance is off by {value:.3g} {energy}", 30.0, "contact"
+    ),
+    Judged(
+        a.ENERGY_STEP,
+        "energy_step",
+        "the energy balance changes by {value:.3g} {energy} within a few steps",
+        30.0,
+        "contact",
+    ),
+    Judged(
+        a.MOMENTUM,
+        "momentum",
+        "bodies on which nothing but weight acts change their momentum by {value:.3g}",
+        5.0,
+        "body",
+    ),
+    Judged(
+        a.SPIN,
+        "angular_momentum",
+        "bodies on which nothing but weight acts change their angular momentum by {value:.3g}",
+        5.0,
+        "body",
+    ),
+    Judged(a.POSITION, "position", "a constraint is left open by {value:.3g}", 10.0, "equation"),
+    Judged(
+        a.VELOCITY, "velocity", "the rate of a constraint is off by {value:.3g}", 10.0, "equation"
+    ),
+    Judged(a.HELD_SLIP, "held_slip", "what friction holds slips, by {value:.3g}", 10.0, "equation"),
+    Judged(a.CONE, "cone", "friction is {value:.3g} above mu N", 10.0, "contact"),
+    Judged(
+        a.NEWTON, "newton", "Newton's iteration left {value:.3g} of a step's equations", 10.0, ""
+    ),
+)
+#: Those of energy.
+ENERGIES = ("energy", "energy_step")
+#: A balance that is off by more than this part of the largest energy is told whatever explains it.
+COARSE = 0.02
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The value that was largest over what is allowed, when, and at which element."""
+
+    value: float
+    allowed: float
+    time: float
+    element: str
+
+    @property
+    def excess(self) -> float:
+        """How many times as large as allowed it was."""
+        return self.value / self.allowed if self.allowed > 0.0 else math.inf * (self.value > 0.0)
+
+
+@dataclass(frozen=True)
+class Share:
+    """The change of the energy balance while one contact pressed hardest."""
+
+    change: float  # in all
+    largest: float  # from one sample to the next
+    time: float  # of that
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What a run found out about itself.
+
+    `balance` is the largest |kinetic + potential + dissipated - work of motions| since the start
+    [F L], at `time`; `of` the largest energy of any kind that there was; `contacts` says by id
+    how much of the changes came while that contact pressed hardest, None while none touched.
+    `entries` has what of `ENTRIES` the model gave reason to look at.
+    """
+
+    balance: float
+    of: float
+    time: float
+    unit: str
+    entries: Mapping[str, Entry]
+    contacts: Mapping[int | None, Share]
+    warnings: tuple[str, ...]
+
+    @property
+    def line(self) -> str:
+        """The one line at a run's end."""
+        return f"balance closes to {self.balance:.1g} of {self.of:.3g} {self.unit}"
+
+
+def audit_of(system: System, left: float, left_time: float) -> Audit | None:
+    """Return what a system's run found out about itself, None where no step was taken.
+
+    Parameters
+    ----------
+    system : System
+    left, left_time : float
+        The most that Newton's iteration left of a step, in the norm of the error, and when.
+    """
+    kept = system.scene.audit
+    tally, found = kept.tally, kept.found.copy()
+    if tally[a.STEPS_ALL] == 0.0:
+        return None
+    if left > 0.0:
+        found[a.NEWTON] = left, kept.plan[a.AUDIT_TOL], left_time, -1
+    unit = UnitSystem(system.model.units.force, system.model.units.length).text(ENERGY_UNIT)
+    entries, warnings = {}, []
+    for judged in ENTRIES:
+        value, explained, time, element = (float(number) for number in found[judged.row])
+        if value < 0.0:
+            continue
+        entry = Entry(value, judged.limit * explained, time, _named(system, judged, int(element)))
+        entries[judged.name] = entry
+        if not entry.excess <= 1.0:
+            says = judged.says.format(value=value, energy=unit)
+            at = f" at {entry.element}" if entry.element else ""
+            warnings.append(
+                f"{says} at time {time:.9g}{at}: {entry.excess:.3g} times what tol explains"
+            )
+    ids = [*system.contact_ids, None]
+    shares = {
+        id: Share(*(float(number) for number in row[:3]))
+        for id, row in zip(ids, kept.contact, strict=True)
+    }
+    balance, time = abs(float(tally[a.WORST_OPEN])), float(tally[a.WORST_TIME])
+    size = float(tally[a.LARGEST_ENERGY])
+    # of a model that stands still no energy is large: what its scales say is
+    part = balance / max(size, float(tally[a.USUAL_ENERGY]))
+    if part > COARSE and not any(
+        entries[name].excess > 1.0 for name in ENERGIES if name in entries
+    ):
+        warnings.append(
+            f"the energy balance is off by {100.0 * part:.2g} % at time {time:.9g}, as tol "
+            f"{kept.plan[a.AUDIT_TOL]:g} explains: choose a smaller one"
+        )
+    return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
+
+
+def _named(system: System, judged: Judged, row: int) -> str:
+    """Return the element of a row as its deck has it."""
+    if judged.element == "contact" and 0 <= row < len(system.contact_ids):
+        return element_name(system.model.file, "Force_Contact", system.contact_ids[row])
+    if judged.element == "body" and 0 <= row < len(system.body_ids):
+        return system.body_name(row)
+    if judged.element == "equation" and 0 <= row < len(system.equation_names):
+        connection = int(system.scene.equations.connection[row])
+        if 0 <= connection < len(system.connections):
+            return f"{system.connection_name(connection)} ({system.equation_names[row]})"
+        return system.equation_names[row]
+    return ""
+
+
+def to_attributes(audit: Audit) -> dict[str, dict[str, Value]]:
+    """Return an audit as attributes of groups of a result file."""
+    found: dict[str, dict[str, Value]] = {
+        "audit": {
+            "balance": audit.balance,
+            "of": audit.of,
+            "time": audit.time,
+            "unit": audit.unit,
+            "warnings": "\n".join(audit.warnings),
+        }
+    }
+    for name, entry in audit.entries.items():
+        found[f"audit/{name}"] = dict(vars(entry))
+    for id, share in audit.contacts.items():
+        found[f"audit/contacts/{'none' if id is None else id}"] = dict(vars(share))
+    return found
+
+
+def from_attributes(found: Mapping[str, Mapping[str, Any]]) -> Audit:
+    """Return the audit that `to_attributes` made attributes of."""
+    whole = dict(found["audit"])
+    warnings = tuple(str(whole.pop("warnings")).splitlines())
+    entries = {
+        judged.name: Entry(**found[f"audit/{judged.name}"])
+        for judged in ENTRIES
+        if f"audit/{judged.name}" in found
+    }
+    contacts: dict[int | None, Share] = {}
+    for name, facts in found.items():
+        if name.startswith("audit/contacts/"):
+            id = name.rpartition("/")[2]
+            contacts[None if id == "none" else int(id)] = Share(**facts)
+    return Audit(**whole, entries=entries, contacts=contacts, warnings=warnings)
+
+
+def facts(audit: Audit) -> dict[str, Any]:
+    """Return an audit for JSON and for `mbsim info`."""
+    return {
+        "balance": audit.balance,
+        "of": audit.of,
+        "time": audit.time,
+        "unit": audit.unit,
+        "warnings": list(audit.warnings),
+        "entries": {
+            name: {**vars(entry), "excess": entry.excess} for name, entry in audit.entries.items()
+        },
+        "contacts": {
+            "none" if id is None else str(id): vars(share) for id, share in audit.contacts.items()
+        },
+    }

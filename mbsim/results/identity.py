@@ -1,0 +1,211 @@
+"""What a run is made of: all that its results follow from, to compare a resumed run with.
+
+The model as it is run (`--set` included), how it is run, and the bytes of users' files. Every
+field of every element counts, whatever it is called, but for those that are marked ASIDE where they
+are declared. Facts are kept, so that a message can name what differs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.expressions import Expression
+from mbsim.model.elements import ASIDE, Source
+from mbsim.model.names import element_name
+from mbsim.results.elements import GROUPS
+
+if TYPE_CHECKING:
+    from mbsim.system.build import System
+
+#: What elements are called in decks, by the field of `Model`; others are called by the field.
+_STATEMENTS = {
+    "bodies": "Body_Rigid",
+    "markers": "Reference_Marker",
+    "graphics": "Post_Graphic",
+    "variables": "Reference_Variable",
+    "differentials": "Control_Diff",
+    "splines": "Reference_Spline",
+    "arrays": "Reference_Array",
+    "sensors": "Sensor_Event",
+    "requests": "Post_Request",
+    "gravity": "Force_Gravity",
+    "transient": "Param_Transient",
+    "units": "Param_Unit",
+    "simulations": "Simulate",
+    "stages": "Simulate",
+} | {group.member: group.title for group in GROUPS.values()}
+#: Differences that a message lists.
+MOST_LISTED = 3
+#: What stands for a field that facts leave out, and for an element that is not there.
+_DEFAULT, _ABSENT = object(), object()
+
+
+def plain(value: Any) -> Any:
+    """Return a value as numbers, texts, lists and mappings; of dataclasses what is not a default.
+
+    Left out are file and line of an element and fields marked ASIDE. Arrays become digests,
+    expressions their text: a tree may be deeper than JSON goes.
+    """
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Expression):
+        return value.text
+    if isinstance(value, np.ndarray):
+        data = np.ascontiguousarray(value)
+        return f"{'x'.join(map(str, data.shape))} {hashlib.sha256(data.tobytes()).hexdigest()}"
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, list | tuple):
+        named = bool(value) and all(isinstance(item, tuple) and len(item) == 2 for item in value)
+        if named and all(isinstance(item[0], str) for item in value):
+            return {name: plain(item) for name, item in value}
+        return [plain(item) for item in value]
+    if not is_dataclass(value):
+        raise TypeError(f"{type(value).__name__} is nothing that a run can be compared by")
+    made = {"": type(value).__name__}
+    for field in fields(value):
+        item = getattr(value, field.name)
+        if isinstance(item, Source) or ASIDE in field.metadata:
+            continue
+        if item is field.default:
+            continue
+        known = plain(item)
+        if field.default is MISSING or repr(known) != repr(plain(field.default)):
+            made[field.name] = known
+    return made
+
+
+def of_elements(holder: Any, file: str) -> dict[str, Any]:
+    """Return the facts of a model or of settings, by the name of each element in its deck."""
+    facts: dict[str, Any] = {}
+    for member, value in plain(holder).items():
+        title = _STATEMENTS.get(member, member)
+        if isinstance(value, dict) and member in _STATEMENTS and "" not in value:
+            facts |= {element_name(file, title, int(id)): item for id, item in value.items()}
+        elif isinstance(value, list) and member in _STATEMENTS:
+            facts |= {f"{title}[{k}]": item for k, item in enumerate(value, 1)}
+        elif member:
+            facts[title] = value
+    return facts
+
+
+def _files(file: Path) -> list[Path]:
+    """Return a user's file and those beside it that it names: scripts import their neighbours."""
+    found, waiting = {file}, [file]
+    while waiting:
+        one = waiting.pop()
+        if one.suffix not in (".py", ".m"):
+            continue
+        text = one.read_text("utf-8", "replace")
+        for word in set(re.findall(r"[^\W\d]\w*", text)):
+            folder = one.parent / word
+            near = folder.with_name(word + one.suffix)
+            named = [near] if near.is_file() else []
+            if one.suffix == ".py" and folder.is_dir():
+                named += folder.rglob("*.py")
+            waiting += [other for other in named if other not in found]
+            found.update(named)
+    return sorted(found)
+
+
+def of_users(system: System) -> dict[str, Any]:
+    """Return the facts of users' subroutines, by element: what is called, and bytes of files."""
+    users = [
+        *((f"Force_Contact[{id}]: {user.name}", user) for id, user in system.user_laws),
+        *((f"Force_Contact[{p.contact.id}]: {p.user.fnc_name}", p) for p in system.posts),
+        *((f"Force_Element[{id}]: {user.name}", user) for id, user in system.residuals.items()),
+        *((f"{s}[{id}]: {user.name}", user) for (s, id), user in system.subroutines.items()),
+    ]
+    facts: dict[str, Any] = {}
+    digests: dict[Path, dict[str, str]] = {}
+    for name, user in users:
+        source = Path(user.source)
+        if source not in digests:
+            digests[source] = {
+                str(file.relative_to(source.parent)): hashlib.sha256(file.read_bytes()).hexdigest()
+                for file in _files(source)
+            }
+        facts[name] = digests[source] | {"compiled": getattr(user, "compiled", False)}
+    return facts
+
+
+class Identity:
+    """What a run is made of, by kind: `model`, `settings`, `subroutines`.
+
+    Parameters
+    ----------
+    system : System
+    settings : dataclass, optional
+        How it is run.
+    """
+
+    def __init__(self, system: System, settings: Any = None) -> None:
+        file = system.model.file
+        self.facts = {
+            "model": of_elements(system.model, file),
+            "settings": {} if settings is None else of_elements(settings, file),
+            "subroutines": of_users(system),
+        }
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """Digests by the name of the result file's attribute."""
+        names = {"model": "system_sha256"}
+        return {
+            names.get(kind, f"{kind}_sha256"): hashlib.sha256(_text(facts)).hexdigest()
+            for kind, facts in self.facts.items()
+        }
+
+    def packed(self) -> np.ndarray[Any, Any]:
+        """Return all facts as bytes."""
+        return np.frombuffer(zlib.compress(_text(self.facts), 1), dtype=np.uint8)
+
+    def changes(self, packed: np.ndarray[Any, Any], kind: str) -> str:
+        """Return what differs from the packed facts of another run, empty if nothing does."""
+        before = json.loads(zlib.decompress(packed.tobytes()))[kind]
+        now = json.loads(_text(self.facts[kind]))
+        found = list(_differences(before, now, ""))
+        more = f" and {len(found) - MOST_LISTED} more" if len(found) > MOST_LISTED else ""
+        return ", ".join(found[:MOST_LISTED]) + more
+
+
+def _text(facts: Any) -> bytes:
+    return json.dumps(facts, sort_keys=True).encode()
+
+
+def _differences(before: Any, now: Any, name: str) -> Iterator[str]:
+    """Yield what differs, in words."""
+    if before == now:
+        return
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in sorted(before.keys() | now.keys()):
+            part = f"{name}.{key}" if name and key else name or key
+            absent = _DEFAULT if name else _ABSENT
+            yield from _differences(before.get(key, absent), now.get(key, absent), part)
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for k, (one, other) in enumerate(zip(before, now, strict=True), 1):
+            yield from _differences(one, other, f"{name}[{k}]")
+    elif isinstance(before, str) and isinstance(now, str) and len(now) >= 64:
+        yield f"{name} is another"  # a digest says nothing more
+    else:
+        yield f"{name} was {_shown(before)} and is {_shown(now)} now"
+
+
+def _shown(value: Any) -> str:
+    """Return a value for a message."""
+    known = {_DEFAULT: "the default", _ABSENT: "not there", None: "not given"}
+    if value is None or value is _DEFAULT or value is _ABSENT:
+        return known[value]
+    text = f"{value:.15g}" if isinstance(value, float) else str(value)
+    return "there" if isinstance(value, dict | list) else text

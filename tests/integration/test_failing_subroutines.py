@@ -1,0 +1,157 @@
+"""A subroutine that fails wherever it is asked ends the run; one that fails far out does not.
+
+The bodies begin where the failure begins, at gap 0: a step that is short enough ends before
+rounding lets them touch, so that it asks nothing and proves nothing.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from decks_io import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from libraries import compiled, need
+
+import mbsim
+from mbsim.cli.main import main
+from mbsim.errors import PluginError, SolverError
+
+METHODS = ["AUTO", "DOP853", "VERLET", "RADAU5", "GALPHA"]
+CFFSUB = "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n    "
+USER = {"cff_type": "USERCFF", "cff_fnc_name": "CFFSUB"}
+
+
+def friction(folder, body):
+    """Return a ball on a plane at gap 0 with a friction subroutine of this body."""
+    (folder / "law.py").write_text(CFFSUB + body + "\n", encoding="utf-8")
+    law = contact(damping=50, dmax=1e-3, script_name="law.py", **USER)
+    return GROUND + sphere(0.1, v=(0.5, 0, 0)) + law + GRAVITY
+
+
+def normal(folder, body):
+    """Return a ball on a plane at gap 0 with a normal force of this body."""
+    (folder / "law.py").write_text(
+        "def CNFSUB(id, time, par, npar, loci, ni, locj, nj, gap, gapdot, gapdotdot, dflag, "
+        f"iflag):\n    {body}\n",
+        encoding="utf-8",
+    )
+    law = contact(cnf_type="USERCNF", cnf_fnc_name="CNFSUB", script_name="law.py")
+    return GROUND + sphere(0.1) + law + GRAVITY
+
+
+def small(results):
+    """Return whether a run ended after few tries."""
+    return results["steps"] + results["rejected"] < 200
+
+
+@pytest.fixture
+def counters(monkeypatch):
+    """Return the counters of the run that failed."""
+    from mbsim import simulation
+
+    found, kept = {}, simulation.Runner.stats
+
+    def stats(self, *arguments):
+        found.update(kept(self, *arguments))
+        return found
+
+    monkeypatch.setattr(simulation.Runner, "stats", stats)
+    return found
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("raise ValueError('no such surface')", "no such surface"),
+        ("return None", "None"),
+        ("return [0.0, 0.0]", "2 values"),
+        ("return [0.0 / (time * 0.0), 0.0, 0.0]", "ZeroDivisionError"),
+        ("return [scipy.hypot(1.0, time), 0.0, 0.0]", "scipy"),
+        ("return [nforce * float('nan'), 0.0, 0.0]", "nan"),
+    ],
+)
+def test_friction_that_fails_from_gap_zero_ends_the_run(tmp_path, counters, body, said, method):
+    with pytest.raises(PluginError, match=said) as caught:
+        run_deck(tmp_path, friction(tmp_path, body), integrator=method)
+    assert "law.py" in str(caught.value)
+    assert small(counters)
+
+
+@pytest.mark.parametrize("how", [{}, {"interpret_plugins": True}])
+@pytest.mark.parametrize("body", ["return 1.0 / (gap - gap)", "return gap * 1e200 * 1e200 * 0.0"])
+def test_a_normal_force_that_fails_from_gap_zero_ends_the_run(tmp_path, counters, body, how):
+    with pytest.raises(PluginError, match=r"law\.py"):
+        run_deck(tmp_path, normal(tmp_path, body), **how)
+    assert small(counters)
+
+
+def test_a_library_that_gives_nan_from_gap_zero_ends_the_run(tmp_path, counters):
+    need("gcc")
+    library = compiled(
+        tmp_path,
+        "void CFFSUB(int *id, double *time, double *par, int *npar, double *loci, double *locj,\n"
+        "  double *x, double *xdot, double *nforce, int *dflag, int *iflag, double *result)\n"
+        "{ result[0] = result[1] = result[2] = (*nforce - *nforce) / (*nforce - *nforce); }\n",
+    )
+    law = contact(damping=50, dmax=1e-3, cff_dll_name=library, **USER)
+    with pytest.raises(PluginError, match="nan"):
+        run_deck(tmp_path, GROUND + sphere(0.1) + law + GRAVITY)
+    assert small(counters)
+
+
+def test_a_force_that_fails_from_where_the_body_begins_ends_the_run(tmp_path, counters):
+    (tmp_path / "law.py").write_text(
+        "def SFOSUB(id, time, par, npar, dflag, iflag):\n"
+        "    z, errflg = py_sysfnc('DZ', [20, 10])\n"
+        "    return sqrt(z - 0.1)\n"
+    )
+    force = (
+        '<Force_Scalar_TwoBody id="1" type="Force" i_marker_id="20" j_marker_id="10" '
+        'script_name="law.py" usrsub_fnc_name="SFOSUB" usrsub_param_string="USER(1)"/>'
+    )
+    with pytest.raises(PluginError, match=r"law\.py"):
+        run_deck(tmp_path, GROUND + sphere(0.1) + force + GRAVITY)
+    assert small(counters)
+
+
+def test_an_expression_that_is_no_number_from_gap_zero_ends_the_run(tmp_path, counters):
+    force = (
+        '<Force_Vector_OneBody id="7" type="ForceOnly" i_marker_id="20" '
+        'fx_expression="SQRT(DZ(20,10)-0.1)"/>'
+    )
+    with pytest.raises(SolverError, match=r"Force_Vector_OneBody\[7\]"):
+        run_deck(tmp_path, GROUND + sphere(0.1) + force + GRAVITY)
+    assert small(counters)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_law_that_ends_far_out_is_asked_nearer(tmp_path, method):
+    # 40 times the force at rest is never reached, but by trial points far ahead
+    body = "return [-0.1 * nforce * xdot[0] / sqrt(4000.0 - nforce), 0.0, 0.0]"
+    results = run_deck(tmp_path, friction(tmp_path, body), end_time=0.3, integrator=method)
+    assert results["time"][-1] == 0.3
+
+
+def test_a_slip_speed_of_zero_in_the_divisor_is_said_and_ends_the_run(tmp_path):
+    # the ball rolls in the end: a slip of rounding errors, and now and then of 0
+    body = (
+        "v = sqrt(xdot[0] ** 2 + xdot[1] ** 2)\n"
+        "    mu = py_step(v, -0.1, -0.05, 0.1, 0.05, 0)[0]\n"
+        "    return [-mu * nforce * xdot[0] / v, -mu * nforce * xdot[1] / v, 0.0]"
+    )
+    (tmp_path / "law.py").write_text(CFFSUB + body + "\n", encoding="utf-8")
+    law = contact(damping=50, dmax=1e-3, script_name="law.py", **USER)
+    ball = sphere(0.1 - (9.81 / 1e5) ** (2 / 3), v=(0.1, 0, 0))
+    deck = write_deck(tmp_path, GROUND + ball + law + GRAVITY, end_time=100.0)
+    done = CliRunner().invoke(main, ["run", str(deck), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 4, done.output
+    assert "line 4: divides by the slip speed v, which fails at v = 0" in done.output
+    assert "law.py:4" in done.output
+    with mbsim.open_results(tmp_path / "out/deck.h5") as results:
+        assert results.stats["rejected"] < 0.2 * results.stats["steps"] + 20

@@ -1,0 +1,66 @@
+"""Decks made from seeds: every run sound by its own audit, methods agree, none fails or stalls.
+
+`python -m pytest -m slow -s tests/validation/test_random_decks.py` runs 300 and prints a table of
+what went wrong.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import random_decks
+
+import mbsim
+
+#: Seeds that together have each shape, a tree with and without contact, each system of units.
+QUICK = (5, 7, 12, 17, 18, 19, 21, 26, 30, 36)
+SLOW = range(300)
+
+
+def test_a_deck_follows_from_its_seed():
+    one, other = random_decks.deck_of(5), random_decks.deck_of(5)
+    assert one == other
+    assert random_decks.deck_of(6)[0] != one[0]
+
+
+def test_units_do_not_change_a_deck(tmp_path):
+    """The same bodies in all systems of units, read back in N, kg, m, s."""
+    seen = []
+    for units in random_decks.UNITS:
+        writer = random_decks.Writer(units)
+        writer.add("Body_Rigid", id=1, isground="TRUE")
+        writer.marker(10, 1, (0, 0, 0))
+        _, end = random_decks.drop(np.random.default_rng(3), writer)
+        path = tmp_path / "deck.xml"
+        path.write_text(writer.text(end, 20))
+        model = mbsim.read_model(path)
+        F, M, L, T = units[1]
+        body, contact = model.bodies[2], model.contacts[1]
+        assert model.units.mass_scale == pytest.approx(M * L / (T * T * F))
+        seen.append((body.mass * M, model.simulations[0].end_time * T, contact.mu_dynamic))
+    for other in seen[1:]:
+        assert other == pytest.approx(seen[0])
+
+
+@pytest.mark.parametrize("seed", QUICK)
+def test_a_random_deck_runs_soundly(seed, tmp_path):
+    said, offences, _ = random_decks.judge(seed, tmp_path)
+    assert not offences, said
+
+
+@pytest.mark.slow
+def test_three_hundred_random_decks_run_soundly(tmp_path):
+    table = []
+    for seed in SLOW:
+        said, offences, apart = random_decks.judge(seed, tmp_path)
+        worst = max((part for _, part in apart.values()), default=0.0)
+        table += [(seed, said, kind, f"{worst:.2g}", text) for kind, text in offences]
+    for row in table:
+        print(*row, sep=" | ")
+    assert not table
