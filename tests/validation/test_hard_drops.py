@@ -74,3 +74,29 @@ def test_and_with_spin_and_friction(tmp_path, method):
 
     rng, moving = np.random.default_rng(4), {"v": (0.5, 0.3, 0.0), "w": (5.0, -3.0, 8.0)}
     assert max(drop(tmp_path, method, 1e-4, rng, given, **moving) for _ in range(4)) < 30.0
+
+
+def rebound(k, c, m, v):
+    """Return at which speed a linear spring beside a damper throws back what comes at speed v.
+
+    d = v/w e^(-b t) sin(w t) until k d + c d' = 0, b = c/(2 m), w^2 = k/m - b^2.
+    """
+    b = c / (2.0 * m)
+    w = np.sqrt(k / m - b * b)
+    t = (np.pi - np.arctan2(c * w, k - c * b)) / w
+    return v * np.exp(-b * t) * (b / w * np.sin(w * t) - np.cos(w * t))
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853", *METHODS])
+@pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-9])
+def test_a_damper_that_comes_in_at_once(tmp_path, method, tol):
+    """Its force jumps at the touch, of which error estimates saw a 74th: 90 tol, whatever tol."""
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        k, m, v = 10.0 ** rng.uniform(6, 11), 10.0 ** rng.uniform(-2, 2), 10.0 ** rng.uniform(-1, 1)
+        c = 10.0 ** rng.uniform(-3, -0.3) * np.sqrt(k * m)
+        law = contact(stiffness=k, exponent=1.0, damping=c, dmax=1e-13)
+        model = GROUND + sphere(0.1 + 0.1 * v, mass=m, v=(0, 0, -v)) + law
+        results = run_deck(tmp_path, model, 0.2, 0.1, integrator=method, tol=tol)
+        error = abs(results["bodies/2/velocity"][-1, 2] / rebound(k, c, m, v) - 1.0)
+        assert error < 30.0 * tol, (k, c, m, v)
