@@ -10,9 +10,9 @@ import math
 
 from mbsim.core.jitable import jitable
 
-#: Rounding errors of a natural map over its largest terms, of which there are a few.
+#: Rounding errors of u over the sum of its terms, of which there are a few.
 NOISE = 8.0 * 2.0**-53
-#: Share of the largest |q| of a contact that rounding may excuse.
+#: Share of the largest |q| of a contact that rounding is at most taken for.
 EXCUSED = 1e-8
 #: A scale-free residual where there is no scale.
 LARGEST = 1e10
@@ -130,18 +130,18 @@ def norm(vector):
 
 @jitable
 def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
-    """Return three figures of the natural maps F_i with each contact's own `rho`, free of units.
+    """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
 
     * The error |F| / max(|rho q|, |r|, |rho u|).
     * The scale-free residual, the largest |F_i| / max(|r_i|, rho_i |q_i|) of a contact, at most
-      LARGEST.
+      LARGEST. Contacts count where |F_i|, |r_i| or rho_i |q_i| is above the rounding of rho_i u_i,
+      NOISE of the sum of rho_i |W_ij| |r_j|: with all three below, there is nothing to judge by.
     * The velocity error |F / rho| / |q|: the other two fall while impulses grow, and this does not.
+    * What of the scale-free residual can be made smaller: that of contacts whose |F_i| is above.
 
-    In the last two an |F_i| within the rounding of its own terms |r_i|, rho_i |q_i| and
-    rho_i |W_ij| |r_j| counts as nothing. That excuses no more than EXCUSED of rho_i times the
-    largest |q_j|, whatever the impulses.
+    Rounding is never more than EXCUSED of the largest |q_j|, whatever the impulses.
     """
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -154,7 +154,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
         fastest = max(fastest, push)
         impulse += square
     fastest = EXCUSED * math.sqrt(fastest)
-    free = 0.0
+    free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
         square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
@@ -166,20 +166,23 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
             moved += (own * u[k]) ** 2
         bound += push
         given += own**2 * push
-        size, push = math.sqrt(size), own * math.sqrt(push)
+        size = max(math.sqrt(size), own * math.sqrt(push))
+        speeds += square / own**2
         square = math.sqrt(square)
+        if square <= NOISE * size:
+            continue
+        share = square / size if square < LARGEST * size else LARGEST
         if square <= own * fastest:
             terms = 0.0
             for j in range(ptr[a], ptr[a + 1]):
                 for row in range(d):
                     for k in range(d):
                         terms += abs(val[j, row, k] * r[d * col[j] + k])
-            if square <= NOISE * (size + push + own * terms):
+            if square <= NOISE * own * terms:
+                if size > min(NOISE * terms, fastest) * own:
+                    free = max(free, share)
                 continue
-        if square > 0.0:
-            speeds += (square / own) ** 2
-            size = max(size, push)
-            free = max(free, square / size if square < LARGEST * size else LARGEST)
+        free, attainable = max(free, share), max(attainable, share)
     missing = math.sqrt(missing)
     scale = math.sqrt(max(given, impulse, moved))
     speeds = math.sqrt(speeds)
@@ -187,6 +190,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
         missing / scale if scale > 0.0 else missing,
         free,
         speeds / math.sqrt(bound) if bound > 0.0 else speeds,
+        attainable,
     )
 
 
@@ -196,14 +200,14 @@ def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, wor
 
     The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
     contact's own rho: in some units the one is small long before the other. The second is the
-    largest of |F| / |q|, MERIT_1 and, over FREE, the scale-free residual and the velocity error
-    (`own_errors`). A scale of 0 does not divide.
+    largest of |F| / |q|, MERIT_1 and, over FREE, the velocity error and what is attainable of the
+    scale-free residual (`own_errors`). A scale of 0 does not divide.
     """
     missing = residual(tangent, rolling, mu, mu_r, u, r, work)
     bound = norm(q)
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
-    own, free, speeds = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
+    own, _, speeds, free = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
     second = max(missing / bound if bound > 0.0 else missing, missing / (1.0 + math.sqrt(bound)))
     return max(error, own), max(second, free / FREE, speeds / FREE)
 

@@ -142,7 +142,7 @@ def _solve_plain(
     sweeps, every = first_sweeps(nc)
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
-    check = np.empty(5)
+    check = np.empty(6)
     ptr, col, val, diagonal, rho, u, done, error, error_q, rows = compiled(local_sweeps)(
         tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol, sweeps, every, GRACE,
         history, check,
@@ -176,9 +176,9 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
         if status == "solved" or task.late or not task.done or task.tol < 1e-3 * tol:
             break
         error = max(left.error, left.own_error)
-        if error <= tol and task.error_q > task.tol_q:
+        second = max(left.error_q, left.attainable / FREE, left.velocity_error / FREE)
+        if error <= tol and (task.error_q > task.tol_q or second <= tol):
             break
-        second = max(left.error_q, left.scale_free / FREE, left.velocity_error / FREE)
         task.tighten(
             0.5 * tol / error if error > tol else 1.0, 0.5 * tol / second if second > tol else 1.0
         )

@@ -92,7 +92,7 @@ def local_sweeps(
     scale = max(bound, norm(r), norm(u))
     check[0] = missing / scale if scale > 0.0 else missing
     check[1] = missing / bound if bound > 0.0 else missing
-    check[2], check[3], check[4] = own_errors(
+    check[2], check[3], check[4], check[5] = own_errors(
         tangent, (), ptr, col, val, mu, mu, rho, q, u, r, work
     )
     return ptr, col, val, diagonal, rho, u, done, error, error_q, rows
