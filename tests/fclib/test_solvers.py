@@ -10,7 +10,7 @@ from fclib_folder import NAMES, problem_file
 
 from mbsim.core import jit
 from mbsim.errors import ModelError
-from mbsim.fclib import factor, hdf5, ordering
+from mbsim.fclib import clock, factor, hdf5, ordering
 from mbsim.fclib.cone import count_changes
 from mbsim.fclib.merit import SLIP, STICK, judge
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
@@ -95,8 +95,9 @@ def test_factors_solve_what_full_matrices_solve(d):
     factors, exchange = np.empty(symbolic[5][-1]), np.empty(d * nc, np.int32)
     front, stack = np.empty(symbolic[6][0] ** 2), np.empty(symbolic[6][1])
     jit.function(factor.factorise)(
-        d, blocks.ptr, blocks.col, back, blocks.val, symbolic, factors, exchange, front, stack
-    )
+        d, blocks.ptr, blocks.col, back, blocks.val, symbolic, factors, exchange, front, stack,
+        clock.unlimited(),
+    )  # fmt: skip
     x = blocks.q.copy()
     jit.function(factor.solve)(d, symbolic, factors, exchange, x, np.empty(symbolic[6][0]))
     w = some_local(30, d).W.csr().toarray()

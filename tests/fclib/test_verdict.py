@@ -11,13 +11,14 @@ from numba.core.compiler_lock import global_compiler_lock
 from test_solvers import some_local, wedge
 
 from mbsim.cli.main import main
-from mbsim.fclib import clock, hdf5
+from mbsim.core import jit
+from mbsim.fclib import clock, factor, hdf5
 from mbsim.fclib.infeasible import is_infeasible
 from mbsim.fclib.merit import errors, judge
 from mbsim.fclib.problem import Local, Solution, matrix
 from mbsim.fclib.reduction import reduce
 from mbsim.fclib.solve import solve
-from mbsim.fclib.solvers import states, task
+from mbsim.fclib.solvers import newton, splitting, states, sweeps, task
 
 GRAVITY = 0.0981
 
@@ -214,19 +215,28 @@ def test_a_few_contacts_in_the_plane_get_every_combination_of_states():
         assert given.r == pytest.approx(solve(problem, 1e-12).r, abs=1e-9)
 
 
-def test_nothing_is_begun_that_the_time_does_not_allow(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(task, "clock", lambda: now[0])
-    given = task.Task(reduce(some_local(2)), np.zeros(6), 1e-4, 1e-4, deadline=1.0)
-    # four times as slow as estimated, and half of what is left
-    assert given.affordable("NSGS", 0.01, 1000) == 12
-    now[0] = 0.5
-    given.took("NSGS", 0.1, 0.0)  # five times as slow as estimated
-    assert given.affordable("NSGS", 0.01, 1000) == 5
-    assert given.affordable("NSGS", 0.01, 3) == 3
-    assert not given.late
-    assert given.affordable("NSGS", 0.2, 1000) == 0
+def test_no_method_goes_on_when_the_time_is_over():
+    blocks = reduce(some_local(60))
+    given = task.Task(blocks, np.zeros(180), 1e-14, 1e-14, deadline=clock.clock() - 1e-3)
+    sweeps.nsgs(given, 10**6)
+    assert given.iterations == 1 + sweeps.LONG // 60
+    assert not splitting.Splitting(given).advance(10**6)
+    assert not newton.Proximal(given).advance(10**6)
     assert given.late
+    # nor is a large factorisation ended: of 60 contacts in one front, and of a sparse matrix
+    for n, size in ((60, 60), (2000, 3)):
+        chain = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) < size
+        ptr = np.concatenate(([0], np.cumsum(chain.sum(axis=1)))).astype(np.int32)
+        col = np.nonzero(chain)[1].astype(np.int32)
+        val = np.where((col == np.repeat(np.arange(n), np.diff(ptr)))[:, None, None], np.eye(3), 0)
+        symbolic, back, shifted, *room, _ = jit.function(splitting.room_for_factors)(
+            3, ptr, col, val
+        )
+        for over in (False, True):
+            until = given.until if over else clock.unlimited()
+            assert over != jit.function(factor.factorise)(
+                3, ptr, col, back, shifted, symbolic, *room, until
+            )
 
 
 def test_compiling_and_loading_are_not_solving(monkeypatch):
@@ -237,7 +247,25 @@ def test_compiling_and_loading_are_not_solving(monkeypatch):
     with global_compiler_lock, global_compiler_lock:
         now[0] += 100.0
     now[0] += 2.0
+    with clock.loading():
+        now[0] += 50.0
     assert clock.clock() - began == 3.0
+
+
+def test_compiled_code_does_not_count_compiling_either():
+    asked = jit.function(clock.late)
+    asked(clock.unlimited())
+    began = clock.clock()
+    past, future = clock.until(began - 1.0), clock.until(began + 1000.0)
+    shared = clock._preparing.shared
+    for compiling, over in (
+        (0.0, (True, False)),
+        (-2000.0, (True, True)),
+        (2000.0, (False, False)),
+    ):
+        shared[0] += compiling
+        assert (asked(past), asked(future)) == over
+        shared[0] -= compiling
 
 
 def test_solved_relative_ends_with_0_and_is_said(tmp_path, monkeypatch):

@@ -120,7 +120,6 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
-    task.newton = costs.newton
     dashes = Dashes(task, costs.newton)
     if task.blocks.rolling:
         _rolling(task, costs, dashes)

@@ -16,7 +16,7 @@ from mbsim.fclib.blocks import (
     product,
     product_of_stored,
 )
-from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import improves, norm, own_errors, relative_errors, residual
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
@@ -32,6 +32,8 @@ GRACE = 20
 POLISHED_FEW = 1e-3
 #: With few contacts, sweeps between leaps ahead.
 LEAP = 8
+#: Contacts whose sweep takes long enough to ask the clock after each.
+LONG = 200
 
 
 @jitable
@@ -69,7 +71,7 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
 
 @jitable
 def local_sweeps(
-    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, history, check
+    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, until, history, check
 ):
     """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
 
@@ -83,7 +85,7 @@ def local_sweeps(
     # without rolling directions the numbers of mu_r do not matter
     done, error, error_q, rows = gauss_seidel(
         tangent, (), ptr, col, val, diagonal, q, mu, mu, rho, r, tol, tol_q, sweeps, every, grace,
-        history,
+        until, history,
     )  # fmt: skip
     u = q.copy()
     product_of_stored(m, nz, p, i, x, r, u)
@@ -123,13 +125,13 @@ def _leap(r, old, older, trial):
 @jitable
 def gauss_seidel(
     tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, tol_q, sweeps, every,
-    grace, history,
+    grace, until, history,
 ):  # fmt: skip
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
     With the first reached, the second gets as many sweeps again, and `grace` more, at most; with
     both reached, as many sweeps again may bring a tenth of them (POLISHED), with few contacts a
-    thousandth.
+    thousandth. The last sweep is the one after which it is late (`clock.until`).
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
@@ -145,18 +147,21 @@ def gauss_seidel(
     done = 0
     looked = -1
     most = sweeps
+    between = 1 + LONG // max(len(mu), 1)
     kept = np.empty(0)
     kept_error, kept_q = np.inf, np.inf
-    while done < most:
+    over = False
+    while done < most and not over:
         change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
         done += 1
+        over = done % between == 0 and late(until)
         small = False
         if done - looked > 1 and done % every:
             size = 0.0
             for k in range(len(r)):
                 size += r[k] * r[k]
             small = change <= tol * tol * size
-        if done % every == 0 or small or done == most:
+        if done % every == 0 or small or done == most or over:
             looked = done
             product(tangent, rolling, ptr, col, val, q, r, u)
             error, error_q = relative_errors(
@@ -205,19 +210,14 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
     """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
     b = task.blocks
     r: Vector = (task.r if start is None else start).copy()
-    cost, began = sweep_work(b), clock()
-    sweeps = task.affordable("NSGS", cost, sweeps)
-    if sweeps == 0:
-        return r
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
     done, error, error_q, rows = compiled(gauss_seidel)(
         b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
-        task.tol, task.tol_q, sweeps, every, GRACE, history,
+        task.tol, task.tol_q, sweeps, every, GRACE, task.until, history,
     )  # fmt: skip
     history[:rows, 0] += task.iterations
     task.iterations += done
-    task.work += done * cost
-    task.took("NSGS", done * cost, began)
+    task.work += done * sweep_work(b)
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     return r
