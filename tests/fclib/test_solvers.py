@@ -319,6 +319,18 @@ def test_merit_is_no_worse_than_that_of_siconos(name, bound):
     assert result.figures.error_q <= 1e-4
 
 
+@pytest.mark.parametrize("name", ["BoxesStack1-i100000-32", "Capsules-i125-1213"])
+def test_weak_contacts_get_newtons_method_soon(name):
+    result = solve(hdf5.read(problem_file(name)).problem, 1e-4)
+    assert result.status == "solved"
+    done = {method: rows[-1, 0] for method, rows in result.history}
+    # what is left within the first goal is no work for ADMM, nor for the 350 sweeps that 40 Newton
+    # iterations would cost; 25 and 78 iterations are needed
+    assert "ADMM" not in done
+    assert done["NSGS"] <= 100
+    assert result.iterations <= 200
+
+
 def test_a_dash_ends_at_rounding():
     problem = some_local(60)
     blocks = reduce(problem)
