@@ -129,60 +129,78 @@ def norm(vector):
 
 
 @jitable
+def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, work):
+    """Return |F_a|^2 of the natural map with the contact's own `rho`, and two shares.
+
+    The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, or 0 where all three are below
+    the rounding of rho_a u_a: NOISE of the sum of rho_a |W_aj| |r_j|, at most rho_a times
+    `fastest`. The second is the first, or 0 where |F_a| alone is below.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    own = rho[a]
+    square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
+    size, push = 0.0, 0.0
+    for k in range(d * a, d * a + d):
+        size += r[k] ** 2
+        push += q[k] ** 2
+    size, missing = max(math.sqrt(size), own * math.sqrt(push)), math.sqrt(square)
+    if missing <= NOISE * size:
+        return square, 0.0, 0.0
+    share = missing / size if missing < LARGEST * size else LARGEST
+    if missing > own * fastest:
+        return square, share, share
+    terms = 0.0
+    for j in range(ptr[a], ptr[a + 1]):
+        for row in range(d):
+            for k in range(d):
+                terms += abs(val[j, row, k] * r[d * col[j] + k])
+    if missing > NOISE * own * terms:
+        return square, share, share
+    return square, share if size > min(NOISE * terms, fastest) * own else 0.0, 0.0
+
+
+@jitable
+def most_rounding(d, q):
+    """Return the velocity that rounding is at most taken for."""
+    fastest = 0.0
+    for first in range(0, len(q), d):
+        push = 0.0
+        for k in range(first, first + d):
+            push += q[k] ** 2
+        fastest = max(fastest, push)
+    return EXCUSED * math.sqrt(fastest)
+
+
+@jitable
 def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
     """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
 
     * The error |F| / max(|rho q|, |r|, |rho u|).
-    * The scale-free residual, the largest |F_i| / max(|r_i|, rho_i |q_i|) of a contact, at most
-      LARGEST. Contacts count where |F_i|, |r_i| or rho_i |q_i| is above the rounding of rho_i u_i,
-      NOISE of the sum of rho_i |W_ij| |r_j|: with all three below, there is nothing to judge by.
+    * The scale-free residual, the largest share of a contact (`own_share`).
     * The velocity error |F / rho| / |q|: the other two fall while impulses grow, and this does not.
-    * What of the scale-free residual can be made smaller: that of contacts whose |F_i| is above.
-
-    Rounding is never more than EXCUSED of the largest |q_j|, whatever the impulses.
+    * What of the scale-free residual can be made smaller: the largest second share.
     """
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    fastest = 0.0
-    for a in range(len(mu)):
-        square, push = 0.0, 0.0
-        for k in range(d * a, d * a + d):
-            square += r[k] ** 2
-            push += q[k] ** 2
-        fastest = max(fastest, push)
-        impulse += square
-    fastest = EXCUSED * math.sqrt(fastest)
+    fastest = most_rounding(d, q)
     free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
-        square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
-        missing += square
-        size, push = 0.0, 0.0
+        push = 0.0
         for k in range(d * a, d * a + d):
-            size += r[k] ** 2
+            impulse += r[k] ** 2
             push += q[k] ** 2
             moved += (own * u[k]) ** 2
         bound += push
         given += own**2 * push
-        size = max(math.sqrt(size), own * math.sqrt(push))
+        square, share, second = own_share(
+            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, work
+        )
+        missing += square
         speeds += square / own**2
-        square = math.sqrt(square)
-        if square <= NOISE * size:
-            continue
-        share = square / size if square < LARGEST * size else LARGEST
-        if square <= own * fastest:
-            terms = 0.0
-            for j in range(ptr[a], ptr[a + 1]):
-                for row in range(d):
-                    for k in range(d):
-                        terms += abs(val[j, row, k] * r[d * col[j] + k])
-            if square <= NOISE * own * terms:
-                if size > min(NOISE * terms, fastest) * own:
-                    free = max(free, share)
-                continue
-        free, attainable = max(free, share), max(attainable, share)
+        free, attainable = max(free, share), max(attainable, second)
     missing = math.sqrt(missing)
     scale = math.sqrt(max(given, impulse, moved))
     speeds = math.sqrt(speeds)

@@ -14,7 +14,7 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
   each contact in place of 1; W, q are condensed. Units do not matter to it.
 * `scale_free`: max_i |F_i| / max(|r_i|, rho_i |q_i|) with these rho_i: no contact, light ones among
   heavy ones included, may be wrong by more. Contacts of which all three are below the rounding of
-  their velocity are left out (`cone.own_errors`).
+  their velocity are left out (`cone.own_share`).
 * `velocity_error`: |F / rho| / |q|. As impulses grow without bound all others but `error_q` fall,
   and that depends on units.
 * `merit1`: FCLIB's MERIT_1 as its code has it,

@@ -21,7 +21,7 @@ from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
 from mbsim.fclib.solvers.catalog import solver as named
-from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, sweep_work
+from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, mended, sweep_work
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -183,6 +183,12 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task, proof
         found = completed(problem, task.r, task.blocks)
         left = errors(problem, found, task.blocks)
         status = _status(left, task, tol)
+        r = mended(task) if status == "solved_relative" else None
+        if r is not None:
+            other = completed(problem, r, task.blocks)
+            after = errors(problem, other, task.blocks)
+            if _status(after, task, tol) == "solved":
+                task.r, found, left, status = r, other, after, "solved"
         if status == "solved" or task.late or not task.done or task.tol < 1e-3 * tol:
             break
         error = max(left.error, left.own_error)

@@ -292,6 +292,22 @@ def test_a_proximal_run_knows_the_mean_of_its_centres():
     assert run.mean == pytest.approx(np.mean(centres, axis=0), abs=1e-15)
 
 
+#: A chute in which two rocks are wedged: against their impulses the published error is met soon,
+#: and weak contacts elsewhere stay wrong by more than their own small size. Without any limit of
+#: time AUTO stagnates at a scale-free residual of 2e-4 and |F|/|q| = 3.8e-8.
+WEDGED = "Gen_chute-nc1035"
+#: Of these, or of perturbed copies, the like is left at 1e-4, where the published error is met long
+#: before; at 1e-8 all are solved.
+WEAK = ("Gen_chute-nc787", "Gen_kapla-nc1204")
+
+
+def is_solved(result, name):
+    """Return whether a shared problem is solved as well as this one can be."""
+    if name.startswith(WEDGED) or (name.startswith(WEAK) and result.tol >= 1e-4):
+        return result.status in ("solved", "solved_relative")
+    return result.status == "solved"
+
+
 @pytest.mark.parametrize(
     ("name", "bound"),
     [
@@ -313,10 +329,27 @@ def test_a_proximal_run_knows_the_mean_of_its_centres():
 )
 def test_merit_is_no_worse_than_that_of_siconos(name, bound):
     result = solve(hdf5.read(problem_file(name)).problem, 1e-4)
-    # Siconos looks at the published error only
-    assert result.status in ("solved", "solved_relative")
+    assert is_solved(result, name)
     assert result.figures.merit1 <= min(bound, 1e-4)
     assert result.figures.error_q <= 1e-4
+
+
+def test_a_few_weak_contacts_are_mended():
+    problem = some_local(60)
+    wanted = solve(problem, 1e-12)
+    blocks = reduce(problem)
+    size = np.linalg.norm(wanted.r.reshape(-1, 3), axis=1)
+    order = np.argsort(np.where(size > 0.0, size, np.inf))
+    for wrong, mended in ((order[:2], True), (order[:30], False)):
+        r = wanted.r.copy().reshape(-1, 3)
+        r[wrong] *= 1.01
+        task = Task(blocks, r.ravel(), 1e-4, 1e-4)
+        found = sweeps.mended(task)
+        assert (found is not None) == mended
+        if found is not None:
+            assert judge(problem, Solution(found, found)).scale_free <= 1e-3
+            # nothing else is touched
+            assert np.count_nonzero(found - task.r) <= 3 * 4
 
 
 @pytest.mark.parametrize("name", ["BoxesStack1-i100000-32", "Capsules-i125-1213"])
@@ -410,14 +443,8 @@ def perturbed(problem, seed):
 def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
     problem = perturbed(hdf5.read(problem_file(name)).problem, seed)
     result = solve(problem, 1e-8, max_seconds=60.0)  # a busy machine must not decide
-    # wedged rocks and towers keep contacts that are wrong by more than their own small size
-    assert result.status in ("solved", "solved_relative")
+    assert is_solved(result, name)
     assert judge(problem, result.solution).error <= 1e-8
-
-
-#: Problems of which only the published error may be met: weak contacts between wedged rocks and in
-#: a tower of a thousand would take AUTO several times as long.
-HARDEST = ("Gen_chute-nc1035", "Gen_chute-nc787", "Gen_kapla-nc1204", "Gen_boxwall-nc1058")
 
 
 @pytest.mark.slow
@@ -430,7 +457,7 @@ def test_auto_solves_the_shared_folder(name, tol):
         # the one that may be missed; then it must say so
         assert result.status == "solved" or result.reason
         return
-    assert result.status == "solved" or (name.startswith(HARDEST) and result.status != "not_solved")
+    assert is_solved(result, name)
     assert judge(problem, result.solution).error <= tol
 
 

@@ -93,6 +93,7 @@ class Dashes:
     def run(self, instead: float = 0.0) -> None:
         """Dash if it is time; `instead`: seconds of what would come next, which count as well."""
         task, b = self.task, self.task.blocks
+        sweeps.mend(task)
         if task.over or task.r is self.begun_at:
             return
         if task.r is not self.looked_at:
@@ -286,7 +287,9 @@ def _proximal(task: Task, run: newton.Proximal) -> None:
         before = run.error
         run.forget()
         for _ in range(WINDOW // SAMPLE):
-            if not run.advance(SAMPLE) or task.over:
+            moved = run.advance(SAMPLE)
+            sweeps.mend(task)
+            if not moved or task.over:
                 return
         if run.error > 0.5 * before:
             return

@@ -17,7 +17,16 @@ from mbsim.fclib.blocks import (
     product_of_stored,
 )
 from mbsim.fclib.clock import compiled, late
-from mbsim.fclib.cone import improves, norm, own_errors, relative_errors, residual
+from mbsim.fclib.cone import (
+    FREE,
+    improves,
+    most_rounding,
+    norm,
+    own_errors,
+    own_share,
+    relative_errors,
+    residual,
+)
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
 
@@ -32,16 +41,18 @@ GRACE = 20
 POLISHED_FEW = 1e-3
 #: With few contacts, sweeps between leaps ahead.
 LEAP = 8
+#: Rounds in which weak contacts are mended where they are no more than one in so many.
+MENDING, WEAK = 5, 20
 #: Contacts whose sweep takes long enough to ask the clock after each.
 LONG = 200
 
 
 @jitable
-def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
-    """Solve every contact once, with the newest impulses of the others; return |change|^2."""
+def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some, work):
+    """Solve contacts `some` once, with the newest impulses of the others; return |change|^2."""
     d = 1 + len(tangent) + len(rolling)
     change = 0.0
-    for a in range(len(mu)):
+    for a in some:
         first = d * a
         own = diagonal[a]
         for row in range(d):
@@ -138,6 +149,7 @@ def gauss_seidel(
     """
     d = 1 + len(tangent) + len(rolling)
     work = np.empty(5 * d)
+    every_one = np.arange(len(mu))
     u = np.empty(len(q))
     missing = np.empty(len(q))
     few = len(q) if every == 1 else 0
@@ -152,7 +164,7 @@ def gauss_seidel(
     kept_error, kept_q = np.inf, np.inf
     over = False
     while done < most and not over:
-        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
+        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, every_one, work)
         done += 1
         over = done % between == 0 and late(until)
         small = False
@@ -189,7 +201,10 @@ def gauss_seidel(
                 elif phase == LEAP - 1:
                     old[:] = r
                 elif phase == 0 and _leap(r, old, older, trial):
-                    sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, work)
+                    sweep(
+                        tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, every_one,
+                        work,
+                    )  # fmt: skip
                     product(tangent, rolling, ptr, col, val, q, trial, u)
                     leapt, leapt_q = relative_errors(
                         tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, missing
@@ -204,6 +219,63 @@ def gauss_seidel(
         r[:] = kept
         error, error_q = kept_error, kept_q
     return done, error, error_q, rows
+
+
+@jitable
+def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, most):
+    """Sweep over weak contacts, whose share (`own_share`) is above a third of the `tol` for it.
+
+    That is done as long as they are not more than `most` and one of them is above; returns whether
+    in the end none is.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    u, missing, work = np.empty(len(q)), np.empty(len(q)), np.empty(5 * d)
+    some = np.empty(most, np.int64)
+    fastest = most_rounding(d, q)
+    for _ in range(MENDING):
+        product(tangent, rolling, ptr, col, val, q, r, u)
+        found, above = 0, 0
+        for a in range(len(mu)):
+            share = own_share(
+                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, missing
+            )[2]
+            above += 1 if share > tol else 0
+            if 3.0 * share > tol:
+                if found == most:
+                    return False
+                some[found] = a
+                found += 1
+        if above == 0:
+            return True
+        for _ in range(3):
+            sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some[:found], work)
+    return False
+
+
+def mended(task: Task) -> Vector | None:
+    """Return the best iterate with its weak contacts mended, if these are few and that works."""
+    b = task.blocks
+    r = task.r.copy()
+    done = compiled(mend_weak)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
+        FREE * task.tol_q, 1 + b.contacts // WEAK,
+    )  # fmt: skip
+    return r if done else None
+
+
+def mend(task: Task) -> None:
+    """Within the first goal, try whether a few weak contacts are all that is left over."""
+    if task.over or task.error > task.tol or task.r is task.mended:
+        return
+    task.mended = task.r
+    r = mended(task)
+    if r is None:
+        return
+    error, error_q = task.look(r)
+    if task.offer(r, error, error_q):
+        task.iterations += 1
+        task.work += 3.0 * sweep_work(task.blocks)
+        task.note("NSGS", np.array([[task.iterations, error, error_q]]))
 
 
 def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -> Vector:

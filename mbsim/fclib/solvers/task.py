@@ -66,6 +66,8 @@ class Task:
     history: list[tuple[str, Any]] = field(default_factory=list)
     #: error_q and the size of r where these were looked at: impulses may grow without bound.
     sizes: list[tuple[float, float]] = field(default_factory=list)
+    #: Iterate whose weak contacts were looked at.
+    mended: Vector | None = None
     #: The deadline as compiled code wants it (`clock.until`).
     until: Any = field(init=False)
 
