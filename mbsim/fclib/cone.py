@@ -10,8 +10,10 @@ import math
 
 from mbsim.core.jitable import jitable
 
-#: Rounding errors of u over the sum of its terms, of which there are a few.
-NOISE = 8.0 * 2.0**-53
+#: Rounding errors of u over the sum of its terms: at most, of which there are a few, and between
+#: two orders of summation. Shares that matter to no tolerance.
+NOISE, ROUNDED = 8.0 * 2.0**-53, 2.0 * 2.0**-53
+NEGLIGIBLE = 1e-12
 #: Share of the largest |q| of a contact that rounding is at most taken for.
 EXCUSED = 1e-8
 #: A scale-free residual where there is no scale.
@@ -129,12 +131,13 @@ def norm(vector):
 
 
 @jitable
-def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, work):
+def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work):
     """Return |F_a|^2 of the natural map with the contact's own `rho`, and two shares.
 
-    The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, or 0 where all three are below
-    the rounding of rho_a u_a: NOISE of the sum of rho_a |W_aj| |r_j|, at most rho_a times
-    `fastest`. The second is the first, or 0 where |F_a| alone is below.
+    The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, with what rounding may hide
+    added to |F_a|: ROUNDED of the sum of rho_a |W_aj| |r_j|. It is 0 where |F_a|, |r_a| and
+    rho_a |q_a| all are below NOISE of that sum (and `most` as a velocity). The second is what can
+    be made smaller, 0 where |F_a| alone is below NOISE. `most`, `reach`: see `rounding`.
     """
     d = 1 + len(tangent) + len(rolling)
     own = rho[a]
@@ -143,32 +146,41 @@ def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastes
     for k in range(d * a, d * a + d):
         size += r[k] ** 2
         push += q[k] ** 2
-    size, missing = max(math.sqrt(size), own * math.sqrt(push)), math.sqrt(square)
-    if missing <= NOISE * size:
-        return square, 0.0, 0.0
-    share = missing / size if missing < LARGEST * size else LARGEST
-    if missing > own * fastest:
-        return square, share, share
+    held, missing = math.sqrt(size), math.sqrt(square)
+    size = max(held, own * math.sqrt(push))
+    if size > 0.0 and ROUNDED * math.sqrt(own) * reach <= NEGLIGIBLE * size:
+        return square, missing / size, missing / size
     terms = 0.0
     for j in range(ptr[a], ptr[a + 1]):
         for row in range(d):
             for k in range(d):
                 terms += abs(val[j, row, k] * r[d * col[j] + k])
-    if missing > NOISE * own * terms:
-        return square, share, share
-    return square, share if size > min(NOISE * terms, fastest) * own else 0.0, 0.0
+    terms *= own
+    rounded = ROUNDED * terms
+    if held == 0.0 and missing == 0.0 and own * u[d * a] > rounded:
+        return square, 0.0, 0.0  # open beyond doubt
+    share = (missing + rounded) / size if missing + rounded < LARGEST * size else LARGEST
+    if missing > NOISE * terms:
+        return square, share, missing / size if missing < LARGEST * size else LARGEST
+    return square, share if size > min(NOISE * terms, most * own) else 0.0, 0.0
 
 
 @jitable
-def most_rounding(d, q):
-    """Return the velocity that rounding is at most taken for."""
-    fastest = 0.0
-    for first in range(0, len(q), d):
-        push = 0.0
-        for k in range(first, first + d):
+def rounding(d, rho, q, r):
+    """Return the velocity that rounding is at most taken for, and `reach`.
+
+    The first is EXCUSED of the largest |q_a|. W being positive, the sum of |W_aj| |r_j| is at most
+    `reach` / sqrt(rho_a).
+    """
+    fastest, reach = 0.0, 0.0
+    for a in range(len(rho)):
+        push, size = 0.0, 0.0
+        for k in range(d * a, d * a + d):
             push += q[k] ** 2
+            size += r[k] ** 2
         fastest = max(fastest, push)
-    return EXCUSED * math.sqrt(fastest)
+        reach += math.sqrt(size / rho[a])
+    return EXCUSED * math.sqrt(fastest), d * reach
 
 
 @jitable
@@ -184,7 +196,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
     """
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    fastest = most_rounding(d, q)
+    most, reach = rounding(d, rho, q, r)
     free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
@@ -196,7 +208,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
         bound += push
         given += own**2 * push
         square, share, second = own_share(
-            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, work
+            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work
         )
         missing += square
         speeds += square / own**2

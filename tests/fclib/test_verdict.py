@@ -161,7 +161,9 @@ def test_rounding_is_excused_where_there_is_nothing_else():
         q[2:4] = -push, 0.0
         problem = Local(2, matrix(w), q, np.full(3, 0.5))
         found = Solution(w @ r + q, r)
-        assert judge(problem, found).scale_free == pytest.approx(free, rel=0.2)
+        # what rounding may hide, 2^-52 of the terms 0.5 and 0.5, is added
+        hidden = 2.0**-52 / impulse if impulse else 0.0
+        assert judge(problem, found).scale_free == pytest.approx(free + hidden, rel=0.2)
         attainable = errors(problem, found, reduce(problem)).attainable
         assert attainable == pytest.approx(free if free == 1.0 else 0.0, abs=1e-15)
         assert scale_free(problem, r)[0] == pytest.approx(free, rel=0.2)

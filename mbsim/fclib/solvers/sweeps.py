@@ -20,12 +20,12 @@ from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import (
     FREE,
     improves,
-    most_rounding,
     norm,
     own_errors,
     own_share,
     relative_errors,
     residual,
+    rounding,
 )
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
@@ -231,13 +231,13 @@ def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, to
     d = 1 + len(tangent) + len(rolling)
     u, missing, work = np.empty(len(q)), np.empty(len(q)), np.empty(5 * d)
     some = np.empty(most, np.int64)
-    fastest = most_rounding(d, q)
+    velocity, reach = rounding(d, rho, q, r)
     for _ in range(MENDING):
         product(tangent, rolling, ptr, col, val, q, r, u)
         found, above = 0, 0
         for a in range(len(mu)):
             share = own_share(
-                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, fastest, missing
+                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, velocity, reach, missing
             )[2]
             above += 1 if share > tol else 0
             if 3.0 * share > tol:
