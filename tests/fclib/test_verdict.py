@@ -180,17 +180,26 @@ def test_under_a_tower_of_masses_in_turn_the_ground_carries_all(boxes, ratio):
     assert result.r[:12:3].sum() == pytest.approx(weight, rel=1e-3)
 
 
-@pytest.mark.parametrize("make", [lambda: tower(10, 1e3)[0], lambda: random_problem(1), wedge])
-def test_units_do_not_matter_to_the_verdict(make):
+@pytest.mark.parametrize(
+    ("make", "tol"),
+    [
+        (lambda: tower(10, 1e3)[0], 1e-6),
+        (lambda: random_problem(1), 1e-6),
+        (wedge, 1e-6),
+        # in some units the published error is met by the first sweeps, far from the solution
+        (lambda: bodies_in_flight(60), 1e-4),
+    ],
+)
+def test_units_do_not_matter_to_the_verdict(make, tol):
     plain = make()
-    wanted = solve(plain, 1e-6, max_seconds=5.0)
+    wanted = solve(plain, tol, max_seconds=5.0)
     for factor_w in (1e-6, 1.0, 1e6):
         for factor_q in (1e-6, 1.0, 1e6):
             w = matrix(factor_w * plain.W.csr())
             scaled = Local(plain.spacedim, w, factor_q * plain.q, plain.mu)
-            result = solve(scaled, 1e-6, max_seconds=5.0)
+            result = solve(scaled, tol, max_seconds=5.0)
             assert result.status == wanted.status
-            assert result.figures.scale_free <= 1e-5
+            assert result.figures.scale_free <= 10.0 * tol
 
 
 def test_what_is_infeasible_is_proved_or_not_said():

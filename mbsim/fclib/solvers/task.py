@@ -20,6 +20,9 @@ GAINED = 0.7
 #: A method that has reached its goal goes on to this share of it while that costs little: its last
 #: iterations gain most for their work, and what is only just good enough serves nobody well.
 POLISHED = 0.1
+#: Times its goal above which the second figure says that the first was met by its units alone: a
+#: heavy body's impulses make it small at once.
+FAR_OFF = 10.0
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
 
@@ -42,7 +45,7 @@ class Task:
         Wanted: error <= tol and error_q <= tol_q.
     strict
         Whether the second must be reached; else it gets more work while it gains, at most twenty
-        times as much, or 50 ms and a third, at a time.
+        times as much, or 50 ms and a third, at a time; while it is FAR_OFF, these.
     deadline
         Value of `clock` at which to give up.
     """
@@ -129,7 +132,9 @@ class Task:
                 self.reached = self.work
             if self.error_q < GAINED * self.graced_at:
                 self.graced_at = self.error_q
-                more = min(20.0 * self.reached + 2e-5, 0.05 + 0.3 * self.reached)
+                more = 0.05 + 0.3 * self.reached
+                if self.error_q <= FAR_OFF * self.tol_q:
+                    more = min(20.0 * self.reached + 2e-5, more)
                 self.grace = self.work + more
         return better
 
