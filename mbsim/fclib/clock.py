@@ -1,18 +1,25 @@
 """The time that solving takes: seconds, those left out in which code is compiled or loaded.
 
 A machine compiles a kernel once, and a process loads it once. Numba does both under one lock, whose
-events are heard here.
+events are heard here. Compiled code asks the same clock (`late`), so that a large factorisation
+ends in time as well.
 """
 
 from __future__ import annotations
 
+import ctypes
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from numba.core import event
 
 from mbsim.core import jit
+from mbsim.core.address import call_float
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
 
 
 class _Preparing(event.Listener):
@@ -20,6 +27,7 @@ class _Preparing(event.Listener):
 
     def __init__(self) -> None:
         self.seconds = 0.0
+        self.shared = np.zeros(1)  # the same, for compiled code
         self._depth = 0
         self._began = 0.0
 
@@ -32,11 +40,15 @@ class _Preparing(event.Listener):
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.perf_counter() - self._began
+            self.shared[0] = self.seconds
 
 
 _preparing = _Preparing()
 event.register("numba:compiler_lock", _preparing)
 _seen: dict[Callable[..., Any], Callable[..., Any]] = {}
+# perf_counter itself, no function of ours: it takes no notice of Ctrl+C, which would be lost here
+_now = ctypes.CFUNCTYPE(ctypes.c_double)(time.perf_counter)
+_addresses = (float(ctypes.cast(_now, ctypes.c_void_p).value or 0), _preparing.shared.ctypes.data)
 
 
 def clock() -> float:
@@ -44,11 +56,43 @@ def clock() -> float:
     return time.perf_counter() - _preparing.seconds
 
 
+def until(deadline: float) -> Any:
+    """Return what tells compiled code a value of `clock` (`late`): three numbers.
+
+    These are the addresses of a function that gives the time and of the seconds that do not count,
+    and the deadline.
+    """
+    return np.array((*_addresses, deadline))
+
+
+@jitable
+def unlimited():
+    """Return an `until` that never comes."""
+    return np.array([0.0, 0.0, np.inf])
+
+
+@jitable
+def late(until):
+    """Return whether the time is over; a question takes 0.2 us."""
+    if until[2] == np.inf:
+        return False
+    return call_float(np.int64(until[0]), ()) - floats_at(until[1], 1)[0] > until[2]
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Leave out the seconds that the block takes, which loads code."""
+    _preparing.on_start(None)
+    try:
+        yield
+    finally:
+        _preparing.on_end(None)
+
+
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function compiled (`jit.function`); finding its cache is loading, too."""
     found = _seen.get(function)
     if found is None:
-        _preparing.on_start(None)
-        found = _seen[function] = jit.function(function)
-        _preparing.on_end(None)
+        with loading():
+            found = _seen[function] = jit.function(function)
     return found

@@ -10,9 +10,11 @@ import math
 
 from mbsim.core.jitable import jitable
 
-#: Rounding errors of a natural map over its largest terms, of which there are a few.
-NOISE = 8.0 * 2.0**-53
-#: Share of the largest |q| of a contact that rounding may excuse.
+#: Rounding errors of u over the sum of its terms: at most, of which there are a few, and between
+#: two orders of summation. Shares that matter to no tolerance.
+NOISE, ROUNDED = 8.0 * 2.0**-53, 2.0 * 2.0**-53
+NEGLIGIBLE = 1e-12
+#: Share of the largest |q| of a contact that rounding is at most taken for.
 EXCUSED = 1e-8
 #: A scale-free residual where there is no scale.
 LARGEST = 1e10
@@ -129,57 +131,88 @@ def norm(vector):
 
 
 @jitable
+def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work):
+    """Return |F_a|^2 of the natural map with the contact's own `rho`, and two shares.
+
+    The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, with what rounding may hide
+    added to |F_a|: ROUNDED of the sum of rho_a |W_aj| |r_j|. It is 0 where |F_a|, |r_a| and
+    rho_a |q_a| all are below NOISE of that sum (and `most` as a velocity). The second is what can
+    be made smaller, 0 where |F_a| alone is below NOISE. `most`, `reach`: see `rounding`.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    own = rho[a]
+    square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
+    size, push = 0.0, 0.0
+    for k in range(d * a, d * a + d):
+        size += r[k] ** 2
+        push += q[k] ** 2
+    held, missing = math.sqrt(size), math.sqrt(square)
+    size = max(held, own * math.sqrt(push))
+    if size > 0.0 and ROUNDED * math.sqrt(own) * reach <= NEGLIGIBLE * size:
+        return square, missing / size, missing / size
+    terms = 0.0
+    for j in range(ptr[a], ptr[a + 1]):
+        for row in range(d):
+            for k in range(d):
+                terms += abs(val[j, row, k] * r[d * col[j] + k])
+    terms *= own
+    rounded = ROUNDED * terms
+    if held == 0.0 and missing == 0.0 and own * u[d * a] > rounded:
+        return square, 0.0, 0.0  # open beyond doubt
+    share = (missing + rounded) / size if missing + rounded < LARGEST * size else LARGEST
+    if missing > NOISE * terms:
+        return square, share, missing / size if missing < LARGEST * size else LARGEST
+    return square, share if size > min(NOISE * terms, most * own) else 0.0, 0.0
+
+
+@jitable
+def rounding(d, rho, q, r):
+    """Return the velocity that rounding is at most taken for, and `reach`.
+
+    The first is EXCUSED of the largest |q_a|. W being positive, the sum of |W_aj| |r_j| is at most
+    `reach` / sqrt(rho_a).
+    """
+    fastest, reach = 0.0, 0.0
+    for a in range(len(rho)):
+        push, size = 0.0, 0.0
+        for k in range(d * a, d * a + d):
+            push += q[k] ** 2
+            size += r[k] ** 2
+        fastest = max(fastest, push)
+        reach += math.sqrt(size / rho[a])
+    return EXCUSED * math.sqrt(fastest), d * reach
+
+
+@jitable
 def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
-    """Return three figures of the natural maps F_i with each contact's own `rho`, free of units.
+    """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
 
     * The error |F| / max(|rho q|, |r|, |rho u|).
-    * The scale-free residual, the largest |F_i| / max(|r_i|, rho_i |q_i|) of a contact, at most
-      LARGEST.
+    * The scale-free residual, the largest share of a contact (`own_share`).
     * The velocity error |F / rho| / |q|: the other two fall while impulses grow, and this does not.
-
-    In the last two an |F_i| within the rounding of its own terms |r_i|, rho_i |q_i| and
-    rho_i |W_ij| |r_j| counts as nothing. That excuses no more than EXCUSED of rho_i times the
-    largest |q_j|, whatever the impulses.
+    * What of the scale-free residual can be made smaller: the largest second share.
     """
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    fastest = 0.0
-    for a in range(len(mu)):
-        square, push = 0.0, 0.0
-        for k in range(d * a, d * a + d):
-            square += r[k] ** 2
-            push += q[k] ** 2
-        fastest = max(fastest, push)
-        impulse += square
-    fastest = EXCUSED * math.sqrt(fastest)
-    free = 0.0
+    most, reach = rounding(d, rho, q, r)
+    free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
-        square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
-        missing += square
-        size, push = 0.0, 0.0
+        push = 0.0
         for k in range(d * a, d * a + d):
-            size += r[k] ** 2
+            impulse += r[k] ** 2
             push += q[k] ** 2
             moved += (own * u[k]) ** 2
         bound += push
         given += own**2 * push
-        size, push = math.sqrt(size), own * math.sqrt(push)
-        square = math.sqrt(square)
-        if square <= own * fastest:
-            terms = 0.0
-            for j in range(ptr[a], ptr[a + 1]):
-                for row in range(d):
-                    for k in range(d):
-                        terms += abs(val[j, row, k] * r[d * col[j] + k])
-            if square <= NOISE * (size + push + own * terms):
-                continue
-        if square > 0.0:
-            speeds += (square / own) ** 2
-            size = max(size, push)
-            free = max(free, square / size if square < LARGEST * size else LARGEST)
+        square, share, second = own_share(
+            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work
+        )
+        missing += square
+        speeds += square / own**2
+        free, attainable = max(free, share), max(attainable, second)
     missing = math.sqrt(missing)
     scale = math.sqrt(max(given, impulse, moved))
     speeds = math.sqrt(speeds)
@@ -187,6 +220,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
         missing / scale if scale > 0.0 else missing,
         free,
         speeds / math.sqrt(bound) if bound > 0.0 else speeds,
+        attainable,
     )
 
 
@@ -196,14 +230,14 @@ def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, wor
 
     The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
     contact's own rho: in some units the one is small long before the other. The second is the
-    largest of |F| / |q|, MERIT_1 and, over FREE, the scale-free residual and the velocity error
-    (`own_errors`). A scale of 0 does not divide.
+    largest of |F| / |q|, MERIT_1 and, over FREE, the velocity error and what is attainable of the
+    scale-free residual (`own_errors`). A scale of 0 does not divide.
     """
     missing = residual(tangent, rolling, mu, mu_r, u, r, work)
     bound = norm(q)
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
-    own, free, speeds = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
+    own, _, speeds, free = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
     second = max(missing / bound if bound > 0.0 else missing, missing / (1.0 + math.sqrt(bound)))
     return max(error, own), max(second, free / FREE, speeds / FREE)
 

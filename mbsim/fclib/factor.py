@@ -12,9 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.core.jitable import jitable
+from mbsim.fclib.clock import late
 
 #: Columns eliminated before the rest of a front is touched.
 PANEL = 8
+#: Size of a matrix whose panels take long enough to ask the clock before each, and the number of
+#: products in smaller ones after which it is asked.
+LARGE, MANY = 64, 200_000
 
 
 @jitable
@@ -40,11 +44,12 @@ def transposed_places(size, ptr, col):
 
 
 @jitable
-def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack):
+def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack, until):
     """Write the factors of the matrix (val: blocks, d, d); return whether every pivot was sound.
 
     `symbolic` is what `ordering.analyse` returned; `factors` has room for factor_ptr[-1] numbers,
-    `exchange` for d * nodes, `front` for room[0]^2 and `stack` for room[1].
+    `exchange` for d * nodes, `front` for room[0]^2 and `stack` for room[1]. It is given up, as not
+    sound, when it is late (`clock.until`).
     """
     front_ptr, nodes, pivots, children, rank, factor_ptr, _ = symbolic
     fronts = len(pivots)
@@ -58,10 +63,16 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
     top = 0
     piv = 0
     sound = True
+    products = 0
     for f in range(fronts):
         lo, hi = front_ptr[f], front_ptr[f + 1]
         n = d * (hi - lo)
         own = d * pivots[f]
+        products += n * n * (own + 1)
+        if products > MANY:
+            if late(until):
+                return False
+            products = 0
         matrix = front[: n * n].reshape(n, n)
         matrix[:] = 0.0
         for k in range(lo, hi):
@@ -109,7 +120,7 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack)
                         target = matrix[row + s, run_to[k] : run_to[k] + length]
                         for t in range(length):
                             target[t] += source[t]
-        sound = partial_lu(matrix, own, exchange[piv : piv + own]) and sound
+        sound = partial_lu(matrix, own, exchange[piv : piv + own], until) and sound
         _keep(matrix, own, factors[factor_ptr[f] : factor_ptr[f + 1]])
         size = n - own
         for i in range(size):
@@ -138,11 +149,16 @@ def _keep(matrix, own, kept):
 
 
 @jitable
-def partial_lu(matrix, own, exchange):
-    """Eliminate the first `own` unknowns of a dense matrix in place; rows change among these."""
+def partial_lu(matrix, own, exchange, until):
+    """Eliminate the first `own` unknowns of a dense matrix in place; rows change among these.
+
+    Return whether every pivot was sound, and there was time for all (`clock.until`).
+    """
     n = matrix.shape[0]
     sound = True
     for begin in range(0, own, PANEL):
+        if n > LARGE and late(until):
+            return False
         end = min(begin + PANEL, own)
         for k in range(begin, end):
             best = k

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.fclib.clock import loading
+
 if TYPE_CHECKING:
     from mbsim.fclib.reduction import Blocks
 
@@ -13,6 +15,11 @@ if TYPE_CHECKING:
 MANY = 300
 #: Rounding of a sum, relatively to its terms.
 ROUNDING = 1e-13
+
+
+def proof_work(contacts: int) -> float:
+    """Return the estimated seconds that looking for a proof takes."""
+    return 1e-4 + 3e-9 * contacts**3 if contacts <= MANY else 0.0
 
 
 def is_infeasible(blocks: Blocks) -> bool:
@@ -26,7 +33,8 @@ def is_infeasible(blocks: Blocks) -> bool:
     nc, nt = blocks.contacts, len(blocks.tangent)
     if not 0 < nc <= MANY:
         return False
-    from scipy.optimize import nnls
+    with loading():
+        from scipy.optimize import nnls
 
     d = 1 + nt + len(blocks.rolling)
     normal = np.zeros((nc, nc, d))

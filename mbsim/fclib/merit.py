@@ -13,7 +13,8 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 * `own_error`: |F| / max(|rho q|, |r|, |rho u|), the first with rho_i = 1 / lambda_max(W_ii) for
   each contact in place of 1; W, q are condensed. Units do not matter to it.
 * `scale_free`: max_i |F_i| / max(|r_i|, rho_i |q_i|) with these rho_i: no contact, light ones among
-  heavy ones included, may be wrong by more.
+  heavy ones included, may be wrong by more. Contacts of which all three are below the rounding of
+  their velocity are left out (`cone.own_share`).
 * `velocity_error`: |F / rho| / |q|. As impulses grow without bound all others but `error_q` fall,
   and that depends on units.
 * `merit1`: FCLIB's MERIT_1 as its code has it,
@@ -126,7 +127,7 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
     return Figures(
         error,
         _over(missing, bound),
-        *_own(blocks, u, found.r),
+        *_own(blocks, u, found.r)[:3],
         missing / (1.0 + math.sqrt(bound)) + absolute,
         missing / (1.0 + bound) + absolute,
         dynamics,
@@ -143,6 +144,8 @@ class Errors(NamedTuple):
     own_error: float
     scale_free: float
     velocity_error: float
+    #: What of `scale_free` is not rounding of velocities.
+    attainable: float = 0.0
 
     def status(self, tol: float) -> str:
         """Return `solved`, `solved_relative` or `not_solved`.
@@ -164,10 +167,10 @@ def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> Error
     return Errors(error, _over(missing, bound), *_own(blocks, u, solution.r))
 
 
-def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float]:
-    """Return own_error, scale_free and velocity_error."""
+def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float, float]:
+    """Return own_error, scale_free, velocity_error and attainable."""
     b = blocks
-    found: tuple[float, float, float] = compiled(own_errors)(
+    found: tuple[float, float, float, float] = compiled(own_errors)(
         b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r, np.empty_like(r)
     )
     return found
@@ -175,7 +178,7 @@ def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float]:
 
 def judged(figures: Figures) -> Errors:
     """Return the figures that decide."""
-    return Errors(*(getattr(figures, name) for name in Errors._fields))
+    return Errors(*(getattr(figures, name) for name in Errors._fields[:-1]))
 
 
 def _whole(problem: Local | Global, solution: Solution, blocks: Blocks | None) -> Solution:

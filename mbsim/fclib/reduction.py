@@ -25,7 +25,7 @@ from mbsim.fclib.blocks import (
     own_units,
     symmetric_pattern,
 )
-from mbsim.fclib.clock import compiled
+from mbsim.fclib.clock import compiled, unlimited
 from mbsim.fclib.factor import factorise, partial_lu, solve, solve_many, transposed_places
 from mbsim.fclib.ordering import analyse_late
 from mbsim.fclib.problem import Global, Local, Matrix, matrix
@@ -197,7 +197,7 @@ def without_multipliers(v, r, s):
             largest = max(largest, abs(r[i, j]))
         for j in range(p, p + k + 1):
             size = max(size, abs(matrix[i, j]))
-    sound = partial_lu(matrix, p, np.empty(p, np.int32))
+    sound = partial_lu(matrix, p, np.empty(p, np.int32), unlimited())
     signs = np.empty(k + 1)
     state = 1
     for _ in range(2):
@@ -530,6 +530,7 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
     analyses, big_factors = np.empty(0, np.int64), np.empty(0)
     local = np.empty(nodes, np.int32)
     sound = True
+    until = unlimited()
     solved = np.empty(n)
     for c in range(count):
         size = row_ptr[c + 1] - row_ptr[c]
@@ -555,7 +556,7 @@ def condense(d, nodes, n, mp, mi, mx, kp, ki, kx, f):
                 for k in range(mp[a], mp[a + 1]):
                     lu[j, inside[mi[k]]] += mx[k]
             swaps = exchange[row_ptr[c] : row_ptr[c + 1]]
-            sound = partial_lu(lu, size, swaps) and sound
+            sound = partial_lu(lu, size, swaps, until) and sound
             if wide > 0:
                 _full_solve(lu, swaps, x)
             _full_solve(lu, swaps, y.reshape(size, 1))
@@ -662,7 +663,7 @@ def _sparse_part(size, mine, inside, mp, mi, mx, kp, exchange):
     back = transposed_places(nodes, bptr, bcol)
     sound = factorise(
         d, bptr, bcol, back, val, symbolic, factors, exchange,
-        np.empty(symbolic[6][0] ** 2), np.empty(symbolic[6][1]),
+        np.empty(symbolic[6][0] ** 2), np.empty(symbolic[6][1]), unlimited(),
     )  # fmt: skip
     return d, symbolic, factors, sound
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.clock import clock, compiled, loading, until
 from mbsim.fclib.cone import FREE
-from mbsim.fclib.infeasible import is_infeasible
+from mbsim.fclib.infeasible import is_infeasible, proof_work
 from mbsim.fclib.merit import FAR, Errors, Figures, completed, errors, judge
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
 from mbsim.fclib.solvers.catalog import solver as named
-from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, sweep_work
+from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, mended, sweep_work
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Rounds in which a solver's goal is tightened where the error of the given problem is larger.
 ROUNDS = 4
+#: Share of the time allowed that looking for a proof may take.
+PROOF = 0.05
 
 
 @dataclass(eq=False)
@@ -119,15 +121,17 @@ def solve(
     plain = isinstance(problem, Local) and problem.V is None and problem.mu_r is None
     if isinstance(problem, Local) and plain and solver == "AUTO" and m:
         return _solve_plain(problem, tol, r, strict, began, max_seconds)
-    method = named(solver, rolling=problem.mu_r is not None)
+    with loading():
+        method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
     condensed = clock()
-    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
+    end = _end(began, max_seconds, blocks.contacts, len(blocks.col))
+    task = Task(blocks, r, tol, tol, strict, end)
     error, error_q = task.look(r)
     if guess is not None or error == 0.0:
         # that r = 0 happens to be near enough makes it no solution
         task.offer(r, error, error_q)
-    result = _rounds(problem, solver, method, task)
+    result = _rounds(problem, solver, method, task, PROOF * max_seconds)
     result.solve_s = clock() - began
     result.condense_s = condensed - began if not plain else 0.0
     return result
@@ -142,10 +146,11 @@ def _solve_plain(
     sweeps, every = first_sweeps(nc)
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
-    check = np.empty(5)
+    check = np.empty(6)
+    end = _end(began, max_seconds, nc, w.entries / problem.spacedim**2)
     ptr, col, val, diagonal, rho, u, done, error, error_q, rows = compiled(local_sweeps)(
         tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol, sweeps, every, GRACE,
-        history, check,
+        until(end), history, check,
     )  # fmt: skip
     blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc), rho)
     if error <= tol and error_q <= tol:
@@ -155,16 +160,21 @@ def _solve_plain(
                 problem, "AUTO", tol, strict, r, u, found.error, found.error_q, clock() - began,
                 0.0, done, [("NSGS", history[:rows])], blocks=blocks,
             )  # fmt: skip
-    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
+    task = Task(blocks, r, tol, tol, strict, end)
     task.work, task.iterations = done * sweep_work(blocks), done
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
-    result = _rounds(problem, "AUTO", named("AUTO"), task)
+    result = _rounds(problem, "AUTO", named("AUTO"), task, PROOF * max_seconds)
     result.solve_s = clock() - began
     return result
 
 
-def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Result:
+def _end(began: float, max_seconds: float, contacts: int, blocks: float) -> float:
+    """Return when solvers end: what they leave is still to be checked, in three products with W."""
+    return began + max_seconds - min(0.5 * max_seconds, 3e-7 * contacts + 5e-8 * blocks)
+
+
+def _rounds(problem: Local | Global, solver: str, method: Any, task: Task, proof: float) -> Result:
     """Run a solver until the errors of the problem as given are small enough."""
     tol = task.tol
     for _ in range(ROUNDS):
@@ -173,12 +183,18 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
         found = completed(problem, task.r, task.blocks)
         left = errors(problem, found, task.blocks)
         status = _status(left, task, tol)
+        r = mended(task) if status == "solved_relative" else None
+        if r is not None:
+            other = completed(problem, r, task.blocks)
+            after = errors(problem, other, task.blocks)
+            if _status(after, task, tol) == "solved":
+                task.r, found, left, status = r, other, after, "solved"
         if status == "solved" or task.late or not task.done or task.tol < 1e-3 * tol:
             break
         error = max(left.error, left.own_error)
-        if error <= tol and task.error_q > task.tol_q:
+        second = max(left.error_q, left.attainable / FREE, left.velocity_error / FREE)
+        if error <= tol and (task.error_q > task.tol_q or second <= tol):
             break
-        second = max(left.error_q, left.scale_free / FREE, left.velocity_error / FREE)
         task.tighten(
             0.5 * tol / error if error > tol else 1.0, 0.5 * tol / second if second > tol else 1.0
         )
@@ -187,7 +203,7 @@ def _rounds(problem: Local | Global, solver: str, method: Any, task: Task) -> Re
         iterations=task.iterations, history=task.history, status=status, blocks=task.blocks,
     )  # fmt: skip
     result.__dict__["solution"] = found
-    result.reason = _reason(status, left, task, tol)
+    result.reason = _reason(status, left, task, tol, proof)
     return result
 
 
@@ -198,8 +214,11 @@ def _status(left: Errors, task: Task, tol: float) -> str:
     return left.status(tol)
 
 
-def _reason(status: str, left: Errors, task: Task, tol: float) -> str:
-    """Return why a problem counts as not solved, or what is left over, or nothing."""
+def _reason(status: str, left: Errors, task: Task, tol: float, proof: float) -> str:
+    """Return why a problem counts as not solved, or what is left over, or nothing.
+
+    `proof`: seconds that looking for one may take.
+    """
     if status == "solved":
         return ""
     if status == "solved_relative":
@@ -209,7 +228,7 @@ def _reason(status: str, left: Errors, task: Task, tol: float) -> str:
         )
     met = max(left.error, left.own_error) <= tol
     if left.velocity_error > FAR * tol and (met or _looks_jammed(task)):
-        if is_infeasible(task.blocks):
+        if proof_work(task.blocks.contacts) <= proof and is_infeasible(task.blocks):
             return "jammed, and infeasible: no impulses at all keep every contact from closing"
         return "jammed: nothing bounded was found, the error is small only against large impulses"
     if left.error < 1e-13 or task.error < 1e-13:

@@ -10,7 +10,7 @@ from fclib_folder import NAMES, problem_file
 
 from mbsim.core import jit
 from mbsim.errors import ModelError
-from mbsim.fclib import factor, hdf5, ordering
+from mbsim.fclib import clock, factor, hdf5, ordering
 from mbsim.fclib.cone import count_changes
 from mbsim.fclib.merit import SLIP, STICK, judge
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
@@ -95,8 +95,9 @@ def test_factors_solve_what_full_matrices_solve(d):
     factors, exchange = np.empty(symbolic[5][-1]), np.empty(d * nc, np.int32)
     front, stack = np.empty(symbolic[6][0] ** 2), np.empty(symbolic[6][1])
     jit.function(factor.factorise)(
-        d, blocks.ptr, blocks.col, back, blocks.val, symbolic, factors, exchange, front, stack
-    )
+        d, blocks.ptr, blocks.col, back, blocks.val, symbolic, factors, exchange, front, stack,
+        clock.unlimited(),
+    )  # fmt: skip
     x = blocks.q.copy()
     jit.function(factor.solve)(d, symbolic, factors, exchange, x, np.empty(symbolic[6][0]))
     w = some_local(30, d).W.csr().toarray()
@@ -291,6 +292,22 @@ def test_a_proximal_run_knows_the_mean_of_its_centres():
     assert run.mean == pytest.approx(np.mean(centres, axis=0), abs=1e-15)
 
 
+#: A chute in which two rocks are wedged: against their impulses the published error is met soon,
+#: and weak contacts elsewhere stay wrong by more than their own small size. Without any limit of
+#: time AUTO stagnates at a scale-free residual of 2e-4 and |F|/|q| = 3.8e-8.
+WEDGED = "Gen_chute-nc1035"
+#: Of these, or of perturbed copies, the like is left at 1e-4, where the published error is met long
+#: before; at 1e-8 all are solved.
+WEAK = ("Gen_chute-nc787", "Gen_kapla-nc1204")
+
+
+def is_solved(result, name):
+    """Return whether a shared problem is solved as well as this one can be."""
+    if name.startswith(WEDGED) or (name.startswith(WEAK) and result.tol >= 1e-4):
+        return result.status in ("solved", "solved_relative")
+    return result.status == "solved"
+
+
 @pytest.mark.parametrize(
     ("name", "bound"),
     [
@@ -312,10 +329,39 @@ def test_a_proximal_run_knows_the_mean_of_its_centres():
 )
 def test_merit_is_no_worse_than_that_of_siconos(name, bound):
     result = solve(hdf5.read(problem_file(name)).problem, 1e-4)
-    # Siconos looks at the published error only
-    assert result.status in ("solved", "solved_relative")
+    assert is_solved(result, name)
     assert result.figures.merit1 <= min(bound, 1e-4)
     assert result.figures.error_q <= 1e-4
+
+
+def test_a_few_weak_contacts_are_mended():
+    problem = some_local(60)
+    wanted = solve(problem, 1e-12)
+    blocks = reduce(problem)
+    size = np.linalg.norm(wanted.r.reshape(-1, 3), axis=1)
+    order = np.argsort(np.where(size > 0.0, size, np.inf))
+    for wrong, mended in ((order[:2], True), (order[:30], False)):
+        r = wanted.r.copy().reshape(-1, 3)
+        r[wrong] *= 1.01
+        task = Task(blocks, r.ravel(), 1e-4, 1e-4)
+        found = sweeps.mended(task)
+        assert (found is not None) == mended
+        if found is not None:
+            assert judge(problem, Solution(found, found)).scale_free <= 1e-3
+            # nothing else is touched
+            assert np.count_nonzero(found - task.r) <= 3 * 4
+
+
+@pytest.mark.parametrize("name", ["BoxesStack1-i100000-32", "Capsules-i125-1213"])
+def test_weak_contacts_get_newtons_method_soon(name):
+    result = solve(hdf5.read(problem_file(name)).problem, 1e-4)
+    assert result.status == "solved"
+    done = {method: rows[-1, 0] for method, rows in result.history}
+    # what is left within the first goal is no work for ADMM, nor for the 350 sweeps that 40 Newton
+    # iterations would cost; 25 and 78 iterations are needed
+    assert "ADMM" not in done
+    assert done["NSGS"] <= 100
+    assert result.iterations <= 200
 
 
 def test_a_dash_ends_at_rounding():
@@ -397,14 +443,8 @@ def perturbed(problem, seed):
 def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
     problem = perturbed(hdf5.read(problem_file(name)).problem, seed)
     result = solve(problem, 1e-8, max_seconds=60.0)  # a busy machine must not decide
-    # wedged rocks and towers keep contacts that are wrong by more than their own small size
-    assert result.status in ("solved", "solved_relative")
+    assert is_solved(result, name)
     assert judge(problem, result.solution).error <= 1e-8
-
-
-#: Problems of which only the published error may be met: weak contacts between wedged rocks and in
-#: a tower of a thousand would take AUTO several times as long.
-HARDEST = ("Gen_chute-nc1035", "Gen_chute-nc787", "Gen_kapla-nc1204", "Gen_boxwall-nc1058")
 
 
 @pytest.mark.slow
@@ -417,7 +457,7 @@ def test_auto_solves_the_shared_folder(name, tol):
         # the one that may be missed; then it must say so
         assert result.status == "solved" or result.reason
         return
-    assert result.status == "solved" or (name.startswith(HARDEST) and result.status != "not_solved")
+    assert is_solved(result, name)
     assert judge(problem, result.solution).error <= tol
 
 

@@ -11,13 +11,14 @@ from numba.core.compiler_lock import global_compiler_lock
 from test_solvers import some_local, wedge
 
 from mbsim.cli.main import main
-from mbsim.fclib import clock, hdf5
+from mbsim.core import jit
+from mbsim.fclib import clock, factor, hdf5
 from mbsim.fclib.infeasible import is_infeasible
-from mbsim.fclib.merit import judge
+from mbsim.fclib.merit import errors, judge
 from mbsim.fclib.problem import Local, Solution, matrix
 from mbsim.fclib.reduction import reduce
 from mbsim.fclib.solve import solve
-from mbsim.fclib.solvers import states, task
+from mbsim.fclib.solvers import newton, splitting, states, sweeps, task
 
 GRAVITY = 0.0981
 
@@ -58,8 +59,16 @@ def random_problem(seed):
     return Local(d, matrix(half.T @ half), q, np.full(nc, rng.choice([0.0, 0.3, 0.8, 2.0])))
 
 
+#: Rounding of a velocity over its terms: twice that of the verdict, for sums in another order.
+ROUNDING = 16.0 * 2.0**-53
+
+
 def scale_free(problem, r):
-    """Return max |r_i - P(r_i - rho_i u_i)| / max(|r_i|, rho_i |q_i|), and |F / rho| / |q|."""
+    """Return max |r_i - P(r_i - rho_i u_i)| / max(|r_i|, rho_i |q_i|), and |F / rho| / |q|.
+
+    A contact counts for nothing where all three are below the rounding of rho_i u_i, and what is
+    rounding is no velocity error.
+    """
     d, mu = problem.spacedim, problem.mu
     w = problem.W.csr().toarray()
     u = w @ r + problem.q
@@ -71,7 +80,7 @@ def scale_free(problem, r):
         shifted[0] += mu[a] * np.linalg.norm(shifted[1:])
         x = r[some] - rho * shifted
         slide = np.linalg.norm(x[1:])
-        if slide <= mu[a] * x[0]:
+        if x[0] >= 0.0 and slide <= mu[a] * x[0]:
             nearest = x
         elif mu[a] * slide <= -x[0]:
             nearest = np.zeros(d)
@@ -80,17 +89,48 @@ def scale_free(problem, r):
             nearest = np.concatenate(([height], mu[a] * height / slide * x[1:]))
         missing = np.linalg.norm(r[some] - nearest)
         size = max(np.linalg.norm(r[some]), rho * np.linalg.norm(problem.q[some]))
-        worst = max(worst, missing / size if missing > 0.0 else 0.0)
-        squares += (missing / rho) ** 2
+        rounding = ROUNDING * rho * float((np.abs(w[some]) @ np.abs(r)).sum())
+        if max(missing, size) > rounding:
+            worst = max(worst, missing / size if size > 0.0 else np.inf)
+        squares += (max(missing - rounding, 0.0) / rho) ** 2
     return worst, np.sqrt(squares) / np.linalg.norm(problem.q)
 
 
+def bodies_in_flight(seed):
+    """Return contacts of bodies, masses over twelve decades, many of which fall side by side.
+
+    q between those is 0, or rounding.
+    """
+    rng = np.random.default_rng(seed)
+    d, bodies, nc = int(rng.integers(2, 4)), int(rng.integers(1, 9)), int(rng.integers(1, 25))
+    turns = 1 if d == 2 else 3
+    h = np.zeros((bodies, d + turns, d * nc))
+    for k in range(nc):
+        first, other = int(rng.integers(0, bodies)), int(rng.integers(-1, bodies))
+        other = -1 if other == first else other
+        frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
+        for body, sign in ((first, 1.0), (other, -1.0)):
+            if body < 0:
+                continue
+            h[body, :d, d * k : d * k + d] += sign * frame.T
+            h[body, d:, d * k : d * k + d] += rng.normal(size=(turns, d))
+    inverse = np.repeat(10.0 ** rng.uniform(-6.0, 6.0, bodies), d + turns)
+    fall = np.zeros((bodies, d + turns))
+    fall[:, :d] = rng.normal(size=d)
+    if seed % 2:
+        fall += rng.normal(size=fall.shape) * (rng.random((bodies, 1)) < 0.5)
+    h = h.reshape(-1, d * nc)
+    w = h.T @ (inverse[:, None] * h)
+    return Local(d, matrix(w), h.T @ fall.ravel(), np.full(nc, rng.choice([0.0, 0.3, 0.8, 2.0])))
+
+
+@pytest.mark.parametrize("make", [random_problem, bodies_in_flight])
 @pytest.mark.parametrize("tol", [1e-4, 1e-8])
-def test_what_is_called_solved_is_solved_contact_by_contact(tol):
+def test_what_is_called_solved_is_solved_contact_by_contact(tol, make):
     found = {"solved": 0, "solved_relative": 0, "not_solved": 0}
     for seed in range(120):
-        problem = random_problem(seed)
-        result = solve(problem, tol, max_seconds=5.0)
+        problem = make(seed)
+        result = solve(problem, tol, max_seconds=1.0)
         found[result.status] += 1
         assert bool(result.reason) == (result.status != "solved")
         if result.status == "solved":
@@ -109,6 +149,26 @@ def test_the_figures_are_those_of_the_formulas():
     assert figures.velocity_error == pytest.approx(velocity, rel=6e-3, abs=1e-15)
 
 
+def test_rounding_is_excused_where_there_is_nothing_else():
+    # a contact between two that balance each other: its velocity is 0, rounded at 1e-16
+    w = np.kron(
+        np.array([[1.0, 0.5, 0.0], [0.5, 1.0, -0.5], [0.0, -0.5, 1.0]]), np.diag([1.0, 0.5])
+    )
+    r = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    for impulse, push, free in ((0.0, 2e-16, 0.0), (1e-10, 1e-10 + 2e-16, 2e-6), (0.0, 1e-14, 1.0)):
+        r[2] = impulse
+        q = -w @ r
+        q[2:4] = -push, 0.0
+        problem = Local(2, matrix(w), q, np.full(3, 0.5))
+        found = Solution(w @ r + q, r)
+        # what rounding may hide, 2^-52 of the terms 0.5 and 0.5, is added
+        hidden = 2.0**-52 / impulse if impulse else 0.0
+        assert judge(problem, found).scale_free == pytest.approx(free + hidden, rel=0.2)
+        attainable = errors(problem, found, reduce(problem)).attainable
+        assert attainable == pytest.approx(free if free == 1.0 else 0.0, abs=1e-15)
+        assert scale_free(problem, r)[0] == pytest.approx(free, rel=0.2)
+
+
 @pytest.mark.parametrize("ratio", [1e-3, 1e3, 1e6])
 @pytest.mark.parametrize("boxes", [5, 10, 30])
 def test_under_a_tower_of_masses_in_turn_the_ground_carries_all(boxes, ratio):
@@ -120,17 +180,26 @@ def test_under_a_tower_of_masses_in_turn_the_ground_carries_all(boxes, ratio):
     assert result.r[:12:3].sum() == pytest.approx(weight, rel=1e-3)
 
 
-@pytest.mark.parametrize("make", [lambda: tower(10, 1e3)[0], lambda: random_problem(1), wedge])
-def test_units_do_not_matter_to_the_verdict(make):
+@pytest.mark.parametrize(
+    ("make", "tol"),
+    [
+        (lambda: tower(10, 1e3)[0], 1e-6),
+        (lambda: random_problem(1), 1e-6),
+        (wedge, 1e-6),
+        # in some units the published error is met by the first sweeps, far from the solution
+        (lambda: bodies_in_flight(60), 1e-4),
+    ],
+)
+def test_units_do_not_matter_to_the_verdict(make, tol):
     plain = make()
-    wanted = solve(plain, 1e-6, max_seconds=5.0)
+    wanted = solve(plain, tol, max_seconds=5.0)
     for factor_w in (1e-6, 1.0, 1e6):
         for factor_q in (1e-6, 1.0, 1e6):
             w = matrix(factor_w * plain.W.csr())
             scaled = Local(plain.spacedim, w, factor_q * plain.q, plain.mu)
-            result = solve(scaled, 1e-6, max_seconds=5.0)
+            result = solve(scaled, tol, max_seconds=5.0)
             assert result.status == wanted.status
-            assert result.figures.scale_free <= 1e-5
+            assert result.figures.scale_free <= 10.0 * tol
 
 
 def test_what_is_infeasible_is_proved_or_not_said():
@@ -157,19 +226,28 @@ def test_a_few_contacts_in_the_plane_get_every_combination_of_states():
         assert given.r == pytest.approx(solve(problem, 1e-12).r, abs=1e-9)
 
 
-def test_nothing_is_begun_that_the_time_does_not_allow(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(task, "clock", lambda: now[0])
-    given = task.Task(reduce(some_local(2)), np.zeros(6), 1e-4, 1e-4, deadline=1.0)
-    # four times as slow as estimated, and half of what is left
-    assert given.affordable("NSGS", 0.01, 1000) == 12
-    now[0] = 0.5
-    given.took("NSGS", 0.1, 0.0)  # five times as slow as estimated
-    assert given.affordable("NSGS", 0.01, 1000) == 5
-    assert given.affordable("NSGS", 0.01, 3) == 3
-    assert not given.late
-    assert given.affordable("NSGS", 0.2, 1000) == 0
+def test_no_method_goes_on_when_the_time_is_over():
+    blocks = reduce(some_local(60))
+    given = task.Task(blocks, np.zeros(180), 1e-14, 1e-14, deadline=clock.clock() - 1e-3)
+    sweeps.nsgs(given, 10**6)
+    assert given.iterations == 1 + sweeps.LONG // 60
+    assert not splitting.Splitting(given).advance(10**6)
+    assert not newton.Proximal(given).advance(10**6)
     assert given.late
+    # nor is a large factorisation ended: of 60 contacts in one front, and of a sparse matrix
+    for n, size in ((60, 60), (2000, 3)):
+        chain = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) < size
+        ptr = np.concatenate(([0], np.cumsum(chain.sum(axis=1)))).astype(np.int32)
+        col = np.nonzero(chain)[1].astype(np.int32)
+        val = np.where((col == np.repeat(np.arange(n), np.diff(ptr)))[:, None, None], np.eye(3), 0)
+        symbolic, back, shifted, *room, _ = jit.function(splitting.room_for_factors)(
+            3, ptr, col, val
+        )
+        for over in (False, True):
+            until = given.until if over else clock.unlimited()
+            assert over != jit.function(factor.factorise)(
+                3, ptr, col, back, shifted, symbolic, *room, until
+            )
 
 
 def test_compiling_and_loading_are_not_solving(monkeypatch):
@@ -180,7 +258,25 @@ def test_compiling_and_loading_are_not_solving(monkeypatch):
     with global_compiler_lock, global_compiler_lock:
         now[0] += 100.0
     now[0] += 2.0
+    with clock.loading():
+        now[0] += 50.0
     assert clock.clock() - began == 3.0
+
+
+def test_compiled_code_does_not_count_compiling_either():
+    asked = jit.function(clock.late)
+    asked(clock.unlimited())
+    began = clock.clock()
+    past, future = clock.until(began - 1.0), clock.until(began + 1000.0)
+    shared = clock._preparing.shared
+    for compiling, over in (
+        (0.0, (True, False)),
+        (-2000.0, (True, True)),
+        (2000.0, (False, False)),
+    ):
+        shared[0] += compiling
+        assert (asked(past), asked(future)) == over
+        shared[0] -= compiling
 
 
 def test_solved_relative_ends_with_0_and_is_said(tmp_path, monkeypatch):

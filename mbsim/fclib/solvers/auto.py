@@ -43,8 +43,8 @@ BEGIN_DASH, SHARE, SHARE_NEXT, PATIENCE = 5e-5, 0.4, 0.25, 2
 CHANGES = 0.01
 #: Iterations of ADMM that show whether all bodies rest.
 RESTED = 5
-#: Newton iterations that a proximal finish takes, roughly.
-FINISH = 40
+#: Newton iterations that a proximal finish takes, roughly: at all, and within the first goal.
+FINISH, FINISH_NEAR = 40, 8
 #: Error from which the proximal method is started, unless sweeps do not get there.
 NEAR = 1.5e-4
 #: rho and reach of successive runs of the proximal method: one that fails should not be repeated.
@@ -93,6 +93,7 @@ class Dashes:
     def run(self, instead: float = 0.0) -> None:
         """Dash if it is time; `instead`: seconds of what would come next, which count as well."""
         task, b = self.task, self.task.blocks
+        sweeps.mend(task)
         if task.over or task.r is self.begun_at:
             return
         if task.r is not self.looked_at:
@@ -103,7 +104,8 @@ class Dashes:
         if self.cost <= max(SHARE * spent, SHARE_NEXT * instead):
             self.begun_at = task.r
             newton.Proximal(task, newton.DASH_ALPHA).dash()
-            self.due = 2.0 * task.work
+            if task.r is self.begun_at:
+                self.due = 2.0 * task.work
 
     def polish(self) -> None:
         """Make a solution better, where that costs little."""
@@ -120,7 +122,6 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
-    task.newton = costs.newton
     dashes = Dashes(task, costs.newton)
     if task.blocks.rolling:
         _rolling(task, costs, dashes)
@@ -136,13 +137,16 @@ def _solve(task: Task, costs: Costs, dashes: Dashes) -> None:
     """Solve with sweeps, ADMM and Newton's method."""
     _sweep(task, BEGIN, dashes)
     finish = FINISH * costs.newton
-    if not task.over and task.blocks.contacts >= STACKS and task.error > max(SETTLED, task.tol):
+    far = max(SETTLED, task.tol)
+    if not task.over and task.blocks.contacts >= STACKS and task.error > far:
         trial = BEGIN + costs.factor + 2.0 * RESTED * costs.splitting
         _sweep(task, trial, dashes)
         dashes.run(trial)
-        if not task.over:
+        if not task.over and task.error > far:
             _try_splitting(task, costs, finish, dashes)
     dashes.run(BEGIN)
+    if task.error <= task.tol:
+        finish = FINISH_NEAR * costs.newton
     _sweep(task, finish, dashes, near=True)
     if not task.over:
         _finish(task)
@@ -193,12 +197,16 @@ def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
 def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> None:
     """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
 
-    `near`: sweep as well to get near enough for the proximal method.
+    `near`: sweep as well to get near enough for the proximal method. Within the first goal it is
+    near, and weak contacts, which are left, come slower than predicted: no more than half is spent.
     """
     cost = sweeps.sweep_work(task.blocks)
     spent = task.work
     dashes.run()
-    while not task.over and task.work - spent < 2.0 * work:
+    while not task.over:
+        most = 0.5 if near and task.error <= task.tol else 2.0
+        if task.work - spent >= most * work:
+            return
         rows = task.history[-1][1]
         left = _remaining(rows, task)
         if near and left * cost > work and task.error > NEAR:
@@ -279,7 +287,9 @@ def _proximal(task: Task, run: newton.Proximal) -> None:
         before = run.error
         run.forget()
         for _ in range(WINDOW // SAMPLE):
-            if not run.advance(SAMPLE) or task.over:
+            moved = run.advance(SAMPLE)
+            sweeps.mend(task)
+            if not moved or task.over:
                 return
         if run.error > 0.5 * before:
             return

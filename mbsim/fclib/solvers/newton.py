@@ -20,7 +20,7 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
-from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import bring_into_cones, improves, norm, own_errors, relative_errors
 from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
@@ -45,15 +45,13 @@ HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
-#: More Newton iterations than any call takes.
-MANY = 10**9
 
 # places in `state`, what a later call needs to go on
 (
     ALPHA, FAILED_AT, SINCE, BEST, BEST_Q, STEPS, NEWTONS, ERROR, STALLED, WORK, SHARP, REACH, DASH,
-    PATIENCE, LAST,
-) = range(15)  # fmt: skip
-STATE = 15
+    PATIENCE,
+) = range(14)  # fmt: skip
+STATE = 14
 
 
 @jitable
@@ -205,16 +203,18 @@ def _linear_system(tangent, ptr, col, val, mu, rho, shift, u, r, slip, number, n
 
 @jitable
 def proximal_newton(
-    tangent, ptr, col, val, diagonal, q, mu, own, r, centre, state, tol, tol_q, limit, history, rows
-):
+    tangent, ptr, col, val, diagonal, q, mu, own, r, centre, state, tol, tol_q, limit, until,
+    history, rows,
+):  # fmt: skip
     """Take proximal steps until the error is small enough or `limit` Newton iterations are spent.
+
+    It ends with the iteration in which it gets late (`clock.until`).
 
     `r` holds the best iterate, in and out; `centre` and `state` what a later call goes on from (a
     first call has state[ALPHA] > 0, state[BEST] the error of r, and the centre at r).
     With the goal reached, one more step, of at most FINAL iterations, is taken to a tenth of it.
     With state[DASH] it is one step of so many iterations at most, which ends when more than
     state[PATIENCE] of them in a row leave more than GAIN of the error, or at WELL times the goal.
-    No more than state[LAST] Newton iterations are begun.
     Returns the number of rows in `history` (Newton iterations so far, error, |F|/|q|).
     """
     nt = len(tangent)
@@ -259,7 +259,7 @@ def proximal_newton(
     spent = 0
     flops = 0.0
     finishing = False
-    while (spent < limit or finishing) and spent < state[LAST]:
+    while (spent < limit or finishing) and not late(until):
         alpha = state[ALPHA]
         shift = alpha * mean
         for a in range(nc):
@@ -284,13 +284,11 @@ def proximal_newton(
         if state[DASH] > 0.0:
             aim = WELL * final
             most = int(state[DASH])
-        if most > state[LAST] - spent:
-            most = int(state[LAST] - spent)
         recent[:] = size_f
         newtons = 0
         good = False
         reached, misses = state[BEST], 0.0
-        while newtons < most:
+        while newtons < most and not late(until):
             # Newton's direction
             same = newtons + spent > 0
             for a in range(nc):
@@ -322,7 +320,7 @@ def proximal_newton(
                     rhs,
                 )  # fmt: skip
                 sound = factorise(
-                    d, rptr, rcol, back, jac, symbolic, factors, exchange, front, stack
+                    d, rptr, rcol, back, jac, symbolic, factors, exchange, front, stack, until
                 )
                 if sound:
                     solve(d, symbolic, factors, exchange, rhs, part)
@@ -482,11 +480,6 @@ class Proximal:
         return float(self.state[STALLED])
 
     @property
-    def newton_work(self) -> float:
-        """Estimated seconds of a Newton iteration so far (0 before the first)."""
-        return float(self.state[WORK] / max(self.state[NEWTONS], 1.0))
-
-    @property
     def mean(self) -> Vector:
         """Mean of the centres since `forget`: the middle, if the run goes round in a circle."""
         found: Vector = self.total / max(self.samples, 1)
@@ -501,8 +494,6 @@ class Proximal:
         """Spend about `limit` Newton iterations; return whether anything was done."""
         task, state = self.task, self.state
         work, newtons = state[WORK], state[NEWTONS]
-        if not self._affords():
-            return False
         rows = self._step(limit)
         rows[:, 0] += task.iterations - newtons
         self.total += self.centre
@@ -521,8 +512,6 @@ class Proximal:
         """
         task, state = self.task, self.state
         state[DASH], state[PATIENCE] = most, patience
-        if not self._affords():
-            return
         rows = self._step(1)
         within = state[BEST] <= task.tol and task.error <= task.tol
         gained = state[BEST_Q] <= GAIN * task.error_q if within else False
@@ -534,26 +523,16 @@ class Proximal:
             rows[:, 0] = task.iterations
             task.note("NSN", rows)
 
-    def _affords(self) -> bool:
-        """Set how many Newton iterations there is time for; return whether there are any."""
-        state = self.state
-        step = self.newton_work or self.task.newton
-        last = self.task.affordable("Newton", step, MANY) if step > 0.0 else MANY
-        state[LAST] = last
-        return last > 0
-
     def _step(self, limit: int) -> Any:
         """Spend about `limit` Newton iterations and return rows for the history."""
-        work, began = float(self.state[WORK]), clock()
         b, task = self.task.blocks, self.task
         r = self.r.copy()
         history = np.empty((ROWS, 3))
         rows = compiled(proximal_newton)(
             b.tangent, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.rho, r, self.centre,
-            self.state, task.tol, task.tol_q, limit, history, 0,
+            self.state, task.tol, task.tol_q, limit, task.until, history, 0,
         )  # fmt: skip
         self.r = r
-        task.took("Newton", float(self.state[WORK]) - work, began)
         return history[:rows]
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
-from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import cone_height, improves, norm, relative_errors
 from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
@@ -78,9 +78,9 @@ def room_for_factors(d, ptr, col, val):
 @jitable
 def admm(
     tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, own, r, z, y, last_z, last_y, lift,
-    room, state, accelerate, tol, tol_q, limit, every, history, rows,
+    room, state, accelerate, tol, tol_q, limit, every, until, history, rows,
 ):  # fmt: skip
-    """Iterate until the error is small enough or `limit` iterations are done.
+    """Iterate until the error is small enough, `limit` iterations are done or it is late.
 
     With the goal reached, a tenth of the iterations more may bring a tenth of it (POLISHED).
     `r` holds the best iterate, in and out. z, y, what they were before they were accelerated
@@ -114,6 +114,8 @@ def admm(
     flops = elimination_flops(symbolic, d)
     last = np.inf
     for _ in range(limit):
+        if late(until):
+            return rows
         penalty = state[PENALTY]
         if penalty != state[FACTORED]:
             state[WORK] += factor_work(flops, len(col))
@@ -121,7 +123,9 @@ def admm(
                 k = diagonal[a]
                 for s in range(d):
                     shifted[k, s, s] = val[k, s, s] + penalty * weight[a]
-            if not factorise(d, ptr, col, back, shifted, symbolic, factors, exchange, front, stack):
+            if not factorise(
+                d, ptr, col, back, shifted, symbolic, factors, exchange, front, stack, until
+            ):
                 return rows
             state[FACTORED] = penalty
         for a in range(nc):
@@ -237,10 +241,6 @@ class Splitting:
         b = task.blocks
         d = 1 + len(b.tangent) + len(b.rolling)
         self.room = compiled(room_for_factors)(d, b.ptr, b.col, b.val)
-        symbolic, factors = self.room[0], self.room[3]
-        flops = compiled(elimination_flops)(symbolic, d)
-        self.factor = float(compiled(factor_work)(flops, len(b.col)))
-        self.step = 1e-9 * len(factors) + 1e-7 * b.contacts + 1e-8 * len(b.col)
 
     def penalise(self, penalty: float) -> None:
         """Go on with another penalty."""
@@ -260,21 +260,16 @@ class Splitting:
         """Iterate at most `limit` times; return whether anything was done."""
         task, state = self.task, self.state
         b = task.blocks
-        r, began = task.r.copy(), clock()
-        # the penalty may change on the way
-        limit = task.affordable("ADMM", self.step, limit, 2.0 * self.factor)
-        if limit == 0:
-            return False
+        r = task.r.copy()
         history = np.empty((min(ROWS, limit), 3))
         work, before = state[WORK], state[ITERATIONS]
         rows = compiled(admm)(
             b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r,
             b.rho, r, self.z, self.y, self.last_z, self.last_y, self.lift, self.room, state,
-            self.accelerate, task.tol, task.tol_q, limit, every, history, 0,
+            self.accelerate, task.tol, task.tol_q, limit, every, task.until, history, 0,
         )  # fmt: skip
         history[:rows, 0] += task.iterations - before
         task.work += float(state[WORK] - work)
-        task.took("ADMM", float(state[WORK] - work), began)
         task.iterations += int(state[ITERATIONS] - before)
         if np.isfinite(state[BEST]):
             task.offer(r, state[BEST], state[BEST_Q])

@@ -16,8 +16,17 @@ from mbsim.fclib.blocks import (
     product,
     product_of_stored,
 )
-from mbsim.fclib.clock import clock, compiled
-from mbsim.fclib.cone import improves, norm, own_errors, relative_errors, residual
+from mbsim.fclib.clock import compiled, late
+from mbsim.fclib.cone import (
+    FREE,
+    improves,
+    norm,
+    own_errors,
+    own_share,
+    relative_errors,
+    residual,
+    rounding,
+)
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
 
@@ -32,14 +41,18 @@ GRACE = 20
 POLISHED_FEW = 1e-3
 #: With few contacts, sweeps between leaps ahead.
 LEAP = 8
+#: Rounds in which weak contacts are mended where they are no more than one in so many.
+MENDING, WEAK = 5, 20
+#: Contacts whose sweep takes long enough to ask the clock after each.
+LONG = 200
 
 
 @jitable
-def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
-    """Solve every contact once, with the newest impulses of the others; return |change|^2."""
+def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some, work):
+    """Solve contacts `some` once, with the newest impulses of the others; return |change|^2."""
     d = 1 + len(tangent) + len(rolling)
     change = 0.0
-    for a in range(len(mu)):
+    for a in some:
         first = d * a
         own = diagonal[a]
         for row in range(d):
@@ -69,7 +82,7 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work):
 
 @jitable
 def local_sweeps(
-    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, history, check
+    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, until, history, check
 ):
     """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
 
@@ -83,7 +96,7 @@ def local_sweeps(
     # without rolling directions the numbers of mu_r do not matter
     done, error, error_q, rows = gauss_seidel(
         tangent, (), ptr, col, val, diagonal, q, mu, mu, rho, r, tol, tol_q, sweeps, every, grace,
-        history,
+        until, history,
     )  # fmt: skip
     u = q.copy()
     product_of_stored(m, nz, p, i, x, r, u)
@@ -92,7 +105,7 @@ def local_sweeps(
     scale = max(bound, norm(r), norm(u))
     check[0] = missing / scale if scale > 0.0 else missing
     check[1] = missing / bound if bound > 0.0 else missing
-    check[2], check[3], check[4] = own_errors(
+    check[2], check[3], check[4], check[5] = own_errors(
         tangent, (), ptr, col, val, mu, mu, rho, q, u, r, work
     )
     return ptr, col, val, diagonal, rho, u, done, error, error_q, rows
@@ -123,19 +136,20 @@ def _leap(r, old, older, trial):
 @jitable
 def gauss_seidel(
     tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, tol_q, sweeps, every,
-    grace, history,
+    grace, until, history,
 ):  # fmt: skip
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
 
     With the first reached, the second gets as many sweeps again, and `grace` more, at most; with
     both reached, as many sweeps again may bring a tenth of them (POLISHED), with few contacts a
-    thousandth.
+    thousandth. The last sweep is the one after which it is late (`clock.until`).
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
     """
     d = 1 + len(tangent) + len(rolling)
     work = np.empty(5 * d)
+    every_one = np.arange(len(mu))
     u = np.empty(len(q))
     missing = np.empty(len(q))
     few = len(q) if every == 1 else 0
@@ -145,18 +159,21 @@ def gauss_seidel(
     done = 0
     looked = -1
     most = sweeps
+    between = 1 + LONG // max(len(mu), 1)
     kept = np.empty(0)
     kept_error, kept_q = np.inf, np.inf
-    while done < most:
-        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, work)
+    over = False
+    while done < most and not over:
+        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, every_one, work)
         done += 1
+        over = done % between == 0 and late(until)
         small = False
         if done - looked > 1 and done % every:
             size = 0.0
             for k in range(len(r)):
                 size += r[k] * r[k]
             small = change <= tol * tol * size
-        if done % every == 0 or small or done == most:
+        if done % every == 0 or small or done == most or over:
             looked = done
             product(tangent, rolling, ptr, col, val, q, r, u)
             error, error_q = relative_errors(
@@ -184,7 +201,10 @@ def gauss_seidel(
                 elif phase == LEAP - 1:
                     old[:] = r
                 elif phase == 0 and _leap(r, old, older, trial):
-                    sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, work)
+                    sweep(
+                        tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, every_one,
+                        work,
+                    )  # fmt: skip
                     product(tangent, rolling, ptr, col, val, q, trial, u)
                     leapt, leapt_q = relative_errors(
                         tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, missing
@@ -201,23 +221,75 @@ def gauss_seidel(
     return done, error, error_q, rows
 
 
+@jitable
+def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, most):
+    """Sweep over weak contacts, whose share (`own_share`) is above a third of the `tol` for it.
+
+    That is done as long as they are not more than `most` and one of them is above; returns whether
+    in the end none is.
+    """
+    d = 1 + len(tangent) + len(rolling)
+    u, missing, work = np.empty(len(q)), np.empty(len(q)), np.empty(5 * d)
+    some = np.empty(most, np.int64)
+    velocity, reach = rounding(d, rho, q, r)
+    for _ in range(MENDING):
+        product(tangent, rolling, ptr, col, val, q, r, u)
+        found, above = 0, 0
+        for a in range(len(mu)):
+            share = own_share(
+                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, velocity, reach, missing
+            )[2]
+            above += 1 if share > tol else 0
+            if 3.0 * share > tol:
+                if found == most:
+                    return False
+                some[found] = a
+                found += 1
+        if above == 0:
+            return True
+        for _ in range(3):
+            sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some[:found], work)
+    return False
+
+
+def mended(task: Task) -> Vector | None:
+    """Return the best iterate with its weak contacts mended, if these are few and that works."""
+    b = task.blocks
+    r = task.r.copy()
+    done = compiled(mend_weak)(
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
+        FREE * task.tol_q, 1 + b.contacts // WEAK,
+    )  # fmt: skip
+    return r if done else None
+
+
+def mend(task: Task) -> None:
+    """Within the first goal, try whether a few weak contacts are all that is left over."""
+    if task.over or task.error > task.tol or task.r is task.mended:
+        return
+    task.mended = task.r
+    r = mended(task)
+    if r is None:
+        return
+    error, error_q = task.look(r)
+    if task.offer(r, error, error_q):
+        task.iterations += 1
+        task.work += 3.0 * sweep_work(task.blocks)
+        task.note("NSGS", np.array([[task.iterations, error, error_q]]))
+
+
 def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -> Vector:
     """Sweep at most `sweeps` times from `start`, by default the best iterate; return the last."""
     b = task.blocks
     r: Vector = (task.r if start is None else start).copy()
-    cost, began = sweep_work(b), clock()
-    sweeps = task.affordable("NSGS", cost, sweeps)
-    if sweeps == 0:
-        return r
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
     done, error, error_q, rows = compiled(gauss_seidel)(
         b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
-        task.tol, task.tol_q, sweeps, every, GRACE, history,
+        task.tol, task.tol_q, sweeps, every, GRACE, task.until, history,
     )  # fmt: skip
     history[:rows, 0] += task.iterations
     task.iterations += done
-    task.work += done * cost
-    task.took("NSGS", done * cost, began)
+    task.work += done * sweep_work(b)
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     return r

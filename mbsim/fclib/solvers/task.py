@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.fclib.blocks import product
-from mbsim.fclib.clock import clock, compiled
+from mbsim.fclib.clock import clock, compiled, until
 from mbsim.fclib.cone import improves, relative_errors
 
 if TYPE_CHECKING:
@@ -20,8 +20,9 @@ GAINED = 0.7
 #: A method that has reached its goal goes on to this share of it while that costs little: its last
 #: iterations gain most for their work, and what is only just good enough serves nobody well.
 POLISHED = 0.1
-#: Seconds over those estimated that a method is thought to take before it has run.
-UNKNOWN = 4.0
+#: Times its goal above which the second figure says that the first was met by its units alone: a
+#: heavy body's impulses make it small at once.
+FAR_OFF = 10.0
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
 
@@ -44,7 +45,7 @@ class Task:
         Wanted: error <= tol and error_q <= tol_q.
     strict
         Whether the second must be reached; else it gets more work while it gains, at most twenty
-        times as much, or 50 ms and a third, at a time.
+        times as much, or 50 ms and a third, at a time; while it is FAR_OFF, these.
     deadline
         Value of `clock` at which to give up.
     """
@@ -68,11 +69,13 @@ class Task:
     history: list[tuple[str, Any]] = field(default_factory=list)
     #: error_q and the size of r where these were looked at: impulses may grow without bound.
     sizes: list[tuple[float, float]] = field(default_factory=list)
-    #: Estimated seconds of a Newton iteration, where a method knows it.
-    newton: float = 0.0
-    #: Seconds that a method took over those estimated, and whether there is no time for any more.
-    pace: dict[str, float] = field(default_factory=dict)
-    expired: bool = False
+    #: Iterate whose weak contacts were looked at.
+    mended: Vector | None = None
+    #: The deadline as compiled code wants it (`clock.until`).
+    until: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.until = until(self.deadline)
 
     @property
     def done(self) -> bool:
@@ -88,33 +91,13 @@ class Task:
 
     @property
     def late(self) -> bool:
-        """Whether the time is over, or too short for what would come next."""
-        return self.expired or clock() > self.deadline
+        """Whether the time is over."""
+        return clock() > self.deadline
 
     @property
     def over(self) -> bool:
         """Whether to stop: done, or out of time."""
         return self.done or self.late
-
-    def affordable(self, name: str, step: float, limit: int, once: float = 0.0) -> int:
-        """Return how many iterations of a method there is time for, at most `limit`.
-
-        `step`, `once`: estimated seconds of an iteration and of beginning.
-        """
-        if self.deadline == np.inf:
-            return limit
-        pace = self.pace.get(name, UNKNOWN)
-        room = ((self.deadline - clock()) / pace - once) / step
-        self.expired = not room >= 1.0
-        if self.expired:
-            return 0
-        # a machine's pace changes: at the end half of what is left, then half of that
-        return limit if 2 * limit <= room else max(1, min(limit, int(0.5 * room)))
-
-    def took(self, name: str, work: float, began: float) -> None:
-        """Learn from a method that began at a value of `clock` and was estimated to take `work`."""
-        if work > 0.0:
-            self.pace[name] = max(clock() - began, 1e-9) / work
 
     def tighten(self, factor: float, factor_q: float) -> None:
         """Want smaller errors, by these factors."""
@@ -128,19 +111,9 @@ class Task:
         u = np.empty_like(r)
         compiled(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
         errors: tuple[float, float] = compiled(relative_errors)(
-            b.tangent,
-            b.rolling,
-            b.ptr,
-            b.col,
-            b.val,
-            b.mu,
-            b.mu_r,
-            b.rho,
-            b.q,
-            u,
-            r,
+            b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r,
             np.empty_like(r),
-        )
+        )  # fmt: skip
         return errors
 
     def offer(self, r: Vector, error: float, error_q: float) -> bool:
@@ -159,7 +132,9 @@ class Task:
                 self.reached = self.work
             if self.error_q < GAINED * self.graced_at:
                 self.graced_at = self.error_q
-                more = min(20.0 * self.reached + 2e-5, 0.05 + 0.3 * self.reached)
+                more = 0.05 + 0.3 * self.reached
+                if self.error_q <= FAR_OFF * self.tol_q:
+                    more = min(20.0 * self.reached + 2e-5, more)
                 self.grace = self.work + more
         return better
 
