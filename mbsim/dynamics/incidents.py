@@ -324,6 +324,9 @@ def commit_slot(scene, t, h, y, s):
         log_touch(scene, t, h, y, s)
     elif now == 0 and before == 1:
         log_leave(scene, t, h, y, s)
+        for k in range(4):
+            # what it was linearised at tells nothing of another touch
+            work.grip[s, k] = 0.0
     # X and memory of an incident that ended, or that is another than before, begin again at 0;
     # at touch they have gathered since the touch within the step and stay
     x, z, begins = scene.slots.x[s], scene.slots.z[s], now == 1 and before == 0

@@ -232,8 +232,8 @@ def friction_left(scene, e, y):
     work, largest = scene.work, 0.0
     for k in range(work.hit[len(work.hit) - 1]):
         s = work.hit[k]
-        grip, point, normal = work.grip[s], work.points[s], work.slot[s, NORMAL]
-        if normal <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
+        grip, point = work.grip[s], work.points[s]
+        if work.slot[s, NORMAL] <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
             continue
         gi, gj = sides(scene, s)
         p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
@@ -244,8 +244,8 @@ def friction_left(scene, e, y):
         )
         u, w = dot(v, tx), dot(v, cross(n, tx))
         change = max(abs(grip[0] * u + grip[1] * w), abs(grip[2] * u + grip[3] * w))
-        if not change <= largest * normal:
-            largest = change / normal
+        if not change <= largest:
+            largest = change
     return largest
 
 

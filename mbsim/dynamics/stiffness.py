@@ -339,7 +339,7 @@ def add_contact_slopes(scene, T, t, h, y, s):
         slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
         counts = min(1.0, slow / (SLOW * scene.world.scale[1]))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2]
+        work.grip[s, k] = counts * L.law[k // 2, k % 2] / given[5] if given[5] > 0.0 else 0.0
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

@@ -4,6 +4,8 @@ What carries is spread by the exterior angle of the patch's border: an arc has i
 a corner the angle by which the border turns there. Their sum is 2 pi for every convex patch,
 so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 shares, a
 polygon of 4 corners 4. A line has 2 shares, fading to 1 as it shrinks to a point.
+What is tilted until no more than one place of it touches is no patch: there one point carries, at
+the depth of the least overlap, whose slope its force is. `share_with_one` leads over to that.
 """
 
 from __future__ import annotations
@@ -141,11 +143,53 @@ def line_share(length, radius):
 
 
 @jitable
-def segment_on_disc(points, first, a, b, disc, o, n, side):
-    """Write the ends of the part of segment a-b that lies over an end disc; return whether any.
+def disc_lies(width, tilt, f):
+    """Return the part that a patch carries: 1, and 0 where it is tilted to one place.
 
+    `width` is how far it reaches along the tilt from its middle, `tilt` a tangent, f the depth.
+    Of a rim the points at +-120 degrees touch up to 1.5 width tilt = f.
+    """
+    return fade(3.0 - 1.5 * width * tilt / f)
+
+
+@jitable
+def line_lies(depth_a, depth_b, f):
+    """Return the part that a line carries: 1, and 0 where one end is far above what touches."""
+    return fade(2.0 - abs(depth_a - depth_b) / f)
+
+
+@jitable
+def side_faces(n, out):
+    """Return the part that a side of normal `out` carries along n: none where its rim presses."""
+    return fade(1.0 - 10.0 * norm(add(n, out)))
+
+
+@jitable
+def share_with_one(points, count, part, crossed, f, p, n):
+    """Leave a part of the force to the first `count` rows, the rest to one point p, the next row.
+
+    No row is deeper than f, the least overlap. Rows that carry less than one point would leave the
+    rest to it as well, unless they have a point where lines cross (`crossed`).
+    """
+    carried = 0.0
+    for row in range(count):
+        points[row, 0] = min(points[row, 0], f)
+        carried += points[row, 7] * max(0.0, points[row, 0]) / f
+    part = max(0.0, part) if crossed else max(0.0, part) * fade(2.0 * carried - 1.0)
+    for row in range(count):
+        points[row, 7] *= part
+        if points[row, 7] <= SMALL:
+            points[row, 0], points[row, 7] = min(points[row, 0], -f), 1.0
+    put_share(points[count], f, p, n, 1.0 - part)
+
+
+@jitable
+def segment_on_disc(points, first, a, b, disc, o, n, side, f):
+    """Write the ends of the part of segment a-b that lies over an end disc.
+
+    Returns the part of the force that they carry, -1 where nothing lies over it.
     `disc` is (centre, radius), `o` its outward normal, `side` 1 where the disc is I's and the
-    segment J's, else -1. Depth is measured along n.
+    segment J's, else -1. Depth is measured along n; f is the least overlap.
     """
     centre, r = disc
     no = dot(n, o)
@@ -158,18 +202,18 @@ def segment_on_disc(points, first, a, b, disc, o, n, side):
     ww, qw = dot(way, way), dot(qa, way)
     root = qw * qw - ww * (dot(qa, qa) - r * r)
     if ww == 0.0 or root <= 0.0:
-        return False
+        return -1.0
     root = math.sqrt(root)
     low, high = max(0.0, (-qw - root) / ww), min(1.0, (root - qw) / ww)
     if low >= high:
-        return False
+        return -1.0
     share = line_share((high - low) * math.sqrt(ww), r)
     for k in range(2):
         s = low if k == 0 else high
         depth = depth_a + s * (depth_b - depth_a)
         x = add(a, scale(s, sub(b, a)))
         put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, share)
-    return True
+    return line_lies(low * (depth_b - depth_a), high * (depth_b - depth_a), f)
 
 
 @jitable

@@ -613,7 +613,7 @@ class Work(NamedTuple):
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     memory: F2  # (ns, most) of friction laws at the trial point
-    grip: F2  # (ns, 4) friction by slip, 2 x 2 by rows, where it was linearised last
+    grip: F2  # (ns, 4) friction over N by slip, 2 x 2 by rows, where it was linearised last
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
     block: F2  # (nb, 20) stiffness that acts on a body (3 x 3) and its turning part, damping

@@ -22,11 +22,15 @@ from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
     crossing_of,
+    disc_lies,
+    line_lies,
     line_share,
     put_apart,
     put_rim,
     put_share,
     segment_on_disc,
+    share_with_one,
+    side_faces,
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
@@ -34,8 +38,8 @@ from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
 from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
 #: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
-#: or its corner; where it leaves); of a line its bottom and top end and a crossing.
-BOX_ROWS = ARC_ROWS + 8
+#: or its corner; where it leaves); of a line its bottom and top end and a crossing; one point.
+BOX_ROWS = ARC_ROWS + 9
 
 
 @jitable
@@ -164,8 +168,9 @@ def put_corners(work, disc, n, weight):
 
 @jitable
 def disc_on_face(i, j, end, k, n, f, points):
-    """Write the patch of an end disc of I on face k of box J; return whether there is one.
+    """Write the patch of an end disc of I on face k of box J.
 
+    Returns the part of the force that it carries, -1 where there is none.
     All is drawn in the plane of the disc, where it is a circle and the face, seen along
     n, a parallelogram. u points to where the disc is deepest.
     """
@@ -210,7 +215,7 @@ def disc_on_face(i, j, end, k, n, f, points):
         elif code == -1:
             beyond = True
     if cuts == 0 and (beyond or not inside):
-        return False
+        return -1.0
 
     # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
     arcs = work[1::2]
@@ -241,13 +246,20 @@ def disc_on_face(i, j, end, k, n, f, points):
     own = math.atan2(sum_y, sum_x) if cuts > 0 else 0.0
     put_rim(points, 0, arcs, 4, disc, n, 1.0, total, own, weight, f)
     put_corners(work, disc, n, weight)
-    return True
+    reach = 0.0
+    for m in range(3):
+        if m != k:
+            reach += j[5][m] * abs(dot(edge_axis(j, m), u))
+    return disc_lies(min(r, reach), rise, f)
 
 
 @jitable
-def line_on_face(i, j, k, n, points):
-    """Write the ends of the part of I's side line that lies over face k of box J."""
-    low, high, _ = side_line(i, scale(-1.0, n))
+def line_on_face(i, j, k, n, f, points):
+    """Write the ends of the part of I's side line that lies over face k of box J.
+
+    Returns the part of the force that they carry, -1 where nothing lies over it.
+    """
+    low, high, out = side_line(i, scale(-1.0, n))
     face = edge_axis(j, k)
     face = scale(1.0 if dot(face, n) >= 0.0 else -1.0, face)
     nf = dot(n, face)
@@ -264,19 +276,21 @@ def line_on_face(i, j, k, n, points):
         y0, y1 = dot(start, a), dot(stop, a)
         if abs(y1 - y0) < 1e-300:
             if abs(y0) > half:
-                return False
+                return -1.0
             continue
         s0, s1 = (-half - y0) / (y1 - y0), (half - y0) / (y1 - y0)
         first, last = max(first, min(s0, s1)), min(last, max(s0, s1))
-    if first >= last:
-        return False
+    # a rim on an edge: which side of it rounding leaves a line on tells nothing
+    if last - first <= 1e-9:
+        return -1.0
     share = line_share((last - first) * norm(way), widest(i[5]))
     for row in range(2):
         s = first if row == 0 else last
         depth = depth_low + s * (depth_high - depth_low)
         p = add(add(low, scale(s, way)), scale(0.5 * depth, n))
         put_point(points[row], depth, p, n, share)
-    return True
+    rise = depth_high - depth_low
+    return line_lies(first * rise, last * rise, f) * side_faces(n, out)
 
 
 @jitable
@@ -284,7 +298,8 @@ def side_on_edge(i, j, axes, n, f, points):
     """Write the side of I on the edge of box J that faces it: both ends, or the crossing.
 
     Where they are parallel to within the depth the ends carry; the more they cross the more
-    does the one point where they cross.
+    does the one point where they cross. Returns the part of the force that these carry, -1 where
+    the side has no part in common with the edge.
     """
     k, second, m = axes
     q = j[1]
@@ -292,7 +307,7 @@ def side_on_edge(i, j, axes, n, f, points):
         a = edge_axis(j, h)
         q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
     e, half = edge_axis(j, m), j[5][m]
-    low, high, _ = side_line(i, scale(-1.0, n))
+    low, high, out = side_line(i, scale(-1.0, n))
     # the part of the edge between both ends of the solid
     first, last = -half, half
     z, rise, end = dot(sub(q, i[1]), i[4]), dot(e, i[4]), i[5][2]
@@ -300,9 +315,9 @@ def side_on_edge(i, j, axes, n, f, points):
         s0, s1 = (-end - z) / rise, (end - z) / rise
         first, last = max(first, min(s0, s1)), min(last, max(s0, s1))
     elif abs(z) > end:
-        return False
+        return -1.0
     if first >= last:
-        return False
+        return -1.0
     share = line_share(last - first, widest(i[5]))
     x0, x1 = add(q, scale(first, e)), add(q, scale(last, e))
     d0, n0 = side_distance(i, x0)
@@ -314,9 +329,11 @@ def side_on_edge(i, j, axes, n, f, points):
               share * both)  # fmt: skip
     put_share(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
               share * both)  # fmt: skip
+    if both == 0.0:
+        x0, x1 = sub(q, scale(half, e)), add(q, scale(half, e))
     x = add(x0, scale(crossing_of(low, high, x0, x1, n), sub(x1, x0)))
     put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
-    return True
+    return side_faces(n, out)
 
 
 @jitable
@@ -327,21 +344,21 @@ def solid_on_box(i, j, points):
     if f <= 0.0:
         put_apart(points, 0, BOX_ROWS, f, middle, n)
         return BOX_ROWS
-    out = -(widest(i[5]) + i[5][2])
-    put_apart(points, 0, BOX_ROWS, out, middle, n)
+    put_apart(points, 0, BOX_ROWS, -(widest(i[5]) + i[5][2]), middle, n)
     axes = first_two(j, n)
     k = axes[0]
     end = end_facing(i, scale(-1.0, n))
     on_face = abs(dot(edge_axis(j, k), n)) > math.sqrt(0.5)
+    crossed = end == 0 and not on_face
     if end != 0 and on_face:
-        done = disc_on_face(i, j, end, k, n, f, points)
+        part = disc_on_face(i, j, end, k, n, f, points)
     elif on_face:
-        done = line_on_face(i, j, k, n, points)
-        if not done:
+        part = line_on_face(i, j, k, n, f, points)
+        if part < 0.0:
             # it leaves the face where it crosses an edge
-            done = side_on_edge(i, j, axes, n, f, points)
+            part, crossed = side_on_edge(i, j, axes, n, f, points), True
     elif end == 0:
-        done = side_on_edge(i, j, axes, n, f, points)
+        part = side_on_edge(i, j, axes, n, f, points)
     else:
         centre, o, r = end_disc(i, end)
         q = j[1]
@@ -349,25 +366,26 @@ def solid_on_box(i, j, points):
             a = edge_axis(j, h)
             q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
         e = scale(j[5][axes[2]], edge_axis(j, axes[2]))
-        done = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0)
-    deepest = out
-    for row in range(BOX_ROWS):
-        # nothing is deeper than the least overlap
-        points[row, 0] = min(points[row, 0], f)
-        deepest = max(deepest, points[row, 0])
-    if not done or deepest < 0.5 * f:
-        put_single(i, j, n, f, points)
+        part = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0, f)
+    p = middle_of_one(i, j, axes, n, f)
+    share_with_one(points, BOX_ROWS - 1, part, crossed, f, p, n)
     return BOX_ROWS
 
 
 @jitable
-def put_single(i, j, n, f, points):
-    """Write one point: that of the rim where one is lowest, else at the box's corner."""
+def middle_of_one(i, j, axes, n, f):
+    """Return the place of one point: at a rim, a corner, or where side and edge cross."""
+    low, high = far(i, scale(-1.0, n)), far(j, n)
     if pointed(i, scale(-1.0, n)) > 1e-6:
-        p = add(far(i, scale(-1.0, n)), scale(0.5 * f, n))
-    else:
-        p = sub(far(j, n), scale(0.5 * f, n))
-    put_point(points[0], f, p, n)
+        return add(low, scale(0.5 * f, n))
+    e = edge_axis(j, axes[2])
+    if abs(dot(e, n)) < 1e-6 and end_facing(i, scale(-1.0, n)) == 0:
+        # all of an edge is farthest
+        low, up, _ = side_line(i, scale(-1.0, n))
+        first = sub(high, scale(dot(sub(high, j[1]), e) + j[5][axes[2]], e))
+        way = scale(2.0 * j[5][axes[2]], e)
+        high = add(first, scale(crossing_of(low, up, first, add(first, way), n), way))
+    return sub(high, scale(0.5 * f, n))
 
 
 @pair("CYLINDER", "BOX", slots=BOX_ROWS, regroups=True)

@@ -6,7 +6,7 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair, put_point
+from mbsim.geometry.catalog import pair
 from mbsim.geometry.convex import (
     ROTOR,
     along_circle,
@@ -23,19 +23,21 @@ from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
     crossing_of,
+    disc_lies,
     fade,
     line_share,
     put_apart,
     put_rim,
     put_share,
     segment_on_disc,
+    share_with_one,
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
-#: Rows: 6 for each rim, 2 where the rims cross; of a line its two ends and a crossing.
-PAIR_ROWS = 2 * ARC_ROWS + 2
+#: Rows: 6 for each rim, 2 where the rims cross; of a line its two ends and a crossing; one point.
+PAIR_ROWS = 2 * ARC_ROWS + 3
 
 
 @jitable
@@ -194,14 +196,14 @@ def put_disc(points, first, arcs, own, other, n, side, start, stop, crossed, f):
 
 @jitable
 def end_on_end(i, j, end_i, end_j, n, f, points):
-    """Write the patch of two end discs; return whether there is one."""
+    """Write the patch of two end discs; return the part of the force it carries, -1 for none."""
     a, b = plane_of(i, end_i), plane_of(j, end_j)
     crossed, start = rims_cross(a, b, n, -1.0)
     other, stop = rims_cross(a, b, n, 1.0)
     cx, cy = seen_on(a, b[0], n)
     # strongly tilted discs are no circles: then one point where they are deepest
     if crossed != other or (not crossed and cx * cx + cy * cy > (a[1] - b[1]) ** 2):
-        return False
+        return -1.0
     arcs = points[2 * ARC_ROWS :]
     out, centre = -a[1] - b[1], a[0]
     nb = dot(n, b[2])
@@ -224,7 +226,7 @@ def end_on_end(i, j, end_i, end_j, n, f, points):
                 turn = turn_of(cy - y, x - cx, -y, x)
             middle = add(p, scale(0.5 * depth, n))
             put_share(points[2 * ARC_ROWS + k], depth, middle, n, 3.0 * turn / TURN)
-    return True
+    return disc_lies(min(a[1], b[1]), norm(cross(a[2], b[2])), f)
 
 
 @jitable
@@ -249,6 +251,8 @@ def put_ball(row, i, j, x, share):
 def side_by_side(i, j, n, f, points):
     """Write two sides along each other: the ends of the common part, or where they cross.
 
+    Returns the part of the force that these carry, -1 where the sides have no part in common.
+
     Where the lines are parallel to within the depth the ends carry; the more they cross the more
     does the one point where they cross.
     """
@@ -262,7 +266,7 @@ def side_by_side(i, j, n, f, points):
     s0, s1 = dot(sub(low_i, low_j), t), dot(sub(high_i, low_j), t)
     first, last = max(0.0, min(s0, s1)), min(length, max(s0, s1))
     if first >= last:
-        return False
+        return -1.0
     # the smaller radius tells a line from a point
     share = line_share(last - first, min(widest(i[5]), widest(j[5])))
     x0, x1 = add(low_j, scale(first, t)), add(low_j, scale(last, t))
@@ -280,7 +284,8 @@ def side_by_side(i, j, n, f, points):
         # between the ends, also where the lines are so parallel that they cross nowhere
         x = add(x0, scale(crossing_of(low_i, high_i, x0, x1, n), sub(x1, x0)))
     put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
-    return True
+    # where a rim presses it is the one point
+    return fade(1.0 - 10.0 * off)
 
 
 @jitable
@@ -291,32 +296,25 @@ def solid_on_solid(i, j, points):
     if f <= 0.0:
         put_apart(points, 0, PAIR_ROWS, f, middle, n)
         return PAIR_ROWS
-    out = -(widest(i[5]) + i[5][2])
-    put_apart(points, 0, PAIR_ROWS, out, middle, n)
+    put_apart(points, 0, PAIR_ROWS, -(widest(i[5]) + i[5][2]), middle, n)
     end_i, end_j = end_facing(i, scale(-1.0, n)), end_facing(j, n)
     if end_i != 0 and end_j != 0:
-        done = end_on_end(i, j, end_i, end_j, n, f, points)
+        part = end_on_end(i, j, end_i, end_j, n, f, points)
     elif end_i != 0:
         centre, o, r = end_disc(i, end_i)
         low, high, _ = side_line(j, n)
-        done = segment_on_disc(points, 0, low, high, (centre, r), o, n, 1.0)
+        part = segment_on_disc(points, 0, low, high, (centre, r), o, n, 1.0, f)
     elif end_j != 0:
         centre, o, r = end_disc(j, end_j)
         low, high, _ = side_line(i, scale(-1.0, n))
-        done = segment_on_disc(points, 0, low, high, (centre, r), o, n, -1.0)
+        part = segment_on_disc(points, 0, low, high, (centre, r), o, n, -1.0, f)
     else:
-        done = side_by_side(i, j, n, f, points)
-    deepest = out
-    for row in range(PAIR_ROWS):
-        # drawn with flat discs and straight sides; nothing is deeper than the least overlap
-        points[row, 0] = min(points[row, 0], f)
-        deepest = max(deepest, points[row, 0])
-    if not done or deepest < 0.5 * f:
-        # a rim has one farthest point, an end or a side many
-        rim_i = pointed(i, scale(-1.0, n)) > pointed(j, n)
-        low, high = far(i, scale(-1.0, n)), far(j, n)
-        p = add(low, scale(0.5 * f, n)) if rim_i else sub(high, scale(0.5 * f, n))
-        put_point(points[0], f, p, n)
+        part = side_by_side(i, j, n, f, points)
+    # a rim has one farthest point, an end or a side many
+    rim_i = pointed(i, scale(-1.0, n)) > pointed(j, n)
+    low, high = far(i, scale(-1.0, n)), far(j, n)
+    p = add(low, scale(0.5 * f, n)) if rim_i else sub(high, scale(0.5 * f, n))
+    share_with_one(points, PAIR_ROWS - 1, part, end_i == 0 and end_j == 0, f, p, n)
     return PAIR_ROWS
 
 
