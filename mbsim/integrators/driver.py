@@ -14,6 +14,7 @@ from mbsim.core.problem import (
     ASK,
     AT_ONCE,
     BEGIN_ANEW,
+    BENDS,
     BY_CHECK,
     BY_ERROR,
     BY_NEWTON,
@@ -21,6 +22,8 @@ from mbsim.core.problem import (
     CHANGES_OVER,
     DONE,
     FAILED,
+    HALF,
+    HALVES,
     HAPPENED,
     LOAD,
     NOT_CONVERGED,
@@ -405,6 +408,18 @@ def reach_of(p, m, t, h, begin):
 
 
 @jitable
+def way_error(p, m, t, h):
+    """Return the error, over tol, of friction that follows the way of the fitted step in one.
+
+    Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
+    stages tells how far that is off: two halves of the step do. What they make of it is kept.
+    """
+    interpolate(m, 0.5, m.error)
+    call_float(p.kinks, (p.context, t + 0.5 * h, HALF, m.error, m.error))
+    return call_float(p.kinks, (p.context, t + h, HALVES, m.trial, m.error)) / m.memory[TOL]
+
+
+@jitable
 def attempt(p, m, steps, t, h, times):
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
@@ -417,7 +432,7 @@ def attempt(p, m, steps, t, h, times):
     code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
     if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
         return code, 1.0, -1.0, False, 1.0
-    asked, kinked, begin, reach = -1.0, False, -1.0, 1.0
+    asked, kinked, bends, begin, reach = -1.0, False, False, -1.0, 1.0
     # one that ends before a switch at the end is taken for the end
     until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
@@ -428,11 +443,15 @@ def attempt(p, m, steps, t, h, times):
     if p.kinks != 0:
         kinked = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0
         if not kinked:
+            bends = call_float(p.kinks, (p.context, t + h, BENDS, m.trial, m.y)) > 0.0
             begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
-    if asked >= 0.0 or kinked or begin >= 0.0 or p.happens != 0 or output_within(m, times, until):
+    looks = kinked or bends or begin >= 0.0
+    if asked >= 0.0 or looks or p.happens != 0 or output_within(m, times, until):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     if begin >= 0.0 and code == 0.0:
         reach = reach_of(p, m, t, h, begin)
+    if bends and code == 0.0:
+        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
     return code, 1.0, asked, kinked, reach
 
 

@@ -613,6 +613,8 @@ class Work(NamedTuple):
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     memory: F2  # (ns, most) of friction laws at the trial point
+    kept: F2  # (ns, 3 + most) while a step is followed in two halves: friction along x and y of the
+    # whole step and what an error of it counts as, what is committed
     grip: F2  # (ns, 4) friction by slip, 2 x 2 by rows, where it was linearised last
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact

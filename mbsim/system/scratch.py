@@ -120,6 +120,7 @@ def scratch(
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
         memory=np.zeros((ns, memory)),
+        kept=np.zeros((ns if ahead else 0, 3 + memory)),
         grip=np.zeros((ns, 4)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),

@@ -363,6 +363,31 @@ def test_slip_in_two_directions_is_followed_however_long_the_steps_are(tmp_path)
         assert off < 10 * tol
 
 
+@pytest.mark.parametrize("stiffness", [30.0, 300.0, 3000.0])
+def test_a_spring_of_any_length_is_dragged_as_exactly_as_tol_asks(tmp_path, stiffness):
+    # lengths of 0.1 m to 1 mm on a bent way of 0.8 m; a high order takes steps as long as the way
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
+        + f"""
+<Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="{stiffness}"
+  tangential_damping="0"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+
+    def end(method, tol):
+        results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method, tol=tol)
+        return results["bodies/2/position"][-1, :2]
+
+    right = end("RADAU5", 1e-11)
+    for method in ("DOPRI5", "DOP853"):
+        # 2 tol at most; 5 to 41 tol while the step's error was that of its stages alone
+        assert np.abs(end(method, 1e-9) - right).max() < 5e-9
+
+
 @pytest.mark.parametrize("law", ["LUGRE", "DAHL", "STICTION"])
 def test_friction_does_not_depend_on_what_is_elsewhere(tmp_path, law):
     own = {
