@@ -547,6 +547,8 @@ class State(NamedTuple):
     """The physical state beside y: the incident table, and where everything was."""
 
     q: F2  # (nb + 1, 4) quaternions at the committed state
+    w: F2  # (nb + 1, 3) angular velocities at the committed state, global frame
+    since: F1  # (1,) time of the committed state
     centre: F2  # (ng, 3) centres of the graphics at the committed state
     angle: F1  # (na,) at the committed state, whole turns included
     touching: I1  # (ns,)

@@ -37,6 +37,8 @@ def start_state(
     q[:, 0] = 1.0
     return a.State(
         q=q,
+        w=np.zeros((nb + 1, 3)),
+        since=np.zeros(1),
         centre=np.zeros((ng, 3)),
         angle=angle,
         touching=np.zeros(ns, dtype=np.int64),
