@@ -13,7 +13,7 @@ from numba import carray
 
 from mbsim.core.address import call_float, call_int, view
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HALF, HALVES, LOAD, PASS
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import (
     ALONG_X,
@@ -29,6 +29,7 @@ from mbsim.dynamics.contact import (
     NORMAL_SLOPE,
     NORMAL_THEN,
     RATE,
+    SLIP,
     STIFFNESS,
     UNIT,
     contact_of,
@@ -38,7 +39,8 @@ from mbsim.dynamics.dry_friction import STATIC, holding_force, is_dry, side_of_d
 from mbsim.dynamics.equations import is_friction
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.laws.catalog import BRANCHES, SLIP, UNDECIDED
+from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
+from mbsim.laws.catalog import SLIP as SLIPS
 from mbsim.system.arrays import (
     ASK_HELD,
     AUDIT_TOL,
@@ -61,6 +63,8 @@ HOT_MODES = 8.0
 #: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
 #: time in which it would be left.
 AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
+#: A load that changes by less of itself within a step passes no limit unseen.
+EVEN = 1e-3
 
 
 @jitable
@@ -225,7 +229,7 @@ def watch(scene, context, t, y, what):
 @jitable
 def follows(scene, s):
     """Return whether friction in slot s follows the way of its slip in closed form."""
-    slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIP
+    slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIPS
     return slips and scene.contacts.carried[contact_of(scene, s)] > 0
 
 
@@ -256,6 +260,32 @@ def bends(scene, y, before):
 
 
 @jitable
+def hides(scene, t, y, before):
+    """Return whether a spring that sticks may have slipped since y `before` and stick again.
+
+    So it is where load and normal force change by more within the step than is left to the limit.
+    """
+    state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
+        if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
+            continue
+        most = scene.audit.cone[c] * row[NORMAL]
+        if scene.contacts.carried[c] == 0 or most == math.inf:
+            continue
+        stretch = math.hypot(y[z], y[z + 1])
+        if most <= 0.0 or stretch == 0.0:
+            continue
+        closes = max(abs(row[RATE]) / row[DEPTH], abs(state.rate[s]) / max(state.depth[s], 1e-300))
+        moves = abs(stretch - math.hypot(before[z], before[z + 1])) + h * row[SLIP]
+        part, change = math.hypot(row[ALONG_X], row[ALONG_Y]) / most, h * closes + moves / stretch
+        if part * (1.0 + change) > 1.0 and change > EVEN:
+            return True
+    return False
+
+
+@jitable
 def follow_half(scene, context, t, y):
     """Go on from a step's middle y as if that were committed, as far as friction is concerned."""
     state, work, hit = scene.state, scene.work, scene.state.hit
@@ -268,7 +298,7 @@ def follow_half(scene, context, t, y):
         s = hit[k]
         for j in range(state.memory.shape[1]):
             work.kept[s, 3 + j] = state.memory[s, j]
-        if follows(scene, s) and work.touching[s] == 1 and work.slot[s, MODE] == SLIP:
+        if follows(scene, s) and work.touching[s] == 1 and work.slot[s, MODE] == SLIPS:
             for j in range(state.memory.shape[1]):
                 state.memory[s, j] = work.memory[s, j]
         else:
@@ -300,6 +330,8 @@ def kinks_hook(context, t, h, a, b):
         return load(scene, context, t, carray(a, (n,)))
     if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
         return 0.0
+    if h == HIDES:
+        return 1.0 if hides(scene, t, carray(a, (n,)), carray(b, (n,))) else 0.0
     if h == BENDS:
         return 1.0 if bends(scene, carray(a, (n,)), carray(b, (n,))) else 0.0
     if h == HALF:

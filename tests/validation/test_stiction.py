@@ -417,6 +417,30 @@ def test_what_friction_remembers_turns_with_a_body_that_tumbles(tmp_path, law):
         assert np.abs(end(method, 1e-9) - right).max() < most
 
 
+@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-7), ("DOP853", 1e-7), ("DOP853", 1e-10)])
+def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
+    # a ball hops on a spring without a damper and slips for a moment before it leaves and behind
+    # each touch, in less than a step of a high order
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 0.5, 0.0), w=(8.0, 1.0, 20.0), inertia=0.004)
+        + """
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="0" dmax="1e-5"
+  cff_type="STICTION" mu_static="3" mu_dynamic="3" tangential_stiffness="1e4"
+  tangential_damping="0"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+
+    def end(method, tol):
+        results = run_deck(tmp_path, model, 0.3, 0.1, integrator=method, tol=tol)
+        return results["bodies/2/velocity"][-1]
+
+    # 4e-8, 6e-8, 6e-10; 6e-5, 5e-5, 2e-5 where a step was looked at in its end alone
+    right = end("DOPRI5", 1e-12)
+    assert np.abs(end(method, tol) - right).max() < max(5.0 * tol, 5e-9)
+
+
 @pytest.mark.parametrize("law", ["LUGRE", "DAHL", "STICTION"])
 def test_friction_does_not_depend_on_what_is_elsewhere(tmp_path, law):
     own = {
