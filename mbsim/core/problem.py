@@ -31,7 +31,12 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 |        |                             | the caller of `advance` must act on, else 0           |
 | kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
 |        |                             | point, 2 if that shall be found exactly, else 0;      |
-|        |                             | LOAD: what friction holds over what it can, or < 0    |
+|        |                             | LOAD: what friction holds over what it can, or < 0;   |
+|        |                             | BENDS (b: y committed): 1 if HALF, at the step's       |
+|        |                             | middle, then HALVES, at its end, are to be asked: the |
+|        |                             | error of a way followed in one, in the norm of errors; |
+|        |                             | HIDES (b: y committed): 1 if a force may leave its     |
+|        |                             | branch and come back within the step                   |
 | stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
 | output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
 | reject | -, -   (h: reason)          | 0; told of every rejected step                        |
@@ -121,10 +126,13 @@ TABLE_OVER = 8
 #: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.
 WATCH_EVERY = 5000
 
-# what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads
 #: What `commit` adds where the motion is held otherwise from here on.
 BEGIN_ANEW = 8.0
-ASK, SETTLE, PASS, LOAD = 0.0, 1.0, 2.0, 3.0
+
+# what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads; and
+# of friction that follows a way in closed form: whether that bends, then two halves of the step;
+# whether a side may have changed twice
+ASK, SETTLE, PASS, LOAD, BENDS, HALF, HALVES, HIDES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON = range(4)

@@ -95,20 +95,25 @@ def matrix_from_quaternion(q, R):
 
 
 @jitable
-def twist_about(q, q0, n):
-    """Return the angle by which the rotation from q0 to q turns about the unit vector n.
+def turn_about(q, q0, w, w0, n, n0, h):
+    """Return the angle by which a body turned about a unit vector on its way: the integral of w.n.
 
-    The relative rotation in the global frame is r = q q0*; its twist about n is
-    2 atan2(r_vec . n, r_w).
+    From q0, w0, n0 to q, w, n in a time h, w the angular velocity in the global frame. The rotation
+    vector of q q0* is the integral of w less h^2 w0 x w/12 (Magnus), and in the integral of its
+    product with n counts what both change together. The error is h^5 where n stays, else h^3.
     """
-    w = q[0] * q0[0] + q[1] * q0[1] + q[2] * q0[2] + q[3] * q0[3]
-    x = -q[0] * q0[1] + q[1] * q0[0] - q[2] * q0[3] + q[3] * q0[2]
-    y = -q[0] * q0[2] + q[1] * q0[3] + q[2] * q0[0] - q[3] * q0[1]
-    z = -q[0] * q0[3] - q[1] * q0[2] + q[2] * q0[1] + q[3] * q0[0]
-    s = x * n[0] + y * n[1] + z * n[2]
-    if w < 0.0:
-        s, w = -s, -w
-    return 2.0 * math.atan2(s, w)
+    c = q[0] * q0[0] + q[1] * q0[1] + q[2] * q0[2] + q[3] * q0[3]
+    r = (
+        -q[0] * q0[1] + q[1] * q0[0] - q[2] * q0[3] + q[3] * q0[2],
+        -q[0] * q0[2] + q[1] * q0[3] + q[2] * q0[0] - q[3] * q0[1],
+        -q[0] * q0[3] - q[1] * q0[2] + q[2] * q0[1] + q[3] * q0[0],
+    )
+    if c < 0.0:
+        r, c = scale(-1.0, r), -c
+    s = norm(r)
+    over = 2.0 * math.atan2(s, c) / s if s > 0.0 else 0.0
+    turn = add(scale(over, r), scale(h * h / 12.0, cross(w0, w)))
+    return 0.5 * dot(turn, add(n0, n)) + h / 12.0 * dot(sub(w, w0), sub(n, n0))
 
 
 @jitable

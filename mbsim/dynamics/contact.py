@@ -24,8 +24,8 @@ from mbsim.core.rotation import (
     scale,
     spin,
     sub,
+    turn_about,
     turn_with_normal,
-    twist_about,
     unrotate,
     vector,
 )
@@ -103,12 +103,16 @@ def velocity_at(scene, y, b, p):
 
 
 @jitable
-def turned(scene, y, b, n):
-    """Return the angle by which body b turned about n since the committed state."""
+def turned(scene, t, y, b, n, n0):
+    """Return the angle by which body b turned about n since the committed state, where it was n0.
+
+    What follows a frame through many steps must not depend on how long they are.
+    """
     if b == len(scene.bodies.mass):
         return 0.0
-    at = BODY_SIZE * b + 3
-    return twist_about((y[at], y[at + 1], y[at + 2], y[at + 3]), scene.state.q[b], n)
+    state, at = scene.state, BODY_SIZE * b + 3
+    q, w, w0 = (y[at], y[at + 1], y[at + 2], y[at + 3]), scene.work.w[b], state.w[b]
+    return turn_about(q, state.q[b], vector(w), vector(w0), n, n0, t - state.since[0])
 
 
 @jitable
@@ -124,7 +128,7 @@ def birth_tangent(scene, graphic_i, n):
 
 
 @jitable
-def tangent(scene, y, s, c, graphic_i, bi, bj, n):
+def tangent(scene, time, y, s, c, graphic_i, bi, bj, n):
     """Return the x-axis of the incident marker of slot s of contact c at the trial point.
 
     Since the committed state it has turned with the normal by the shortest rotation and about
@@ -138,8 +142,10 @@ def tangent(scene, y, s, c, graphic_i, bi, bj, n):
         return vector(state.t[s])
     if state.touching[s] == 0:
         return birth_tangent(scene, graphic_i, n)
-    t = turn_with_normal(vector(state.t[s]), vector(state.n[s]), n)
-    return spin(t, n, 0.5 * (turned(scene, y, bi, n) + turned(scene, y, bj, n)))
+    n0 = vector(state.n[s])
+    t = turn_with_normal(vector(state.t[s]), n0, n)
+    both = turned(scene, time, y, bi, n, n0) + turned(scene, time, y, bj, n, n0)
+    return spin(t, n, 0.5 * both)
 
 
 @jitable
@@ -388,7 +394,7 @@ def add_contact(scene, t, h, y, dy, s):
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
     w = sub(vector(work.w[bi]), vector(work.w[bj]))
     rate = -dot(v, n)
-    tx = tangent(scene, y, s, c, gi, bi, bj, n)
+    tx = tangent(scene, t, y, s, c, gi, bi, bj, n)
     ty = cross(n, tx)
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))

@@ -408,6 +408,9 @@ def commit(scene, t, h, y):
     for b in range(ground):
         for k in range(4):
             state.q[b, k] = y[BODY_SIZE * b + 3 + k]
+        for k in range(3):
+            state.w[b, k] = scene.work.w[b, k]
+    state.since[0] = t
     for g in range(len(graphics.body)):
         if graphics.body[g] < ground:
             for k in range(3):

@@ -13,29 +13,37 @@ from numba import carray
 
 from mbsim.core.address import call_float, call_int, view
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, LOAD, PASS
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
 from mbsim.dynamics.contact import (
+    ALONG_X,
+    ALONG_Y,
     BRANCH,
     DEPTH,
     FOUND_AT,
     LIMIT,
     LIMIT_SLOPE,
     LIMIT_THEN,
+    MODE,
     NORMAL,
     NORMAL_SLOPE,
     NORMAL_THEN,
     RATE,
+    SLIP,
     STIFFNESS,
+    UNIT,
+    contact_of,
     slipping_mass,
 )
 from mbsim.dynamics.dry_friction import STATIC, holding_force, is_dry, side_of_dry
 from mbsim.dynamics.equations import is_friction
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
-from mbsim.laws.catalog import UNDECIDED
+from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
+from mbsim.laws.catalog import SLIP as SLIPS
 from mbsim.system.arrays import (
     ASK_HELD,
+    AUDIT_TOL,
     EVALUATE_DOOR,
     HEAT,
     HOT,
@@ -55,6 +63,8 @@ HOT_MODES = 8.0
 #: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
 #: time in which it would be left.
 AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
+#: A load that changes by less of itself within a step passes no limit unseen.
+EVEN = 1e-3
 
 
 @jitable
@@ -216,9 +226,117 @@ def watch(scene, context, t, y, what):
     return differs
 
 
+@jitable
+def follows(scene, s):
+    """Return whether friction in slot s follows the way of its slip in closed form."""
+    slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIPS
+    return slips and scene.contacts.carried[contact_of(scene, s)] > 0
+
+
+@jitable
+def counts_as(scene, s):
+    """Return the part of the norm of errors that a change of friction in slot s by all of it is."""
+    squares, group = scene.work.squares, scene.scales.of_contact[contact_of(scene, s)]
+    return scene.work.slot[s, UNIT] / math.sqrt(squares[group])
+
+
+@jitable
+def bends(scene, y, before):
+    """Return whether the way of some slip since y `before` is another than friction's direction.
+
+    By an angle that tol sees: less changes its direction by less.
+    """
+    hit, tol = scene.work.hit, scene.audit.plan[AUDIT_TOL]
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if not follows(scene, s):
+            continue
+        row, z = scene.work.slot[s], scene.slots.z[s]
+        mx, my = y[z] - before[z], y[z + 1] - before[z + 1]
+        size = math.hypot(row[ALONG_X], row[ALONG_Y]) * math.hypot(mx, my)
+        if counts_as(scene, s) * abs(row[ALONG_X] * my - row[ALONG_Y] * mx) > tol * size:
+            return True
+    return False
+
+
+@jitable
+def hides(scene, t, y, before):
+    """Return whether a spring that sticks may have slipped since y `before` and stick again.
+
+    So it is where load and normal force change by more within the step than is left to the limit.
+    """
+    state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
+        if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
+            continue
+        most = scene.audit.cone[c] * row[NORMAL]
+        if scene.contacts.carried[c] == 0 or most == math.inf:
+            continue
+        stretch = math.hypot(y[z], y[z + 1])
+        if most <= 0.0 or stretch == 0.0:
+            continue
+        closes = max(abs(row[RATE]) / row[DEPTH], abs(state.rate[s]) / max(state.depth[s], 1e-300))
+        moves = abs(stretch - math.hypot(before[z], before[z + 1])) + h * row[SLIP]
+        part, change = math.hypot(row[ALONG_X], row[ALONG_Y]) / most, h * closes + moves / stretch
+        if part * (1.0 + change) > 1.0 and change > EVEN:
+            return True
+    return False
+
+
+@jitable
+def follow_half(scene, context, t, y):
+    """Go on from a step's middle y as if that were committed, as far as friction is concerned."""
+    state, work, hit = scene.state, scene.work, scene.state.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, kept = work.slot[s], work.kept[s]
+        kept[0], kept[1], kept[2] = row[ALONG_X], row[ALONG_Y], counts_as(scene, s)
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        for j in range(state.memory.shape[1]):
+            work.kept[s, 3 + j] = state.memory[s, j]
+        if follows(scene, s) and work.touching[s] == 1 and work.slot[s, MODE] == SLIPS:
+            for j in range(state.memory.shape[1]):
+                state.memory[s, j] = work.memory[s, j]
+        else:
+            work.kept[s, 2] = 0.0
+
+
+@jitable
+def follow_halves(scene, context, t, y):
+    """Return how far friction at a step's end is from that of its second half, as an error."""
+    state, work, hit, worst = scene.state, scene.work, scene.state.hit, 0.0
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, kept = work.slot[s], work.kept[s]
+        for j in range(state.memory.shape[1]):
+            state.memory[s, j] = kept[3 + j]
+        size = math.hypot(kept[0], kept[1])
+        if kept[2] > 0.0 and size > 0.0 and work.touching[s] == 1:
+            off = math.hypot(row[ALONG_X] - kept[0], row[ALONG_Y] - kept[1])
+            worst = max(worst, kept[2] * off / size)
+    return worst
+
+
 def kinks_hook(context, t, h, a, b):
-    """Whether a force is on another branch; h says whether that is kept, or asks for loads."""
+    """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
     scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
     if h == LOAD:
-        return load(scene, context, t, carray(a, (scene.rows.y.shape[1],)))
-    return watch(scene, context, t, carray(a, (scene.rows.y.shape[1],)), h)
+        return load(scene, context, t, carray(a, (n,)))
+    if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
+        return 0.0
+    if h == HIDES:
+        return 1.0 if hides(scene, t, carray(a, (n,)), carray(b, (n,))) else 0.0
+    if h == BENDS:
+        return 1.0 if bends(scene, carray(a, (n,)), carray(b, (n,))) else 0.0
+    if h == HALF:
+        follow_half(scene, context, t, carray(a, (n,)))
+        return 0.0
+    if h == HALVES:
+        return follow_halves(scene, context, t, carray(a, (n,)))
+    return watch(scene, context, t, carray(a, (n,)), h)

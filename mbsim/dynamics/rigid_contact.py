@@ -142,7 +142,7 @@ def look_around(scene, y, pair, moment):
 
 
 @jitable
-def fill_hold(scene, y, s, moment):
+def fill_hold(scene, t, y, s, moment):
     """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
     points, row = scene.work.look, scene.work.hold[s]
     k = s - scene.pairs.slot[scene.slots.pair[s]]
@@ -160,15 +160,15 @@ def fill_hold(scene, y, s, moment):
     n = vector(now[4:7])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    t = tangent(scene, y, s, contact_of(scene, s), gi, bi, bj, n)
+    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
     for i in range(3):
-        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], t[i]
+        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], x[i]
         row[9 + i] = (points[last, k, 1 + i] - points[first, k, 1 + i]) / time
         row[12 + i] = (points[last, k, 4 + i] - points[first, k, 4 + i]) / time
 
 
 @jitable
-def place_held(scene, y):
+def place_held(scene, t, y):
     """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
     slot, last = scene.equations.slot, -1
     moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
@@ -179,7 +179,7 @@ def place_held(scene, y):
         if pair != last:
             look_around(scene, y, pair, moment)
             last = pair
-        fill_hold(scene, y, slot[e], moment)
+        fill_hold(scene, t, y, slot[e], moment)
 
 
 @jitable
@@ -502,7 +502,7 @@ def hold_implied(scene, t, y):
         if scene.state.touching[s] == 0 or kept[KEPT_MODE] == STICK or released:
             continue
         look_around(scene, y, scene.slots.pair[s], moment)
-        fill_hold(scene, y, s, moment)
+        fill_hold(scene, t, y, s, moment)
         for q in (e, e + 1):
             left = fill_slip(scene, t, y, q, active_count(scene), scene.sweep.share[0])
             fill_size(scene, q)
@@ -610,7 +610,7 @@ def changed_held(scene):
 def serve_held(scene, what, t, y):
     """Do what is asked for at the door of rigid contacts; return an answer or 0."""
     if what == PLACE_HELD:
-        place_held(scene, y)
+        place_held(scene, t, y)
     elif what == SHARE_HELD:
         share_held(scene, t, y)
     elif what == ASK_HELD:

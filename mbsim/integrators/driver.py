@@ -14,6 +14,7 @@ from mbsim.core.problem import (
     ASK,
     AT_ONCE,
     BEGIN_ANEW,
+    BENDS,
     BY_CHECK,
     BY_ERROR,
     BY_NEWTON,
@@ -21,7 +22,10 @@ from mbsim.core.problem import (
     CHANGES_OVER,
     DONE,
     FAILED,
+    HALF,
+    HALVES,
     HAPPENED,
+    HIDES,
     LOAD,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -325,15 +329,19 @@ def side_at(p, m, t, h, s, what):
 
 
 @jitable
-def first_kink(p, m, t, h, whole):
+def first_kink(p, m, t, h, whole, behind):
     """Return the length of the fitted step up to its first kink that matters, h for none.
 
-    `whole` is its length before it was cut, or more where that is little. The problem is left
-    evaluated at the trial point.
+    `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
+    at which a side differs. The problem is left evaluated at the trial point.
     """
-    low, high, near = NEAR_KINK, 1.0, NEAR_KINK
+    low, high, near = NEAR_KINK, behind, NEAR_KINK
     side_at(p, m, t, h, low, SETTLE)
-    differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    if behind < 1.0:
+        interpolate(m, behind, m.error)
+        differs = call_float(p.kinks, (p.context, t + behind * h, ASK, m.error, m.error))
+    else:
+        differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
     if differs > 1.0:
         # it is told from what was committed, however near that is
         # a part of the whole step: where it lies at the very begin, as behind another, a step
@@ -405,10 +413,36 @@ def reach_of(p, m, t, h, begin):
 
 
 @jitable
+def way_error(p, m, t, h):
+    """Return the error, over tol, of friction that follows the way of the fitted step in one.
+
+    Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
+    stages tells how far that is off: two halves of the step do. What they make of it is kept.
+    """
+    interpolate(m, 0.5, m.error)
+    call_float(p.kinks, (p.context, t + 0.5 * h, HALF, m.error, m.error))
+    return call_float(p.kinks, (p.context, t + h, HALVES, m.trial, m.error)) / m.memory[TOL]
+
+
+@jitable
+def hidden_side(p, m, t, h):
+    """Return a part of the fitted step at which a side differs that does not at its end, else 0.
+
+    The problem is left evaluated at the trial point.
+    """
+    part = 0.0
+    for k in range(1, LOOKS):
+        if part == 0.0 and side_at(p, m, t, h, k / LOOKS, ASK):
+            part = k / LOOKS
+    call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    return part
+
+
+@jitable
 def attempt(p, m, steps, t, h, times):
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
-    And whether it ends on another branch of a force, and the part of it that `reach_of` allows.
+    And a part of it at which a force is on another branch, 0 for none, and what `reach_of` allows.
 
     A step that fails is not checked. The dense output of one that will be taken is fitted
     before the problem is committed, while its hooks still know the step's begin. Single impacts
@@ -416,23 +450,31 @@ def attempt(p, m, steps, t, h, times):
     """
     code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
     if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code, 1.0, -1.0, False, 1.0
-    asked, kinked, begin, reach = -1.0, False, -1.0, 1.0
+        return code, 1.0, -1.0, 0.0, 1.0
+    asked, kinked, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
     # one that ends before a switch at the end is taken for the end
     until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
         if part < 1.0:
-            return 0.0, part, -1.0, False, 1.0
+            return 0.0, part, -1.0, 0.0, 1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if p.kinks != 0:
-        kinked = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error)) > 0.0
-        if not kinked:
+        differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+        kinked = 1.0 if differs > 0.0 else 0.0
+        if kinked == 0.0:
+            hides = call_float(p.kinks, (p.context, t + h, HIDES, m.trial, m.y)) > 0.0
+            bends = call_float(p.kinks, (p.context, t + h, BENDS, m.trial, m.y)) > 0.0
             begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
-    if asked >= 0.0 or kinked or begin >= 0.0 or p.happens != 0 or output_within(m, times, until):
+    looks = kinked > 0.0 or hides or bends or begin >= 0.0
+    if asked >= 0.0 or looks or p.happens != 0 or output_within(m, times, until):
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     if begin >= 0.0 and code == 0.0:
         reach = reach_of(p, m, t, h, begin)
+    if hides and code == 0.0:
+        kinked = hidden_side(p, m, t, h)
+    if bends and code == 0.0 and kinked == 0.0:
+        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
     return code, 1.0, asked, kinked, reach
 
 
@@ -453,9 +495,9 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     while True:
         code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
         failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
-        if kinked and not failed and cuts < MOST_CUTS and not shortened:
+        if kinked > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
-            cut = first_kink(p, m, t, h, whole)
+            cut = first_kink(p, m, t, h, whole, kinked)
             if floor < cut < h:
                 h = cut
                 continue

@@ -547,6 +547,8 @@ class State(NamedTuple):
     """The physical state beside y: the incident table, and where everything was."""
 
     q: F2  # (nb + 1, 4) quaternions at the committed state
+    w: F2  # (nb + 1, 3) angular velocities at the committed state, global frame
+    since: F1  # (1,) time of the committed state
     centre: F2  # (ng, 3) centres of the graphics at the committed state
     angle: F1  # (na,) at the committed state, whole turns included
     touching: I1  # (ns,)
@@ -613,6 +615,8 @@ class Work(NamedTuple):
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see dynamics.contact
     memory: F2  # (ns, most) of friction laws at the trial point
+    kept: F2  # (ns, 3 + most) while a step is followed in two halves: friction along x and y of the
+    # whole step and what an error of it counts as, what is committed
     grip: F2  # (ns, 4) friction over N by slip, 2 x 2 by rows, where it was linearised last
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact

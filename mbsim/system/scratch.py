@@ -37,6 +37,8 @@ def start_state(
     q[:, 0] = 1.0
     return a.State(
         q=q,
+        w=np.zeros((nb + 1, 3)),
+        since=np.zeros(1),
         centre=np.zeros((ng, 3)),
         angle=angle,
         touching=np.zeros(ns, dtype=np.int64),
@@ -120,6 +122,7 @@ def scratch(
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
         memory=np.zeros((ns, memory)),
+        kept=np.zeros((ns if ahead else 0, 3 + memory)),
         grip=np.zeros((ns, 4)),
         fcl=np.zeros(max(1, np_), dtype=np.int64),
         net=np.zeros((nc, 3)),

@@ -363,6 +363,84 @@ def test_slip_in_two_directions_is_followed_however_long_the_steps_are(tmp_path)
         assert off < 10 * tol
 
 
+@pytest.mark.parametrize("stiffness", [30.0, 300.0, 3000.0])
+def test_a_spring_of_any_length_is_dragged_as_exactly_as_tol_asks(tmp_path, stiffness):
+    # lengths of 0.1 m to 1 mm on a bent way of 0.8 m; a high order takes steps as long as the way
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
+        + f"""
+<Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="{stiffness}"
+  tangential_damping="0"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+
+    def end(method, tol):
+        results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method, tol=tol)
+        return results["bodies/2/position"][-1, :2]
+
+    right = end("RADAU5", 1e-11)
+    for method in ("DOPRI5", "DOP853"):
+        # 2 tol at most; 5 to 41 tol while the step's error was that of its stages alone
+        assert np.abs(end(method, 1e-9) - right).max() < 5e-9
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        'LUGRE" stribeck_vel="0.01" bristle_stiffness="1e3" bristle_damping="3',
+        'DAHL" bristle_stiffness="1e3',
+    ],
+)
+def test_what_friction_remembers_turns_with_a_body_that_tumbles(tmp_path, law):
+    # a ball that spins about the normal as it rolls to and fro on what holds it
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 0.5, 0.0), w=(8.0, 1.0, 20.0), inertia=0.004)
+        + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="0" dmax="1e-5"
+  cff_type="{law}" mu_static="3" mu_dynamic="3"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+
+    def end(method, tol):
+        results = run_deck(tmp_path, model, 0.3, 0.1, integrator=method, tol=tol)
+        return results["bodies/2/velocity"][-1]
+
+    right = end("DOPRI5", 1e-12)
+    # 2e-10, 7e-9 and 5e-10, the frame of order 4; of order 2 it left 9e-8, 5e-6 and 2e-8
+    for method, most in (("DOPRI5", 2e-9), ("DOP853", 3e-8), ("RADAU5", 3e-9)):
+        assert np.abs(end(method, 1e-9) - right).max() < most
+
+
+@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-7), ("DOP853", 1e-7), ("DOP853", 1e-10)])
+def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
+    # a ball hops on a spring without a damper and slips for a moment before it leaves and behind
+    # each touch, in less than a step of a high order
+    model = (
+        GROUND
+        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 0.5, 0.0), w=(8.0, 1.0, 20.0), inertia=0.004)
+        + """
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="0" dmax="1e-5"
+  cff_type="STICTION" mu_static="3" mu_dynamic="3" tangential_stiffness="1e4"
+  tangential_damping="0"/>
+<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
+    )
+
+    def end(method, tol):
+        results = run_deck(tmp_path, model, 0.3, 0.1, integrator=method, tol=tol)
+        return results["bodies/2/velocity"][-1]
+
+    # 4e-8, 6e-8, 6e-10; 6e-5, 5e-5, 2e-5 where a step was looked at in its end alone
+    right = end("DOPRI5", 1e-12)
+    assert np.abs(end(method, tol) - right).max() < max(5.0 * tol, 5e-9)
+
+
 @pytest.mark.parametrize("law", ["LUGRE", "DAHL", "STICTION"])
 def test_friction_does_not_depend_on_what_is_elsewhere(tmp_path, law):
     own = {
