@@ -276,9 +276,11 @@ class Runner:
 
     def settle_contacts(self, allow_overlap: bool) -> None:
         """Begin with the incidents that exist at the start; refuse those that are too deep."""
-        from mbsim.system.arrays import LIVE
+        from mbsim.system.arrays import LIVE, TOLERANCE
 
         t = self.settings.stages[0].simulation.start_time
+        # what begins to stick or slip is told by it
+        self.system.scene.world.scale[TOLERANCE] = self.settings.stages[0].tol
         y, f = self.method.y, self.method.k[0]
         code = self.call(self.problem.rhs, t, 0.0, y, f)
         if code != 0.0:

@@ -59,9 +59,9 @@ from mbsim.system.arrays import (
     VALUES_DOOR,
 )
 
-#: From this part of its group's V on an impact counts, slower ones having little of the energy;
-#: what counts least of its own speed.
-FAST, SLIGHT = 0.4, 5e-4
+#: The least speed of an impact, over its group's V, that it is judged by, slower ones having little
+#: of the energy; what counts least of its own speed.
+FAST, SLIGHT = 0.2, 5e-4
 
 
 @jitable
@@ -253,30 +253,33 @@ def friction_left(scene, e, y):
 def impact_left(scene, h, e, y):
     """Return the largest change of a closing speed that e causes, over that in the step h.
 
-    Of impacts: contacts whose force is what changes the motion along the normal, which, with what
-    is stored of it, is one of its group's. There the errors of very many steps add up, though
-    none is large. What hardly changes, as just behind a touch, counts as SLIGHT of that motion.
+    That is of the motion or, where a weight is nearly balanced, what the contact's force would make
+    it: there the errors of very many steps add up, though none is large. What hardly changes, as
+    just behind a touch, counts as SLIGHT of the closing motion with what is stored of it. So does
+    an error of what is lost, over the energy that changes. Of slow impacts as much energy may be
+    wrong as of the least that count.
     """
     work, state, largest = scene.work, scene.state, 0.0
+    first = len(e) - max(1, len(scene.contacts.id))
     for k in range(work.hit[len(work.hit) - 1]):
         s = work.hit[k]
         mass, rate, point = effective_mass(scene, y, s), work.slot[s, RATE], work.points[s]
-        change = abs(rate - state.rate[s])
-        if state.touching[s] == 0 or mass * change < 0.5 * h * work.slot[s, NORMAL]:
-            continue
         speed = math.sqrt(rate * rate + 2.0 * max(0.0, work.slot[s, STORED]) / mass)
-        usual = math.sqrt(work.squares[scene.scales.of_contact[contact_of(scene, s)]])
-        if speed < FAST * usual:
+        if state.touching[s] == 0 or speed == 0.0:
             continue
+        c = contact_of(scene, s)
+        least = FAST * math.sqrt(work.squares[scene.scales.of_contact[c]])
         gi, gj = sides(scene, s)
         p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
         v = sub(
             speed_change(scene, e, y, scene.graphics.body[gi], p),
             speed_change(scene, e, y, scene.graphics.body[gj], p),
         )
-        change = max(change, SLIGHT * speed)
-        if not abs(dot(v, n)) <= largest * change:
-            largest = abs(dot(v, n)) / change
+        change = max(abs(rate - state.rate[s]), h * work.slot[s, NORMAL] / mass)
+        change = max(change, SLIGHT * speed) * max(1.0, least / speed) ** 2
+        off = max(abs(dot(v, n)), abs(e[first + c]) / (mass * speed))
+        if not off <= largest * change:
+            largest = off / change
     return largest
 
 

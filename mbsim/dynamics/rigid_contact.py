@@ -34,7 +34,7 @@ from mbsim.dynamics.incidents import record_event
 from mbsim.dynamics.kinematics import place_body, place_graphic
 from mbsim.dynamics.tree import respond
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
-from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.system.arrays import (
     ASK_HELD,
     BEGIN_HELD,
@@ -63,6 +63,9 @@ SETTLED = 0.1
 #: Slip whose part against the way it had is larger than this part of it goes back, and has not only
 #: turned.
 BACK = 0.7
+#: What is let go while it moves goes back only where it is so many times faster, and keeps to the
+#: way in which it is accelerated until it is that many times faster again.
+BEYOND = 3.0
 #: What presses less than this part of what presses most counts as that: no limit is 0.
 LEAST_PART = 1e-9
 #: Slots that slip are sought with limits that are lower by this part: where they are just reached
@@ -389,7 +392,7 @@ def ask_held(scene, y):
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
         if scene.work.touching[s] == 1 and scene.state.memory[s, KEPT_MODE] == SLIP:
-            if onward(scene, s, slip_of(scene, y, s)) < -rest(scene):
+            if goes_back(scene, s, onward(scene, s, slip_of(scene, y, s))):
                 return 1
     return 0
 
@@ -401,18 +404,25 @@ def load_held(scene):
 
 
 @jitable
-def let_slip(scene, s, x, y, speed):
-    """Let slot s slip along (x, y) from here on, at a speed."""
-    kept, size = scene.state.memory[s], rest(scene) / math.hypot(x, y)
+def goes_back(scene, s, along):
+    """Return whether slot s goes back that slips by so much along the way it had."""
+    return along < -(rest(scene) + BEYOND * scene.state.memory[s, KEPT_PLAY])
+
+
+@jitable
+def let_slip(scene, s, x, y, speed, play):
+    """Let slot s slip along (x, y) from here on, at a speed, let go with some play."""
+    kept = scene.state.memory[s]
+    size = (rest(scene) + settled(scene) + BEYOND**2 * play) / math.hypot(x, y)
     kept[KEPT_MODE], kept[KEPT_X], kept[KEPT_Y] = SLIP, size * x, size * y
-    kept[KEPT_SPEED] = speed
+    kept[KEPT_SPEED], kept[KEPT_PLAY] = speed, play
 
 
 @jitable
 def let_stick(scene, s):
     """Let slot s stick from here on."""
-    scene.state.memory[s, KEPT_MODE] = STICK
-    scene.state.memory[s, KEPT_SPEED] = 0.0
+    kept = scene.state.memory[s]
+    kept[KEPT_MODE], kept[KEPT_SPEED], kept[KEPT_PLAY] = STICK, 0.0, 0.0
 
 
 @jitable
@@ -427,10 +437,14 @@ def begin_slot(scene, y, s):
     turns, rests = 0, speed <= AT_REST * rest(scene)
     if kept[KEPT_MODE] == SLIP:
         along = onward(scene, s, v)
-        turns = 1 if along < -rest(scene) else 0
-        rests = rests or (turns == 1 and speed <= settled(scene)) or -along > BACK * speed
-    if not rests:
-        let_slip(scene, s, v[0], v[1], speed)
+        turns = 1 if goes_back(scene, s, along) else 0
+        rests = rests or (turns == 1 and speed <= settled(scene))
+        rests = rests or (turns == 1 and -along > BACK * speed)
+    if not rests and kept[KEPT_MODE] == SLIP and turns == 0:
+        # the way that friction is against
+        let_slip(scene, s, v[0] + kept[KEPT_X], v[1] + kept[KEPT_Y], speed, kept[KEPT_PLAY])
+    elif not rests:
+        let_slip(scene, s, v[0], v[1], speed, 0.0)
     elif kept[KEPT_MODE] == BEGUN or turns == 1:
         let_stick(scene, s)
     return turns
@@ -518,7 +532,7 @@ def fill_sliding(scene, t, y, count):
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
         x, z = scene.work.held[s, 0], scene.work.held[s, 1]
-        let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0)
+        let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
     call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
@@ -563,7 +577,9 @@ def release_held(scene, t, y):
     for k in range(count // 2):
         x, z = cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]
         if math.hypot(x, z) > least:
-            let_slip(scene, scene.equations.slot[int(cone[WHICH, k])], -x, -z, 0.0)
+            s = scene.equations.slot[int(cone[WHICH, k])]
+            v = slip_of(scene, y, s)
+            let_slip(scene, s, -x, -z, 0.0, math.hypot(v[0], v[1]))
             released += 1
     if released == 0:
         # sliding would rub more than sticking holds: it goes on to stick

@@ -42,7 +42,8 @@ from mbsim.dynamics.slopes import A_STATE, POSES, WAYS
 from mbsim.dynamics.subroutines import user_result
 from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
 from mbsim.laws.abi import DFLAG
-from mbsim.laws.friction.stiction import KEPT_SPEED
+from mbsim.laws.catalog import SLIP
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
 from mbsim.system.arrays import (
     AXIS_FORCE,
@@ -145,8 +146,11 @@ def ask_friction(scene, t, h, y, s, c, around, given):
 
 @jitable
 def rigid_slip(scene, s, c):
-    """Return how fast slot s of contact c slipped at the committed state if it is rigid, else 0."""
-    return scene.state.memory[s, KEPT_SPEED] if scene.contacts.rigid[c] == 1 else 0.0
+    """Return over which slip the friction of slot s turns if it is rigid and slips, else 0."""
+    kept = scene.state.memory[s]
+    if scene.contacts.rigid[c] == 0 or kept[KEPT_MODE] != SLIP:
+        return 0.0
+    return kept[KEPT_SPEED] + math.hypot(kept[KEPT_X], kept[KEPT_Y])
 
 
 @jitable

@@ -87,7 +87,7 @@ ROUGH = 1e-3
 
 #: And by so many times tol of what a speed changes by in an impact: its steps are the more the
 #: smaller tol is, and the impact as a whole is to be off by some tol.
-OF_IMPACT = 12.0
+OF_IMPACT = 6.0
 
 #: Corrections in one step at most: with an old linearisation, which another may better, with one
 #: of this step, and with a linearisation and a line search for each.

@@ -195,6 +195,40 @@ def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(margin, slip, 
     assert len(events(results, "slip")) == len(events(results, "stick")) == 1
 
 
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize(("scale", "turned"), [(1.0, 1.0), (1000.0, 0.3)], ids=["m", "mm"])
+def test_and_a_block_that_is_turned_on_its_incline(scale, turned, tol, tmp_path):
+    # as before, but a corner is in front: each point slips a little otherwise. What begins to slip
+    # is slower than any tolerance, and each way across was met by the whole of friction: Newton's
+    # iteration ended for steps of 1e-9 s alone. A square block tilts alike about all lines
+    tilt, margin, down = math.radians(20.0), 1e-3, 2.0
+    pull, mu = G * scale * math.sin(tilt), math.tan(tilt) * (1.0 + margin)
+    gx, gy, gz = pull * math.cos(down), pull * math.sin(down), -G * scale * math.cos(tilt)
+    z, turn = (0.05 - 2.0 * G * math.cos(tilt) / 4e6) * scale, 0.02 * scale**2
+    unit = "METER" if scale == 1.0 else "MILLIMETER"
+    model = f"""
+<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Force_Gravity grav_x="{gx!r}" grav_y="{gy!r}" grav_z="{gz!r}"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="{turn!r}" inertia_yy="{turn!r}"
+  inertia_zz="{1.5 * turn!r}"/>
+<Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="{down + turned!r}"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+  length_x="{0.3 * scale!r}" length_y="{0.3 * scale!r}" length_z="{0.1 * scale!r}"/>"""
+    given = {"stiffness": 1e6 / scale, "damping": 2e3 / scale, "dmax": 1e-5 * scale}
+    model += rub(mu, mu, **given)
+    results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5", tol=tol)
+    w, x, y, v = results["bodies/2/quaternion"].T
+    up = np.array([2.0 * (x * v + w * y), 2.0 * (y * v - w * x)]).T
+    rubs = results["bodies/2/position"][:, :2] / scale - 0.05 * up  # the middle of its lower face
+    way = rubs[-1] @ [math.cos(down), math.sin(down)]
+    # that of a planar integration
+    assert way == pytest.approx(3.161e-6, rel=0.05)
+    assert np.ptp(rubs[-8:], axis=0).max() < 1e-11
+    assert results.stats["steps"] < 1000
+
+
 @pytest.mark.parametrize("scale", [1.0, 1000.0], ids=["m", "mm"])
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_block_that_slows_down_ever_so_little_stops_and_holds(method, scale, tmp_path):

@@ -72,10 +72,11 @@ def test_errors_of_galpha_fall_with_tol_where_bodies_land(name):
     # that were solved with the slopes of a touch that it had left
     deck = next(deck for deck in stiff.DECKS if deck.name == name)
     model = mbsim.read_model(stiff.deck_path(deck))
-    for tol, most in ((1e-3, 1.5e-2), (1e-5, 1e-3), (1e-7, 5e-5)):
+    for tol, most, steps in ((1e-3, 1.5e-2, 1500), (1e-5, 5e-4, 3000), (1e-7, 5e-6, 13000)):
         found = mbsim.simulate(model, integrator="GALPHA", tol=tol)
         assert stiff.error(deck, ours.outcome(found, 0.0)) < most, tol
-        assert found.stats["steps"] < 3000
+        # of order 2, with an error of each step that is a part of its impact
+        assert found.stats["steps"] < steps
 
 
 @pytest.mark.parametrize(

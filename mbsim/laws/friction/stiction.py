@@ -28,8 +28,10 @@ what slips has F = -mu_d N v/|v|, d in place of v where that is 0:
 
     F = -mu_d N u/|u|,  u = d + v, mirrored where it goes against d,
 
-d being the direction in which it slipped at the committed state, of a length that is rounding of
-velocities. A step that goes on past a reversal, which it will be cut at, thus goes on smoothly.
+d being the direction in which it slipped at the committed state, of a length that the tolerance
+explains. A step that goes on past a reversal, which it will be cut at, thus goes on smoothly, and
+so does slip that begins: of its way across, whose friction is the steeper the slower it slips,
+less than d is none.
 Sources: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268; C. Thornton, K. W. Yin, Powder Technology
 65 (1991) 153-166; D. Elata, J. G. Berryman, Mechanics of Materials 24 (1996) 229-240; J. C. Simo,
 T. J. R. Hughes, Computational Inelasticity (1998), ch. 1.
@@ -102,9 +104,10 @@ def _dynamic_limit(inputs, mu_dynamic):
 
 
 #: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown; in
-#: place of that force, while it slips, the speed at the committed state.
+#: place of that force, while it slips, the speed at the committed state, and that at which it was
+#: let go: what sticks moves as its neighbours let it, that is by how they turn over its depth.
 KEPT_MODE, KEPT_X, KEPT_Y, HELD_X, HELD_Y = range(5)
-KEPT_SPEED = HELD_X
+KEPT_SPEED, KEPT_PLAY = HELD_X, HELD_Y
 #: Slip across d that is less than this part of the committed speed is rounding. It is to stay so
 #: where v goes through 0: there it is compared with a part of that speed at least.
 STRAIGHT, PART = 1e-6, 0.7
