@@ -155,7 +155,7 @@ def test_and_with_spin_and_friction(tmp_path, method):
     assert max(drop(tmp_path, method, 1e-4, rng, given, **moving) for _ in range(4)) < 30.0
 
 
-def rebound(k, c, m, v):
+def linear_rebound(k, c, m, v):
     """Return at which speed a linear spring beside a damper throws back what comes at speed v.
 
     d = v/w e^(-b t) sin(w t) until k d + c d' = 0, b = c/(2 m), w^2 = k/m - b^2.
@@ -177,5 +177,5 @@ def test_a_damper_that_comes_in_at_once(tmp_path, method, tol):
         law = contact(stiffness=k, exponent=1.0, damping=c, dmax=1e-13)
         model = GROUND + sphere(0.1 + 0.1 * v, mass=m, v=(0, 0, -v)) + law
         results = run_deck(tmp_path, model, 0.2, 0.1, integrator=method, tol=tol)
-        error = abs(results["bodies/2/velocity"][-1, 2] / rebound(k, c, m, v) - 1.0)
+        error = abs(results["bodies/2/velocity"][-1, 2] / linear_rebound(k, c, m, v) - 1.0)
         assert error < 30.0 * tol, (k, c, m, v)
