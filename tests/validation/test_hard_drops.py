@@ -120,7 +120,7 @@ def test_what_damping_takes(tmp_path, method, tol):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
 @pytest.mark.parametrize("tol", TOLERANCES)
 def test_what_damping_takes_of_a_hundred(tmp_path, method, tol):
     rng = np.random.default_rng(6)
