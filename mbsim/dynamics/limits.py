@@ -33,6 +33,8 @@ BLIND_SHARE = 0.1
 BLIND_JUMP, AT_ONCE = 0.1, 1e-4
 #: The longest step towards the end of a force, over the time until then, whose error is seen.
 SEEN = 0.6
+#: The end of a damper's ramp that is met within this part of a step is as good as at its begin.
+AT_BEGIN = 0.02
 #: Part of the scene's length below which a depth is rounding.
 ROUNDING = 1e-13
 
@@ -89,6 +91,14 @@ def thrust(scene, f, b):
 
 
 @jitable
+def depth_bend(scene, f, s):
+    """Return the second rate of the depth of slot s that accelerations make, d'' of d."""
+    gi, gj = sides(scene, s)
+    i, j = thrust(scene, f, scene.graphics.body[gi]), thrust(scene, f, scene.graphics.body[gj])
+    return -dot(sub(i, j), vector(scene.state.n[s]))
+
+
+@jitable
 def step_to_leave(scene, f, s, h):
     """Return the step that ends where the force of the parting slot s ends or comes back.
 
@@ -99,11 +109,10 @@ def step_to_leave(scene, f, s, h):
     separation can outweigh the spring: then the force is 0 sooner, and as the damper fades with
     depth it comes back just before the shapes part.
     """
-    state, n, c = scene.state, vector(scene.state.n[s]), contact_of(scene, s)
+    state, c = scene.state, contact_of(scene, s)
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    depth, rate = state.depth[s], state.rate[s]
-    bend = -dot(sub(thrust(scene, f, bi), thrust(scene, f, bj)), n)
+    depth, rate, bend = state.depth[s], state.rate[s], depth_bend(scene, f, s)
     square = rate * rate - 2.0 * bend * depth
     if square < 0.0:
         return math.inf
@@ -136,12 +145,32 @@ def step_to_leave(scene, f, s, h):
 
 
 @jitable
-def longest_parting(scene, f, h):
-    """Return how much of a step h may be tried so that it does not leap over the end of a force."""
+def step_to_ramp(scene, f, s, h):
+    """Return the step that ends where the depth of slot s passes dmax; h where it does not in h.
+
+    There the damper's curvature jumps, so that a step across it is taken where its error estimate
+    vanishes by chance. dmax = d + d' t + d'' t^2 / 2, the first such t.
+    """
+    state, dmax = scene.state, scene.contacts.dmax[contact_of(scene, s)]
+    if dmax == 0.0:
+        return h
+    way, rate, bend = dmax - state.depth[s], state.rate[s], depth_bend(scene, f, s)
+    square = rate * rate + 2.0 * bend * way
+    if not way * rate > 0.0 or square < 0.0:
+        return h
+    t = 2.0 * way / (rate + math.copysign(math.sqrt(square), rate))
+    return t if AT_BEGIN * h < t < h else h
+
+
+@jitable
+def longest_touching(scene, f, h):
+    """Return how much of a step h may be tried so that no force bends sharply or ends within it."""
     state, longest = scene.state, h
     for k in range(state.hit[len(state.hit) - 1]):
-        if state.rate[state.hit[k]] < 0.0:
-            longest = min(longest, step_to_leave(scene, f, state.hit[k], longest))
+        s = state.hit[k]
+        if state.rate[s] < 0.0:
+            longest = min(longest, step_to_leave(scene, f, s, longest))
+        longest = step_to_ramp(scene, f, s, longest)
     return longest
 
 
@@ -269,4 +298,4 @@ def longest_way(scene, y, f, h):
 @jitable
 def longest_step(scene, y, f, h):
     """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
-    return min(longest_parting(scene, f, h), longest_way(scene, y, f, h))
+    return min(longest_touching(scene, f, h), longest_way(scene, y, f, h))

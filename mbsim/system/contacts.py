@@ -253,11 +253,11 @@ def _or(value: float | None, default: float) -> float:
 
 
 def _full_damping_depth(contact: Contact) -> float:
-    """Return dmax [L] where the normal law reads it, else 0."""
+    """Return dmax [L] where the normal law has a damper that comes in over it, else 0."""
     if contact.cnf_type == "USERCNF":
         return 0.0
     read = "dmax" in NORMAL_LAWS[contact.cnf_type].parameters
-    return _or(contact.dmax, 0.0) if read else 0.0
+    return _or(contact.dmax, 0.0) if read and contact.damping else 0.0
 
 
 def contacts_table(

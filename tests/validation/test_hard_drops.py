@@ -68,11 +68,16 @@ def damped_drop(folder, method, tol, rng):
     """Drop a sphere that is damped; return the error of its energy in flight as `drop` does."""
     k, m = 10.0 ** rng.uniform(8, 15), 10.0 ** rng.uniform(-3, 3)
     height = 10.0 ** rng.uniform(-2.0, 1.0)
+    # a part of what is critical, over a depth that is reached or not
+    part, over = 10.0 ** rng.uniform(-2.5, -0.5), 10.0 ** rng.uniform(-2.0, 0.5)
+    return damped(folder, method, tol, k, m, height, part, over)
+
+
+def damped(folder, method, tol, k, m, height, part, over):
+    """Return the error of a drop with this part of critical damping, dmax over the depth."""
     speed = np.sqrt(2.0 * 9.81 * height)
     depth = (1.25 * m * speed**2 / k) ** 0.4
-    # a part of what is critical, over a depth that is reached or not
-    damping = 2.0 * 10.0 ** rng.uniform(-2.5, -0.5) * np.sqrt(k * np.sqrt(depth) * m)
-    law = {"damping": damping, "dmax": depth * 10.0 ** rng.uniform(-2.0, 0.5)}
+    law = {"damping": 2.0 * part * np.sqrt(k * np.sqrt(depth) * m), "dmax": depth * over}
     flights, touches = [speed], [speed / 9.81]
     begins = [0.0]
     for _ in range(2):
@@ -113,14 +118,20 @@ def test_two_hundred_impacts_keep_energy(tmp_path, method, tol):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("tol", [1e-4, 1e-6])
+@pytest.mark.parametrize("tol", [1e-4, 1e-7])
 def test_what_damping_takes(tmp_path, method, tol):
     rng = np.random.default_rng(5)
     assert max(damped_drop(tmp_path, method, tol, rng) for _ in range(10)) < 30.0
 
 
+def test_the_end_of_a_dampers_ramp_is_the_end_of_a_step(tmp_path):
+    """Steps across it were taken where their error estimate vanished by chance: up to 130 tol."""
+    for over in np.geomspace(0.03, 0.6, 24):
+        assert damped(tmp_path, "AUTO", 1e-7, 1.4e11, 0.3, 0.012, 0.1, over) < 10.0, over
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tol", TOLERANCES)
 def test_what_damping_takes_of_a_hundred(tmp_path, method, tol):
     rng = np.random.default_rng(6)
