@@ -130,9 +130,8 @@ class Methods:
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
         if stiff:
-            # one that goes to and fro waits longer each time, where what is stiff shows it
+            # one that goes to and fro waits longer each time
             memory[scheme.PATIENCE] *= 2.0
-            memory[scheme.WAITS] *= 1.0 if bound else 2.0
         self.arrays.dense[...] = 0.0
         self._forget()
         self.changes += 1

@@ -35,7 +35,6 @@ from mbsim.integrators.scheme import (
     STIFF_STEPS,
     STIFFNESS,
     TIME,
-    WAITS,
 )
 
 #: From here on a step is at the stability bound, or in reach of it.
@@ -51,9 +50,6 @@ MANY = 20_000
 #: Implicit steps between trials of an explicit one, and how many good ones change back: more of
 #: them, over WINDOW steps, where it would be shorter than what the explicit method took before.
 TRY_EVERY, TRIALS, TRIALS_OF_SHORT = 20, 2, 10
-#: So many times as many at most where explicit steps were many after all: what hides its rate from
-#: them is found calm by them.
-MOST_WAITS = 4.0
 
 
 @jitable
@@ -104,8 +100,7 @@ def is_calm(p, m, steps, t_end):
     # a short step, as after a change or a kink, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
-    trials = TRIALS_OF_SHORT if short else TRIALS
-    if m.memory[CALM_STEPS] < min(MOST_WAITS, m.memory[WAITS]) * trials:
+    if m.memory[CALM_STEPS] < (TRIALS_OF_SHORT if short else TRIALS):
         return False
     m.memory[STEP] = min(1.0, part) * h
     return True

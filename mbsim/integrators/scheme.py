@@ -70,10 +70,7 @@ COSTLY = 43
 CUT_FROM = 44
 # 1 where the last step that was taken was cut at a kink or event
 WAS_CUT = 45
-# of AUTO: by how much longer the implicit method runs before it is left, for what was calm there
-# and took as many explicit steps as before all the same
-WAITS = 46
-MEMORY = 47
+MEMORY = 46
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
@@ -140,7 +137,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
     n = len(y0)
     memory = np.zeros(MEMORY)
     memory[TIME] = t0
-    memory[ERROR_BEFORE] = memory[OWN_TIME] = memory[WAITS] = 1.0
+    memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
     memory[ROW_ENDS] = memory[REACH] = memory[COSTLY] = math.inf
