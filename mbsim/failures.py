@@ -134,7 +134,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
         from mbsim.plugins.normal import reproduce_normal
 
         reproduce_normal(system.user_normal[element])
-    if code in (RAISED_COMPILED, USER_NOT_FINITE):
+    if code in (RAISED_COMPILED, USER_NOT_FINITE) and element in system.user_friction:
         from mbsim.plugins import reproduce
 
         user = system.user_friction[element]
@@ -153,7 +153,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
         raise SolverError(
             f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
         )
-    if code == NOT_FINITE:
+    if code in (NOT_FINITE, USER_NOT_FINITE):
         where = "".join(f" of {name}" for name in _not_finite(system)[:1])
         raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
     raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
