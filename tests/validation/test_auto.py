@@ -93,7 +93,7 @@ def standing(tmp_path, speed):
  cff_type="COULOMB_ON" mu_static="0.8" mu_dynamic="0.8" stiction_trans_vel="{speed}"
  friction_trans_vel="{speed}"/>
 <Force_Gravity grav_x="0.98" grav_z="-9.76"/></Model>
-<Command><Simulate analysis_type="Transient" end_time="2" print_interval="0.1"/></Command>
+<Command><Simulate analysis_type="Transient" end_time="4" print_interval="0.1"/></Command>
 </MotionSolve>"""
     )
     return mbsim.read_model(path)
