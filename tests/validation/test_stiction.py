@@ -183,19 +183,22 @@ def thrown_across(end):
     return y[:2]
 
 
-@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-5), ("DOPRI5", 1e-8), ("RADAU5", 1e-7)])
-def test_a_block_thrown_across_an_incline_goes_as_its_equations_say(tmp_path, method, tol):
-    model = (
-        GROUND
-        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
-        + """
+#: A block that does not turn, thrown across an incline.
+THROWN_ACROSS = (
+    GROUND
+    + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
+    + """
 <Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
 <Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
   j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
   cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="1e4"/>
 <Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
-    )
-    results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method, tol=tol)
+)
+
+
+@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-5), ("DOPRI5", 1e-8), ("RADAU5", 1e-7)])
+def test_a_block_thrown_across_an_incline_goes_as_its_equations_say(tmp_path, method, tol):
+    results = run_deck(tmp_path, THROWN_ACROSS, 1.0, 0.1, integrator=method, tol=tol)
     # the spring's direction is followed to its own stretch of mu N/k, whatever the steps are
     give = 0.3 * 9.81 / 1e4
     assert results["bodies/2/position"][-1, :2] == pytest.approx(thrown_across(1.0), abs=give)
@@ -346,19 +349,9 @@ def test_an_impact_of_stick_and_slip_goes_as_its_equations_say(tmp_path, start, 
 
 def test_slip_in_two_directions_is_followed_however_long_the_steps_are(tmp_path):
     # thrown across an incline of which nothing is left but the path: see above for the bound before
-    model = (
-        GROUND
-        + sphere(0.1 - 9.81 / 1e5, v=(0.0, 2.0, 0.0))
-        + """
-<Constraint_Joint id="1" type="ORIENTATION" i_marker_id="20" j_marker_id="10"/>
-<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
-  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="1" damping="30" dmax="1e-5"
-  cff_type="STICTION" mu_static="0.3" mu_dynamic="0.3" tangential_stiffness="1e4"/>
-<Force_Gravity grav_x="1.5" grav_z="-9.81"/>"""
-    )
     right = thrown_across(1.0)
     for tol in (1e-5, 1e-7):
-        results = run_deck(tmp_path, model, 1.0, 0.1, integrator="DOPRI5", tol=tol)
+        results = run_deck(tmp_path, THROWN_ACROSS, 1.0, 0.1, integrator="DOPRI5", tol=tol)
         off = np.abs(results["bodies/2/position"][-1, :2] - right).max()
         assert off < 10 * tol
 

@@ -195,6 +195,26 @@ def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(margin, slip, 
     assert len(events(results, "slip")) == len(events(results, "stick")) == 1
 
 
+def turned_block(scale, tilt, margin, down, psi):
+    """Return a block that is turned by psi, put down flat on an incline that falls along `down`."""
+    pull, mu = G * scale * math.sin(tilt), math.tan(tilt) * (1.0 + margin)
+    gx, gy, gz = pull * math.cos(down), pull * math.sin(down), -G * scale * math.cos(tilt)
+    z, turn = (0.05 - 2.0 * G * math.cos(tilt) / 4e6) * scale, 0.02 * scale**2
+    unit = "METER" if scale == 1.0 else "MILLIMETER"
+    given = {"stiffness": 1e6 / scale, "damping": 2e3 / scale, "dmax": 1e-5 * scale}
+    block = f"""
+<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Force_Gravity grav_x="{gx!r}" grav_y="{gy!r}" grav_z="{gz!r}"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="{turn!r}" inertia_yy="{turn!r}"
+  inertia_zz="{1.5 * turn!r}"/>
+<Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="{psi!r}"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+  length_x="{0.3 * scale!r}" length_y="{0.3 * scale!r}" length_z="{0.1 * scale!r}"/>"""
+    return block + rub(mu, mu, **given)
+
+
 @pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7, 1e-9])
 @pytest.mark.parametrize(("scale", "turned"), [(1.0, 1.0), (1000.0, 0.3)], ids=["m", "mm"])
 def test_and_a_block_that_is_turned_on_its_incline(scale, turned, tol, tmp_path):
@@ -202,22 +222,7 @@ def test_and_a_block_that_is_turned_on_its_incline(scale, turned, tol, tmp_path)
     # is slower than any tolerance, and each way across was met by the whole of friction: Newton's
     # iteration ended for steps of 1e-9 s alone. A square block tilts alike about all lines
     tilt, margin, down = math.radians(20.0), 1e-3, 2.0
-    pull, mu = G * scale * math.sin(tilt), math.tan(tilt) * (1.0 + margin)
-    gx, gy, gz = pull * math.cos(down), pull * math.sin(down), -G * scale * math.cos(tilt)
-    z, turn = (0.05 - 2.0 * G * math.cos(tilt) / 4e6) * scale, 0.02 * scale**2
-    unit = "METER" if scale == 1.0 else "MILLIMETER"
-    model = f"""
-<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
-<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
-<Post_Graphic id="100" type="Plane" rm_id="10"/>
-<Force_Gravity grav_x="{gx!r}" grav_y="{gy!r}" grav_z="{gz!r}"/>
-<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="{turn!r}" inertia_yy="{turn!r}"
-  inertia_zz="{1.5 * turn!r}"/>
-<Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="{down + turned!r}"/>
-<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
-  length_x="{0.3 * scale!r}" length_y="{0.3 * scale!r}" length_z="{0.1 * scale!r}"/>"""
-    given = {"stiffness": 1e6 / scale, "damping": 2e3 / scale, "dmax": 1e-5 * scale}
-    model += rub(mu, mu, **given)
+    model = turned_block(scale, tilt, margin, down, down + turned)
     results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5", tol=tol)
     w, x, y, v = results["bodies/2/quaternion"].T
     up = np.array([2.0 * (x * v + w * y), 2.0 * (y * v - w * x)]).T
@@ -236,23 +241,8 @@ def test_a_block_that_slows_down_ever_so_little_stops_and_holds(method, scale, t
     # front points and slides on at some 1e-4 m/s, slowed by 2e-4 of what pulls it. Errors of
     # velocities across, all within the tolerance, took so much from friction that it crept for ever
     tilt, margin, across = math.radians(30.0), 2e-4, 5.4
-    pull, mu = G * scale * math.sin(tilt), math.tan(tilt) * (1.0 + margin)
-    gx, gy, gz = pull * math.cos(across), pull * math.sin(across), -G * scale * math.cos(tilt)
-    z = 0.05 * scale - 2.0 * G * math.cos(tilt) * scale / 4e6
-    turn = 0.02 * scale**2
-    unit = "METER" if scale == 1.0 else "MILLIMETER"
-    model = f"""
-<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
-<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
-<Post_Graphic id="100" type="Plane" rm_id="10"/>
-<Force_Gravity grav_x="{gx!r}" grav_y="{gy!r}" grav_z="{gz!r}"/>
-<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="{turn}" inertia_yy="{turn}"
-  inertia_zz="{1.5 * turn}"/>
-<Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="2"/>
-<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
-  length_x="{0.3 * scale}" length_y="{0.3 * scale}" length_z="{0.1 * scale}"/>"""
-    given = {"stiffness": 1e6 / scale, "damping": 2e3 / scale, "dmax": 1e-5 * scale}
-    results = run_deck(tmp_path, model + rub(mu, mu, **given), 1.0, 0.1, integrator=method)
+    model = turned_block(scale, tilt, margin, across, 2.0)
+    results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method)
     place = results["bodies/2/position"] / scale
     assert len(events(results, "stick")) > 0
     # GALPHA goes on rocking a little on its springs, by tol of what it sinks in (4e-6 m) or so; it
