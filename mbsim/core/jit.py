@@ -15,6 +15,7 @@ on using an edited helper's old code.
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import os
 import re
@@ -30,6 +31,7 @@ from numba.core.caching import CacheImpl, _CacheLocator
 from numba.extending import register_jitable
 
 import mbsim.core.address  # noqa: F401  (compiled forms of core.memory)
+from mbsim.core import linking
 from mbsim.core.jitable import take_marked
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -114,7 +116,7 @@ class _ContentLocator(_CacheLocator):
         # an adapter closes over the law it adapts: that law's file counts as well
         cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
         files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
-        locator = cls(root / numba.__version__ / source_digest([file, *files]))
+        locator = cls(root / f"{numba.__version__}-{linking.POLICY}" / source_digest([file, *files]))
         try:
             locator.ensure_cache_path()
         except OSError:
@@ -128,8 +130,9 @@ if _ContentLocator not in CacheImpl._locator_classes:
 
 def _register() -> None:
     """Tell Numba of the functions marked since the last compilation."""
+    linking.install()
     for function in take_marked():
-        register_jitable(error_model="numpy")(function)
+        register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
 
 
 class _Watch(event.Listener):
@@ -138,11 +141,14 @@ class _Watch(event.Listener):
     def __init__(self) -> None:
         self._depth = 0
         self._began = 0.0
+        self._collects = False
 
     def on_start(self, happened: Any) -> None:
         global on_first_compile
         if self._depth == 0:
             self._began = time.perf_counter()
+            self._collects = gc.isenabled()
+            gc.disable()  # the compiler's million small objects are looked through again and again
             if on_first_compile is not None:
                 tell, on_first_compile = on_first_compile, None
                 tell()
@@ -152,6 +158,8 @@ class _Watch(event.Listener):
         global compile_seconds
         self._depth -= 1
         if self._depth == 0:
+            if self._collects:
+                gc.enable()
             compile_seconds += time.perf_counter() - self._began
 
 

@@ -1,0 +1,168 @@
+"""Machine code for roots only: what they call is linked into them once, and optimised there.
+
+Numba optimises and emits every function that another one calls, and links all of it again into
+the caller, so that a chain of n functions is optimised n times over. Here a function that only
+compiled code calls keeps the code as it was lowered. A root (what Python, or an address, calls)
+links all that it reaches, once, is optimised and emitted.
+
+Numba's own linking is used where its version is not one of those that this was tested with.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+from numba.core import codegen, environment, targetconfig
+from numba.core.registry import cpu_target
+
+#: Versions of Numba whose private methods are as this module takes them to be.
+TESTED = ("0.68.0", "0.68.1")
+
+#: Part of the name of the cache's folder: code of another policy is not mixed with it.
+POLICY = "roots1" if numba.__version__ in TESTED else "all"
+
+_ENVIRONMENT = "_ZN08NumbaEnv"
+_RECURSIVE = codegen.RuntimeLinker.PREFIX
+
+#: Names of the roots that were optimised and emitted in this process.
+emitted: list[str] = []
+
+
+class RootLibrary(codegen.JITCodeLibrary):
+    """A function's code as it was lowered, until somebody asks for its address."""
+
+    _as_lowered: Any = None
+    _from_cache = False
+
+    def add_linking_library(self, library: Any) -> None:
+        """Remember what this function calls, without optimising or emitting it."""
+        self._linking_libraries.append(library)
+
+    def lowered(self) -> Any:
+        """Return the code as it was lowered, its symbols such that many roots may hold them."""
+        if self._as_lowered is None:
+            module = self._final_module if self._finalized else self._final_module.clone()
+            for function in module.functions:
+                if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                    function.linkage = "linkonce_odr"
+            self._as_lowered = module
+        return self._as_lowered
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of `name`; 0, with nothing emitted, where there is no such function."""
+        if not self._finalized and not _defines(self._final_module, name):
+            return 0
+        return int(super().get_pointer_to_function(name))
+
+    def finalize(self) -> None:
+        """Link all that is reached, optimise and emit it."""
+        emitted.append(self.name)
+        self.lowered()  # before optimised: another root may call this one
+        reached = list(_callers_first(self))[1:]
+        self._reload_init.update(*(library._reload_init for library in reached))
+        for library in reached:
+            raw = isinstance(library, RootLibrary) and not library._from_cache
+            module = library.lowered() if raw else library._get_module_for_linking()
+            self._final_module.link_in(module, preserve=True)
+        self._resolve_recursion()
+        self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+        for variable in self._final_module.global_variables:
+            if variable.name.startswith(_ENVIRONMENT):
+                found = environment.lookup_environment(variable.name)
+                if found is not None:
+                    self._codegen.set_env(variable.name, found)
+
+    def _resolve_recursion(self) -> None:
+        """Let calls of functions that call each other go straight, now that all are here."""
+        names = [v.name for v in self._final_module.global_variables]
+        lines = []
+        for name in names:
+            if name.startswith(_RECURSIVE):
+                called = name[len(_RECURSIVE) :]
+                if _defines(self._final_module, called):
+                    lines.append(f'declare void @"{called}"()')
+                    lines.append(f'@"{name}" = linkonce_odr constant ptr @"{called}"')
+        if lines:
+            self._final_module.link_in(llvm.parse_assembly("\n".join(lines)))
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        """Return the library that the cache holds: optimised, nothing to link."""
+        library = super()._unserialize(codegen, state)
+        library._from_cache = True
+        return library
+
+
+def _defines(module: Any, name: str) -> bool:
+    """Return whether a module has the code of a function."""
+    try:
+        return not module.get_function(name).is_declaration
+    except NameError:
+        return False
+
+
+def _callers_first(root: Any) -> Iterator[Any]:
+    """Yield all libraries that `root` reaches, each after all that call it.
+
+    The linker drops what nothing calls yet.
+    """
+    order: list[Any] = []
+    seen = {id(root)}
+    stack = [(root, iter(root._linking_libraries))]
+    while stack:
+        library, called = stack[-1]
+        for other in called:
+            if id(other) not in seen:
+                seen.add(id(other))
+                raw = isinstance(other, RootLibrary) and not other._from_cache
+                stack.append((other, iter(other._linking_libraries if raw else ())))
+                break
+        else:
+            order.append(library)
+            stack.pop()
+    yield from reversed(order)
+
+
+_full_eq = targetconfig.TargetConfig.__eq__
+
+
+def _same_options(self: Any, other: Any) -> Any:
+    """Compare what was set, which is nearly always the same, before all options by name."""
+    if type(self) is type(other) and self._values == other._values:
+        return True
+    return _full_eq(self, other)
+
+
+@functools.cache
+def _hash_of_names(kind: type) -> int:
+    return hash(tuple(sorted(kind.options)))  # type: ignore[attr-defined]
+
+
+def _hash_of_options(self: Any) -> int:
+    """Numba hashes the options' names, not their values: the same number for all of a class."""
+    return _hash_of_names(type(self))
+
+
+def install() -> None:
+    """Make Numba link in this way for the rest of the process, if its version was tested."""
+    if POLICY == "all":
+        return
+    generator = cpu_target.target_context.codegen()
+    if generator._library_class is RootLibrary:
+        return
+    set_env = generator.set_env
+
+    def set_where_emitted(name: str, value: Any) -> None:
+        if generator._engine.is_symbol_defined(name):
+            set_env(name, value)
+
+    generator._library_class = RootLibrary
+    generator.set_env = set_where_emitted
+    targetconfig.TargetConfig.__eq__ = _same_options  # type: ignore[method-assign,assignment]
+    targetconfig.TargetConfig.__hash__ = _hash_of_options  # type: ignore[method-assign]
