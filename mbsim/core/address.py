@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, types
+from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
@@ -164,15 +164,55 @@ def call_float(typingctx: Any, address: Any, arguments: Any) -> Any:
     return _call(types.float64, ir.DoubleType(), arguments)
 
 
+_VECTOR, _TABLE = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
+
+
+def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
+    """Return the doubles at a pointer as an array of `shape` that shares them."""
+    array = arrayobj.make_array(kind)(context, builder)
+    strides = [ir.Constant(_WORD, 8)]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    arrayobj.populate_array(
+        array,
+        data=builder.bitcast(data, array.data.type),
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=ir.Constant(_WORD, 8),
+        meminfo=None,
+    )
+    return array._getvalue()
+
+
 @intrinsic
-def _float_pointer(typingctx: Any, address: Any) -> Any:
-    """Return an integer address as a pointer to doubles."""
-    target = types.CPointer(types.float64)
+def vector_at(typingctx: Any, pointer: Any, count: Any) -> Any:
+    """Return `count` doubles at a pointer as an array that shares them, without reference counts."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], context.get_value_type(target))
+        return _array(context, builder, _VECTOR, args[0], args[1:])
 
-    return target(types.int64), codegen
+    return _VECTOR(pointer, types.int64), codegen
+
+
+@intrinsic
+def table_at(typingctx: Any, pointer: Any, rows: Any, columns: Any) -> Any:
+    """Return the doubles at a pointer as an array of rows and columns that shares them."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _array(context, builder, _TABLE, args[0], args[1:])
+
+    return _TABLE(pointer, types.int64, types.int64), codegen
+
+
+@intrinsic
+def _vector_of(typingctx: Any, address: Any, count: Any) -> Any:
+    """Return `count` doubles at an address that is an integer."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = builder.inttoptr(args[0], _WORD.as_pointer())
+        return _array(context, builder, _VECTOR, data, args[1:])
+
+    return _VECTOR(types.int64, types.int64), codegen
 
 
 @overload(floats_at)
@@ -180,6 +220,6 @@ def _floats_at(address: Any, count: Any) -> Any:
     """Give compiled code its form of `floats_at`."""
 
     def compiled(address: Any, count: Any) -> Any:
-        return carray(_float_pointer(np.int64(address)), (np.int64(count),))
+        return _vector_of(np.int64(address), np.int64(count))
 
     return compiled

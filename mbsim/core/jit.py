@@ -116,7 +116,9 @@ class _ContentLocator(_CacheLocator):
         # an adapter closes over the law it adapts: that law's file counts as well
         cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
         files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
-        locator = cls(root / f"{numba.__version__}-{linking.POLICY}" / source_digest([file, *files]))
+        locator = cls(
+            root / f"{numba.__version__}-{linking.POLICY}" / source_digest([file, *files])
+        )
         try:
             locator.ensure_cache_path()
         except OSError:

@@ -53,7 +53,7 @@ class RootLibrary(codegen.JITCodeLibrary):
         return self._as_lowered
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Return the address of `name`; 0, with nothing emitted, where there is no such function."""
+        """Return the address of `name`; 0, and nothing is emitted, where it is not defined."""
         if not self._finalized and not _defines(self._final_module, name):
             return 0
         return int(super().get_pointer_to_function(name))
@@ -134,9 +134,12 @@ _full_eq = targetconfig.TargetConfig.__eq__
 
 def _same_options(self: Any, other: Any) -> Any:
     """Compare what was set, which is nearly always the same, before all options by name."""
-    if type(self) is type(other) and self._values == other._values:
-        return True
-    return _full_eq(self, other)
+    if type(self) is not type(other):
+        return _full_eq(self, other)
+    mine, others = self._values, other._values
+    return mine == others or all(
+        getattr(self, name) == getattr(other, name) for name in mine.keys() | others.keys()
+    )
 
 
 @functools.cache

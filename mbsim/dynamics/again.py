@@ -7,9 +7,7 @@ same code gives the same numbers to the last bit.
 
 from __future__ import annotations
 
-from numba import carray
-
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact import add_contact
 from mbsim.dynamics.kinematics import place_bodies
@@ -100,6 +98,6 @@ def again_hook(context, t, h, a, b):
     size = CONTACT_COLUMNS * len(scene.contacts.id)
     wide = len(scene.work.law_in) + len(scene.work.law_out) + SLOT_COLUMNS
     count = scene.rows.used[1]
-    room = carray(b, (n + size + count * wide,))
+    room = vector_at(b, n + size + count * wide)
     table = room[n + size :].reshape(count, wide)
-    return float(evaluate_again(scene, t, carray(a, (n,)), room[:n], room[n : n + size], table))
+    return float(evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.angles import commit_angles, longest_turn
 from mbsim.dynamics.applied import add_applied
@@ -62,14 +62,14 @@ def _drive(context, t, y, dy):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     scene.users.failed[0] = 0
-    return drive(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    return drive(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
 def _act(context, t, y, dy):
     """The forces between markers, and the same."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    a, b = carray(y, (n,)), carray(dy, (n,))
+    a, b = vector_at(y, n), vector_at(dy, n)
     scene.users.failed[0] = 0
     code = failure_or(scene, add_applied(scene, t, a, b))
     return code if code != 0 else drive(scene, t, a, b)
@@ -78,40 +78,40 @@ def _act(context, t, y, dy):
 def _wrench(context, t, y, f):
     """A bushing or a vector force."""
     scene = view(context, Scene)
-    return add_wrench(scene, t, carray(y, (scene.rows.y.shape[1],)), f)
+    return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
 
 def _rub(context, t, y, dy):
     """Friction in joints, and the accelerations with it."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_friction(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    return add_friction(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
 def _settle(context, t, y, dy):
     """Forces that need reactions, with friction in joints, and the accelerations with them."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_late(scene, t, carray(y, (n,)), carray(dy, (n,)))
+    return add_late(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
 def _express(context, t, y, program, body, way):
     """The jet of an expression."""
     scene = view(context, Scene)
-    return interpret(scene, t, carray(y, (scene.rows.y.shape[1],)), program, body, way)
+    return interpret(scene, t, vector_at(y, scene.rows.y.shape[1]), program, body, way)
 
 
 def _evaluate(context, t, y, program):
     """The value of an expression."""
     scene = view(context, Scene)
-    return evaluate_program(scene, t, carray(y, (scene.rows.y.shape[1],)), program)
+    return evaluate_program(scene, t, vector_at(y, scene.rows.y.shape[1]), program)
 
 
 def _evaluate_requests(context, t, y):
     """The expressions of requests at an output row."""
     scene = view(context, Scene)
     scene.users.failed[0] = 0
-    return failure_or(scene, fill_values(scene, t, carray(y, (scene.rows.y.shape[1],))))
+    return failure_or(scene, fill_values(scene, t, vector_at(y, scene.rows.y.shape[1])))
 
 
 def _commit_angles(context):
@@ -122,19 +122,19 @@ def _commit_angles(context):
 def _serve_dry(context, what, t, y):
     """What dry friction keeps of an accepted step, and what it holds."""
     scene = view(context, Scene)
-    return serve_dry(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+    return serve_dry(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def _serve_rigid(context, what, t, y):
     """The same where some is rigid."""
     scene = view(context, Scene)
-    return serve_rigid(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+    return serve_rigid(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def _serve_held(context, what, t, y):
     """What contacts do whose friction is rigid."""
     scene = view(context, Scene)
-    return serve_held(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+    return serve_held(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def open_held(scene: Scene) -> None:
@@ -150,7 +150,7 @@ def limit_turn(context, t, h, a, b):
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return longest_turn(scene, longest_step(scene, carray(a, (n,)), carray(b, (n,)), h))
+    return longest_turn(scene, longest_step(scene, vector_at(a, n), vector_at(b, n), h))
 
 
 def open_jets(scene: Scene) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import call_int, pack, view
+from mbsim.core.address import call_int, pack, vector_at, view
 from mbsim.core.problem import (
     ALONG,
     BEGIN_ANEW,
@@ -59,14 +59,14 @@ def _rhs(context, t, h, a, b):
     """f(t, y)."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    code = evaluate(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    code = evaluate(scene, t, h, vector_at(a, n), vector_at(b, n))
     return float(code)
 
 
 def _project(context, t, h, a, b):
     """Quaternions back to unit length, and bodies onto their constraints."""
     scene = view(context, Scene)
-    y = carray(a, (scene.rows.y.shape[1],))
+    y = vector_at(a, scene.rows.y.shape[1])
     for body in range(len(scene.bodies.mass)):
         at = BODY_SIZE * body + 3
         length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
@@ -83,10 +83,10 @@ def _norm(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return impact_left(scene, t, carray(a, (n,)), carray(b, (n,)))
+        return impact_left(scene, t, vector_at(a, n), vector_at(b, n))
     if h == FRICTION_ALONE:
-        return friction_left(scene, carray(a, (n,)), carray(b, (n,)))
-    error = scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
+        return friction_left(scene, vector_at(a, n), vector_at(b, n))
+    error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error
     return error
@@ -95,7 +95,7 @@ def _norm(context, t, h, a, b):
 def _check(context, t, h, a, b):
     """The guard of first penetration."""
     scene = view(context, Scene)
-    return first_depth(scene, t, h, carray(a, (scene.rows.y.shape[1],)))
+    return first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
 
 
 def _commit(context, t, h, a, b):
@@ -112,7 +112,7 @@ def _commit(context, t, h, a, b):
         code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
         if code != 0:
             return -float(code)
-    y = carray(a, (scene.rows.y.shape[1],))
+    y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
     changed = commit(scene, t, h, y)
     examine(scene, t, h, y)
@@ -127,7 +127,7 @@ def _look(context, t, h, a, b):
     """Peaks at an inner point of a step."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    code = evaluate_past(scene, t, h, carray(a, (n,)), carray(b, (n,)))
+    code = evaluate_past(scene, t, h, vector_at(a, n), vector_at(b, n))
     if code == 0:
         watch_peaks(scene, t)
     if scene.world.doors[DRY_DOOR] != 0:
@@ -144,18 +144,18 @@ def _limit(context, t, h, a, b):
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return longest_step(scene, carray(a, (n,)), carray(b, (n,)), h)
+    return longest_step(scene, vector_at(a, n), vector_at(b, n), h)
 
 
 def _output(context, t, h, a, b):
     """A row of results at an interpolated, projected state."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    f = carray(b, (n,))
-    code = evaluate_past(scene, t, h, carray(a, (n,)), f)
+    f = vector_at(b, n)
+    code = evaluate_past(scene, t, h, vector_at(a, n), f)
     if code != 0:
         return -float(code)
-    full = write_row(scene, t, h, carray(a, (n,)), f)
+    full = write_row(scene, t, h, vector_at(a, n), f)
     if scene.world.doors[DRY_DOOR] != 0:
         call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
     if scene.users.failed[0] != 0:
@@ -179,13 +179,13 @@ def _stable(context, t, h, a, b):
     """The step for a method without error estimate, h being the tolerance."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return stable_step(scene, h, carray(a, (n,)), carray(b, (n,)))
+    return stable_step(scene, h, vector_at(a, n), vector_at(b, n))
 
 
 def _follow(context, y):
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
-    follow(scene, carray(y, (scene.rows.y.shape[1],)))
+    follow(scene, vector_at(y, scene.rows.y.shape[1]))
     return 0
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import pack, view
+from mbsim.core.address import pack, vector_at, view
 from mbsim.core.problem import HOOK, Problem
 from mbsim.dynamics.connection_slopes import add_connection_slopes
 from mbsim.dynamics.doors import open_jets
@@ -40,7 +40,7 @@ def _linearise(context, t, h, a, b):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    return float(linearise(scene, T, t, h, carray(a, (n,)), carray(b, (n,))))
+    return float(linearise(scene, T, t, h, vector_at(a, n), vector_at(b, n)))
 
 
 def _factor(context, t, h, a, b):
@@ -57,7 +57,7 @@ def _solve(context, t, h, a, b):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    return float(solve(scene, T, T.real, carray(a, (n,)), carray(b, (n,))))
+    return float(solve(scene, T, T.real, vector_at(a, n), vector_at(b, n)))
 
 
 def _factor_pair(context, t, h, a, b):
@@ -89,7 +89,7 @@ def _slopes(context, t, y):
     """The derivatives of forces between markers and of states' slopes."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
@@ -99,7 +99,7 @@ def _all_slopes(context, t, y):
     """The same, of bushings and friction in joints too."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     add_connection_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
@@ -110,7 +110,7 @@ def _bend(context, t, y):
     """How the forces of equations turn with the bodies."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
-    add_bends(scene, T, t, carray(y, (scene.rows.y.shape[1],)))
+    add_bends(scene, T, t, vector_at(y, scene.rows.y.shape[1]))
     return 0
 
 
@@ -118,7 +118,7 @@ def _bend_and_drive(context, t, y):
     """The same, and the rows of motions of velocities and accelerations."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     add_bends(scene, T, t, a)
     add_motion_rows(scene, T, t, a)
     return 0

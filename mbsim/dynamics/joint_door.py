@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.dynamics.constraints import serve
 from mbsim.dynamics.limbs import serve_limbs
 from mbsim.system.arrays import JOINTS_DOOR, SLIDE_FRICTION, Scene
@@ -18,14 +18,14 @@ def _joints(context, what, t, y, dy):
     """All that joints are asked for."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return serve(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
+    return serve(scene, what, t, vector_at(y, n), vector_at(dy, n))
 
 
 def _limbs(context, what, t, y, dy):
     """The same where the tree holds all joints."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return serve_limbs(scene, what, t, carray(y, (n,)), carray(dy, (n,)))
+    return serve_limbs(scene, what, t, vector_at(y, n), vector_at(dy, n))
 
 
 def open_joints(scene: Scene) -> None:

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import carray
-
-from mbsim.core.address import call_float, call_int, view
+from mbsim.core.address import call_float, call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.applied import along_axis, along_slide, at_limit
@@ -327,16 +325,16 @@ def kinks_hook(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == LOAD:
-        return load(scene, context, t, carray(a, (n,)))
+        return load(scene, context, t, vector_at(a, n))
     if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
         return 0.0
     if h == HIDES:
-        return 1.0 if hides(scene, t, carray(a, (n,)), carray(b, (n,))) else 0.0
+        return 1.0 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0.0
     if h == BENDS:
-        return 1.0 if bends(scene, carray(a, (n,)), carray(b, (n,))) else 0.0
+        return 1.0 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0.0
     if h == HALF:
-        follow_half(scene, context, t, carray(a, (n,)))
+        follow_half(scene, context, t, vector_at(a, n))
         return 0.0
     if h == HALVES:
-        return follow_halves(scene, context, t, carray(a, (n,)))
-    return watch(scene, context, t, carray(a, (n,)), h)
+        return follow_halves(scene, context, t, vector_at(a, n))
+    return watch(scene, context, t, vector_at(a, n), h)

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub
 from mbsim.dynamics.contact import contact_of, in_marker, sides
@@ -318,7 +318,7 @@ def _real(context, what, r, d):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    a, b = carray(r, (n,)), carray(d, (n,))
+    a, b = vector_at(r, n), vector_at(d, n)
     if what == FACTOR:
         add_to_matrix(scene, T, T.real)
     elif what == RIGHT:
@@ -335,7 +335,7 @@ def _pair(context, what, r, d):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    a, b = carray(r, (n,)), carray(d, (n,))
+    a, b = vector_at(r, n), vector_at(d, n)
     if what == FACTOR:
         add_to_matrix(scene, T, T.pair)
     elif what == RIGHT:

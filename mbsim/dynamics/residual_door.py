@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, types
+from numba import types
 
 from mbsim.core import jit
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.dynamics.connection_slopes import add_connection_slopes
 from mbsim.dynamics.dry_friction import serve_dry
 from mbsim.dynamics.residual import keep_residuals, serve_residual
@@ -31,19 +31,19 @@ _KEEP = types.int64(types.int64, types.int64, types.float64, _POINTER)
 def _serve(context, t, y, element, component):
     """What an element gives."""
     scene = view(context, Scene)
-    return serve_residual(scene, t, carray(y, (scene.rows.y.shape[1],)), element, component)
+    return serve_residual(scene, t, vector_at(y, scene.rows.y.shape[1]), element, component)
 
 
 def _keep(context, what, t, y):
     """What elements keep of an accepted step."""
     scene = view(context, Scene)
-    return keep_residuals(scene, what, t, carray(y, (scene.rows.y.shape[1],)))
+    return keep_residuals(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def _keep_with_dry(context, what, t, y):
     """The same, and what dry friction keeps."""
     scene = view(context, Scene)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     keep_residuals(scene, what, t, a)
     return serve_dry(scene, what, t, a)
 
@@ -51,7 +51,7 @@ def _keep_with_dry(context, what, t, y):
 def _keep_with_rigid(context, what, t, y):
     """The same where some is rigid."""
     scene = view(context, Scene)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     keep_residuals(scene, what, t, a)
     return serve_rigid(scene, what, t, a)
 
@@ -60,7 +60,7 @@ def residual_slopes(context, t, y):
     """The derivatives of all forces between markers, elements among them, and of states' slopes."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
-    a = carray(y, (scene.rows.y.shape[1],))
+    a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     add_connection_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)

@@ -15,9 +15,7 @@ and it acts where it is on and was not. A located EQUAL acts wherever e comes to
 
 from __future__ import annotations
 
-from numba import carray
-
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.expressions import value
 from mbsim.dynamics.kinematics import place_bodies
@@ -111,10 +109,10 @@ def arrive(scene, t, y):
 def happens_hook(context, t, h, a, b):
     """Whether a located sensor has become true."""
     scene = view(context, Scene)
-    return happens(scene, t, carray(a, (scene.rows.y.shape[1],)))
+    return happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
 
 
 def arrive_hook(context, t, h, a, b):
     """What sensors see at a committed state."""
     scene = view(context, Scene)
-    return arrive(scene, t, carray(a, (scene.rows.y.shape[1],)))
+    return arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))

@@ -19,10 +19,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import carray, types
+from numba import types
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
+from mbsim.core.address import vector_at
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
@@ -71,8 +72,8 @@ def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
     """Return a normal law of `count` constants as a C function."""
 
     def entry(depth, rate, par, out):
-        values = to_fixed_tuple(carray(par, (count,)), count)
-        result = carray(out, (3,))
+        values = to_fixed_tuple(vector_at(par, count), count)
+        result = vector_at(out, 3)
         force, elastic, stored = law(depth, rate, *values)
         result[0] = force
         result[1] = elastic
@@ -86,9 +87,9 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     """Return `force` of `count` parameters as a C function."""
 
     def entry(element, inputs, par, out):
-        values = to_fixed_tuple(carray(par, (count,)), count)
-        result = carray(out, (5,))
-        given = friction_input(carray(inputs, (FRICTION_INPUTS,)))
+        values = to_fixed_tuple(vector_at(par, count), count)
+        result = vector_at(out, 5)
+        given = friction_input(vector_at(inputs, FRICTION_INPUTS))
         fx, fy, mx, my, tz = force(given, *values)
         result[0] = fx
         result[1] = fy
@@ -105,10 +106,10 @@ def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int, carri
     given = memory + carried
 
     def entry(element, inputs, par, out):
-        values = to_fixed_tuple(carray(par, (count,)), count)
-        a = carray(inputs, (FRICTION_INPUTS + memory,))
+        values = to_fixed_tuple(vector_at(par, count), count)
+        a = vector_at(inputs, FRICTION_INPUTS + memory)
         kept = to_fixed_tuple(a[FRICTION_INPUTS:], memory)
-        result = carray(out, (MEMORY_OUT + given,))
+        result = vector_at(out, MEMORY_OUT + given)
         found, new = force(friction_input(a), kept, *values)
         for k in range(MEMORY_OUT):
             result[k] = found[k]

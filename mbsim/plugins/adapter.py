@@ -11,11 +11,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from numba import carray  # type: ignore[attr-defined]
 from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
+from mbsim.core.address import vector_at
 from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, MEMORY_OUT, RAISED_COMPILED
 
 
@@ -23,10 +23,10 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
     """Return CFFSUB with `count` parameters as a C function that signals what it raises."""
 
     def entry(element, inputs, par, out):
-        a = carray(inputs, (FRICTION_INPUTS,))
+        a = vector_at(inputs, FRICTION_INPUTS)
         # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
-        result = carray(out, (5,))
+        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
+        result = vector_at(out, 5)
         code = 0
         try:
             force = function(
@@ -62,10 +62,10 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
     """Return CFFSUB that keeps so many numbers of its own as a C function."""
 
     def entry(element, inputs, par, out):
-        a = carray(inputs, (FRICTION_INPUTS + states,))
-        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
+        a = vector_at(inputs, FRICTION_INPUTS + states)
+        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
         kept: Any = to_fixed_tuple(a[FRICTION_INPUTS:], states)  # type: ignore[call-arg]
-        result = carray(out, (MEMORY_OUT + states,))
+        result = vector_at(out, MEMORY_OUT + states)
         code = 0
         try:
             force, new = function(

@@ -13,9 +13,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import carray  # type: ignore[attr-defined]
 
-from mbsim.core.address import call_int, view
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, I1
 from mbsim.core.jitable import jitable
 from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
@@ -44,32 +43,32 @@ def begin_call(call, element, values, dflag):
 def call_c(element, inputs, par, out):
     """CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, result)."""
     # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
-    a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
+    call: Any = view(np.int64(vector_at(par, 1)[0]), LibraryCall)  # type: ignore[call-arg]
+    a, n = vector_at(inputs, FRICTION_INPUTS), len(call.par)
     whole, result = call.whole, call.result
-    begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))
+    begin_call(call, element, vector_at(par, 1 + n)[1:], int(a[DFLAG]))
     # the function returns nothing, and nobody looks at what `call_int` takes for its result
     call_int(
         call.address[0],
         (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:],
          whole[2:], whole[3:], result),
     )  # fmt: skip
-    force = carray(out, (5,))
+    force = vector_at(out, 5)
     force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]
     return 0
 
 
 def call_fortran(element, inputs, par, out):
     """CFFSUB(ID, TIME, PAR, NPAR, LOCI, LOCJ, X, XDOT, NFORCE, AREA, DFLAG, IFLAG, RESULTS)."""
-    call: Any = view(np.int64(carray(par, (1,))[0]), LibraryCall)  # type: ignore[call-arg]
-    a, n = carray(inputs, (FRICTION_INPUTS,)), len(call.par)
+    call: Any = view(np.int64(vector_at(par, 1)[0]), LibraryCall)  # type: ignore[call-arg]
+    a, n = vector_at(inputs, FRICTION_INPUTS), len(call.par)
     whole, result = call.whole, call.result
-    begin_call(call, element, carray(par, (1 + n,))[1:], int(a[DFLAG]))
+    begin_call(call, element, vector_at(par, 1 + n)[1:], int(a[DFLAG]))
     call_int(
         call.address[0],
         (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:], a[11:],
          whole[2:], whole[3:], result),
     )  # fmt: skip
-    force = carray(out, (5,))
+    force = vector_at(out, 5)
     force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]
     return 0

@@ -13,12 +13,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import carray, types  # type: ignore[attr-defined]
+from numba import types  # type: ignore[attr-defined]
 from numba.extending import overload, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.core.address import call_int, view
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -72,9 +72,9 @@ def call_c(depth, rate, par, out):
     iflag, result.
     """
     # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-    call: Any = view(np.int64(carray(par, (1,))[0]), NormalCall)  # type: ignore[call-arg]
-    result, at, gap, whole = carray(out, (3,)), call.place, call.gap, call.whole
-    values = carray(par, (1 + len(call.par),))[1:]
+    call: Any = view(np.int64(vector_at(par, 1)[0]), NormalCall)  # type: ignore[call-arg]
+    result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
+    values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
     for k in range(questions(at, depth)):
         d, r = question(k, depth, rate)
@@ -91,9 +91,9 @@ def call_c(depth, rate, par, out):
 
 def call_fortran(depth, rate, par, out):
     """As `call_c`, with AREA before DFLAG."""
-    call: Any = view(np.int64(carray(par, (1,))[0]), NormalCall)  # type: ignore[call-arg]
-    result, at, gap, whole = carray(out, (3,)), call.place, call.gap, call.whole
-    values = carray(par, (1 + len(call.par),))[1:]
+    call: Any = view(np.int64(vector_at(par, 1)[0]), NormalCall)  # type: ignore[call-arg]
+    result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
+    values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
     for k in range(questions(at, depth)):
         d, r = question(k, depth, rate)
@@ -130,9 +130,9 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
     wide = count + 1  # with the address ahead of them
 
     def entry(depth, rate, par, out):
-        row: Any = to_fixed_tuple(carray(par, (wide,)), wide)  # type: ignore[call-arg]
+        row: Any = to_fixed_tuple(vector_at(par, wide), wide)  # type: ignore[call-arg]
         at, values = floats_at(row[0], PLACE), row[1:]
-        result = carray(out, (3,))
+        result = vector_at(out, 3)
         begin(result, depth)
         code = 0
         try:

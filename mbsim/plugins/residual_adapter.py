@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import carray  # type: ignore[attr-defined]
 from numba.extending import register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
+from mbsim.core.address import vector_at
 from mbsim.laws.abi import FRICTION_SIGNATURE, RAISED_COMPILED
 
 
@@ -24,14 +24,14 @@ def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -
     size = first + 2 * unknowns
 
     def entry(element, given, par, out):
-        a = carray(given, (size,))
+        a = vector_at(given, size)
         # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-        values: Any = to_fixed_tuple(carray(par, (count,)), count)  # type: ignore[call-arg]
+        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
         x: Any = to_fixed_tuple(a[1:], axes)  # type: ignore[call-arg]
         xdot: Any = to_fixed_tuple(a[1 + axes :], axes)  # type: ignore[call-arg]
         f: Any = to_fixed_tuple(a[first:], unknowns)  # type: ignore[call-arg]
         fdot: Any = to_fixed_tuple(a[first + unknowns :], unknowns)  # type: ignore[call-arg]
-        result = carray(out, (unknowns,))
+        result = vector_at(out, unknowns)
         code = 0
         try:
             found = function(x, xdot, f, fdot, a[0], values, a[0])

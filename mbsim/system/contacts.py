@@ -41,15 +41,15 @@ SKIN = 0.45
 
 def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
     """Return a pair function as a C function of plain pointers."""
-    from numba import carray
+    from mbsim.core.address import table_at, vector_at
 
     def entry(frame_i, size_i, frame_j, size_j, out):
         return points(
-            carray(frame_i, (12,)),
-            carray(size_i, (3,)),
-            carray(frame_j, (12,)),
-            carray(size_j, (3,)),
-            carray(out, (slots, POINT)),
+            vector_at(frame_i, 12),
+            vector_at(size_i, 3),
+            vector_at(frame_j, 12),
+            vector_at(size_j, 3),
+            table_at(out, slots, POINT),
         )
 
     return entry
@@ -57,17 +57,16 @@ def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
 
 def _adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
     """Return a pair function with area as a C function that writes its one incident ahead."""
-    from numba import carray
-
+    from mbsim.core.address import table_at, vector_at
     from mbsim.geometry.region import sum_points
 
     def entry(frame_i, size_i, frame_j, size_j, out):
-        rows = carray(out, (slots, POINT))
+        rows = table_at(out, slots, POINT)
         count, area = region(
-            carray(frame_i, (12,)),
-            carray(size_i, (3,)),
-            carray(frame_j, (12,)),
-            carray(size_j, (3,)),
+            vector_at(frame_i, 12),
+            vector_at(size_i, 3),
+            vector_at(frame_j, 12),
+            vector_at(size_j, 3),
             rows[REGION_ROWS:],
         )
         count += REGION_ROWS
