@@ -20,7 +20,7 @@ from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import intrinsic, lower_builtin, register_model, type_callable
 from numba.np import arrayobj
 
 from mbsim.core.memory import floats_at
@@ -186,7 +186,7 @@ def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
 
 @intrinsic
 def vector_at(typingctx: Any, pointer: Any, count: Any) -> Any:
-    """Return `count` doubles at a pointer as an array that shares them, without reference counts."""
+    """Return `count` doubles at a pointer as an array that shares them."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _array(context, builder, _VECTOR, args[0], args[1:])
@@ -204,22 +204,17 @@ def table_at(typingctx: Any, pointer: Any, rows: Any, columns: Any) -> Any:
     return _TABLE(pointer, types.int64, types.int64), codegen
 
 
-@intrinsic
-def _vector_of(typingctx: Any, address: Any, count: Any) -> Any:
-    """Return `count` doubles at an address that is an integer."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        data = builder.inttoptr(args[0], _WORD.as_pointer())
-        return _array(context, builder, _VECTOR, data, args[1:])
-
-    return _VECTOR(types.int64, types.int64), codegen
-
-
-@overload(floats_at)
-def _floats_at(address: Any, count: Any) -> Any:
+@type_callable(floats_at)
+def _type_of_floats(context: Any) -> Any:
     """Give compiled code its form of `floats_at`."""
+    return lambda address, count: _VECTOR
 
-    def compiled(address: Any, count: Any) -> Any:
-        return _vector_of(np.int64(address), np.int64(count))
 
-    return compiled
+@lower_builtin(floats_at, types.Number, types.Number)
+def _floats_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Return the doubles at an address that is a number."""
+    kinds = zip(args, signature.args, strict=True)
+    whole = [context.cast(builder, value, kind, types.int64) for value, kind in kinds]
+    return _array(
+        context, builder, _VECTOR, builder.inttoptr(whole[0], _WORD.as_pointer()), whole[1:]
+    )

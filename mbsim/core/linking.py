@@ -10,14 +10,15 @@ Numba's own linking is used where its version is not one of those that this was 
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import codegen, environment, targetconfig
+from numba.core import codegen, environment
 from numba.core.registry import cpu_target
+
+from mbsim.core import numba_costs
 
 #: Versions of Numba whose private methods are as this module takes them to be.
 TESTED = ("0.68.0", "0.68.1")
@@ -129,29 +130,6 @@ def _callers_first(root: Any) -> Iterator[Any]:
     yield from reversed(order)
 
 
-_full_eq = targetconfig.TargetConfig.__eq__
-
-
-def _same_options(self: Any, other: Any) -> Any:
-    """Compare what was set, which is nearly always the same, before all options by name."""
-    if type(self) is not type(other):
-        return _full_eq(self, other)
-    mine, others = self._values, other._values
-    return mine == others or all(
-        getattr(self, name) == getattr(other, name) for name in mine.keys() | others.keys()
-    )
-
-
-@functools.cache
-def _hash_of_names(kind: type) -> int:
-    return hash(tuple(sorted(kind.options)))  # type: ignore[attr-defined]
-
-
-def _hash_of_options(self: Any) -> int:
-    """Numba hashes the options' names, not their values: the same number for all of a class."""
-    return _hash_of_names(type(self))
-
-
 def install() -> None:
     """Make Numba link in this way for the rest of the process, if its version was tested."""
     if POLICY == "all":
@@ -167,5 +145,4 @@ def install() -> None:
 
     generator._library_class = RootLibrary
     generator.set_env = set_where_emitted
-    targetconfig.TargetConfig.__eq__ = _same_options  # type: ignore[method-assign,assignment]
-    targetconfig.TargetConfig.__hash__ = _hash_of_options  # type: ignore[method-assign]
+    numba_costs.install()
