@@ -130,22 +130,11 @@ if _ContentLocator not in CacheImpl._locator_classes:
     CacheImpl._locator_classes.insert(0, _ContentLocator)
 
 
-def _allocates(module: str) -> bool:
-    """Return whether a module's compiled code may make arrays.
-
-    Kernels of the simulator work in arrays that were there before: to count who holds these
-    costs a tenth of what is compiled.
-    """
-    return not module.startswith("mbsim.") or module.startswith(("mbsim.fclib", "mbsim.plugins"))
-
-
 def _register() -> None:
     """Tell Numba of the functions marked since the last compilation."""
     linking.install()
     for function in take_marked():
-        register_jitable(
-            error_model="numpy", no_cfunc_wrapper=True, _nrt=_allocates(function.__module__)
-        )(function)
+        register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
 
 
 class _Watch(event.Listener):
@@ -198,8 +187,6 @@ _kept: list[Any] = []
 def address(py_func: Callable[..., Any], signature: Any) -> int:
     """Return the address of `py_func` compiled as a C function; it lives as long as the process."""
     _register()
-    compiled = numba.cfunc(
-        signature, cache=True, error_model="numpy", _nrt=_allocates(py_func.__module__)
-    )(py_func)
+    compiled = numba.cfunc(signature, cache=True, error_model="numpy")(py_func)
     _kept.append(compiled)
     return int(compiled.address)
