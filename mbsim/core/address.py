@@ -164,13 +164,14 @@ def call_float(typingctx: Any, address: Any, arguments: Any) -> Any:
     return _call(types.float64, ir.DoubleType(), arguments)
 
 
-_VECTOR, _TABLE = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
+_FLOATS = types.Array(types.float64, 1, "C")
 
 
 def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
-    """Return the doubles at a pointer as an array of `shape` that shares them."""
+    """Return what lies at a pointer as an array of a kind and `shape` that shares it."""
     array = arrayobj.make_array(kind)(context, builder)
-    strides = [ir.Constant(_WORD, 8)]
+    size = ir.Constant(_WORD, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], length))
     arrayobj.populate_array(
@@ -178,36 +179,37 @@ def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
         data=builder.bitcast(data, array.data.type),
         shape=cgutils.pack_array(builder, shape),
         strides=cgutils.pack_array(builder, strides),
-        itemsize=ir.Constant(_WORD, 8),
+        itemsize=size,
         meminfo=None,
     )
     return array._getvalue()
 
 
+def _at(kind: Any) -> Any:
+    """Return the code of an array of a kind at a pointer, its lengths being the arguments."""
+    return lambda context, builder, signature, args: _array(
+        context, builder, kind, args[0], args[1:]
+    )
+
+
 @intrinsic
 def vector_at(typingctx: Any, pointer: Any, count: Any) -> Any:
-    """Return `count` doubles at a pointer as an array that shares them."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _array(context, builder, _VECTOR, args[0], args[1:])
-
-    return _VECTOR(pointer, types.int64), codegen
+    """Return `count` numbers at a pointer as an array that shares them."""
+    kind = types.Array(pointer.dtype, 1, "C")
+    return kind(pointer, types.int64), _at(kind)
 
 
 @intrinsic
 def table_at(typingctx: Any, pointer: Any, rows: Any, columns: Any) -> Any:
-    """Return the doubles at a pointer as an array of rows and columns that shares them."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _array(context, builder, _TABLE, args[0], args[1:])
-
-    return _TABLE(pointer, types.int64, types.int64), codegen
+    """Return the numbers at a pointer as an array of rows and columns that shares them."""
+    kind = types.Array(pointer.dtype, 2, "C")
+    return kind(pointer, types.int64, types.int64), _at(kind)
 
 
 @type_callable(floats_at)
 def _type_of_floats(context: Any) -> Any:
     """Give compiled code its form of `floats_at`."""
-    return lambda address, count: _VECTOR
+    return lambda address, count: _FLOATS
 
 
 @lower_builtin(floats_at, types.Number, types.Number)
@@ -216,5 +218,5 @@ def _floats_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds = zip(args, signature.args, strict=True)
     whole = [context.cast(builder, value, kind, types.int64) for value, kind in kinds]
     return _array(
-        context, builder, _VECTOR, builder.inttoptr(whole[0], _WORD.as_pointer()), whole[1:]
+        context, builder, _FLOATS, builder.inttoptr(whole[0], _WORD.as_pointer()), whole[1:]
     )
