@@ -23,7 +23,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
     """Return CFFSUB with `count` parameters as a C function that signals what it raises."""
 
     def entry(element, inputs, par, out):
-        a = vector_at(inputs, FRICTION_INPUTS)
+        a: Any = vector_at(inputs, FRICTION_INPUTS)  # type: ignore[call-arg]
         # mypy sees the typing context that Numba passes to an intrinsic as a first argument
         values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
         result = vector_at(out, 5)
@@ -62,7 +62,7 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
     """Return CFFSUB that keeps so many numbers of its own as a C function."""
 
     def entry(element, inputs, par, out):
-        a = vector_at(inputs, FRICTION_INPUTS + states)
+        a: Any = vector_at(inputs, FRICTION_INPUTS + states)  # type: ignore[call-arg]
         values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
         kept: Any = to_fixed_tuple(a[FRICTION_INPUTS:], states)  # type: ignore[call-arg]
         result = vector_at(out, MEMORY_OUT + states)

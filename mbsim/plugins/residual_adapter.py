@@ -24,7 +24,7 @@ def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -
     size = first + 2 * unknowns
 
     def entry(element, given, par, out):
-        a = vector_at(given, size)
+        a: Any = vector_at(given, size)  # type: ignore[call-arg]
         # mypy sees the typing context that Numba passes to an intrinsic as a first argument
         values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
         x: Any = to_fixed_tuple(a[1:], axes)  # type: ignore[call-arg]
