@@ -102,7 +102,7 @@ class Dashes:
             self.looked_at = task.r
         spent = task.work if self.settled and task.work >= self.due else 0.0
         # what costs hardly more than to begin is worth a try at once
-        at_once = 2.0 * BEGIN_DASH if self.begun_at is None else 0.0
+        at_once = 1.5 * BEGIN_DASH if self.begun_at is None else 0.0
         if self.cost <= max(SHARE * spent, SHARE_NEXT * instead, at_once):
             self.begun_at = task.r
             newton.Proximal(task, newton.DASH_ALPHA).dash()
