@@ -236,3 +236,29 @@ def test_contact_results_that_fail_keep_the_rows_so_far(tmp_path, line, time):
     said = until(tmp_path, GROUND + sphere(0.1) + law + GRAVITY, time)
     assert f"CONTACTPOST failed at time {time:g}" in said
     assert "post.py:2" in said
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "name"),
+    [
+        ("c", "#include <stdlib.h>\nvoid CFFSUB(int *id) { if (*id < 0) exit(3); }\n", "exit"),
+        ("c", "#include <stdlib.h>\nvoid CFFSUB(int *id) { if (*id < 0) abort(); }\n", "abort"),
+        (
+            "f90",
+            "subroutine cffsub(id)\n integer id\n if (id < 0) stop 3\nend subroutine\n",
+            "stop",
+        ),
+        ("c", "void CFFSUB(int *id) { }\n", ""),
+    ],
+)
+def test_a_library_that_would_end_the_process_is_warned_of(tmp_path, language, text, name):
+    from mbsim.plugins.shared_library import address_of, read_library
+
+    said = []
+    library = read_library(compiled(tmp_path, text, language), "Force_Contact[1]")
+    (symbol,) = library.conventions("CFFSUB").values()
+    assert address_of(library, symbol, said.append)
+    assert len(said) == bool(name)
+    for line in said:
+        assert ": warning: " in line
+        assert name in line.split("which ends")[0]
