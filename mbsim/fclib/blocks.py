@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbsim.core.jitable import jitable
@@ -100,16 +102,29 @@ def diagonal_places(ptr, col):
 
 
 @jitable
+def _largest_of_three(a, b, c, e, f, g):
+    """Return the largest eigenvalue of [[a, e, f], [e, b, g], [f, g, c]], by the roots' cosines."""
+    mean = (a + b + c) / 3.0
+    a, b, c = a - mean, b - mean, c - mean
+    spread = math.sqrt((a * a + b * b + c * c + 2.0 * (e * e + f * f + g * g)) / 6.0)
+    if not spread > 0.0:
+        return mean
+    half = 0.5 * (a * (b * c - g * g) - e * (e * c - g * f) + f * (e * g - b * f)) / spread**3
+    return mean + 2.0 * spread * math.cos(math.acos(min(max(half, -1.0), 1.0)) / 3.0)
+
+
+@jitable
 def own_units(val, diagonal):
     """Return rho (contacts,), 1 / lambda_max of the symmetric part of each diagonal block.
 
-    Five squarings bring out the largest eigenvalue, and a Rayleigh quotient gives it to 0.3 % at
-    worst. A block without a positive one gets the mean of the others, or 1.
+    Of blocks larger than 3 x 3 five squarings bring out the largest eigenvalue, and a Rayleigh
+    quotient gives it to 0.3 % at worst. A block without a positive one gets the mean of the others,
+    or 1.
     """
     d = val.shape[1]
     rho = np.empty(len(diagonal))
-    power, square = np.empty((d, d)), np.empty((d, d))
     total, found = 0.0, 0
+    power, square = np.empty((d, d)), np.empty((d, d))
     for a in range(len(diagonal)):
         block = val[diagonal[a]]
         trace = 0.0
@@ -121,27 +136,37 @@ def own_units(val, diagonal):
         for s in range(d):
             for t in range(d):
                 power[s, t] = 0.5 * (block[s, t] + block[t, s]) / trace
-        for _ in range(5):
-            size = 0.0
+        largest = 0.0
+        if d == 2:
+            apart = 0.5 * (power[0, 0] - power[1, 1])
+            largest = 0.5 + math.sqrt(apart**2 + power[0, 1] ** 2)
+        elif d == 3:
+            largest = _largest_of_three(
+                power[0, 0], power[1, 1], power[2, 2], power[0, 1], power[0, 2], power[1, 2]
+            )
+        else:
+            for _ in range(5):
+                size = 0.0
+                for s in range(d):
+                    for t in range(d):
+                        square[s, t] = 0.0
+                        for k in range(d):
+                            square[s, t] += power[s, k] * power[k, t]
+                    size += square[s, s]
+                for s in range(d):
+                    for t in range(d):
+                        power[s, t] = square[s, t] / size
+            best = 0
+            for s in range(1, d):
+                best = s if power[s, s] > power[best, best] else best
+            along, length = 0.0, 0.0
             for s in range(d):
+                length += power[s, best] ** 2
                 for t in range(d):
-                    square[s, t] = 0.0
-                    for k in range(d):
-                        square[s, t] += power[s, k] * power[k, t]
-                size += square[s, s]
-            for s in range(d):
-                for t in range(d):
-                    power[s, t] = square[s, t] / size
-        best = 0
-        for s in range(1, d):
-            best = s if power[s, s] > power[best, best] else best
-        along, length = 0.0, 0.0
-        for s in range(d):
-            length += power[s, best] ** 2
-            for t in range(d):
-                along += power[s, best] * block[s, t] * power[t, best]
-        if along > 0.0:
-            rho[a] = length / along
+                    along += power[s, best] * block[s, t] * power[t, best]
+            largest = along / (length * trace)
+        if largest > 0.0:
+            rho[a] = 1.0 / (largest * trace)
             total += rho[a]
             found += 1
     for a in range(len(rho)):

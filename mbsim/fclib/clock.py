@@ -48,7 +48,9 @@ event.register("numba:compiler_lock", _preparing)
 _seen: dict[Callable[..., Any], Callable[..., Any]] = {}
 # perf_counter itself, no function of ours: it takes no notice of Ctrl+C, which would be lost here
 _now = ctypes.CFUNCTYPE(ctypes.c_double)(time.perf_counter)
-_addresses = (float(ctypes.cast(_now, ctypes.c_void_p).value or 0), _preparing.shared.ctypes.data)
+_addresses = np.array(
+    [float(ctypes.cast(_now, ctypes.c_void_p).value or 0), _preparing.shared.ctypes.data, np.inf]
+)
 
 
 def clock() -> float:
@@ -62,7 +64,9 @@ def until(deadline: float) -> Any:
     These are the addresses of a function that gives the time and of the seconds that do not count,
     and the deadline.
     """
-    return np.array((*_addresses, deadline))
+    found = _addresses.copy()
+    found[2] = deadline
+    return found
 
 
 @jitable

@@ -21,6 +21,9 @@ LARGEST = 1e10
 #: Times the tolerance that the scale-free residual and the velocity error may be: 10, less what
 #: rho is uncertain by.
 FREE = 9.9
+#: How much is looked at: the published error alone (`relative_errors`); of the contacts' shares
+#: none, most, or all (`own_errors`).
+PUBLISHED, NO_SHARES, DECIDING, EVERY_SHARE = range(4)
 #: Growth of |r| that every gain is worth.
 GROWTH = 2.0
 
@@ -54,6 +57,15 @@ def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
     The contact's numbers begin at `first` in u, r and `out`.
     """
     nt, nr = len(tangent), len(rolling)
+    if r[first] == 0.0 and u[first] >= 0.0:
+        size = 0.0
+        for k in range(1, 1 + nt + nr):
+            size += abs(r[first + k])
+        if size == 0.0:
+            # open: x is in the polar cone
+            for k in range(1 + nt + nr):
+                out[first + k] = 0.0
+            return 0.0
     speed = 0.0
     spin = 0.0
     for k in range(nt):
@@ -131,17 +143,15 @@ def norm(vector):
 
 
 @jitable
-def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work):
-    """Return |F_a|^2 of the natural map with the contact's own `rho`, and two shares.
+def own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach):
+    """Return two shares of a contact, whose natural map F_a with its own `rho` has this square.
 
     The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, with what rounding may hide
     added to |F_a|: ROUNDED of the sum of rho_a |W_aj| |r_j|. It is 0 where |F_a|, |r_a| and
     rho_a |q_a| all are below NOISE of that sum (and `most` as a velocity). The second is what can
     be made smaller, 0 where |F_a| alone is below NOISE. `most`, `reach`: see `rounding`.
     """
-    d = 1 + len(tangent) + len(rolling)
     own = rho[a]
-    square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
     size, push = 0.0, 0.0
     for k in range(d * a, d * a + d):
         size += r[k] ** 2
@@ -149,7 +159,7 @@ def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, 
     held, missing = math.sqrt(size), math.sqrt(square)
     size = max(held, own * math.sqrt(push))
     if size > 0.0 and ROUNDED * math.sqrt(own) * reach <= NEGLIGIBLE * size:
-        return square, missing / size, missing / size
+        return missing / size, missing / size
     terms = 0.0
     for j in range(ptr[a], ptr[a + 1]):
         for row in range(d):
@@ -158,11 +168,11 @@ def own_share(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, 
     terms *= own
     rounded = ROUNDED * terms
     if held == 0.0 and missing == 0.0 and own * u[d * a] > rounded:
-        return square, 0.0, 0.0  # open beyond doubt
+        return 0.0, 0.0  # open beyond doubt
     share = (missing + rounded) / size if missing + rounded < LARGEST * size else LARGEST
     if missing > NOISE * terms:
-        return square, share, missing / size if missing < LARGEST * size else LARGEST
-    return square, share if size > min(NOISE * terms, most * own) else 0.0, 0.0
+        return share, missing / size if missing < LARGEST * size else LARGEST
+    return share if size > min(NOISE * terms, most * own) else 0.0, 0.0
 
 
 @jitable
@@ -184,7 +194,7 @@ def rounding(d, rho, q, r):
 
 
 @jitable
-def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
+def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work):
     """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
@@ -193,26 +203,37 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
     * The scale-free residual, the largest share of a contact (`own_share`).
     * The velocity error |F / rho| / |q|: the other two fall while impulses grow, and this does not.
     * What of the scale-free residual can be made smaller: the largest second share.
+
+    `shares`: EVERY_SHARE; DECIDING, for which the second figure is 0, and sums over a row of W, of
+    which rounding is a part, are made only of contacts that the fourth depends on; NO_SHARES, and
+    both are 0.
     """
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    most, reach = rounding(d, rho, q, r)
+    most, reach = rounding(d, rho, q, r) if shares == EVERY_SHARE else (-1.0, 0.0)
     free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
-        push = 0.0
+        push, held = 0.0, 0.0
         for k in range(d * a, d * a + d):
-            impulse += r[k] ** 2
+            held += r[k] ** 2
             push += q[k] ** 2
             moved += (own * u[k]) ** 2
+        impulse += held
         bound += push
         given += own**2 * push
-        square, share, second = own_share(
-            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, most, reach, work
-        )
+        square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, own, work)
         missing += square
         speeds += square / own**2
-        free, attainable = max(free, share), max(attainable, second)
+        if shares == EVERY_SHARE or (
+            shares == DECIDING and square > attainable**2 * max(held, own**2 * push)
+        ):
+            if most < 0.0:
+                most, reach = rounding(d, rho, q, r)
+            share, second = own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach)
+            attainable = max(attainable, second)
+            if shares == EVERY_SHARE:
+                free = max(free, share)
     missing = math.sqrt(missing)
     scale = math.sqrt(max(given, impulse, moved))
     speeds = math.sqrt(speeds)
@@ -225,20 +246,25 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
 
 
 @jitable
-def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work):
+def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work):
     """Return how far an iterate is from the first goal and from the second one.
 
     The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
     contact's own rho: in some units the one is small long before the other. The second is the
     largest of |F| / |q|, MERIT_1 and, over FREE, the velocity error and what is attainable of the
-    scale-free residual (`own_errors`). A scale of 0 does not divide.
+    scale-free residual (`own_errors`). A scale of 0 does not divide. `shares`: DECIDING; or
+    PUBLISHED, for what is lower than both and does for an iterate not within the first goal.
     """
     missing = residual(tangent, rolling, mu, mu_r, u, r, work)
     bound = norm(q)
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
-    own, _, speeds, free = own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, work)
     second = max(missing / bound if bound > 0.0 else missing, missing / (1.0 + math.sqrt(bound)))
+    if shares == PUBLISHED:
+        return error, second
+    own, _, speeds, free = own_errors(
+        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work
+    )
     return max(error, own), max(second, free / FREE, speeds / FREE)
 
 

@@ -37,7 +37,7 @@ import numpy as np
 
 from mbsim.fclib.blocks import product_of_stored, transposed_product_of_stored
 from mbsim.fclib.clock import compiled
-from mbsim.fclib.cone import FREE, own_errors, residual
+from mbsim.fclib.cone import EVERY_SHARE, FREE, own_errors, residual
 from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import directions, multipliers, reduce, velocities
 
@@ -154,10 +154,11 @@ class Errors(NamedTuple):
         own; some contact may be far off. It is not met where it is small only against impulses that
         run away, and velocities are FAR off.
         """
-        if not max(self.error, self.own_error, self.velocity_error / FAR) <= tol:
+        speed = self.velocity_error
+        if not (self.error <= tol and self.own_error <= tol and speed <= FAR * tol):
             return "not_solved"
-        free = max(self.scale_free, self.velocity_error)
-        return "solved" if free <= FREE * tol else "solved_relative"
+        met = self.scale_free <= FREE * tol and speed <= FREE * tol
+        return "solved" if met else "solved_relative"
 
 
 def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> Errors:
@@ -171,8 +172,9 @@ def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float, flo
     """Return own_error, scale_free, velocity_error and attainable."""
     b = blocks
     found: tuple[float, float, float, float] = compiled(own_errors)(
-        b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r, np.empty_like(r)
-    )
+        b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r, EVERY_SHARE,
+        np.empty_like(r),
+    )  # fmt: skip
     return found
 
 

@@ -218,7 +218,8 @@ def lint(text: str, name: str, with_state: bool = False) -> list[str]:
             wrong = slip.wrong_lengths(node, with_state)
             found += zeros + [item for item in wrong if item[0] not in known]
             found += slip.unguarded_divisions(node)
-    return [f"line {line}: {what}" for line, what in sorted(found, key=_line)]
+    # two divisions of one line are one warning
+    return [f"line {line}: {what}" for line, what in dict.fromkeys(sorted(found, key=_line))]
 
 
 def reads_parameter(text: str, name: str, position: int) -> bool:

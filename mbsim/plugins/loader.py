@@ -207,7 +207,7 @@ def load_friction(
     element, name = f"Force_Contact[{contact.id}]", contact.cff.fnc_name or "CFFSUB"
     script = find_subroutine(contact, plugin_files, {} if scripts is None else scripts)
     if isinstance(script, Library):
-        return _from_library(script, contact, name)
+        return _from_library(script, contact, name, say)
     if isinstance(script, OctaveFile):
         return _from_octave(script, contact, name, say)
     states = _states(script, contact)
@@ -284,11 +284,14 @@ def check_libraries(contacts: Iterable[Contact]) -> None:
         raise ModelError("\n".join(faults))
 
 
-def _from_library(library: Library, contact: Contact, name: str) -> UserFriction:
+def _from_library(
+    library: Library, contact: Contact, name: str, say: Callable[[str], None]
+) -> UserFriction:
     """Return the friction function of a shared library."""
     par = np.array(contact.cff.par, dtype=np.float64)
     language, symbol = choose(library, name, "cff", contact.cff.language)
-    address, hidden, keep = friction(address_of(library, symbol), language, contact.id, par)
+    at = address_of(library, symbol, say)
+    address, hidden, keep = friction(at, language, contact.id, par)
     reads_x = sees_x(address, contact.id, np.concatenate([[hidden], par]), contact.cff.par)
     return UserFriction(
         address=address,

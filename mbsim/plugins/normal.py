@@ -129,7 +129,7 @@ def load_normal(
         element=contact.id,
     )
     if isinstance(source, Library):
-        return _from_library(made, source, contact.cnf.language)
+        return _from_library(made, source, contact.cnf.language, say)
     if isinstance(source, OctaveFile):
         octave = running(element)
         function = octave.add(source, CNFSUB, len(made.par), element)
@@ -151,7 +151,9 @@ def load_normal(
     return replace(made, address=address, keep=(keep, made.keep))
 
 
-def _from_library(made: UserNormal, library: Library, language: str) -> UserNormal:
+def _from_library(
+    made: UserNormal, library: Library, language: str, say: Callable[[str], None]
+) -> UserNormal:
     """Return the normal law of a shared library; its function has been called with iflag 1."""
     from mbsim.core import jit
     from mbsim.core.address import pack
@@ -160,7 +162,7 @@ def _from_library(made: UserNormal, library: Library, language: str) -> UserNorm
 
     spoken, symbol = choose(library, made.name, "cnf", language)
     call = NormalCall(
-        address=np.array([address_of(library, symbol)], dtype=np.int64),
+        address=np.array([address_of(library, symbol, say)], dtype=np.int64),
         whole=np.array([made.element, len(made.par), 0, 1], dtype=np.int32),
         par=made.par.copy(),
         place=made.place,

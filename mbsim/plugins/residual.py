@@ -307,7 +307,10 @@ def _refuse_jumps(
     axes: int,
     who: str,
 ) -> None:
-    """Refuse a residual that jumps where an unknown or its rate changes: it may have no zero.
+    """Refuse a residual that jumps where an unknown, its rate or x' changes.
+
+    It may have no zero; or its force jumps against the motion, which then is at rest nowhere near.
+    Where f' alone jumps, f does not.
 
     Raises
     ------
@@ -318,13 +321,25 @@ def _refuse_jumps(
     first = 1 + 2 * axes + count
     log, host.log = host.log, lambda line: None
     try:
-        for given in itertools.islice(_points(sizes, axes, count), 1, None, JUMPS_EVERY):
-            for at in range(first - count, first + count):
+        points = list(itertools.islice(_points(sizes, axes, count), 1, None, JUMPS_EVERY))
+        # what has no zero is told first
+        for places in (range(first - count, first + count), range(1 + axes, first - count)):
+            for given, at in itertools.product(points, places):
                 found = _jump(call, given, at)
                 if found is None:
                     continue
+                where, low, high, row = found
+                if at < first - count:
+                    if _gives_a_rate(call, given, row, first, unknowns):
+                        continue
+                    raise ModelError(
+                        f"{who}: jumps from {low:.6g} to {high:.6g} where x' passes {where:.6g}: "
+                        "a force that jumps against the motion switches to and fro for ever. Take "
+                        "Force_DryFriction, or a smooth law, F tanh(x'/v), or write stick and slip "
+                        "in one equation, f = clip(f + r (x' - f'/k), -F, F): see "
+                        "userfuncs/dry_friction_element.py"
+                    )
                 name, rate = unknowns[(at - first) % count].name, "'" if at >= first else ""
-                where, low, high = found
                 raise ModelError(
                     f"{who}: jumps from {low:.6g} to {high:.6g} where {name}{rate} passes "
                     f"{where:.6g}, so that it may be 0 nowhere: a residual must be continuous. "
@@ -335,10 +350,28 @@ def _refuse_jumps(
         host.log = log
 
 
+def _gives_a_rate(
+    call: Callable[[list[float]], list[float]],
+    given: list[float],
+    row: int,
+    first: int,
+    unknowns: tuple[Unknown, ...],
+) -> bool:
+    """Return whether a row depends on the rate of an unknown that is a state."""
+    base = call(given)[row]
+    for k, unknown in enumerate(unknowns):
+        if unknown.kind == DIFFERENTIAL:
+            other = given.copy()
+            other[first + k] += abs(other[first + k]) or 1.0
+            if call(other)[row] != base:
+                return True
+    return False
+
+
 def _jump(
     call: Callable[[list[float]], list[float]], given: list[float], at: int
-) -> tuple[float, float, float] | None:
-    """Return where a residual jumps as one argument changes, and from what to what, or None.
+) -> tuple[float, float, float, int] | None:
+    """Return where a residual jumps as one argument changes, from what to what, and its row.
 
     The parts over which it changes most are halved down to rounding: what is left of the change of
     a residual that is continuous goes down with them.
@@ -367,7 +400,7 @@ def _jump(
     left = [abs(a - b) for a, b in zip(before, behind, strict=True)]
     row = left.index(max(left))
     # rounding of what cancels in it may be larger than the interval
-    return (where, before[row], behind[row]) if left[row] > LEFT_OF_JUMP * whole else None
+    return (where, before[row], behind[row], row) if left[row] > LEFT_OF_JUMP * whole else None
 
 
 def _change(part: Any) -> float:

@@ -7,7 +7,7 @@ Fortran's CFFSUB is, is Fortran. Where both or neither are there nothing is gues
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.errors import ModelError
-from mbsim.plugins.symbols import functions_of
+from mbsim.plugins.symbols import ends_the_process, functions_of
 
 if TYPE_CHECKING:
     from mbsim.plugins.library_adapter import LibraryCall
@@ -135,8 +135,18 @@ def choose(library: Library, name: str, prefix: str, language: str) -> tuple[str
     )
 
 
-def address_of(library: Library, symbol: str) -> int:
-    """Return where a function lies, after loading its library into this process."""
+def address_of(library: Library, symbol: str, say: Callable[[str], None]) -> int:
+    """Return where a function lies, after loading its library into this process.
+
+    `say` takes a warning of what would end the process from within, which nobody can catch.
+    """
+    ending = sorted(ends_the_process(library.path))
+    if ending:
+        say(
+            f"{library.element}: {library.path}: warning: it calls {', '.join(ending)} (Fortran's "
+            "STOP is such a call), which ends mbsim without a message, and results since the last "
+            "flush are lost: return a result that is no number (NaN) instead"
+        )
     function = getattr(library.open(), symbol)
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 

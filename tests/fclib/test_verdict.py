@@ -12,7 +12,7 @@ from test_solvers import some_local, wedge
 
 from mbsim.cli.main import main
 from mbsim.core import jit
-from mbsim.fclib import clock, factor, hdf5
+from mbsim.fclib import blocks, clock, cone, factor, hdf5
 from mbsim.fclib.infeasible import is_infeasible
 from mbsim.fclib.merit import errors, judge
 from mbsim.fclib.problem import Local, Solution, matrix
@@ -149,6 +149,38 @@ def test_the_figures_are_those_of_the_formulas():
     assert figures.velocity_error == pytest.approx(velocity, rel=6e-3, abs=1e-15)
 
 
+def test_what_decides_is_what_every_share_gives():
+    for seed in range(40):
+        problem = (random_problem, bodies_in_flight)[seed % 2](seed)
+        b = reduce(problem)
+        given = task.Task(b, np.zeros(len(b.q)), 1e-8, 1e-8)
+        sweeps.nsgs(given, 1 + seed % 5)
+        u = b.q.copy()
+        jit.function(blocks.product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, given.r, u)
+        found = [
+            jit.function(cone.own_errors)(
+                b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, given.r,
+                shares, np.empty_like(u),
+            )
+            for shares in (cone.EVERY_SHARE, cone.DECIDING, cone.NO_SHARES)
+        ]  # fmt: skip
+        assert found[1] == (found[0][0], 0.0, *found[0][2:])
+        assert found[2] == (found[0][0], 0.0, found[0][2], 0.0)
+
+
+@pytest.mark.parametrize("d", [2, 3, 5])
+def test_a_contacts_unit_is_that_of_its_largest_eigenvalue(d):
+    rng = np.random.default_rng(d)
+    spectra = 10.0 ** rng.uniform(-8.0, 8.0, (60, d))
+    spectra[:20] = spectra[:20, :1]  # all alike, and below, two that are the largest
+    spectra[20:40, 0] = spectra[20:40, 1] = spectra[20:40].max(axis=1)
+    turns = np.linalg.qr(rng.normal(size=(60, d, d)))[0]
+    val = turns @ (spectra[:, :, None] * turns.transpose(0, 2, 1))
+    rho = jit.function(blocks.own_units)(val, np.arange(60, dtype=np.int32))
+    # the angle of the roots is lost to sqrt(eps) where two are alike; 5 x 5 goes by squarings
+    assert rho * spectra.max(axis=1) == pytest.approx(1.0, rel=3e-3 if d == 5 else 1e-7)
+
+
 def test_rounding_is_excused_where_there_is_nothing_else():
     # a contact between two that balance each other: its velocity is 0, rounded at 1e-16
     w = np.kron(
@@ -227,8 +259,9 @@ def test_a_few_contacts_in_the_plane_get_every_combination_of_states():
 
 
 def test_no_method_goes_on_when_the_time_is_over():
-    blocks = reduce(some_local(60))
-    given = task.Task(blocks, np.zeros(180), 1e-14, 1e-14, deadline=clock.clock() - 1e-3)
+    given = task.Task(
+        reduce(some_local(60)), np.zeros(180), 1e-14, 1e-14, deadline=clock.clock() - 1e-3
+    )
     sweeps.nsgs(given, 10**6)
     assert given.iterations == 1 + sweeps.LONG // 60
     assert not splitting.Splitting(given).advance(10**6)

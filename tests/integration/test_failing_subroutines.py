@@ -155,3 +155,110 @@ def test_a_slip_speed_of_zero_in_the_divisor_is_said_and_ends_the_run(tmp_path):
     assert "law.py:4" in done.output
     with mbsim.open_results(tmp_path / "out/deck.h5") as results:
         assert results.stats["rejected"] < 0.2 * results.stats["steps"] + 20
+
+
+# what begins each language's friction, and what it returns: no friction, and no number
+LANGUAGES = {
+    "c": (
+        "#include <math.h>\nvoid CFFSUB(int *id, double *time, double *par, int *npar, "
+        "double *loci, double *locj,\n  double *x, double *xdot, double *nforce, int *dflag, "
+        "int *iflag, double *result)\n{{ result[0] = result[1] = result[2] = 0.0;\n"
+        "  if (*time > {after}) result[0] = NAN; }}\n"
+    ),
+    "f90": (
+        "subroutine cffsub(id, time, par, npar, loci, locj, x, xdot, nforce, area, dflag, &\n"
+        "    iflag, results)\n  integer :: id, npar\n  logical :: dflag, iflag\n"
+        "  double precision :: time, par(*), loci(3), locj(3), x(3), xdot(3), nforce, area\n"
+        "  double precision :: results(3)\n  results = 0\n"
+        "  if (time > {after}d0) results(1) = sqrt({after}d0 - time)\nend subroutine\n"
+    ),
+}
+OCTAVE = """function f = CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag)
+  f = [0, 0, 0];
+  if time > {after}
+    {what};
+  end
+end
+"""
+
+
+def until(folder, deck, after):
+    """Run a deck whose subroutine fails from a time on; return what the command said."""
+    file = write_deck(folder, deck, end_time=0.2)
+    done = CliRunner().invoke(main, ["run", str(file), "-o", str(folder / "out")])
+    assert done.exit_code == 4, done.output
+    with mbsim.open_results(folder / "out/deck.h5") as results:
+        assert results.status == "failed"
+        # every row before the failure is kept
+        assert results["time"][-1] == pytest.approx(after - 0.01, abs=0.0101)
+        assert small(results.stats)
+    return done.output
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("after", ["-1.0", "0.1"])
+def test_a_library_that_fails_from_a_time_on_keeps_what_was_before(tmp_path, language, after):
+    library = compiled(tmp_path, LANGUAGES[language].format(after=after), language)
+    law = contact(damping=50, dmax=1e-3, cff_dll_name=library, **USER)
+    said = until(tmp_path, GROUND + sphere(0.1) + law + GRAVITY, max(float(after), 0.0))
+    assert "CFFSUB failed at time" in said
+    assert "user.so" in said
+
+
+@pytest.mark.parametrize(
+    ("what", "said"), [("error ('no such surface')", "no such surface"), ("f = [NaN, 0, 0]", "nan")]
+)
+@pytest.mark.parametrize("after", ["-1.0", "0.1"])
+def test_octave_that_fails_from_a_time_on_keeps_what_was_before(tmp_path, what, said, after):
+    need("octave-cli")
+    (tmp_path / "CFFSUB.m").write_text(OCTAVE.format(after=after, what=what), encoding="utf-8")
+    law = contact(damping=50, dmax=1e-3, script_name="CFFSUB.m", interpreter="MATLAB", **USER)
+    output = until(tmp_path, GROUND + sphere(0.1) + law + GRAVITY, max(float(after), 0.0))
+    assert said in output.lower()
+    assert "CFFSUB.m" in output
+
+
+@pytest.mark.parametrize(
+    ("line", "time"),
+    [
+        ("if time > 0.095: raise ValueError('no such table')", 0.1),
+        ("if time > 0.095: undefined_name", 0.1),
+        ("if endflg: 1.0 / (time - time)", 0.2),
+        ("if time > 0.095: import sys; sys.exit(0)", 0.1),
+    ],
+)
+def test_contact_results_that_fail_keep_the_rows_so_far(tmp_path, line, time):
+    (tmp_path / "post.py").write_text(
+        f"def CONTACTPOST(id, i_gra_id, j_gra_id, time, par, npar, iflag, endflg):\n    {line}\n",
+        encoding="utf-8",
+    )
+    law = contact(damping=50, dmax=1e-3, cpost_fnc_name="CONTACTPOST", cpost_script_name="post.py")
+    said = until(tmp_path, GROUND + sphere(0.1) + law + GRAVITY, time)
+    assert f"CONTACTPOST failed at time {time:g}" in said
+    assert "post.py:2" in said
+
+
+@pytest.mark.parametrize(
+    ("language", "text", "name"),
+    [
+        ("c", "#include <stdlib.h>\nvoid CFFSUB(int *id) { if (*id < 0) exit(3); }\n", "exit"),
+        ("c", "#include <stdlib.h>\nvoid CFFSUB(int *id) { if (*id < 0) abort(); }\n", "abort"),
+        (
+            "f90",
+            "subroutine cffsub(id)\n integer id\n if (id < 0) stop 3\nend subroutine\n",
+            "stop",
+        ),
+        ("c", "void CFFSUB(int *id) { }\n", ""),
+    ],
+)
+def test_a_library_that_would_end_the_process_is_warned_of(tmp_path, language, text, name):
+    from mbsim.plugins.shared_library import address_of, read_library
+
+    said = []
+    library = read_library(compiled(tmp_path, text, language), "Force_Contact[1]")
+    (symbol,) = library.conventions("CFFSUB").values()
+    assert address_of(library, symbol, said.append)
+    assert len(said) == bool(name)
+    for line in said:
+        assert ": warning: " in line
+        assert name in line.split("which ends")[0]

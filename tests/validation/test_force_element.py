@@ -497,10 +497,25 @@ def test_a_residual_that_jumps_is_refused(tmp_path, name, values):
 @pytest.mark.parametrize(
     "line",
     [
+        "    return [f[0] - limit*copysign(1.0, xdot[0])]",
+        "    return [f[0] - limit*(xdot[0]/abs(xdot[0]) if xdot[0] else 0.0)]",
+        "    return [f[0] - (limit if xdot[0] > 0.5 else 0.0)]",
+        "    v = xdot[0]\n    return [f[0] - limit*(v/0.1 if abs(v) < 0.1 else copysign(1.5, v))]",
+    ],
+)
+def test_a_force_that_jumps_with_the_rate_is_refused(tmp_path, line):
+    (tmp_path / "modes.py").write_text(MODES.format(body=line))
+    model = GROUND + body(2, 1.0, v=1.0) + element("law", "3,1", "modes.py")
+    with pytest.raises(ModelError, match=r"jumps from .* where x' passes .* F tanh"):
+        run_deck(tmp_path, model, 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
         "    return [f[0] - max(-limit, min(limit, f[0] + limit*stick))]",
         "    return [sqrt(abs(f[0]))*f[0] + soft*fdot[0] - xdot[0]]",
         "    return [f[0] - limit*tanh(1e4*xdot[0])]",
-        "    return [f[0] - limit*copysign(1.0, xdot[0])]",
         "    return [fdot[0] - 1e6*abs(xdot[0])*(1 - f[0]/limit*copysign(1.0, xdot[0]))]",
     ],
 )

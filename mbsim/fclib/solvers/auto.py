@@ -101,15 +101,19 @@ class Dashes:
             self.settled = changed <= CHANGES * b.contacts + 1.0
             self.looked_at = task.r
         spent = task.work if self.settled and task.work >= self.due else 0.0
-        if self.cost <= max(SHARE * spent, SHARE_NEXT * instead):
+        # what costs hardly more than to begin is worth a try at once
+        at_once = 1.5 * BEGIN_DASH if self.begun_at is None else 0.0
+        if self.cost <= max(SHARE * spent, SHARE_NEXT * instead, at_once):
             self.begun_at = task.r
             newton.Proximal(task, newton.DASH_ALPHA).dash()
             if task.r is self.begun_at:
                 self.due = 2.0 * task.work
 
     def polish(self) -> None:
-        """Make a solution better, where that costs little."""
+        """Make a solution better, where that costs little; proximal steps have done so."""
         task = self.task
+        if task.history[-1][0] == "PROX":
+            return
         if task.distance > newton.WELL and self.cost <= SHARE * task.work and not task.late:
             most = max(1, int(0.25 * SHARE * task.work / self.step))
             newton.Proximal(task, newton.DASH_ALPHA).dash(min(most, newton.MOST_DASH), PATIENCE)
@@ -198,22 +202,19 @@ def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> No
     """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
 
     `near`: sweep as well to get near enough for the proximal method. Within the first goal it is
-    near, and weak contacts, which are left, come slower than predicted: no more than half is spent.
+    near, and weak contacts, which are left, come far slower than predicted.
     """
     cost = sweeps.sweep_work(task.blocks)
     spent = task.work
     dashes.run()
-    while not task.over:
-        most = 0.5 if near and task.error <= task.tol else 2.0
-        if task.work - spent >= most * work:
-            return
+    while not task.over and task.work - spent < 2.0 * work:
         rows = task.history[-1][1]
         left = _remaining(rows, task)
         if near and left * cost > work and task.error > NEAR:
             left = _remaining(rows, task, NEAR)
             if task.history[-1][0] != "NSGS":
                 left = 0.0  # nothing known yet
-        if left * cost > work:
+        if left * cost > (0.1 if near and task.error <= task.tol else 1.0) * work:
             return
         chunk = min(max(25, task.iterations // 4), 100)
         best = task.r

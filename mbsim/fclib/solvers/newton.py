@@ -21,7 +21,16 @@ import numpy as np
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
 from mbsim.fclib.clock import compiled, late
-from mbsim.fclib.cone import bring_into_cones, improves, norm, own_errors, relative_errors
+from mbsim.fclib.cone import (
+    DECIDING,
+    NO_SHARES,
+    PUBLISHED,
+    bring_into_cones,
+    improves,
+    norm,
+    own_errors,
+    relative_errors,
+)
 from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
@@ -45,6 +54,9 @@ HALVINGS, MEMORY = 8, 5
 #: The proximal centre goes this far towards the new point (state[REACH]).
 OVER = 1.6
 SMALLEST_ALPHA = 1e-12
+
+#: Contacts in the matrix over closed ones: with some that have opened it is not analysed anew.
+SPARE = 1.1
 
 # places in `state`, what a later call needs to go on
 (
@@ -93,12 +105,12 @@ def states(tangent, mu, rho, u, r, slip, function):
 
 
 @jitable
-def _closed_pattern(ptr, col, slip, number, nodes):
-    """Return the pattern among closed contacts; `number` and `nodes` say who they are."""
+def _pattern(ptr, col, held, number, nodes):
+    """Return the pattern among contacts `held`; `number` and `nodes` say who they are."""
     size = 0
-    for a in range(len(slip)):
+    for a in range(len(held)):
         number[a] = -1
-        if slip[a] != 0.0:
+        if held[a]:
             number[a] = size
             nodes[size] = a
             size += 1
@@ -124,7 +136,7 @@ def _closed_pattern(ptr, col, slip, number, nodes):
 
 @jitable
 def _linear_system(tangent, ptr, col, val, mu, rho, shift, u, r, slip, number, nodes, size, jac, x):
-    """Write Newton's matrix and right side of the closed contacts.
+    """Write Newton's matrix and right side of contacts `nodes`, all closed ones among them.
 
     Rows are divided by rho (and g, where a contact slips), so that they have the size of W's.
     With x = r - rho u, e = x_T / |x_T|, P = I - e e' and c = 1 / (rho max(g, 1 / RHO)):
@@ -132,7 +144,7 @@ def _linear_system(tangent, ptr, col, val, mu, rho, shift, u, r, slip, number, n
         W_N dr = -u_N;   stick: W_T dr = -u_T;
         slip: c ((I - g P) dr_T - mu e dr_N) + c g rho P W_T dr = -c (r_T - mu r_N e).
 
-    Open contacts have dr = -r, known, so they are on the right side.
+    Open contacts have dr = -r; of those that are not among `nodes` that is on the right side.
     """
     nt = len(tangent)
     d = 1 + nt
@@ -142,6 +154,18 @@ def _linear_system(tangent, ptr, col, val, mu, rho, shift, u, r, slip, number, n
     for k in range(size):
         a = nodes[k]
         first = d * a
+        if slip[a] == 0.0:
+            for s in range(d):
+                x[d * k + s] = -r[first + s]
+            for j in range(ptr[a], ptr[a + 1]):
+                b = number[col[j]]
+                if b < 0:
+                    continue
+                for s in range(d):
+                    for t in range(d):
+                        jac[at, s, t] = 1.0 if b == k and s == t else 0.0
+                at += 1
+            continue
         for s in range(d):
             x[d * k + s] = 0.0
         # velocity change by the contacts that open
@@ -244,7 +268,7 @@ def proximal_newton(
     trial_slip = np.empty(nc)
     number = np.empty(nc, np.int32)
     nodes = np.empty(nc, np.int32)
-    closed = np.zeros(nc, np.bool_)
+    held = np.zeros(nc, np.bool_)
     rptr, rcol = np.zeros(1, np.int32), np.zeros(0, np.int32)
     back = np.zeros(0, np.int32)
     symbolic = analyse(0, rptr, rcol, d)
@@ -291,14 +315,18 @@ def proximal_newton(
         while newtons < most and not late(until):
             # Newton's direction
             same = newtons + spent > 0
+            closed, either = 0, 0
             for a in range(nc):
-                if closed[a] != (slip[a] != 0.0):
-                    same = False
-                    break
-            if not same:
+                if slip[a] != 0.0:
+                    closed += 1
+                    same = same and held[a]
+                if held[a] or slip[a] != 0.0:
+                    either += 1
+            few = either <= SPARE * closed
+            if not (same and few):
                 for a in range(nc):
-                    closed[a] = slip[a] != 0.0
-                rptr, rcol = _closed_pattern(ptr, col, slip, number, nodes)
+                    held[a] = slip[a] != 0.0 or (held[a] and few)
+                rptr, rcol = _pattern(ptr, col, held, number, nodes)
                 back = transposed_places(len(rptr) - 1, rptr, rcol)
                 symbolic = analyse(len(rptr) - 1, rptr, rcol, d)
                 flops = elimination_flops(symbolic, d)
@@ -373,7 +401,9 @@ def proximal_newton(
                 recent[k] = recent[k + 1]
             recent[MEMORY - 1] = size_f
             # natural map of the proximal problem
-            near = own_errors(tangent, (), ptr, col, val, mu, mu_r, own, q, u, x, work)[0]
+            near = own_errors(tangent, (), ptr, col, val, mu, mu_r, own, q, u, x, NO_SHARES, work)[
+                0
+            ]
             if near <= aim:
                 good = True
                 break
@@ -391,7 +421,7 @@ def proximal_newton(
         bring_into_cones(tangent, mu, x, trial)
         product(tangent, (), ptr, col, val, q, trial, plain)
         error, error_q = relative_errors(
-            tangent, (), ptr, col, val, mu, mu_r, own, q, plain, trial, work
+            tangent, (), ptr, col, val, mu, mu_r, own, q, plain, trial, DECIDING, work
         )
         if rows < len(history):
             history[rows, 0] = state[NEWTONS]
@@ -414,7 +444,11 @@ def proximal_newton(
         if finishing or state[DASH] > 0.0:
             break
         if done:
-            if error_q <= POLISHED * tol_q:
+            # a weak contact that is good enough is no reason for more
+            _, second = relative_errors(
+                tangent, (), ptr, col, val, mu, mu_r, own, q, plain, trial, PUBLISHED, work
+            )
+            if second <= POLISHED * tol_q:
                 break
             finishing = True
             for k in range(m):

@@ -20,7 +20,7 @@ import numpy as np
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
 from mbsim.fclib.clock import compiled, late
-from mbsim.fclib.cone import cone_height, improves, norm, relative_errors
+from mbsim.fclib.cone import DECIDING, cone_height, improves, norm, relative_errors
 from mbsim.fclib.factor import factor_work, factorise, solve, transposed_places
 from mbsim.fclib.ordering import analyse, elimination_flops
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
@@ -164,7 +164,7 @@ def admm(
         if state[ITERATIONS] % every == 0.0:
             product(tangent, rolling, ptr, col, val, q, z, u)
             error, error_q = relative_errors(
-                tangent, rolling, ptr, col, val, mu, mu_r, own, q, u, z, work
+                tangent, rolling, ptr, col, val, mu, mu_r, own, q, u, z, DECIDING, work
             )
             if rows < len(history):
                 history[rows, 0] = state[ITERATIONS]

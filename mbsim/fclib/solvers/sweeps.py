@@ -18,8 +18,12 @@ from mbsim.fclib.blocks import (
 )
 from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import (
+    DECIDING,
+    EVERY_SHARE,
     FREE,
+    PUBLISHED,
     improves,
+    natural_map,
     norm,
     own_errors,
     own_share,
@@ -106,7 +110,7 @@ def local_sweeps(
     check[0] = missing / scale if scale > 0.0 else missing
     check[1] = missing / bound if bound > 0.0 else missing
     check[2], check[3], check[4], check[5] = own_errors(
-        tangent, (), ptr, col, val, mu, mu, rho, q, u, r, work
+        tangent, (), ptr, col, val, mu, mu, rho, q, u, r, EVERY_SHARE, work
     )
     return ptr, col, val, diagonal, rho, u, done, error, error_q, rows
 
@@ -162,6 +166,8 @@ def gauss_seidel(
     between = 1 + LONG // max(len(mu), 1)
     kept = np.empty(0)
     kept_error, kept_q = np.inf, np.inf
+    # with few contacts every sweep is looked at, and rows say little of the sweeps to come
+    shares = PUBLISHED if every == 1 else DECIDING
     over = False
     while done < most and not over:
         change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, every_one, work)
@@ -177,8 +183,12 @@ def gauss_seidel(
             looked = done
             product(tangent, rolling, ptr, col, val, q, r, u)
             error, error_q = relative_errors(
-                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, missing
+                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, missing
             )
+            if shares == PUBLISHED and error <= tol:
+                error, error_q = relative_errors(
+                    tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, DECIDING, missing
+                )
             if rows < len(history):
                 history[rows, 0] = done
                 history[rows, 1] = error
@@ -207,14 +217,24 @@ def gauss_seidel(
                     )  # fmt: skip
                     product(tangent, rolling, ptr, col, val, q, trial, u)
                     leapt, leapt_q = relative_errors(
-                        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, missing
+                        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, shares, missing
                     )
+                    if leapt <= tol:
+                        leapt, leapt_q = relative_errors(
+                            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, DECIDING,
+                            missing,
+                        )  # fmt: skip
                     done += 1
                     if leapt < error:
                         r[:] = trial
                         error, error_q = leapt, leapt_q
                         if error <= tol and error_q <= tol_q:
                             break
+    if shares == PUBLISHED and error > tol:
+        product(tangent, rolling, ptr, col, val, q, r, u)
+        error, error_q = relative_errors(
+            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, DECIDING, missing
+        )
     if len(kept) > 0 and not (error <= tol and improves(error_q, norm(r), kept_q, norm(kept))):
         r[:] = kept
         error, error_q = kept_error, kept_q
@@ -236,9 +256,8 @@ def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, to
         product(tangent, rolling, ptr, col, val, q, r, u)
         found, above = 0, 0
         for a in range(len(mu)):
-            share = own_share(
-                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, a, velocity, reach, missing
-            )[2]
+            square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, rho[a], missing)
+            share = own_share(d, ptr, col, val, rho, q, u, r, a, square, velocity, reach)[1]
             above += 1 if share > tol else 0
             if 3.0 * share > tol:
                 if found == most:

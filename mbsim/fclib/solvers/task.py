@@ -9,7 +9,7 @@ import numpy as np
 
 from mbsim.fclib.blocks import product
 from mbsim.fclib.clock import clock, compiled, until
-from mbsim.fclib.cone import improves, relative_errors
+from mbsim.fclib.cone import DECIDING, improves, relative_errors
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -112,7 +112,7 @@ class Task:
         compiled(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
         errors: tuple[float, float] = compiled(relative_errors)(
             b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r,
-            np.empty_like(r),
+            DECIDING, np.empty_like(r),
         )  # fmt: skip
         return errors
 
