@@ -61,6 +61,8 @@ class Active(NamedTuple):
     size: Any
     kept_at: Any
     kept_a: Any
+    kept_power: Any
+    released: Any
 
 
 class Runner:
@@ -340,6 +342,8 @@ class Runner:
                 scene.sweep.size,
                 scene.sweep.kept_at,
                 scene.sweep.kept_a,
+                scene.sweep.kept_power,
+                scene.sweep.released,
             ),
             "log": scene.log,
             "audit": scene.audit,

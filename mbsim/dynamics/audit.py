@@ -21,7 +21,7 @@ import math
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
 from mbsim.dynamics.contact import FORCE, NORMAL, contact_of, sides
-from mbsim.dynamics.equations import MISMATCH, RESIDUAL, active_count, is_friction
+from mbsim.dynamics.equations import MISMATCH, RESIDUAL, active_count, is_friction, is_held
 from mbsim.dynamics.output import fill_energy
 from mbsim.dynamics.scales import fill_squares
 from mbsim.system.arrays import (
@@ -39,6 +39,9 @@ from mbsim.system.arrays import (
     ERROR_NOW,
     ERRORS_ALL,
     ERRORS_SINCE,
+    FOLD,
+    FOLD_AT,
+    FOLD_OFF,
     FOUND_ALLOWED,
     FOUND_ELEMENT,
     FOUND_TIME,
@@ -65,6 +68,8 @@ from mbsim.system.arrays import (
 ROUNDING = 1e-13
 #: Rounding of constraints' residuals and rates, over their units.
 CLOSED = 1e-10
+#: What rounding makes of velocities across a fold behind it, over the usual ones, for each loop.
+PASSED = 1e-8
 #: Bodies of the largest model that is sampled where contacts begin and end: of many, one always
 #: does.
 FEW = 16
@@ -217,10 +222,22 @@ def examine_equations(scene, t):
         if is_friction(scene, e):
             note(scene, HELD_SLIP, rate, allowed, t, e)
             continue
+        if not is_held(scene, e, t):
+            continue
         if eq.level[e] == 2:
             note(scene, POSITION, abs(sweep.rate[e, RESIDUAL]) / eq.unit[e], allowed, t, e)
         if eq.level[e] >= 1:
             note(scene, VELOCITY, rate, allowed, t, e)
+
+
+@jitable
+def examine_fold(scene, t):
+    """Look at how far velocities were off when a fold was left behind."""
+    quality, tol = scene.sweep.quality, scene.audit.plan[AUDIT_TOL]
+    count = 0
+    for e in range(len(scene.sweep.released)):
+        count += scene.sweep.released[e]
+    note(scene, FOLD, quality[FOLD_OFF], tol + PASSED * count, t, int(quality[FOLD_AT]))
 
 
 @jitable

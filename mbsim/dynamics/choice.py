@@ -14,25 +14,29 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.equations import (
     CONTRADICTION,
-    FOLDING,
     RESIDUAL,
-    SOUND,
     active_count,
+    factor_matrix,
     fill_equation,
     fill_equations,
     fill_matrix,
     is_active,
     is_friction,
     keep_accelerations,
+    leave_fold,
     near_fold,
     side_place,
+    watch_fold,
 )
 from mbsim.laws.catalog import STICK
 from mbsim.system.arrays import (
     CHOSEN,
+    FOLDS,
     KEPT,
+    KEPT_PIVOT,
     NEAR_FOLD,
     PIVOT,
+    PIVOT_THEN,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -41,6 +45,8 @@ from mbsim.system.arrays import (
     WITHIN,
 )
 
+#: What `keep_choice` returns where a fold was left behind.
+LEFT = -1
 #: What at most is left of an equation that others imply, as part of its size for free bodies.
 IMPLIED = 1e-12
 #: The same of friction at contact points. Those of a flat face lie in a plane but for their depths;
@@ -215,31 +221,40 @@ def choose_better(scene, t, y, least):
     for r in range(last + 1):
         chosen[r] = active[r]
     choose(scene, t, y)
-    same = active[last] == chosen[last]
-    for r in range(active[last]):
-        same = same and active[r] == chosen[r]
-    if same:
-        return
     worse = _BETTER * scene.sweep.quality[CHOSEN] < least / _WORN
     if active[last] < chosen[last] or (active[last] == chosen[last] and worse):
         for r in range(last + 1):
             active[r] = chosen[r]
         fill_skyline(scene)
+    # how near a fold is goes by the pivots of what is in use
+    quality = scene.sweep.quality
+    fill_equations(scene, t, y)
+    fill_matrix(scene)
+    factor_matrix(scene, t)
+    if quality[PIVOT_THEN] > 0.0:
+        quality[KEPT_PIVOT] *= quality[PIVOT] / quality[PIVOT_THEN]
+        quality[PIVOT_THEN] = quality[PIVOT]
 
 
 @jitable
 def keep_choice(scene, t, y):
-    """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
+    """Choose anew where the choice has worn; return 0, or a code if implied equations fail.
+
+    Or LEFT where a fold was left behind: what was released does not hold exactly then.
+    """
     sweep, count = scene.sweep, active_count(scene)
     if count == 0:
         return 0
+    if sweep.quality[FOLDS] == 1.0:
+        return LEFT if leave_fold(scene, t) else 0
     least = sweep.quality[PIVOT]
     sweep.quality[NEAR_FOLD] = 1.0 if near_fold(scene) else 0.0
     if least > sweep.quality[USUAL]:
         sweep.quality[KEPT] = 0.0
-    elif least > SOUND * FOLDING * sweep.quality[USUAL]:
+    else:
         keep_accelerations(scene, t)
-    if count == len(scene.equations.active) - 1:
+    watch_fold(scene, t)
+    if sweep.quality[FOLDS] == 1.0 or count == len(scene.equations.active) - 1:
         return 0
     apart, worst = implied_residual(scene, t, y)
     if apart > _DOUBT or least < _WORN * sweep.quality[CHOSEN]:

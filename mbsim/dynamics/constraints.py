@@ -7,14 +7,16 @@ import math
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import NOT_FINITE
-from mbsim.dynamics.choice import choose, fill_size, keep_choice, use_all
+from mbsim.core.rotation import add, cross, dot, vector
+from mbsim.dynamics.choice import LEFT, choose, fill_size, keep_choice, use_all
 from mbsim.dynamics.dry_friction import show_held
 from mbsim.dynamics.equations import (
-    FLOW,
+    MISMATCH,
     active_count,
     fill_matrix,
     hold,
-    is_friction,
+    passes_fold,
+    power_of_equations,
 )
 from mbsim.dynamics.projection import (
     displace,
@@ -31,9 +33,16 @@ from mbsim.system.arrays import (
     ALONG_JOINTS,
     CHOOSE,
     DISPLACE,
+    DRIFT,
+    DRIFTER,
+    FOLD_AT,
+    FOLD_BEGINS,
+    FOLD_OFF,
+    FOLD_POWER,
     FRICTION_DOOR,
     KEEP,
     MATRIX,
+    NEAR_FOLD,
     PROJECT,
     REACT,
     SEAT,
@@ -55,14 +64,43 @@ def constrain(scene, t, y, dy):
     total = write_accelerations(scene, dy)
     ledger = scene.world.ledger[0]
     if ledger >= 0:
-        # the work of what moves with time: multiplier times the rate of its equation's sum
-        power, sweep = 0.0, scene.sweep
-        for r in range(active_count(scene)):
-            if is_friction(scene, scene.equations.active[r]):
-                continue
-            power += sweep.multiplier[r] * sweep.rate[scene.equations.active[r], FLOW]
+        passing = passes_fold(scene, t)
+        power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
         dy[ledger] = power
     return 0 if math.isfinite(total) else NOT_FINITE
+
+
+@jitable
+def hold_all(scene, t, y):
+    """Fill accelerations and multipliers as if nothing was released: reactions are those."""
+    quality = scene.sweep.quality
+    begins = quality[FOLD_BEGINS]
+    quality[FOLD_BEGINS] = math.inf
+    hold(scene, t, y)
+    quality[FOLD_BEGINS] = begins
+
+
+@jitable
+def return_to_equations(scene, t, y):
+    """Bring y back onto what was released while a loop passed a fold; note how far off that was.
+
+    What was foreseen is off along the constraints as much as across them, which is seen here.
+    """
+    sweep, scales, quality, eq = scene.sweep, scene.scales, scene.sweep.quality, scene.equations
+    project(scene, t, y, 1)
+    quality[FOLD_OFF], worst = 0.0, 0.0
+    for p in range(len(scene.tree.body)):
+        g, D, r = scales.group[scene.tree.body[p]], sweep.answer[p], vector(sweep.arm[p])
+        shift = add((D[3], D[4], D[5]), cross((D[0], D[1], D[2]), r))
+        off = math.sqrt(dot(shift, shift) / scene.work.squares[g])
+        quality[FOLD_OFF] = max(quality[FOLD_OFF], off)
+    for k in range(active_count(scene)):
+        e = eq.active[k]
+        rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e]
+        if sweep.released[e] == 1 and rate >= worst:
+            worst, quality[FOLD_AT] = rate, e
+    prepare_equations(scene, t, y)
+    quality[NEAR_FOLD] = 1.0
 
 
 @jitable
@@ -75,14 +113,21 @@ def serve(scene, what, t, y, dy):
     if what == ACCELERATE:
         return constrain(scene, t, y, dy)
     if what == SEAT:
-        seat_all(scene, y)
-        carry_all(scene, y)
+        quality = scene.sweep.quality
+        drift, drifter = quality[DRIFT], quality[DRIFTER]
+        project(scene, t, y, 1)
+        quality[DRIFT], quality[DRIFTER] = drift, drifter
     elif what == PROJECT or what == ALONG_JOINTS:
         project(scene, t, y, 1 if what == PROJECT else 2)
     elif what == REACT:
+        if passes_fold(scene, t):
+            hold_all(scene, t, y)
         fill_reactions(scene, t, y)
     elif what == KEEP:
-        return keep_choice(scene, t, y)
+        code = keep_choice(scene, t, y)
+        if code == LEFT:
+            return_to_equations(scene, t, y)
+        return code
     elif what == MATRIX:
         use_all(scene, 0)
         prepare_equations(scene, t, y)

@@ -30,6 +30,7 @@ from mbsim.system.arrays import (
     DRY_SLIDE,
     DRY_TURN,
     EXPRESSION_DOOR,
+    FOLD_HALT,
     FRICTION_DOOR,
     RIGID_DOOR,
     SLIDE_LIMIT,
@@ -150,7 +151,9 @@ def limit_turn(context, t, h, a, b):
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return longest_turn(scene, longest_step(scene, vector_at(a, n), vector_at(b, n), h))
+    longest = longest_turn(scene, longest_step(scene, vector_at(a, n), vector_at(b, n), h))
+    halt = scene.sweep.quality[FOLD_HALT]
+    return min(longest, halt - t) if halt > t else longest
 
 
 def open_jets(scene: Scene) -> None:

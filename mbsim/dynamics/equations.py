@@ -33,12 +33,20 @@ from mbsim.dynamics.tree import load, origin, put, respond
 from mbsim.system.arrays import (
     ANGLE,
     ASKED,
+    AUDIT_TOL,
+    FOLD_BEGINS,
+    FOLD_ENDS,
+    FOLD_HALT,
+    FOLD_POWER,
+    FOLDS,
     GENERAL,
     KEPT,
     KEPT_PIVOT,
     OFFSET,
     PERP,
     PIVOT,
+    PIVOT_THEN,
+    PIVOT_TIME,
     PLACE_HELD,
     RIGID_DOOR,
     TOUCHING,
@@ -53,20 +61,30 @@ RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 #: Code of constraints that contradict each other in the course of the motion.
 CONTRADICTION = 9
 
-#: Pivots of about this part of the usual ones are those of a position in which a loop can fold:
-#: there an equation fades out, and behind it comes in again. A loop whose lengths are wrong by a
-#: rounding error e moves along with (e/pivot) of its speed beside what it should.
-FOLDING = 1e-5
-#: Below this part of the usual pivots a state is near such a position.
+#: Below this part of the usual pivots a state is near a position in which a loop can fold: how far
+#: that is goes as the square root of the least pivot.
 NEAR = 0.01
-#: Accelerations are kept where no pivot is below so many times the part at which equations fade.
-SOUND = 10.0
-#: Below this part of the usual pivots what is foreseen begins to count.
-FADES = 100.0 * FOLDING
-#: They are foreseen over at most so many times the time over which they were kept. A motion that
-#: stays near a fold for longer is slow: rounding leads it less astray, and equations fade later.
-REACH = 3.0
-UNFORESEEN = 1e-8
+#: Below this part what multipliers do is foreseen, until the fold is as far behind. A loop whose
+#: lengths are wrong by a rounding error e is accelerated by e/part**1.5 beside what it should.
+FOLDING = 2.5e-4
+#: Equations are released there whose pivots are below this part.
+RELEASED = 0.05
+#: From this part on steps go no farther than `CLOSER` of the way to the fold, so that there are
+#: samples of accelerations from which what is ahead can be told.
+WATCHED, CLOSER = 0.25, 0.3
+#: And so much farther at a tolerance of 1e-3, where fewer samples are enough.
+LOOSER = 0.2
+#: Samples are taken where the least pivot has fallen to this part of the last one's.
+SAMPLED = 0.6
+#: It is foreseen from so many times as far from the fold as `FOLDING` is, or, where samples do not
+#: tell it to this part of tol, from nearer up to this.
+ENTERED, DOUBT, NEAREST = 1.5, 0.1, 0.4
+#: What rounding makes of that.
+NOISE = 1e-10
+#: What is foreseen lasts at most so many times the time over which samples were taken.
+REACH = 1.0
+#: Pivots of this part are none: there an equation fades out.
+NAUGHT = 1e-8
 
 
 @jitable
@@ -406,9 +424,11 @@ def factor_matrix(scene, t):
     """
     A, first, n = scene.sweep.A, scene.sweep.skyline, active_count(scene)
     usual, least = scene.sweep.quality[USUAL], 1.0
-    folding = FOLDING if foreseeable(scene, t) else UNFORESEEN
+    passing = passes_fold(scene, t)
     for i in range(n):
-        size = scene.sweep.size[scene.equations.active[i]] ** 2
+        e = scene.equations.active[i]
+        size = scene.sweep.size[e] ** 2
+        released = passing and not is_held(scene, e, t)
         for j in range(first[i], i + 1):
             total = A[i, j]
             for k in range(max(first[i], first[j]), j):
@@ -416,9 +436,10 @@ def factor_matrix(scene, t):
             if j < i:
                 A[i, j] = total / A[j, j]
                 continue
-            least = min(least, total / size)
-            part = total / (folding * usual * size) if usual > 0.0 else math.inf
-            if part < 1e-4:
+            if not released:
+                least = min(least, total / size)
+            part = total / (NAUGHT * usual * size) if usual > 0.0 else math.inf
+            if part < 1e-4 or released:
                 A[i, i] = math.inf
             else:
                 A[i, i] = math.sqrt(total * (1.0 + part**-8) if part < 100.0 else total)
@@ -472,8 +493,8 @@ def impose(scene, t):
         e = active[r]
         sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, e)
     solve_matrix(scene)
-    # what is foreseen stands in for what equations that fade out no longer ask for
-    ahead = sweep.quality[PIVOT] < FADES * sweep.quality[USUAL] and foreseeable(scene, t)
+    # what is foreseen stands in for what equations that are released no longer ask for
+    ahead = passes_fold(scene, t)
     if ahead:
         foresee(scene, t)
         for r in range(n):
@@ -502,32 +523,119 @@ def near_fold(scene):
 
 
 @jitable
-def foreseeable(scene, t):
-    """Return whether enough was kept to foresee what multipliers do at t."""
-    when, last = scene.sweep.kept_at, int(scene.sweep.quality[KEPT]) - 1
-    return last > 0 and t - when[0] < REACH * (when[0] - when[last])
+def passes_fold(scene, t):
+    """Return whether at t a loop passes a fold.
+
+    Steps begin and end where that does; times before are those of output rows.
+    """
+    quality = scene.sweep.quality
+    return t >= quality[FOLD_BEGINS] and (t < quality[FOLD_ENDS] or quality[FOLDS] == 1.0)
+
+
+@jitable
+def is_held(scene, e, t):
+    """Return whether equation e holds at t: what is released does not while a fold is passed."""
+    return scene.sweep.released[e] == 0 or not passes_fold(scene, t)
+
+
+@jitable
+def watch_fold(scene, t):
+    """Look at the committed state how far ahead a fold is, and begin to pass one that is near.
+
+    The time until there follows from how the square root of the least pivot falls. Through the
+    fold, and as far behind it, equations whose pivots vanish there are released.
+    """
+    sweep, active, quality = scene.sweep, scene.equations.active, scene.sweep.quality
+    least, before, since = quality[PIVOT], quality[PIVOT_THEN], t - quality[PIVOT_TIME]
+    quality[PIVOT_THEN], quality[PIVOT_TIME], quality[FOLD_HALT] = least, t, math.inf
+    if not (since > 0.0 and 0.0 < least < min(before, WATCHED * quality[USUAL])):
+        return
+    ahead = since / (math.sqrt(before / least) - 1.0)
+    last, tol = int(quality[KEPT]) - 1, scene.audit.plan[AUDIT_TOL]
+    within = math.sqrt(least / (FOLDING * quality[USUAL]))
+    near = within <= ENTERED and last > 0 and 2.0 * ahead < REACH * (t - sweep.kept_at[last])
+    # where samples are too few a nearer one makes up for that
+    if near and (
+        within <= NEAREST or 2.0 * ahead * doubted(scene, t + ahead) <= max(DOUBT * tol, NOISE)
+    ):
+        quality[FOLDS], quality[FOLD_BEGINS], quality[FOLD_ENDS] = 1.0, t, t + 2.0 * ahead
+        quality[FOLD_HALT] = quality[FOLD_ENDS]
+        for r in range(active_count(scene)):
+            pivot = (sweep.A[r, r] / sweep.size[active[r]]) ** 2
+            sweep.released[active[r]] = 1 if pivot < RELEASED * quality[USUAL] else 0
+    elif within > NEAREST:
+        part = CLOSER + LOOSER * min(max(0.25 * math.log10(tol) + 1.75, 0.0), 1.0)
+        until = 1.0 if within > ENTERED else NEAREST
+        quality[FOLD_HALT] = t + ahead * min(part, 1.0 - until / within)
+
+
+@jitable
+def doubted(scene, t):
+    """Return by how much accelerations foreseen at t differ with one sample less, over V [1/T]."""
+    sweep, scales, when, off = scene.sweep, scene.scales, scene.sweep.kept_at, 0.0
+    count = int(sweep.quality[KEPT])
+    for p in range(len(scene.tree.body)):
+        for c in range(6):
+            sweep.answer[p, c] = 0.0
+    for i in range(count):
+        # the divided difference times the product of distances: what the last one adds
+        part = 1.0
+        for j in range(count):
+            if j < count - 1:
+                part *= t - when[j]
+            if j != i:
+                part /= when[i] - when[j]
+        for p in range(len(scene.tree.body)):
+            for c in range(6):
+                sweep.answer[p, c] += part * sweep.kept_a[i, p, c]
+    for p in range(len(scene.tree.body)):
+        g, D = scales.group[scene.tree.body[p]], sweep.answer[p]
+        shift = add((D[3], D[4], D[5]), cross((D[0], D[1], D[2]), vector(sweep.arm[p])))
+        off = max(off, math.sqrt(dot(shift, shift) / scene.work.squares[g]))
+    return off
+
+
+@jitable
+def leave_fold(scene, t):
+    """Return whether a fold that was being passed is left behind at the committed time t."""
+    quality = scene.sweep.quality
+    begins, ends = quality[FOLD_BEGINS], quality[FOLD_ENDS]
+    if t < ends - 1e-9 * (ends - begins):
+        return False
+    quality[FOLDS], quality[FOLD_ENDS] = 0.0, t
+    quality[FOLD_HALT], quality[PIVOT_THEN] = math.inf, 0.0
+    return True
+
+
+@jitable
+def power_of_equations(scene):
+    """Return the power of what moves with time: multiplier times the rate of its equation's sum."""
+    sweep, power = scene.sweep, 0.0
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        if not is_friction(scene, e):
+            power += sweep.multiplier[r] * sweep.rate[e, FLOW]
+    return power
 
 
 @jitable
 def foresee(scene, t):
     """Fill `answer` with what multipliers do to accelerations, if that goes on as it did.
 
-    It goes on as the polynomial through what was kept does (Lagrange's form); it counts fully
-    where equations fade, and not at all where they hold.
+    It goes on as the polynomial through what was kept does (Lagrange's form).
     """
     sweep, nt = scene.sweep, len(scene.tree.body)
-    quality, when = sweep.quality, sweep.kept_at
-    count, part = int(quality[KEPT]), quality[PIVOT] / quality[USUAL]
-    s = min(max((FADES - part) / (FADES - SOUND * FOLDING), 0.0), 1.0)
-    counts = s * s * (3.0 - 2.0 * s)
+    count, when = int(sweep.quality[KEPT]), sweep.kept_at
+    sweep.quality[FOLD_POWER] = 0.0
     for p in range(nt):
         for c in range(6):
             sweep.answer[p, c] = 0.0
     for i in range(count):
-        part = counts
+        part = 1.0
         for j in range(count):
             if j != i:
                 part *= (t - when[j]) / (when[i] - when[j])
+        sweep.quality[FOLD_POWER] += part * sweep.kept_power[i]
         for p in range(nt):
             for c in range(6):
                 sweep.answer[p, c] += part * sweep.kept_a[i, p, c]
@@ -544,17 +652,17 @@ def keep_accelerations(scene, t):
     sweep, nt, most = scene.sweep, len(scene.tree.body), len(scene.sweep.kept_at)
     quality, when = sweep.quality, sweep.kept_at
     count = int(quality[KEPT])
-    if count > 0 and not t > when[0]:
+    if count > 0 and not (t > when[0] and quality[PIVOT] < quality[KEPT_PIVOT]):
         count = 0
-    if count > 1 and t - when[0] < 0.1 * (when[0] - when[1]):
+    if count > 0 and quality[PIVOT] > SAMPLED * quality[KEPT_PIVOT]:
         # too near to tell how they change
         return
     for i in range(min(count, most - 1), 0, -1):
-        when[i] = when[i - 1]
+        when[i], sweep.kept_power[i] = when[i - 1], sweep.kept_power[i - 1]
         for p in range(nt):
             for c in range(6):
                 sweep.kept_a[i, p, c] = sweep.kept_a[i - 1, p, c]
-    when[0] = t
+    when[0], sweep.kept_power[0] = t, power_of_equations(scene)
     for p in range(nt):
         for c in range(6):
             sweep.p[p, c] = 0.0

@@ -89,7 +89,7 @@ def evaluate(scene, t, h, y, dy):
     # where things are
     place_bodies(scene, y)
     if scene.sweep.quality[NEAR_FOLD] == 1.0:
-        # near a position in which a loop can fold, equations are sound only on a sound tree
+        # near a position in which a loop can fold, equations are sound only where they hold
         call_int(scene.world.doors[JOINTS_DOOR], (scene, SEAT, t, y, dy))
 
     # who touches whom

@@ -18,7 +18,7 @@ from mbsim.core.problem import (
     IMPACTS_ALONE,
     Problem,
 )
-from mbsim.dynamics.audit import examine
+from mbsim.dynamics.audit import examine, examine_fold
 from mbsim.dynamics.crowd import follow
 from mbsim.dynamics.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.incidents import commit, first_depth, reversal, watch_peaks
@@ -39,6 +39,8 @@ from mbsim.system.arrays import (
     DRY_DOOR,
     ERROR_NOW,
     EVALUATE_DOOR,
+    FOLD_HALT,
+    FOLDS,
     HELD_OTHERWISE,
     HOLD_AGAIN,
     JOINTS_DOOR,
@@ -104,20 +106,24 @@ def _commit(context, t, h, a, b):
     Bit 1: y changed, bit 2: empty the events first, bit 3: a stable step is to be found anew.
     """
     scene = view(context, Scene)
-    listings = scene.log.counters[LISTINGS]
+    listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
     if scene.world.doors[RIGID_DOOR] != 0:
         # before equations may be chosen anew
         call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, a))
     if scene.world.doors[JOINTS_DOOR] != 0:
         code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
-        if code != 0:
+        if code > 0:
             return -float(code)
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
     changed = commit(scene, t, h, y)
     examine(scene, t, h, y)
-    word = (1.0 if changed > 0 else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
-    if changed == HELD_OTHERWISE:
+    passes = scene.sweep.quality[FOLDS] == 1.0
+    left = passed and not passes
+    if left:
+        examine_fold(scene, t)
+    word = (1.0 if changed > 0 or left else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    if changed == HELD_OTHERWISE or passed != passes:
         word += BEGIN_ANEW
     # pairs that were not near, and so not counted, are now
     return word + (STEP_IS_STALE if scene.log.counters[LISTINGS] > listings else 0.0)
@@ -144,7 +150,9 @@ def _limit(context, t, h, a, b):
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    halt = scene.sweep.quality[FOLD_HALT]
+    return min(longest, halt - t) if halt > t else longest
 
 
 def _output(context, t, h, a, b):

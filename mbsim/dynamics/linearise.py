@@ -19,7 +19,7 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.blocks import COUPLINGS, STALE, couple, drop_fill, find_order, forget_pattern
-from mbsim.dynamics.equations import active_count, fill_equation, side_place
+from mbsim.dynamics.equations import active_count, fill_equation, is_held, side_place
 from mbsim.dynamics.kinematics import place_body
 from mbsim.dynamics.stiffness import (
     add_contacts_slopes,
@@ -212,11 +212,12 @@ def clear(scene, T):
 
 
 @jitable
-def fill_rows(scene, L):
+def fill_rows(scene, L, t):
     """Fill the gradients of the equations in use; rows of level 2, others have their own."""
     eq = scene.equations
     for row in range(active_count(scene)):
         e = eq.active[row]
+        L.released[row] = 0 if is_held(scene, e, t) else 1
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):
                 k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
@@ -319,7 +320,7 @@ def linearise(scene, T, t, h, y, dy):
     fill_joint_forces(scene, T.linear)
     for k in range(len(scene.tree.body)):
         fill_joint(scene, T.linear, y, k)
-    fill_rows(scene, T.linear)
+    fill_rows(scene, T.linear, t)
     if active_count(scene) > 0:
         call_int(scene.world.doors[BEND_DOOR], (scene, t, y))
     code = add_contacts_slopes(scene, T, t, h, y)

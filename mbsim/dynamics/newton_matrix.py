@@ -292,6 +292,9 @@ def factor_rest(scene, T, M):
         for other in range(size):
             if k < held:
                 M.border[k, other] = held_row(scene, L, M, row, M.answer[other])
+                if L.released[k] == 1:
+                    # its multiplier is 0
+                    M.border[k, other] = 1.0 if k == other else 0.0
                 continue
             M.border[k, other] = -along_row(L, M, row, 1, M.answer[other])
             if other >= held:
@@ -374,6 +377,8 @@ def solve_border_part(scene, T, M, r):
         row = bordered(scene, k)
         if k < held:
             x[k] = held_residual(scene, L, M, row, r) - held_row(scene, L, M, row, M.g)
+            if L.released[k] == 1:
+                x[k] = 0.0 * x[k]
             continue
         place = scene.states.place[k - held]
         x[k] = r[place] + along_row(L, M, row, 1, M.g)

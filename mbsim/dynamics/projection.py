@@ -16,6 +16,7 @@ from mbsim.dynamics.equations import (
     factor_matrix,
     fill_equations,
     fill_matrix,
+    is_held,
     near_fold,
     solve_matrix,
 )
@@ -96,12 +97,12 @@ def speed_up(scene, y):
 
 
 @jitable
-def largest_residual(scene, level, column):
-    """Return the largest residual of the equations in use over its unit."""
+def largest_residual(scene, level, column, t):
+    """Return the largest residual over its unit of the equations in use that hold at t."""
     largest = 0.0
     for r in range(active_count(scene)):
         e = scene.equations.active[r]
-        if scene.equations.level[e] >= level:
+        if scene.equations.level[e] >= level and is_held(scene, e, t):
             largest = max(largest, abs(scene.sweep.rate[e, column]) / scene.equations.unit[e])
     return largest
 
@@ -119,7 +120,7 @@ def note_drift(scene, level, column, part):
 
 
 @jitable
-def note_gap(scene):
+def note_gap(scene, t):
     """Note as drift, over `SMALL`, a residual that Newton has left: the step is to be refused.
 
     A motion that asked for more than that of the step keeps its name: it is the cause.
@@ -129,7 +130,8 @@ def note_gap(scene):
     for r in range(active_count(scene)):
         e = scene.equations.active[r]
         gap = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
-        if scene.equations.level[e] >= 2 and gap > max(SMALL, worst):
+        held = scene.equations.level[e] >= 2 and is_held(scene, e, t)
+        if held and gap > max(SMALL, worst):
             worst = gap
             if asked <= SMALL:
                 quality[DRIFTER] = e
@@ -157,7 +159,7 @@ def close_loops(scene, t, y):
     fill_matrix(scene)
     factor_matrix(scene, t)
     for _ in range(MOST_ROUNDS):
-        size = largest_residual(scene, 2, RESIDUAL)
+        size = largest_residual(scene, 2, RESIDUAL, t)
         if size <= (ROUNDED if near_fold(scene) else CLOSED):
             return
         correct(scene, 2, RESIDUAL)
@@ -168,7 +170,7 @@ def close_loops(scene, t, y):
         prepare_equations(scene, t, y)
         fill_matrix(scene)
         factor_matrix(scene, t)
-    note_gap(scene)
+    note_gap(scene, t)
 
 
 @jitable

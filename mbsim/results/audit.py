@@ -67,6 +67,13 @@ ENTRIES = (
     Judged(
         a.NEWTON, "newton", "Newton's iteration left {value:.3g} of a step's equations", 10.0, ""
     ),
+    Judged(
+        a.FOLD,
+        "fold",
+        "velocities are off by {value:.3g} of the usual behind a position in which a loop can fold",
+        10.0,
+        "equation",
+    ),
 )
 #: Those of energy.
 ENERGIES = ("energy", "energy_step")

@@ -120,8 +120,30 @@ OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST = range(7)
 # the equations before it was brought back onto them, as a local error, and which equation most;
 # the least pivot of the factor at hand over its size squared, and
 # how many accelerations `Sweep.kept_a` holds; of the last of those their square in the norm of the
-# inertia, times the square root of the least pivot, and that pivot
-CHOSEN, USUAL, NEAR_FOLD, DRIFT, DRIFTER, PIVOT, KEPT, ASKED, KEPT_PIVOT = range(9)
+# inertia, times the square root of the least pivot, and that pivot; at the committed state the
+# least pivot and the time; whether a fold is being passed, when that began and when it ends, and
+# until when the next step may go; how far off velocities were behind it, and at which equation;
+# power of motions within it
+(
+    CHOSEN,
+    USUAL,
+    NEAR_FOLD,
+    DRIFT,
+    DRIFTER,
+    PIVOT,
+    KEPT,
+    ASKED,
+    KEPT_PIVOT,
+    PIVOT_THEN,
+    PIVOT_TIME,
+    FOLDS,
+    FOLD_BEGINS,
+    FOLD_ENDS,
+    FOLD_HALT,
+    FOLD_OFF,
+    FOLD_AT,
+    FOLD_POWER,
+) = range(18)
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -137,8 +159,9 @@ STORED_ENERGY, LOST_POWER = 6, 7
     HELD_SLIP,  # slip where friction holds
     CONE,  # friction over mu N, as a part of the contact's largest mu N
     NEWTON,  # what Newton's iteration left of an implicit step
-) = range(9)
-AUDITS = 9
+    FOLD,  # velocities across a fold behind it, over the usual ones
+) = range(10)
+AUDITS = 10
 # its columns, of the sample in which the value was largest over what was allowed
 FOUND_VALUE, FOUND_ALLOWED, FOUND_TIME, FOUND_ELEMENT = range(4)
 
@@ -667,10 +690,12 @@ class Sweep(NamedTuple):
     rhs: F1  # (ne,)
     skyline: I1  # (ne,) first column of a row of A
     size: F1  # (ne,) square root of what A would have if the bodies were free
+    released: I1  # (ne,) equations that do not hold while a loop passes a fold
     wanted: F1  # (ne,) multipliers of equations alone, near a fold
-    kept_at: F1  # (4,) times of the last committed states that no loop was about to fold in
-    kept_a: F3  # (4, nt, 6) what multipliers did to accelerations then
-    quality: F1  # (9,) least pivot over its size squared, see the names above
+    kept_at: F1  # (8,) times of the last committed states that no loop was about to fold in
+    kept_a: F3  # (8, nt, 6) what multipliers did to accelerations then
+    kept_power: F1  # (8,) power of motions then
+    quality: F1  # (18,) least pivot over its size squared, see the names above
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
     share: F2  # (nh, nh) slips of what sticks, by rows: S of dynamics.cones, and its matrix

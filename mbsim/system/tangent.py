@@ -62,6 +62,7 @@ class Linear(NamedTuple):
     column: F3  # (border, nb, 6) force of a unit multiplier, or of a unit of a state
     row: F3  # (border, nb, 6) gradient of an equation, or of a state's slope by xi
     row_rate: F3  # (border, nb, 6) of a state's slope by the rates
+    released: I1  # (border,) rows of equations that do not hold while a loop passes a fold
     slopes: F2  # (states, states) of states by states
     basis: F3  # (2, 9, 6) scratch
     law: F2  # (6, 12) scratch
@@ -189,6 +190,7 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((blocks, 6, 6)),
         np.zeros((blocks, 6, 6)),
         *(np.zeros((m, nb, 6)) for _ in range(3)),
+        np.zeros(m, dtype=np.int64),
         np.zeros((nz, nz)),
         np.zeros((2, 9, 6)),
         np.zeros((6, 12)),
