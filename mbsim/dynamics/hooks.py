@@ -85,7 +85,7 @@ def _norm(context, t, h, a, b):
     if h == IMPACTS_ALONE:
         return impact_left(scene, t, carray(a, (n,)), carray(b, (n,)))
     if h == FRICTION_ALONE:
-        return friction_left(scene, carray(a, (n,)), carray(b, (n,)))
+        return friction_left(scene, carray(a, (n,)), carray(b, (n,)), False)
     error = scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error
