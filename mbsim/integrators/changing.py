@@ -9,8 +9,11 @@ twice running, it costs less.
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
 Friction that turns sign from step to step within the tolerance hides its rate. That is mostly seen
-all the same (`dopri5.stiffness`); else a run that takes as many steps a time as when it was found
-stiff before, or has very many steps ahead, tries the implicit method now and then.
+all the same (`dopri5.stiffness`), and counts twice: such steps are far beyond the bound, and what
+else they shake leaves the state that the implicit method would begin from. What trembles so leaves
+and touches, and steps are short behind that: as calm they count by their length. Else a run that
+takes as many steps a time as when it was found stiff before, or has very many steps ahead, tries
+the implicit method now and then.
 Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
@@ -28,10 +31,12 @@ from mbsim.integrators.scheme import (
     EXPLICIT_STEPS,
     IMPLICIT_STEPS,
     LAST_ERROR,
+    LAST_STEP,
     PACE,
     PATIENCE,
     STEP,
     STEPS,
+    STIFF_STEP,
     STIFF_STEPS,
     STIFFNESS,
     TIME,
@@ -56,10 +61,13 @@ TRY_EVERY, TRIALS, TRIALS_OF_SHORT = 20, 2, 10
 def is_stiff(m, t_end):
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
-        m.memory[STIFF_STEPS] += 1.0
+        # a hidden rate is far beyond the bound: what else it bounds trembles soon
+        m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
         m.memory[CALM_STEPS] = 0.0
-    else:
-        m.memory[CALM_STEPS] += 1.0
+        m.memory[STIFF_STEP] = m.memory[LAST_STEP]
+    elif m.memory[STIFF_STEPS] > 0.0:
+        # what trembles leaves and touches: the short steps behind that are not what bounds it
+        m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0

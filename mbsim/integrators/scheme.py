@@ -74,7 +74,9 @@ CUT_FROM = 44
 WAS_CUT = 45
 # 1 where a row of results lies within the step that is tried
 SHOWN = 46
-MEMORY = 47
+# of AUTO: length of the step that was found stiff last
+STIFF_STEP = 47
+MEMORY = 48
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
