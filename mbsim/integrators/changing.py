@@ -48,8 +48,9 @@ BOUND, WITHIN = 3.0, 2.5
 FIRST_PATIENCE, FORGET = 15, 6
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
-#: A change is worth it for so many steps that are still to be taken.
-WORTH = 2000
+#: A change is worth it for so many steps that are still to be taken; once the implicit method has
+#: run, and nothing is to be loaded for it, for fewer.
+WORTH, WORTH_AGAIN = 2000, 200
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: Implicit steps between trials of an explicit one, and how many good ones change back: more of
@@ -78,11 +79,19 @@ def is_stiff(m, t_end):
     if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
     # steps that grow, as from a start, are not yet those to come
-    ahead = min((t_end - t) * m.memory[PACE], (t_end - t) / m.memory[STEP])
+    most = (t_end - t) / m.memory[STEP]
+    ahead = min((t_end - t) * m.memory[PACE], most)
+    if m.memory[COSTLY] == math.inf:
+        enough = ahead > WORTH
+    elif m.memory[PACE] == 0.0:
+        # until there is a window, as many a time as when it was found stiff before
+        enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
+    else:
+        enough = ahead > WORTH_AGAIN
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
-        return ahead > WORTH
+        return enough
     return ahead > MANY and steps >= m.memory[PATIENCE]
 
 
