@@ -131,7 +131,7 @@ class Methods:
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
         if stiff:
             # one that goes to and fro waits longer each time
-            memory[scheme.PATIENCE] *= 2.0
+            memory[scheme.PATIENCE] *= 1.5
         self.arrays.dense[...] = 0.0
         self._forget()
         self.changes += 1

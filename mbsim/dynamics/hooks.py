@@ -87,7 +87,7 @@ def _norm(context, t, h, a, b):
     if h == IMPACTS_ALONE:
         return impact_left(scene, t, vector_at(a, n), vector_at(b, n))
     if h == FRICTION_ALONE:
-        return friction_left(scene, vector_at(a, n), vector_at(b, n))
+        return friction_left(scene, vector_at(a, n), vector_at(b, n), False)
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error

@@ -224,12 +224,13 @@ def speed_change(scene, e, y, b, p):
 
 
 @jitable
-def friction_left(scene, e, y):
+def friction_left(scene, e, y, turns):
     """Return the largest change of friction that e causes, over the normal force.
 
-    By friction's slopes where it was linearised last, 0 where none was.
+    By friction's slopes where it was linearised last, 0 where none was; and, if `turns`, by a slip
+    that it turns round.
     """
-    work, largest = scene.work, 0.0
+    work, contacts, largest = scene.work, scene.contacts, 0.0
     for k in range(work.hit[len(work.hit) - 1]):
         s = work.hit[k]
         grip, point = work.grip[s], work.points[s]
@@ -244,6 +245,14 @@ def friction_left(scene, e, y):
         )
         u, w = dot(v, tx), dot(v, cross(n, tx))
         change = max(abs(grip[0] * u + grip[1] * w), abs(grip[2] * u + grip[3] * w))
+        c = contact_of(scene, s)
+        if turns and contacts.memory[c] == 0 and contacts.rigid[c] == 0:
+            # what turns the slip round turns friction round, whose slope along it knows of no such
+            row, force = work.slot[s], vector(work.slot[s, FORCE : FORCE + 3])
+            fx, fy = dot(force, tx), dot(force, cross(n, tx))
+            rubs = math.hypot(fx, fy)
+            if fx * u + fy * w > rubs * row[SLIP]:
+                change = max(change, 2.0 * rubs / row[NORMAL])
         if not change <= largest:
             largest = change
     return largest
@@ -358,7 +367,7 @@ def scaled_error(scene, h, e, y):
         # what was not integrated but put right, as after a motion that jumps
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     else:
-        largest = max(largest, friction_left(scene, e, y) ** 2)
+        largest = max(largest, friction_left(scene, e, y, True) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

@@ -9,8 +9,11 @@ twice running, it costs less.
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
 Friction that turns sign from step to step within the tolerance hides its rate. That is mostly seen
-all the same (`dopri5.stiffness`); else a run that takes as many steps a time as when it was found
-stiff before, or has very many steps ahead, tries the implicit method now and then.
+all the same (`dopri5.stiffness`), and counts twice: such steps are far beyond the bound, and what
+else they shake leaves the state that the implicit method would begin from. What trembles so leaves
+and touches, and steps are short behind that: as calm they count by their length. Else a run that
+takes as many steps a time as when it was found stiff before, or has very many steps ahead, tries
+the implicit method now and then.
 Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
@@ -28,10 +31,12 @@ from mbsim.integrators.scheme import (
     EXPLICIT_STEPS,
     IMPLICIT_STEPS,
     LAST_ERROR,
+    LAST_STEP,
     PACE,
     PATIENCE,
     STEP,
     STEPS,
+    STIFF_STEP,
     STIFF_STEPS,
     STIFFNESS,
     TIME,
@@ -43,8 +48,9 @@ BOUND, WITHIN = 3.0, 2.5
 FIRST_PATIENCE, FORGET = 15, 6
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
-#: A change is worth it for so many steps that are still to be taken.
-WORTH = 2000
+#: A change is worth it for so many steps that are still to be taken; once the implicit method has
+#: run, and nothing is to be loaded for it, for fewer.
+WORTH, WORTH_AGAIN = 2000, 200
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: Implicit steps between trials of an explicit one, and how many good ones change back: more of
@@ -56,10 +62,13 @@ TRY_EVERY, TRIALS, TRIALS_OF_SHORT = 20, 2, 10
 def is_stiff(m, t_end):
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
-        m.memory[STIFF_STEPS] += 1.0
+        # a hidden rate is far beyond the bound: what else it bounds trembles soon
+        m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
         m.memory[CALM_STEPS] = 0.0
-    else:
-        m.memory[CALM_STEPS] += 1.0
+        m.memory[STIFF_STEP] = m.memory[LAST_STEP]
+    elif m.memory[STIFF_STEPS] > 0.0:
+        # what trembles leaves and touches: the short steps behind that are not what bounds it
+        m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0
@@ -70,11 +79,19 @@ def is_stiff(m, t_end):
     if steps % WINDOW == 0.0:
         m.memory[BEGUN] = t
     # steps that grow, as from a start, are not yet those to come
-    ahead = min((t_end - t) * m.memory[PACE], (t_end - t) / m.memory[STEP])
+    most = (t_end - t) / m.memory[STEP]
+    ahead = min((t_end - t) * m.memory[PACE], most)
+    if m.memory[COSTLY] == math.inf:
+        enough = ahead > WORTH
+    elif m.memory[PACE] == 0.0:
+        # until there is a window, as many a time as when it was found stiff before
+        enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
+    else:
+        enough = ahead > WORTH_AGAIN
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
-        return ahead > WORTH
+        return enough
     return ahead > MANY and steps >= m.memory[PATIENCE]
 
 

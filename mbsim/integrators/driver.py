@@ -82,6 +82,7 @@ from mbsim.integrators.scheme import (
     RETRY,
     ROW,
     ROW_ENDS,
+    SHOWN,
     STALE,
     STEP,
     STEPS,
@@ -89,6 +90,7 @@ from mbsim.integrators.scheme import (
     TOL,
     WAS_CUT,
     WATCH,
+    interpolate,
     on_bench,
 )
 
@@ -119,18 +121,6 @@ MOST_FAILURES, MOST_NOT_FINITE = 5, 20
 #: A step that ends behind the last failure takes so much from the count of failures. Until then
 #: nothing shows that the hook gives numbers there: before it a step may be too short to ask.
 FORGIVEN = 0.1
-
-
-@jitable
-def interpolate(m, s, out):
-    """Write the state at the part s (0..1) of the last fitted step into `out`."""
-    d, r = m.dense, 1.0 - s
-    last = len(d) - 1
-    for i in range(len(out)):
-        value = d[last, i]
-        for j in range(last - 1, -1, -1):
-            value = d[j, i] + (s if j % 2 == 0 else r) * value
-        out[i] = value
 
 
 @jitable
@@ -467,7 +457,10 @@ def attempt(p, m, steps, t, h, times):
             bends = call_float(p.kinks, (p.context, t + h, BENDS, m.trial, m.y)) > 0.0
             begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
     looks = kinked > 0.0 or hides or bends or begin >= 0.0
-    if asked >= 0.0 or looks or p.happens != 0 or output_within(m, times, until):
+    # a peak is looked for in every step of what trembles at its bound of stability: not shown
+    shown = output_within(m, times, until)
+    m.memory[SHOWN] = 1.0 if shown else 0.0
+    if asked >= 0.0 or shown or looks or p.happens != 0:
         code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     if begin >= 0.0 and code == 0.0:
         reach = reach_of(p, m, t, h, begin)

@@ -10,7 +10,9 @@ uses. With p the problem, m the `Method` and k the stages, k[0] = f at the commi
   its evaluations and returns 0 or the code of the hook that failed.
 * `fit_dense(p, m, t, h)` fills `dense` for a step that is about to be accepted, only where an
   output or a peak lies in it. It may take more stages, if it leaves the problem evaluated at
-  the trial point. The polynomial in s = 0..1, r = 1 - s, is
+  the trial point. Where memory[SHOWN] is 1 a method whose polynomial may be worse than its step
+  raises memory[LAST_ERROR], beyond 1 for the step to be tried shorter. The polynomial in
+  s = 0..1, r = 1 - s, is
   d0 + s (d1 + r (d2 + s (d3 + r (d4 + ...)))).
 
 `order` is the power of h that the error of a step has; 0 stands for a method without an error
@@ -70,7 +72,11 @@ COSTLY = 43
 CUT_FROM = 44
 # 1 where the last step that was taken was cut at a kink or event
 WAS_CUT = 45
-MEMORY = 46
+# 1 where a row of results lies within the step that is tried
+SHOWN = 46
+# of AUTO: length of the step that was found stiff last
+STIFF_STEP = 47
+MEMORY = 48
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
@@ -206,3 +212,15 @@ def combine(k, weights, count, out):
         if weight != 0.0:
             for i in range(len(out)):
                 out[i] += weight * k[j, i]
+
+
+@jitable
+def interpolate(m, s, out):
+    """Write the state at the part s (0..1) of the last fitted step into `out`."""
+    d, r = m.dense, 1.0 - s
+    last = len(d) - 1
+    for i in range(len(out)):
+        value = d[last, i]
+        for j in range(last - 1, -1, -1):
+            value = d[j, i] + (s if j % 2 == 0 else r) * value
+        out[i] = value
