@@ -70,7 +70,9 @@ COSTLY = 43
 CUT_FROM = 44
 # 1 where the last step that was taken was cut at a kink or event
 WAS_CUT = 45
-MEMORY = 46
+# how many steps in a row were cut at a kink and ended before it after all
+VAIN = 46
+MEMORY = 47
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
