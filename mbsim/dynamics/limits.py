@@ -57,6 +57,20 @@ def seen_part(scene, c, depth, per_mass):
 
 
 @jitable
+def is_over(scene, c, depth, normal, per_mass):
+    """Return whether all that contact c may still do before it leaves is too little to matter.
+
+    `per_mass` is h/m of a step over it, whose first stage takes it to last. Where points of a patch
+    move with it their depth goes on otherwise than their rate has it, and steps that end where they
+    would leave get shorter and shorter but never there.
+    """
+    out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
+    return BLIND_JUMP * max(normal, out[1]) * per_mass <= allowed
+
+
+@jitable
 def longest_at_jump(scene, c, depth, speed, mass):
     """Return the longest step that may begin just before a touch at which the force jumps.
 
@@ -109,7 +123,7 @@ def step_to_leave(scene, f, s, h):
     separation can outweigh the spring: then the force is 0 sooner, and as the damper fades with
     depth it comes back just before the shapes part.
     """
-    state, c = scene.state, contact_of(scene, s)
+    state, c, m = scene.state, contact_of(scene, s), scene.bodies.mass
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     depth, rate, bend = state.depth[s], state.rate[s], depth_bend(scene, f, s)
@@ -118,9 +132,10 @@ def step_to_leave(scene, f, s, h):
         return math.inf
     leave = 2.0 * depth / (math.sqrt(square) - rate)
     pushes = state.normal[s] > 0.0
+    inverse = (1.0 / m[bi] if bi < len(m) else 0.0) + (1.0 / m[bj] if bj < len(m) else 0.0)
+    if leave < h and is_over(scene, c, depth, state.normal[s], h * inverse):
+        return h
     if pushes and leave < 2.0 * h:
-        m = scene.bodies.mass
-        inverse = (1.0 / m[bi] if bi < len(m) else 0.0) + (1.0 / m[bj] if bj < len(m) else 0.0)
         last = seen_part(scene, c, depth, leave * inverse)
         if last < 0.9:
             h = min(h, max(min(SEEN, 1.0 - last) * leave, ROUNDING * scene.world.scale[0] / -rate))

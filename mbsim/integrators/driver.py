@@ -88,6 +88,7 @@ from mbsim.integrators.scheme import (
     STEPS,
     TIME,
     TOL,
+    VAIN,
     WAS_CUT,
     WATCH,
     interpolate,
@@ -107,6 +108,10 @@ MOST_RETAKES = 40
 NEAR_KINK = 1e-4
 #: The same where what goes on is another motion, which begins there: friction that sticks or slips.
 NEAR_CHANGE = 1e-9
+#: So much farther behind a kink ends a step after two that were cut there in vain, up to the whole
+#: of it: bodies do not move at all in a very short one, for positions have no more digits, and then
+#: no side changes.
+FARTHER = 10.0
 #: The same over the smallest step: one that ends there may be rejected and tried shorter.
 NEAR_FLOORS = 100.0
 #: So often at most a step is taken again to end at a kink.
@@ -325,7 +330,10 @@ def first_kink(p, m, t, h, whole, behind):
     `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
     at which a side differs. The problem is left evaluated at the trial point.
     """
-    low, high, near = NEAR_KINK, behind, NEAR_KINK
+    farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
+    low, high, near = NEAR_KINK, behind, NEAR_KINK * farther
+    if near >= behind:
+        return h
     side_at(p, m, t, h, low, SETTLE)
     if behind < 1.0:
         interpolate(m, behind, m.error)
@@ -336,7 +344,7 @@ def first_kink(p, m, t, h, whole, behind):
         # it is told from what was committed, however near that is
         # a part of the whole step: where it lies at the very begin, as behind another, a step
         # that is cut again and again would get too short to reach it
-        low, near = 0.0, NEAR_CHANGE * whole / h
+        low, near = 0.0, NEAR_CHANGE * whole / h * farther
     if differs > 0.0:
         while high - low > 0.1 * near:
             middle = 0.5 * (low + high)
@@ -499,6 +507,8 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             if reach * h > floor:
                 h *= reach
                 continue
+        if not failed:
+            m.memory[VAIN] = m.memory[VAIN] + 1.0 if cuts > 0 and kinked == 0.0 else 0.0
         if p.happens == 0 or failed:
             return code, part, asked, h
         cut = first_event(p, m, t, h, times)

@@ -76,7 +76,9 @@ WAS_CUT = 45
 SHOWN = 46
 # of AUTO: length of the step that was found stiff last
 STIFF_STEP = 47
-MEMORY = 48
+# how many steps in a row were cut at a kink and ended before it after all
+VAIN = 48
+MEMORY = 49
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)

@@ -492,3 +492,58 @@ def test_a_stack_of_touching_boxes_settles_at_every_tolerance(tmp_path, method):
         assert top[2] == pytest.approx(right, abs=1e-2 * sunk)
         assert np.abs(top[:2]).max() < 1e-12
         assert results.stats["steps"] + results.stats["rejected"] < 6000
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "AUTO", "RADAU5"])
+@pytest.mark.parametrize("far", [0.0, 20.0, 1000.0])
+def test_how_far_from_the_origin_a_block_lands_costs_no_steps(tmp_path, method, far):
+    # points slip just before they leave: at 20 m a step that ends 1e-9 of itself behind such a
+    # change moves no body, for positions have no more digits, and the change never came
+    deck = f"""
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1" pos_z="{far}"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Force_Gravity grav_x="0.17" grav_z="-9.81"/>
+<Body_Rigid id="2" cg_id="20" mass="0.44" inertia_xx="0.0016" inertia_yy="0.0016"
+  inertia_zz="0.0028"/>
+<Reference_Marker id="20" body_id="2" pos_x="{far}" pos_y="{-0.5 * far}" pos_z="{far + 0.03484!r}"/>
+<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
+  length_x="0.197" length_y="0.199" length_z="0.06966"/>
+<Force_Contact id="1" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1" j_graphics_id="100"
+  cnf_type="IMPACT" stiffness="4e5" exponent="1" damping="250" dmax="1e-5" cff_type="STICTION"
+  mu_dynamic="0.0555" mu_static="0.0747"/>"""
+    results = run_deck(tmp_path, deck, 0.2, 0.05, integrator=method, tol=1e-6)
+    # 120 to 490
+    assert results.stats["steps"] < 1000
+    # it holds: tan(1 degree) < mu
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
+    assert results["bodies/2/position"][-1, 0] == pytest.approx(far, abs=1e-5)
+
+
+@pytest.mark.parametrize(("method", "tol"), [("AUTO", 1e-3), ("DOPRI5", 1e-9)])
+def test_a_cylinder_that_rattles_in_a_groove_gets_on(tmp_path, method, tol):
+    # it leaves one flank after the other, and friction lets go each time just before
+    half, radius, length = 1.0195, 0.0675, 0.167
+    height, flanks = radius / math.cos(half) + 1e-4, ""
+    for k, way in enumerate((1.0, -1.0)):
+        cos, sin = math.cos(half), way * math.sin(half)
+        flanks += f"""
+<Reference_Marker id="{11 + k}" body_id="1" a00="1" a10="0" a20="0" a01="0" a11="{cos!r}"
+  a21="{-sin!r}" a02="0" a12="{sin!r}" a22="{cos!r}"/>
+<Post_Graphic id="{100 + k}" type="Plane" rm_id="{11 + k}"/>
+<Force_Contact id="{1 + k}" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="{100 + k}" cnf_type="IMPACT" stiffness="1.74e6" exponent="1" damping="252"
+  dmax="1e-5" cff_type="STICTION" mu_dynamic="0.479" mu_static="0.528"/>"""
+    along = 'a00="0" a10="0" a20="-1" a01="0" a11="1" a21="0" a02="1" a12="0" a22="0"'
+    deck = f"""
+<Body_Rigid id="1" isground="TRUE"/>{flanks}
+<Force_Gravity grav_x="0.8094" grav_z="-9.7765"/>
+<Body_Rigid id="2" cg_id="20" mass="0.2283" inertia_xx="3.32e-4" inertia_yy="3.32e-4"
+  inertia_zz="5.2e-4" v_ic_x="0.3" v_ic_x_flag="TRUE"/>
+<Reference_Marker id="20" body_id="2" pos_z="{height!r}" {along}/>
+<Reference_Marker id="21" body_id="2" pos_x="{-0.5 * length!r}" pos_z="{height!r}" {along}/>
+<Post_Graphic id="200" type="Cylinder" center_marker_id="21" radius="{radius}"
+  length="{length}"/>"""
+    results = run_deck(tmp_path, deck, 0.6, 0.1, integrator=method, tol=tol)
+    # 480 and 5850
+    assert results.stats["steps"] < 15000
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
