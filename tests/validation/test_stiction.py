@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from pathlib import Path
@@ -547,3 +548,30 @@ def test_a_cylinder_that_rattles_in_a_groove_gets_on(tmp_path, method, tol):
     # 480 and 5850
     assert results.stats["steps"] < 15000
     assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5"])
+@pytest.mark.parametrize(("tol", "margin"), [(1e-4, 0.1), (1e-7, 4e-3), (1e-9, 2e-3)])
+def test_a_touch_at_the_limit_sticks_or_slips_by_how_force_and_limit_grow(
+    tmp_path, method, tol, margin
+):
+    """Both begin at 0, within a step: k v against mu_s N', however the step came to be."""
+    mindlin, slip = 2.0 * (1.0 - 0.3) / (2.0 - 0.3), 0.4
+    found, expected = [], []
+    sides, gaps = (1.0 - margin, 1.0 + margin), (3e-5, 7.1e-5, 1e-4)
+    for exponent, over, gap in itertools.product((1.0, 1.5), sides, gaps):
+        mu = mindlin * slip / over
+        model = (
+            GROUND
+            + sphere(0.1 + gap, v=(slip, 0.0, -1.0))
+            + f"""
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+  j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="{exponent}" damping="0"
+  cff_type="STICTION" mu_static="{mu!r}" mu_dynamic="{0.7 * mu!r}"/>"""
+        )
+        results = run_deck(tmp_path, model, 2e-4, 1e-5, integrator=method, tol=tol)
+        force = results["contacts/301/force"][-1]
+        found.append(-force[0] / (mu * force[2]))
+        # the damper in parallel takes what sticks to its limit
+        expected.append(1.0 if over < 1.0 else 0.7)
+    assert found == pytest.approx(expected, abs=1e-6)

@@ -66,6 +66,10 @@ CLEAR = 100.0
 #: Nearer to its limit than this part of it a spring that sticks slips only if it goes on towards
 #: it: one that has just come to stick is at the limit but for rounding of the normal force.
 NEAR = 1e-6
+#: Slip over so many times the frequency of what slips is too short for what the spring is over its
+#: limit to be known: both begin at 0 when two bodies touch, within a step. What it goes on
+#: towards decides then.
+EARLY = 1e-3
 
 # what is kept: z, or M; z where it slips, M and its rate then; time then; twist less turn since
 # touch, and the sign of its slip; mode
@@ -236,10 +240,13 @@ def stiction(
             zx, zy = px / k, py / k
         length = math.hypot(zx, zy)
         mode = STICK if k * length <= holds else SLIP
-        if frozen and before == STICK and holds < k * length <= (1.0 + NEAR) * holds:
-            own = mu_static * inputs.nforce_rate / k - holds / k * (growth - ease)
-            sure = 0 if math.isnan(own) else 1
-            mode = SLIP if zx * v[0] + zy * v[1] > own * length else STICK
+        near = NEAR * length + EARLY * math.hypot(v[0], v[1]) * heavy / k
+        if before != SLIP and holds < k * length and k * (length - near) <= holds:
+            mode = STICK
+            if frozen:
+                own = mu_static * inputs.nforce_rate / k - holds / k * (growth - ease)
+                sure = 0 if math.isnan(own) else 1
+                mode = SLIP if zx * v[0] + zy * v[1] > own * length else STICK
         most = holds if mode == STICK or (frozen and before == STICK) else limit
         fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
         force = math.hypot(fx, fy)
