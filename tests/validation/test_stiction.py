@@ -569,7 +569,8 @@ def test_a_touch_at_the_limit_sticks_or_slips_by_how_force_and_limit_grow(
   j_graphics_id="100" cnf_type="IMPACT" stiffness="1e5" exponent="{exponent}" damping="0"
   cff_type="STICTION" mu_static="{mu!r}" mu_dynamic="{0.7 * mu!r}"/>"""
         )
-        results = run_deck(tmp_path, model, 2e-4, 1e-5, integrator=method, tol=tol)
+        # behind the first step within the contact, which takes up to 33 ms
+        results = run_deck(tmp_path, model, 1e-3, 1e-4, integrator=method, tol=tol)
         force = results["contacts/301/force"][-1]
         found.append(-force[0] / (mu * force[2]))
         # the damper in parallel takes what sticks to its limit

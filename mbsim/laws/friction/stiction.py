@@ -67,8 +67,8 @@ CLEAR = 100.0
 #: it: one that has just come to stick is at the limit but for rounding of the normal force.
 NEAR = 1e-6
 #: Slip over so many times the frequency of what slips is too short for what the spring is over its
-#: limit to be known: both begin at 0 when two bodies touch, within a step. What it goes on
-#: towards decides then.
+#: limit to be known, but for twice as much: both begin at 0 when two bodies touch, within a step.
+#: What it goes on towards decides then.
 EARLY = 1e-3
 
 # what is kept: z, or M; z where it slips, M and its rate then; time then; twist less turn since
@@ -240,7 +240,7 @@ def stiction(
             zx, zy = px / k, py / k
         length = math.hypot(zx, zy)
         mode = STICK if k * length <= holds else SLIP
-        near = NEAR * length + EARLY * math.hypot(v[0], v[1]) * heavy / k
+        near = NEAR * length + min(0.5 * length, EARLY * math.hypot(v[0], v[1]) * heavy / k)
         if before != SLIP and holds < k * length and k * (length - near) <= holds:
             mode = STICK
             if frozen:
