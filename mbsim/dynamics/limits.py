@@ -133,7 +133,9 @@ def step_to_leave(scene, f, s, h):
     leave = 2.0 * depth / (math.sqrt(square) - rate)
     pushes = state.normal[s] > 0.0
     inverse = (1.0 / m[bi] if bi < len(m) else 0.0) + (1.0 / m[bj] if bj < len(m) else 0.0)
-    if leave < h and is_over(scene, c, depth, state.normal[s], h * inverse):
+    # what friction keeps ends with the contact, which is to be seen
+    keeps = scene.contacts.memory[c] > 0
+    if not keeps and leave < h and is_over(scene, c, depth, state.normal[s], h * inverse):
         return h
     if pushes and leave < 2.0 * h:
         last = seen_part(scene, c, depth, leave * inverse)
