@@ -672,7 +672,7 @@ def simulate(
     settings = settle(model, end_time, print_interval, integrator, tol)
     tell = notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (half a minute to two); later runs load it"
+        "compiling what this model needs (a quarter of a minute to one); later runs load it"
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
