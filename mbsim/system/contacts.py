@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.core import jit
-from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS, REGIONS, Pair
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
@@ -39,52 +39,14 @@ CELLS_EACH = 4
 SKIN = 0.45
 
 
-def _adapt_pair(points: Callable[..., int], slots: int) -> Any:
-    """Return a pair function as a C function of plain pointers."""
-    from mbsim.core.address import table_at, vector_at
-
-    def entry(frame_i, size_i, frame_j, size_j, out):
-        return points(
-            vector_at(frame_i, 12),
-            vector_at(size_i, 3),
-            vector_at(frame_j, 12),
-            vector_at(size_j, 3),
-            table_at(out, slots, POINT),
-        )
-
-    return entry
-
-
-def _adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
-    """Return a pair function with area as a C function that writes its one incident ahead."""
-    from mbsim.core.address import table_at, vector_at
-    from mbsim.geometry.region import sum_points
-
-    def entry(frame_i, size_i, frame_j, size_j, out):
-        rows = table_at(out, slots, POINT)
-        count, area = region(
-            vector_at(frame_i, 12),
-            vector_at(size_i, 3),
-            vector_at(frame_j, 12),
-            vector_at(size_j, 3),
-            rows[REGION_ROWS:],
-        )
-        count += REGION_ROWS
-        sum_points(rows[:count], whole, area)
-        return count
-
-    return entry
-
-
 @functools.cache
 def region_address(name: str) -> int:
     """Return the address of a closed-form pair that is one incident."""
-    from numba import types
+    from mbsim.system import pair_adapter
 
-    pointer = types.CPointer(types.float64)
-    signature = types.int64(pointer, pointer, pointer, pointer, pointer)
     made, slots = REGIONS[name], PAIRS[name].slots + REGION_ROWS
-    return jit.address(_adapt_region(made.points, made.whole, slots), signature)
+    adapted = pair_adapter.adapt_region(made.points, made.whole, slots)
+    return jit.address(adapted, pair_adapter.SIGNATURE)
 
 
 def kernel_address(kind: Kind) -> int:
@@ -99,11 +61,10 @@ def kernel_address(kind: Kind) -> int:
 @functools.cache
 def pair_address(pair: Pair) -> int:
     """Return the address of a closed-form pair."""
-    from numba import types
+    from mbsim.system import pair_adapter
 
-    pointer = types.CPointer(types.float64)
-    signature = types.int64(pointer, pointer, pointer, pointer, pointer)
-    return jit.address(_adapt_pair(pair.points, pair.slots), signature)
+    adapted = pair_adapter.adapt_pair(pair.points, pair.slots)
+    return jit.address(adapted, pair_adapter.SIGNATURE)
 
 
 def graphics_table(

@@ -193,3 +193,30 @@ def test_types_of_mixed_operators_are_as_before():
     assert mixed(np.array([1.5]), 0.5, 4) == 2.0 + 4.0 + 2
     assert mixed.nopython_signatures[0].return_type == float64
     assert int64 in mixed.nopython_signatures[0].args
+
+
+PAIR = """
+from mbsim.core import jit
+from mbsim.geometry.catalog import PAIRS
+from mbsim.laws.catalog import NORMAL_LAWS
+from mbsim.laws import abi
+from mbsim.system.contacts import pair_address, region_address
+pair_address(PAIRS["SPHERE-PLANE"]), region_address("BOX-PLANE")
+abi.normal_address(NORMAL_LAWS["IMPACT"])
+print(jit.compile_seconds > 0.0)
+"""
+
+
+def test_what_is_compiled_for_a_scene_is_found_again_by_the_next_process(tmp_path):
+    environment = {**os.environ, "MBSIM_CACHE_DIR": str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", PAIR],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    assert said == [["True"], ["False"]]

@@ -1,0 +1,53 @@
+"""Pair functions as C functions of plain pointers.
+
+What these close over is part of the key of their compiled code, so it is functions of the project
+and numbers alone: an intrinsic among them would have another key in every process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+
+from mbsim.core.address import table_at, vector_at
+from mbsim.geometry.catalog import POINT, REGION_ROWS
+from mbsim.geometry.region import sum_points
+
+_POINTER = types.CPointer(types.float64)
+SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER, _POINTER, _POINTER)
+
+
+def adapt_pair(points: Callable[..., int], slots: int) -> Any:
+    """Return a pair function as a C function of plain pointers."""
+
+    def entry(frame_i, size_i, frame_j, size_j, out):
+        return points(
+            vector_at(frame_i, 12),
+            vector_at(size_i, 3),
+            vector_at(frame_j, 12),
+            vector_at(size_j, 3),
+            table_at(out, slots, POINT),
+        )
+
+    return entry
+
+
+def adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
+    """Return a pair function with area as a C function that writes its one incident ahead."""
+
+    def entry(frame_i, size_i, frame_j, size_j, out):
+        rows = table_at(out, slots, POINT)
+        count, area = region(
+            vector_at(frame_i, 12),
+            vector_at(size_i, 3),
+            vector_at(frame_j, 12),
+            vector_at(size_j, 3),
+            rows[REGION_ROWS:],
+        )
+        count += REGION_ROWS
+        sum_points(rows[:count], whole, area)
+        return count
+
+    return entry
