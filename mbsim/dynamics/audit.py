@@ -70,6 +70,8 @@ ROUNDING = 1e-13
 CLOSED = 1e-10
 #: What rounding makes of velocities across a fold behind it, over the usual ones, for each loop.
 PASSED = 1e-8
+#: Rounding of a force whose friction is looked at, over its part along the normal.
+CONE_ROUNDING = 1e-12
 #: Bodies of the largest model that is sampled where contacts begin and end: of many, one always
 #: does.
 FEW = 16
@@ -255,7 +257,7 @@ def examine_friction(scene, t):
         most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
         row = audit.contact[c]
         row[3] = max(row[3], most)
-        if rubs > most:
+        if rubs > most + CONE_ROUNDING * abs(normal):
             note(scene, CONE, (rubs - most) / max(row[3], rubs), audit.plan[AUDIT_TOL], t, c)
 
 

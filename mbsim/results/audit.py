@@ -166,13 +166,15 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
     balance, time = abs(float(tally[a.WORST_OPEN])), float(tally[a.WORST_TIME])
     size = float(tally[a.LARGEST_ENERGY])
     # of a model that stands still no energy is large: what its scales say is
-    part = balance / max(size, float(tally[a.USUAL_ENERGY]))
+    usual = max(size, float(tally[a.USUAL_ENERGY]))
+    part = balance / usual
     if part > COARSE and not any(
         entries[name].excess > 1.0 for name in ENERGIES if name in entries
     ):
         warnings.append(
-            f"the energy balance is off by {100.0 * part:.2g} % at time {time:.9g}, as tol "
-            f"{kept.plan[a.AUDIT_TOL]:g} explains: choose a smaller one"
+            f"the energy balance is off by {balance:.2g} {unit}, {100.0 * part:.2g} % of the usual "
+            f"energy of {usual:.3g} {unit}, at time {time:.9g}, as tol {kept.plan[a.AUDIT_TOL]:g} "
+            "explains: choose a smaller one"
         )
     return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
 

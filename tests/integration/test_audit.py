@@ -181,6 +181,24 @@ def test_friction_above_its_cone_is_told(tmp_path, monkeypatch):
     assert audit.entries["cone"].time >= 0.05
 
 
+@pytest.mark.parametrize("law", ["COULOMB_ON", "COULOMB_DYNAMICONLY", "TANH", "STICTION"])
+def test_no_friction_is_within_a_cone_of_none(law, tmp_path):
+    """A force along a normal that is askew has rounding across it."""
+    model = (
+        GROUND
+        + sphere(0.12, v=(0.7, 0.3, 0.0))
+        + contact(cff_type=law, mu_static=0.0, mu_dynamic=0.0)
+        + '<Force_Gravity grav_x="1.3" grav_y="0.7" grav_z="-9.81"/>'
+    ).replace(
+        'id="10" body_id="1"',
+        'id="10" body_id="1" a00="1" a11="0.96" a21="0.28" a12="-0.28" a22="0.96"',
+    )
+    path = write_deck(tmp_path, model, 0.5, 0.05)
+    with mbsim.simulate(mbsim.read_model(path)) as results:
+        assert results["contacts/301/penetration"].max() > 0.0
+        assert results.audit.warnings == ()
+
+
 def test_energy_of_a_mechanism_is_judged(monkeypatch):
     """Without contact: all bodies of a four-bar are 5 % faster from one step to the next."""
 
