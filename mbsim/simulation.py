@@ -676,6 +676,9 @@ def simulate(
     )
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
+    for file in files:
+        if not file.is_file():
+            raise ModelError(f"--plugin {file}: no such file")
     said: list[str] = []
     system = build(model, files, interpret_plugins, detector, said.append)
     for note in said:
