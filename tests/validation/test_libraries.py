@@ -283,7 +283,7 @@ def test_files_that_are_no_libraries_are_refused_with_their_line(refused, tmp_pa
     assert "cannot be loaded" in refused(cff_dll_name="text.so")
     assert 'cff_language="PASCAL"' in refused(cff_language="PASCAL")
     said = refused(cff_dll_name="NULL", plugins=[tmp_path / "missing.so"])
-    assert "missing.so: No such file" in said
+    assert "missing.so: no such file" in said
 
 
 def test_a_missing_library_of_a_library_is_named(tmp_path):
