@@ -21,7 +21,7 @@ from numba.core.registry import cpu_target
 from mbsim.core import numba_costs
 
 #: Versions of Numba whose private methods are as this module takes them to be.
-TESTED = ("0.68.0", "0.68.1")
+TESTED = ("0.68.1",)
 
 #: Part of the name of the cache's folder: code of another policy is not mixed with it.
 POLICY = "roots1" if numba.__version__ in TESTED else "all"

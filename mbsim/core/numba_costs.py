@@ -1,7 +1,7 @@
 """Numba's own bookkeeping, done once and not again for every function that is compiled.
 
-Each function here gives what Numba's own gives, in less time; together they are a quarter of what
-Python does while a scene is compiled. They are put in place only where `core.linking` is.
+Each function here gives what Numba's own gives, in less time. They are put in place only where
+`core.linking` is.
 """
 
 from __future__ import annotations
