@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from mbsim.plugins.helpers import espy
     from mbsim.reader.xml import read_model
     from mbsim.results.reading import open_results
-    from mbsim.simulation import simulate
+    from mbsim.run.simulation import simulate
 
 __version__ = "0.1.0"
 
@@ -25,7 +25,7 @@ _HOMES = {
     "espy": "mbsim.plugins.helpers",
     "open_results": "mbsim.results.reading",
     "read_model": "mbsim.reader.xml",
-    "simulate": "mbsim.simulation",
+    "simulate": "mbsim.run.simulation",
 }
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import mbsim
-from mbsim import simulation
 from mbsim.errors import Interrupted
+from mbsim.run import simulation
 
 ROOT = Path(__file__).resolve().parent.parent
 MODELS = ROOT / "models"

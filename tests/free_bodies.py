@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from mbsim.compile_model.build import build
 from mbsim.model.elements import Body, Gravity, Marker, Model, Simulation, Units
-from mbsim.settings import settle
-from mbsim.simulation import Runner
-from mbsim.system.build import build
+from mbsim.run.settings import settle
+from mbsim.run.simulation import Runner
 
 
 def rotation(axis, angle):

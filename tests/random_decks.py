@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import mbsim
-from mbsim import simulation
 from mbsim.errors import Interrupted, MbsimError, ModelError
+from mbsim.run import simulation
 
 #: Names of units of force, mass, length, time, and what they are in N, kg, m, s.
 UNITS = (

@@ -18,7 +18,7 @@ from mbsim.bench.measurement import OURS, Measurement, failed, measured
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scene import Scene, Variation
 from mbsim.errors import Interrupted, MbsimError, ModelError
-from mbsim.settings import INTEGRATORS, settle
+from mbsim.run.settings import INTEGRATORS, settle
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -106,7 +106,7 @@ def run(deck: Model, setting: Setting, repeats: int, limit: float) -> Outcome:
     The time is `loop_s`: all calls of the compiled stepping loop, which also writes the rows.
     A run is given up after `limit` seconds.
     """
-    from mbsim.simulation import simulate
+    from mbsim.run.simulation import simulate
 
     walls = []
     for _ in range(repeats):
@@ -244,6 +244,6 @@ def _first_line(error: MbsimError) -> str:
 
 def simulate_once(deck: Model, setting: Setting) -> None:
     """Run the first millisecond of a deck."""
-    from mbsim.simulation import simulate
+    from mbsim.run.simulation import simulate
 
     simulate(deck, integrator=setting.integrator, tol=setting.tol, end_time=1e-3)

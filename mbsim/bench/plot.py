@@ -21,7 +21,7 @@ from mbsim.bench.front import (
 )
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
-from mbsim.settings import INTEGRATORS
+from mbsim.run.settings import INTEGRATORS
 
 _COLOURS = {"mujoco": "tab:blue", "exudyn": "tab:green", "pybullet": "tab:purple"}
 _OWN_COLOURS = ("tab:red", "tab:orange", "tab:brown", "black", "tab:cyan", "tab:pink", "tab:olive")

@@ -14,7 +14,7 @@ from mbsim.bench.measurement import Measurement, failed, measured
 from mbsim.bench.scene import Scene
 from mbsim.bench.scenes import all_scenes
 from mbsim.errors import ModelError
-from mbsim.settings import INTEGRATORS
+from mbsim.run.settings import INTEGRATORS
 
 Tell = Callable[[str], None]
 

@@ -40,12 +40,12 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     Says what is in the model and how each pair of shapes will be tested.
     """
     from mbsim.cli.messages import warn
+    from mbsim.compile_model.acting import check_expressions
+    from mbsim.compile_model.pairing import plan_pairs
     from mbsim.model.names import is_adams
     from mbsim.plugins import check_libraries
     from mbsim.reader.xml import read_model
-    from mbsim.settings import settle
-    from mbsim.system.acting import check_expressions
-    from mbsim.system.pairing import plan_pairs
+    from mbsim.run.settings import settle
 
     deck = read_model(model, overrides)
     plans = plan_pairs(deck)

@@ -62,10 +62,10 @@ def _is_result(file: Path) -> bool:
 
 def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Return what a deck describes."""
+    from mbsim.compile_model.pairing import plan_pairs
     from mbsim.model.placement import place
     from mbsim.results.log import counts, pair_texts, title, units_text
     from mbsim.results.reading import finite
-    from mbsim.system.pairing import plan_pairs
 
     placement = place(model)
     plans = plan_pairs(model)
@@ -116,13 +116,13 @@ def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]
 
 def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     """Return user subroutines by element: function, file, and what they ask for under iflag."""
+    from mbsim.compile_model.acting import wanted
     from mbsim.model.names import element_name, is_adams
     from mbsim.plugins.about import about
     from mbsim.plugins.contact_post import CONTACTPOST
     from mbsim.plugins.loader import CFFSUB, Scripts, friction_arguments
     from mbsim.plugins.normal import CNFSUB, normal_arguments
     from mbsim.plugins.subroutine import ARGUMENTS
-    from mbsim.system.acting import wanted
 
     scripts: Scripts = {}
     found: dict[str, Any] = {}

@@ -30,11 +30,11 @@ def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: 
     K counting the incidents of the row from 0. /x, /y, /z or /mag after a vector takes one number
     of it. The deck and users' files must be those of the run.
     """
-    from mbsim.again import request
     from mbsim.cli.messages import print_json
     from mbsim.errors import ModelError
     from mbsim.results.files import replace_text
     from mbsim.results.reading import finite, open_results
+    from mbsim.run.replay import request
 
     if output is not None and as_json:
         raise ModelError("-o goes with CSV: take either -o or --json")

@@ -101,7 +101,7 @@ def command(
     result_file = directory / f"{deck.name}.h5"
 
     from mbsim.cli.progress import Display
-    from mbsim.simulation import simulate
+    from mbsim.run.simulation import simulate
 
     shown = progress == "auto" and sys.stderr.isatty()
     display = Display() if shown else None

@@ -1,6 +1,6 @@
 """Array types for the fields of NamedTuple groups: the dimension is part of the name.
 
-The groups (`system/arrays.py`) annotate their fields with these; `core.address`
+The groups (`arrays/scene.py`) annotate their fields with these; `core.address`
 reads the annotation to rebuild a group in compiled code. All are C-contiguous.
 """
 

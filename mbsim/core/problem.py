@@ -2,7 +2,7 @@
 
     double hook(int64 context, double t, double h, double *a, double *b)
 
-A mechanism (`dynamics.hooks`) and a scalar test equation (the tests) look the same, and a
+A mechanism (`pipeline.hooks`) and a scalar test equation (the tests) look the same, and a
 method is compiled once for all. Codes are 0 for success. A trial point whose rhs fails is tried
 again nearer to the committed one before the run ends, but for codes from AT_ONCE on.
 

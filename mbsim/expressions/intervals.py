@@ -512,7 +512,7 @@ def apply(op: int, parts: Sequence[Bound]) -> Bound:
 
 
 class Curve:
-    """A curve of cubic pieces, as `system.splines` makes them, and its bounds."""
+    """A curve of cubic pieces, as `compile_model.splines` makes them, and its bounds."""
 
     def __init__(self, piece: Array, order: int) -> None:
         factors = np.array(piece[:, 1:], dtype=np.float64)

@@ -27,7 +27,7 @@ from mbsim.geometry.support import CONVEX, ROUND, face_normal, round_normal, sup
 from mbsim.model.elements import Graphic
 
 if TYPE_CHECKING:
-    from mbsim.system.arrays import Scene
+    from mbsim.arrays.scene import Scene
 
 DETECTOR_FAILED = 4
 #: Directions that FCL's iterative solver returns scatter by this much (the project's measurement

@@ -13,7 +13,7 @@ with the shapes (`geometry.crossing`), or normals differ, a couple is left, for 
 law's force. Of a linear law
 force and torque are those of the points in every pose; of others they are where the depth is
 even. Damping has the rate of the place, which tilting hardly moves; what the points' dampers do
-against tilting is a couple (`dynamics.contact.tilting`) with the moments of their parts of the
+against tilting is a couple (`contact.forces.tilting`) with the moments of their parts of the
 force about the place. From a face over an edge to a corner nothing jumps, for the points do not.
 
 The area is that of the cut of the shape with the plane it touches, or of the common part of two

@@ -2,7 +2,7 @@
 
 A normal law has the signature (depth, rate, parameters) -> force, force at rate 0, stored energy.
 A user's CNFSUB takes more than that and gives the force alone. The rest of what it takes lies in
-an array of PLACE numbers, one a contact, which `dynamics.contact` fills; force at rate 0 and
+an array of PLACE numbers, one a contact, which `contact.forces` fills; force at rate 0 and
 stored energy are asked of it only where somebody looks for depths, times or step lengths
 (EXPLORE). In the equations of motion all its work counts as dissipated: what it stores, if
 anything, nobody can tell.

@@ -1,6 +1,6 @@
 """`Audit`: what a run found out about itself; its table of entries is in one place, `ENTRIES`.
 
-Compiled code (`dynamics.audit`) keeps, for every row of `system.arrays.Audit.found`, the value
+Compiled code (`pipeline.audit`) keeps, for every row of `arrays.scene.Audit.found`, the value
 that was largest over what the local errors of the steps explain. Here it is said what that is,
 how many times as large it may be, and at which element it was.
 """
@@ -12,14 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from mbsim.arrays import scene as a
 from mbsim.model.names import element_name
 from mbsim.results.quantities import ENERGY as ENERGY_UNIT
 from mbsim.results.quantities import UnitSystem
-from mbsim.system import arrays as a
 
 if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
     from mbsim.results.store import Value
-    from mbsim.system.build import System
 
 
 class Judged(NamedTuple):

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.scene import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
 from mbsim.plugins.contact_post import ContactPost, Pair, Shown
 from mbsim.plugins.helpers import host
-from mbsim.system.arrays import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 #: A contact of more pairs of graphics than this is shown pairs that touch alone.
 MOST_PAIRS = 256

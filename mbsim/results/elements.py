@@ -10,7 +10,7 @@ from mbsim.model.elements import Model
 from mbsim.model.names import element_name
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbsim.arrays.scene import CONTACT_COLUMNS
 from mbsim.errors import DeckError, Fault
 from mbsim.model.elements import Array, Contact, Model, Request
 from mbsim.model.names import element_name
 from mbsim.results.elements import APPLIED, GROUPS, elements_of
 from mbsim.results.motion import Motion, rotate
-from mbsim.system.arrays import CONTACT_COLUMNS
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from mbsim.model.names import element_name
 from mbsim.results.elements import GROUPS
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 #: What elements are called in decks, by the field of `Model`; others are called by the field.
 _STATEMENTS = {

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mbsim.arrays import scene as a
+from mbsim.compile_model.pairing import Plans
 from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.model.elements import Contact, Model
@@ -19,11 +21,9 @@ from mbsim.results.files import replace_text
 from mbsim.results.forces import actings, marker_actings
 from mbsim.results.store import Value
 from mbsim.results.watch import Watch, energies
-from mbsim.system import arrays as a
-from mbsim.system.pairing import Plans
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 #: A user subroutine may talk at every evaluation; no more lines than this are kept.
 MOST_LINES = 20_000

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.scene import BODY_SIZE
 from mbsim.model.elements import Array
-from mbsim.system.arrays import BODY_SIZE
 
 
 def rotate(q: Array, v: Array) -> Array:
@@ -55,7 +55,7 @@ def motion(body_ids: Sequence[int], y: Array, accel: Array) -> Motion:
     body_ids : sequence of int
         Of the moving bodies, in the order of y.
     y : ndarray, shape (n, ny)
-        As in `system.arrays`: angular velocity in cg axes.
+        As in `arrays.scene`: angular velocity in cg axes.
     accel : ndarray, shape (n, 6 nb)
         Of the cg and angular, global.
     """

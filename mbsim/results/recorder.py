@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.scene import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.contact_posts import ContactPosts
@@ -23,10 +24,9 @@ from mbsim.results.reading import Results, open_results
 from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch, energies
-from mbsim.system.arrays import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 Table = np.ndarray[Any, Any]
 
@@ -61,7 +61,7 @@ FIRST_FLUSH_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Block:
-    """Output rows as the pipeline leaves them; see `system.arrays.Rows`."""
+    """Output rows as the pipeline leaves them; see `arrays.scene.Rows`."""
 
     time: Table
     y: Table

@@ -13,7 +13,7 @@ from mbsim.results.elements import GROUPS
 from mbsim.results.reading import Results
 
 if TYPE_CHECKING:
-    from mbsim.system.build import System
+    from mbsim.compile_model.build import System
 
 #: Names in the group `energy`, by the column of `Rows.energy`.
 ENERGIES = ("kinetic", "potential", "dissipated", "work_of_motions")

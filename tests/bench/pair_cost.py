@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from contracts.test_pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
 
+from mbsim.compile_model.contacts import pair_address, region_address
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
-from mbsim.system.contacts import pair_address, region_address
 
 SHAPES = {
     **SIZES,

@@ -19,9 +19,9 @@ from contracts.test_polyhedra import CUBE, box, box_mesh, mesh, rotation
 from decks_io import contact, run_deck
 from validation.test_flat_shapes import FLOATING, cube
 
+from mbsim.compile_model.contacts import pair_address
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import PAIRS, POINT
-from mbsim.system.contacts import pair_address
 
 pytestmark = pytest.mark.bench
 

@@ -20,13 +20,13 @@ from crowd_decks import block, pile, random_axes, sets, shape_graphic, solid
 from decks_io import COULOMB, GRAVITY, GROUND, write_deck
 
 import mbsim
+from mbsim.arrays.scene import LIVE, Scene
+from mbsim.compile_model import pairing
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
-from mbsim.dynamics.crowd import list_pairs
-from mbsim.dynamics.kinematics import place_bodies, place_graphics
-from mbsim.system import pairing
-from mbsim.system.arrays import LIVE, Scene
-from mbsim.system.build import build
+from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
+from mbsim.dynamics.contact.broadphase import list_pairs
 
 pytestmark = pytest.mark.bench
 LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}

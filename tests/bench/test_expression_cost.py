@@ -21,15 +21,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import call_float, pack, view
-from mbsim.dynamics.doors import open_expressions
-from mbsim.dynamics.expressions import value
-from mbsim.dynamics.kinematics import place_bodies
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.expressions.jets import value
+from mbsim.dynamics.pipeline.force_hooks import open_expressions
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, Spline
-from mbsim.system.arrays import Scene
-from mbsim.system.build import build
 
 pytestmark = pytest.mark.bench
 

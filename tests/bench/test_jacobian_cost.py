@@ -18,10 +18,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import joint_chain
 
 import mbsim
-from mbsim.dynamics.implicit_hooks import implicit_hooks
-from mbsim.settings import settle
-from mbsim.simulation import Runner
-from mbsim.system.build import build
+from mbsim.compile_model.build import build
+from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.run.settings import settle
+from mbsim.run.simulation import Runner
 
 pytestmark = pytest.mark.bench
 

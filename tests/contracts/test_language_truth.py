@@ -22,18 +22,18 @@ from language_truth import CASES, MOST_ARGS
 from measure_truth import Motion, component, fixed, measure, opposite
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
+from mbsim.arrays.scene import SHOWN, Scene
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.contact import FORCE
-from mbsim.dynamics.doors import open_expressions, open_jets
-from mbsim.dynamics.expressions import jet, value
-from mbsim.dynamics.kinematics import place_bodies
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.contact.forces import FORCE
+from mbsim.dynamics.expressions.jets import jet, value
+from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.model import elements as el
-from mbsim.system.arrays import SHOWN, Scene
-from mbsim.system.build import build
 
 POINTS = 1000
 #: Of these, plain Python takes the first where it would take long.

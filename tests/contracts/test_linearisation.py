@@ -22,12 +22,12 @@ from mechanism_decks import Joint, Scene, marker
 from scipy.spatial.transform import Rotation
 
 import mbsim
-from mbsim.dynamics.implicit_hooks import implicit_hooks
+from mbsim.arrays.scene import CHOOSE
+from mbsim.compile_model.build import build
+from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
-from mbsim.settings import settle
-from mbsim.simulation import Runner
-from mbsim.system.arrays import CHOOSE
-from mbsim.system.build import build
+from mbsim.run.settings import settle
+from mbsim.run.simulation import Runner
 
 COEFFICIENTS = (1.0, 10.0, 1e3)
 #: Half of the step of differences, and how many times f is rounded on its way from a state.

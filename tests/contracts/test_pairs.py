@@ -8,9 +8,9 @@ import functools
 import numpy as np
 import pytest
 
+from mbsim.compile_model.contacts import pair_address
 from mbsim.geometry.catalog import PAIRS, POINT
 from mbsim.geometry.support import support
-from mbsim.system.contacts import pair_address
 
 # radius, half edges, radius and half length, both radii and half length; a plane has no size
 SIZES = {

@@ -17,11 +17,11 @@ from decks_io import GROUND, contact, write_deck
 from test_pairs import frame, random_rotation
 
 import mbsim
+from mbsim.compile_model.contacts import pair_address
+from mbsim.compile_model.pairing import plan_pairs
 from mbsim.geometry.catalog import COUPLE, PAIRS, POINT
 from mbsim.model import hull as packed
 from mbsim.model.hull import polyhedron_of
-from mbsim.system.contacts import pair_address
-from mbsim.system.pairing import plan_pairs
 
 POINTER = ctypes.c_void_p
 COUNTS = [1000, pytest.param(100_000, marks=pytest.mark.slow)]

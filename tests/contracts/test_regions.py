@@ -10,9 +10,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
+from mbsim.compile_model.contacts import region_address
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
 from mbsim.model.hull import polyhedron_of
-from mbsim.system.contacts import region_address
 
 SIZES = {
     "BOX": np.array([0.4, 0.3, 0.2]),

@@ -21,13 +21,13 @@ from click.testing import CliRunner
 from decks_io import GROUND, MODELS, contact, run_in_pieces, run_model, sphere, write_deck
 
 import mbsim
-from mbsim import simulation
+from mbsim.arrays import scene as a
 from mbsim.cli.main import main
-from mbsim.dynamics.audit import examine
+from mbsim.compile_model.build import build
+from mbsim.dynamics.pipeline.audit import examine
 from mbsim.integrators import scheme
 from mbsim.results.audit import ENTRIES, audit_of
-from mbsim.system import arrays as a
-from mbsim.system.build import build
+from mbsim.run import simulation
 
 ENERGY = {"energy", "energy_step"}
 

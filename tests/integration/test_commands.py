@@ -100,7 +100,7 @@ def test_resume_in_the_second_part_is_bit_equal(tmp_path):
             runner["stopped"] = t
             raise KeyboardInterrupt
 
-    from mbsim import simulation
+    from mbsim.run import simulation
 
     before = simulation.RETURN_SECONDS, simulation.FIRST_BUDGET
     simulation.RETURN_SECONDS, simulation.FIRST_BUDGET = 1e-5, 5

@@ -52,7 +52,7 @@ def small(results):
 @pytest.fixture
 def counters(monkeypatch):
     """Return the counters of the run that failed."""
-    from mbsim import simulation
+    from mbsim.run import simulation
 
     found, kept = {}, simulation.Runner.stats
 

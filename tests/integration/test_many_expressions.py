@@ -9,10 +9,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, ScalarForce
-from mbsim.system.build import build
 
 
 def model_of(count):

@@ -13,12 +13,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import MODELS
 
 import mbsim
-from mbsim import runaway, simulation
+from mbsim.compile_model import scratch
 from mbsim.core import problem
 from mbsim.errors import Interrupted, SolverError
 from mbsim.integrators import scheme
-from mbsim.methods import Methods
-from mbsim.system import scratch
+from mbsim.run import divergence as runaway
+from mbsim.run import simulation
+from mbsim.run.methods import Methods
 
 #: Evaluations from one return to the next, and rows and events that fit until then.
 RETURNS = {"1": (1, 256), "997": (997, 256), "5003": (5003, 3), "1 row": (10**9, 1)}

@@ -13,9 +13,9 @@ import pytest
 from click.testing import CliRunner
 
 import mbsim
-from mbsim.again import Again, request
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
+from mbsim.run.replay import Again, request
 
 USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
 MODELS = Path(__file__).resolve().parents[2] / "models"

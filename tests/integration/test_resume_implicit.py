@@ -14,10 +14,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import MODELS
 
 import mbsim
-from mbsim import simulation
 from mbsim.errors import Interrupted
 from mbsim.integrators import scheme
 from mbsim.results import recorder
+from mbsim.run import simulation
 
 STIFF = MODELS / "stiff"
 COUNTED = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorizations", "method_changes")

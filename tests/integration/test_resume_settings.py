@@ -14,12 +14,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import GROUND, sphere
 
 import mbsim
-from mbsim import simulation
+from mbsim.compile_model.build import build
 from mbsim.errors import Interrupted, ModelError
 from mbsim.model import elements
 from mbsim.results.identity import Identity, plain
-from mbsim.settings import Settings, Stage, settle
-from mbsim.system.build import build
+from mbsim.run import simulation
+from mbsim.run.settings import Settings, Stage, settle
 
 LAW = """
 from helper import STIFFNESS

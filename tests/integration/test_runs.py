@@ -352,7 +352,7 @@ def test_two_methods_in_one_run_are_refused(tmp_path):
 
 
 def test_pauses_do_not_change_a_run(tmp_path, monkeypatch):
-    from mbsim import simulation
+    from mbsim.run import simulation
 
     ends = []
     for budget in (50, 10**9):

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from decks import added, read
 
+from mbsim.arrays import scene as a
+from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.pairing import plan_pairs
 from mbsim.model.elements import Model
 from mbsim.model.placement import place
 from mbsim.results.elements import APPLIED, CONSTRAINTS, elements_of
 from mbsim.results.recorder import Recorder
-from mbsim.system import arrays as a
-from mbsim.system.markers import MarkerTable
-from mbsim.system.pairing import plan_pairs
 
 REQUEST = '<Post_Request id="7" type="MARKER_DISPLACEMENT" i_marker_id="20" label="ball"/>'
 SETTINGS: dict[str, Any] = {

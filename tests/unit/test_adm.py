@@ -20,7 +20,7 @@ from mbsim.model.names import is_adams
 from mbsim.model.placement import place
 from mbsim.reader.adm.lexer import split_statements, unique
 from mbsim.reader.xml import read_model
-from mbsim.settings import settle
+from mbsim.run.settings import settle
 
 ADAMS = next(
     (

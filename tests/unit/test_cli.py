@@ -15,12 +15,12 @@ from decks import CONTACT_LINE, MINIMAL, deck
 from fake_run import SETTINGS, add_rows, checkpoint, fake_system
 
 import mbsim
-from mbsim import simulation
 from mbsim.cli.main import COMMANDS, main
 from mbsim.cli.progress import Display
 from mbsim.errors import Interrupted, ModelError, PluginError, ResultsError, SolverError
 from mbsim.results.reading import Results
 from mbsim.results.recorder import Recorder
+from mbsim.run import simulation
 
 ROOT = str(Path(mbsim.__file__).parent.parent)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from mbsim.dynamics import cones
+from mbsim.dynamics.stiction import cones
 
 
 def points(rng, count):

@@ -13,16 +13,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.blend import step, step5_derivative, step_derivative
-from mbsim.dynamics.doors import open_expressions, open_jets
-from mbsim.dynamics.expressions import jet, value
+from mbsim.dynamics.expressions.jets import jet, value
+from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Request
-from mbsim.system.arrays import Scene
-from mbsim.system.build import build
 
 
 def scene_of(*texts):

@@ -15,6 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError
 from mbsim.expressions.functions import CONSTANTS, FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError, parse
@@ -29,8 +31,6 @@ from mbsim.model.elements import (
     Variable,
 )
 from mbsim.model.placement import place
-from mbsim.system.markers import MarkerTable
-from mbsim.system.programs import ProgramTable
 
 
 def table(variables=()):

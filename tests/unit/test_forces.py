@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from decks import added, read
 from fake_run import SETTINGS, add_rows, checkpoint, fake_system_of
 
+from mbsim.arrays import scene as a
 from mbsim.cli import info
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
@@ -29,7 +30,6 @@ from mbsim.results.reading import Results
 from mbsim.results.recorder import Recorder
 from mbsim.results.requests import measures_of
 from mbsim.results.watch import Watch
-from mbsim.system import arrays as a
 
 STATS = {"steps": 3}
 #: A second body, and markers away from the cgs of both; 11 and 12 are on ground.

@@ -12,15 +12,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
-from mbsim.dynamics.expressions import jet
+from mbsim.compile_model import timetable as tt
+from mbsim.compile_model.build import build
+from mbsim.compile_model.splines import pieces
+from mbsim.dynamics.expressions.jets import jet
 from mbsim.expressions import intervals
 from mbsim.expressions.elementary import CODES
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Request
-from mbsim.system import timetable as tt
-from mbsim.system.build import build
-from mbsim.system.splines import pieces
 
 TEXTS = [
     "TIME + 2 - TIME**2",

@@ -19,7 +19,7 @@ def test_digest_follows_imports_through_files(tmp_path, monkeypatch):
         "from pathlib import Path; from mbsim.core import jit; "
         f"print(jit.source_digest([Path({str(package)!r}) / 'laws/normal/impact.py']), "
         f"jit.source_digest([Path({str(package)!r}) / 'laws/friction/coulomb.py']), "
-        f"jit.source_digest([Path({str(package)!r}) / 'dynamics/hooks.py']))"
+        f"jit.source_digest([Path({str(package)!r}) / 'dynamics/pipeline/hooks.py']))"
     )
 
     def digests():

@@ -200,7 +200,7 @@ from mbsim.core import jit
 from mbsim.geometry.catalog import PAIRS
 from mbsim.laws.catalog import NORMAL_LAWS
 from mbsim.laws import abi
-from mbsim.system.contacts import pair_address, region_address
+from mbsim.compile_model.contacts import pair_address, region_address
 pair_address(PAIRS["SPHERE-PLANE"]), region_address("BOX-PLANE")
 abi.normal_address(NORMAL_LAWS["IMPACT"])
 print(jit.compile_seconds > 0.0)

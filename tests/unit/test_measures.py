@@ -13,12 +13,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import free_bodies as free
 from free_bodies import rotation
 
-from mbsim.dynamics.angles import commit_angles, longest_turn
-from mbsim.dynamics.expressions import gradient, jet, value
-from mbsim.dynamics.kinematics import place_bodies
+from mbsim.compile_model.build import build
+from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.expressions.jets import gradient, jet, value
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper
-from mbsim.system.build import build
 
 
 def random_rotation(rng):

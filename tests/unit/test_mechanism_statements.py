@@ -12,8 +12,8 @@ from decks import added, deck, read
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions.tree import Call, Number
 from mbsim.joints.catalog import JOINTS
-from mbsim.settings import settle
-from mbsim.simulation import simulate
+from mbsim.run.settings import settle
+from mbsim.run.simulation import simulate
 
 ADDED_LINE = 14  # of the last statement of <Model> in the minimal deck
 ON = 'i_marker_id="20" j_marker_id="10"'

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import COULOMB, GRAVITY, GROUND, MODELS, contact, sphere, write_deck
 
 import mbsim
-from mbsim.dynamics.hooks import mechanism
-from mbsim.system.build import build
+from mbsim.compile_model.build import build
+from mbsim.dynamics.pipeline.hooks import mechanism
 
 POINTER = ctypes.c_void_p
 HOOK = ctypes.CFUNCTYPE(
@@ -102,8 +102,8 @@ def quaternion_about_z(angle):
 
 
 def test_incident_marker_turns_with_a_turntable(tmp_path):
-    from mbsim.dynamics.contact import tangent
-    from mbsim.dynamics.kinematics import place_bodies
+    from mbsim.dynamics.bodies.kinematics import place_bodies
+    from mbsim.dynamics.contact.forces import tangent
 
     # a ball on a disc, both moving bodies; the frame must turn with both
     disc = """<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="2"/>

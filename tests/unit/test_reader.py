@@ -20,7 +20,7 @@ from mbsim.model.elements import Model
 from mbsim.model.frames import rotation_313
 from mbsim.model.placement import place
 from mbsim.reader import units
-from mbsim.settings import settle
+from mbsim.run.settings import settle
 
 SAMPLE = """<Sample><Model>
  <Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="METER" time_unit="SECOND"/>

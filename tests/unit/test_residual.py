@@ -87,7 +87,7 @@ class Scene:
 
     def solve(self, h, base, start=0.0):
         """Return code, f and f' of the solution."""
-        from mbsim.dynamics import residual
+        from mbsim.dynamics.forces import force_element as residual
 
         R, n = self.residuals, len(self.residuals.z)
         R.base[:], R.start[:] = base, start
@@ -144,7 +144,7 @@ def test_several_unknowns_and_roots_that_newton_misses():
     ],
 )
 def test_what_has_no_root_is_said(residual):
-    from mbsim.dynamics.residual import UNSOLVED_ELEMENT
+    from mbsim.dynamics.forces.force_element import UNSOLVED_ELEMENT
 
     scene = Scene(residual, [ALGEBRAIC])
     assert scene.solve(1.0, 0.0)[0] == UNSOLVED_ELEMENT

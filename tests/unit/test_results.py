@@ -14,6 +14,7 @@ import pytest
 from decks import added
 from fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system, fake_system_of
 
+from mbsim.arrays import scene as a
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
 from mbsim.results.log import MOST_LINES, RunLog
@@ -21,7 +22,6 @@ from mbsim.results.reading import Results, finite, open_results
 from mbsim.results.recorder import Recorder
 from mbsim.results.store import Store
 from mbsim.results.watch import Watch
-from mbsim.system import arrays as a
 
 FAKE = Path(__file__).with_name("fake_run.py")
 STATS = {"steps": 12, "wall_s": 0.5}

@@ -13,12 +13,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
-from mbsim.dynamics.expressions import run, value
-from mbsim.dynamics.kinematics import place_bodies
-from mbsim.dynamics.slopes import A_STATE, WAYS
+from mbsim.compile_model.build import build
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.expressions.jets import run, value
+from mbsim.dynamics.expressions.slopes import A_STATE, WAYS
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Differential, Marker, Request
-from mbsim.system.build import build
 
 STEP = 1e-3
 

@@ -16,16 +16,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
-from mbsim.dynamics.doors import open_expressions, open_jets
-from mbsim.dynamics.expressions import jet, value
+from mbsim.dynamics.expressions.jets import jet, value
+from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
 from mbsim.errors import DeckError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import ArrayOfNumbers, Request, Spline
 from mbsim.reader.xml import read_model
-from mbsim.system.arrays import Scene
-from mbsim.system.build import build
 
 X = (0.0, 0.1, 0.25, 0.5, 0.6, 1.0)
 Y = (1.0, 3.0, 2.0, 2.5, -1.0, 0.5)

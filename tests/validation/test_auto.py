@@ -164,7 +164,7 @@ def test_a_motion_of_accelerations_on_a_rail(tmp_path, method):
 
 
 def test_too_many_bodies_are_said(monkeypatch):
-    from mbsim import methods
+    from mbsim.run import methods
 
     monkeypatch.setattr(methods, "MOST_LINEARISED", 0)
     with pytest.raises(ModelError, match="1 bodies are more than the 0"):

@@ -262,7 +262,7 @@ def test_explicit_methods_refuse_rigid_friction(tmp_path):
 
 def test_auto_says_that_it_runs_the_implicit_method(tmp_path):
     text = ground() + body(2, 1.0) + friction('friction="1"')
-    from mbsim.settings import settle
+    from mbsim.run.settings import settle
 
     settings = settle(mbsim.read_model(write_deck(tmp_path, text)))
     assert settings.integrator == "RADAU5"

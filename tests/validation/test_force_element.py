@@ -18,8 +18,8 @@ from decks_io import USERFUNCS, run_deck, run_in_pieces, write_deck
 from models.reference import jenkins_block
 
 import mbsim
-from mbsim import simulation
 from mbsim.errors import DeckError, Interrupted, ModelError, PluginError, SolverError
+from mbsim.run import simulation
 
 DRY = USERFUNCS / "dry_friction_element.py"
 

@@ -21,11 +21,11 @@ from mechanism_decks import Joint, Scene
 from scipy.spatial.transform import Rotation
 
 import mbsim
+from mbsim.arrays import scene as arrays
 from mbsim.core.address import view
-from mbsim.dynamics import hooks
-from mbsim.dynamics.output import scaled_error
+from mbsim.dynamics.pipeline import hooks
+from mbsim.dynamics.pipeline.output import scaled_error
 from mbsim.errors import SolverError
-from mbsim.system import arrays
 
 END = 1.0
 #: Steps of two runs, and the tol of which only Newton's iteration knows: RADAU5's errors are to be

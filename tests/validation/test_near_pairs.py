@@ -14,12 +14,12 @@ from crowd_decks import SHAPES, balls, block, pile, random_axes, sets, shape_gra
 from decks_io import COULOMB, GRAVITY, GROUND, run_deck, write_deck
 
 import mbsim
-from mbsim import simulation
-from mbsim.dynamics import crowd
-from mbsim.dynamics.kinematics import place_bodies, place_graphics
+from mbsim.arrays.scene import FREE, LISTINGS, LIVE, WANTED
+from mbsim.compile_model import build, contacts, pairing
+from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
+from mbsim.dynamics.contact import broadphase as crowd
 from mbsim.errors import Interrupted, ModelError, SolverError
-from mbsim.system import build, contacts, pairing
-from mbsim.system.arrays import FREE, LISTINGS, LIVE, WANTED
+from mbsim.run import simulation
 
 LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
 MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" inertia_yy="1"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import mbsim
-from mbsim import simulation
-from mbsim.dynamics import hooks
+from mbsim.dynamics.pipeline import hooks
 from mbsim.errors import Interrupted, ModelError, PluginError
 from mbsim.plugins import failure
+from mbsim.run import simulation
 
 USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
 KEEPS = USERFUNCS / "stiction_with_state.py"

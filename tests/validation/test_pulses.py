@@ -156,7 +156,7 @@ def test_a_sensor_of_time_sees_what_is_shorter_than_a_step(tmp_path, located):
     ],
 )
 def test_slow_functions_cost_nothing(tmp_path, monkeypatch, expression, end):
-    from mbsim.system.timetable import Timetable
+    from mbsim.compile_model.timetable import Timetable
 
     model = mbsim.read_model(write_deck(tmp_path, force(expression), end, end / 10.0))
     for tol in (1e-3, 1e-5):

@@ -14,8 +14,8 @@ from decks_io import GRAVITY, GROUND, run_deck, write_deck
 from libraries import compiled
 
 import mbsim
-from mbsim.again import request
 from mbsim.errors import DeckError, Interrupted, ModelError
+from mbsim.run.replay import request
 
 BOX = (
     '<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20" '

@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import COULOMB, GRAVITY, GROUND, MODELS, contact, run_deck, sphere, write_deck
 
 import mbsim
+from mbsim.compile_model.groups import find_groups, natural_speed
 from mbsim.model.placement import place
-from mbsim.system.groups import find_groups, natural_speed
 
 METHODS = ["AUTO", "DOPRI5", "DOP853", "RADAU5", "GALPHA"]
 UNITS = (

@@ -158,8 +158,8 @@ def test_a_run_resumed_after_a_sensor_is_the_same_to_the_last_bit(tmp_path, monk
     model = mbsim.read_model(path)
     whole = mbsim.simulate(model, output=tmp_path / "whole")
 
-    from mbsim import simulation
     from mbsim.errors import Interrupted
+    from mbsim.run import simulation
 
     sense = simulation.Runner._sense
 

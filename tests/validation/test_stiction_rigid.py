@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from decks_io import MODELS, USERFUNCS, contact, run_deck, run_in_pieces, sphere, write_deck
 
 import mbsim
-from mbsim.again import request
 from mbsim.errors import DeckError, ModelError
+from mbsim.run.replay import request
 
 G = 9.81
 IMPLICIT = ("RADAU5", "GALPHA")
@@ -308,7 +308,7 @@ def test_explicit_methods_refuse_it_by_name(tmp_path):
     for method in ("DOPRI5", "DOP853", "VERLET"):
         with pytest.raises(ModelError, match=said):
             mbsim.simulate(model, integrator=method)
-    from mbsim.settings import settle
+    from mbsim.run.settings import settle
 
     settings = settle(model)
     assert settings.integrator == "RADAU5"

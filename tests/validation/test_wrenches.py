@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import free_bodies as free
 
-from mbsim.dynamics.wrenches import turning_torque
+from mbsim.dynamics.forces.wrenches import turning_torque
 from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import BodyForce, Bushing, Marker, Request, VectorForce

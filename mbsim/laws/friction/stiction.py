@@ -23,7 +23,7 @@ or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more woul
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
 up to mu_s N r. With `cff_fnc_name` the size of what that function returns takes the place of
 mu_d N.
-With k INFINITE there is no spring: what sticks is held by equations (`dynamics.rigid_contact`), and
+With k INFINITE there is no spring: what sticks is held by equations (`stiction.rigid_contact`), and
 what slips has F = -mu_d N v/|v|, d in place of v where that is 0:
 
     F = -mu_d N u/|u|,  u = d + v, mirrored where it goes against d,

@@ -1,0 +1,1 @@
+"""Every array of the compiled pipeline, declared once."""

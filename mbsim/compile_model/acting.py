@@ -1,0 +1,171 @@
+"""What acts in a model and what is asked for, as rows and programs; laws only where it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mbsim.arrays import scene as a
+from mbsim.compile_model.applied import applied_forces
+from mbsim.compile_model.force_order import check_states, in_order
+from mbsim.compile_model.gravity import Pull, pulls
+from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.mechanism import Grip, Mechanism, constrain
+from mbsim.compile_model.programs import ProgramTable
+from mbsim.compile_model.states import sensors_table, states_table
+from mbsim.compile_model.switching import kinks_table
+from mbsim.model.elements import Model, Subroutine
+from mbsim.model.placement import place
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.subroutines import StateReader
+    from mbsim.plugins.residual import UserResidual
+    from mbsim.plugins.subroutine import UserSubroutine
+
+
+def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
+    """Return statement, XML statement, id, subroutine and number of results of all users'."""
+    found = []
+    for force in model.scalar_forces.values():
+        if force.user is not None:
+            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
+    for variable in model.variables.values():
+        if variable.user is not None:
+            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
+    for statement, xml, table in (
+        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
+        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
+    ):
+        for vector in table.values():
+            if vector.user is not None:
+                count = sum(expr is not None for expr in vector.exprs)
+                found.append((statement, xml, vector.id, vector.user, count))
+    return found
+
+
+def _values(
+    model: Model, programs: ProgramTable, residuals: Mapping[int, UserResidual] | None
+) -> list[tuple[int, int]]:
+    """Make the programs of requests, the last of all; return request and F number of each.
+
+    Before them those of the unknowns of elements are made, which have no request: id 0.
+    """
+    made = []
+    if residuals:
+        from mbsim.compile_model.force_elements import unknown_programs
+
+        made = [(0, k) for k, _ in enumerate(unknown_programs(model, programs, residuals))]
+    for request in model.requests.values():
+        for k, expression in enumerate(request.exprs):
+            if expression is not None:
+                programs.add(expression, request, forces=True, accelerations=True)
+                made.append((request.id, k + 1))
+    return made
+
+
+def _state_reader(model: Model, programs: ProgramTable, looks: bool) -> StateReader | None:
+    """Return what serves py_sysfnc where a script has it."""
+    if not looks:
+        return None
+    from mbsim.compile_model.subroutines import StateReader
+
+    return StateReader(model, programs)
+
+
+@dataclass
+class Acting:
+    """What acts and what is asked for, as rows and programs, which are made in one order."""
+
+    programs: ProgramTable
+    applied: a.Applied
+    applied_ids: list[tuple[str, int]]
+    mechanism: Mechanism
+    states: a.States
+    sensors: a.Sensors
+    kinks: a.Kinks
+    reader: StateReader | None
+    pulls: list[Pull]
+    values: list[tuple[int, int]]
+    residuals: a.Residuals | None
+
+
+def _link_dry(
+    model: Model, mechanism: Mechanism, applied: a.Applied, applied_ids: list[tuple[str, int]]
+) -> None:
+    """Let rigid dry frictions and their equations, know each other.
+
+    Theirs are the last but for those of contacts.
+    """
+    rigid = [id for id, friction in model.dry_frictions.items() if friction.dx == 0.0]
+    grips = int((mechanism.equations.slot >= 0).sum())
+    first = len(mechanism.equations.program) - grips - len(rigid)
+    for k, id in enumerate(rigid):
+        row = applied_ids.index(("DRYFRICTION", id))
+        applied.equation[row], mechanism.equations.dry[first + k] = first + k, row
+
+
+def acting(
+    model: Model,
+    table: MarkerTable,
+    first_state: int,
+    subroutines: Mapping[tuple[str, int], UserSubroutine | None],
+    looks: bool,
+    runs: bool = True,
+    residuals: Mapping[int, UserResidual] | None = None,
+    grips: Sequence[Grip] = (),
+) -> Acting:
+    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
+
+    `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
+    look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.
+    `grips`: slots whose friction is rigid.
+    """
+    programs = ProgramTable(
+        table,
+        model.variables,
+        model.differentials,
+        first_state,
+        tuple(model.sensors),
+        model.splines,
+        model.arrays,
+    )
+    elements = [("FORCEELEMENT", id) for id in model.force_elements]
+    programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
+    applied, applied_ids = applied_forces(model, table, programs, laws=runs)
+    mechanism = constrain(model, table, programs, grips)
+    applied, applied_ids = in_order(
+        model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
+    )
+    _link_dry(model, mechanism, applied, applied_ids)
+    states = states_table(model, programs)
+    table_of_residuals, modes = None, []
+    if residuals:
+        from mbsim.compile_model.force_elements import mode_programs, residuals_table
+
+        table_of_residuals, states = residuals_table(model, table, programs, residuals, states)
+        modes = mode_programs(model, programs, residuals)
+    held = (mechanism.connections, mechanism.elements, programs)
+    check_states(model, states, applied, applied_ids, *held)
+    return Acting(
+        programs,
+        applied,
+        applied_ids,
+        mechanism,
+        states,
+        sensors_table(model, programs),
+        kinks_table(model, programs, applied, modes),
+        _state_reader(model, programs, looks) if runs else None,
+        pulls(model, programs),
+        _values(model, programs, residuals),  # the last of all
+        table_of_residuals,
+    )
+
+
+def check_expressions(model: Model) -> None:
+    """Raise what is wrong with expressions where they stand, as `build` would."""
+    placement = place(model)
+    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
+    rows.update({id: k for k, id in enumerate(placement.bodies)})
+    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
+    acting(model, MarkerTable(placement, rows), 0, users, looks=False, runs=False)

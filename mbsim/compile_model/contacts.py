@@ -1,0 +1,294 @@
+"""Shapes, pairs and contacts of a model -> arrays; only what takes part gets a row."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.arrays import scene as a
+from mbsim.compile_model.pairing import (
+    Kind,
+    Plans,
+    half_extent,
+    kernel_size,
+    reach,
+    shape_class,
+    thinnest,
+)
+from mbsim.core import jit
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, Pair
+from mbsim.geometry.fcl_detector import states_noise
+from mbsim.laws import abi
+from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
+from mbsim.model.elements import Contact, Model
+from mbsim.model.placement import Placement
+
+if TYPE_CHECKING:
+    from mbsim.plugins import UserFriction
+    from mbsim.plugins.normal import UserNormal
+
+#: Places for near pairs of a crowd, for each of its graphics.
+NEAR_EACH = 24
+#: Most cells of the grid that finds them, for each graphic.
+CELLS_EACH = 4
+#: Boxes nearer than this many radii are listed as near.
+SKIN = 0.45
+
+
+@functools.cache
+def region_address(name: str) -> int:
+    """Return the address of a closed-form pair that is one incident."""
+    from mbsim.compile_model import pair_adapter
+
+    made, slots = REGIONS[name], PAIRS[name].slots + REGION_ROWS
+    adapted = pair_adapter.adapt_region(made.points, made.whole, slots)
+    return jit.address(adapted, pair_adapter.SIGNATURE)
+
+
+def kernel_address(kind: Kind) -> int:
+    """Return the address of a kind's closed form, 0 where it has none."""
+    if not kind.closed_form:
+        return 0
+    if kind.region:
+        return region_address(kind.closed_form)
+    return pair_address(PAIRS[kind.closed_form])
+
+
+@functools.cache
+def pair_address(pair: Pair) -> int:
+    """Return the address of a closed-form pair."""
+    from mbsim.compile_model import pair_adapter
+
+    adapted = pair_adapter.adapt_pair(pair.points, pair.slots)
+    return jit.address(adapted, pair_adapter.SIGNATURE)
+
+
+def graphics_table(
+    model: Model, placement: Placement, ids: list[int], row: dict[int, int], shapes: list[str]
+) -> a.Graphics:
+    """Return the shapes in their bodies' cg axes; `row` is the body row by body id."""
+    n = len(ids)
+    made = a.Graphics(
+        body=np.zeros(n, dtype=np.int64),
+        p=np.zeros((n, 3)),
+        R=np.zeros((n, 3, 3)),
+        size=np.zeros((n, 3)),
+        reach=np.zeros(n),
+        half=np.zeros((n, 3)),
+        turns=np.ones(n, dtype=np.int64),
+        thin=np.zeros(n),
+        shape=np.zeros(n, dtype=np.int64),
+        marker_p=np.zeros((n, 3)),
+        marker_R=np.zeros((n, 3, 3)),
+    )
+    for g, graphic_id in enumerate(ids):
+        graphic = model.graphics[graphic_id]
+        marker = placement.markers[graphic.marker_id]
+        made.body[g] = row[marker.body_id]
+        made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
+        made.R[g] = marker.R_B
+        made.size[g] = kernel_size(graphic)
+        made.reach[g] = reach(graphic)
+        made.half[g] = half_extent(graphic)
+        made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
+        made.thin[g] = thinnest(graphic)
+        made.shape[g] = shapes.index(shape_class(graphic))
+        made.marker_p[g] = marker.p_B
+        made.marker_R[g] = marker.R_B
+    return made
+
+
+def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
+    """Return how pairs are tested; `contacts` is the contact row by id."""
+    return a.Kinds(
+        contact=np.array([contacts[k.contact] for k in kinds], dtype=np.int64),
+        kernel=np.array([kernel_address(k) for k in kinds], dtype=np.int64),
+        slots=np.array([k.slots for k in kinds], dtype=np.int64),
+        swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
+        regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
+        whole=np.array([REGIONS[k.closed_form].whole if k.region else 0.0 for k in kinds]),
+        noise=np.array(
+            [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
+        ),
+    )
+
+
+def _crowd_places(plans: Plans) -> tuple[int, int]:
+    """Return how many pairs of crowds can be near at once, and the slots of one such place."""
+    if not plans.crowds:
+        return 0, 0
+    places = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.crowds)
+    return places, max(kind.slots for crowd in plans.crowds for kind in crowd.kinds.values())
+
+
+def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[a.Pairs, int]:
+    """Return the places for pairs and the number of their slots; `rows`: graphic row by id.
+
+    Listed pairs come first and stay; the places of crowds have slots for any of their kinds.
+    """
+    fixed = len(plans.pairs)
+    places, wide = _crowd_places(plans)
+    n = fixed + places
+    row_of = {kind: k for k, kind in enumerate(kinds)}
+    listed = np.array([plan.kind.slots for plan in plans.pairs], dtype=np.int64)
+    ends = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(listed)])
+    crowd_slots = ends[-1] + wide * np.arange(places + 1)
+    made = a.Pairs(
+        kind=np.zeros(n, dtype=np.int64),
+        graphic_i=np.zeros(n, dtype=np.int64),
+        graphic_j=np.zeros(n, dtype=np.int64),
+        slot=np.concatenate([ends[:-1], crowd_slots[:-1]]),
+        last=np.concatenate([ends[1:], crowd_slots[1:]]),
+        touches=np.zeros(n, dtype=np.int64),
+        gap=np.zeros(n),
+        left=np.zeros(n),
+        live=np.arange(n),
+        free=np.arange(n)[::-1].copy(),
+        count=np.array([fixed, places, fixed, 0], dtype=np.int64),
+    )
+    for k, plan in enumerate(plans.pairs):
+        made.kind[k] = row_of[plan.kind]
+        made.graphic_i[k], made.graphic_j[k] = rows[plan.graphic_i], rows[plan.graphic_j]
+    return made, int(crowd_slots[-1])
+
+
+def crowds_table(
+    plans: Plans,
+    kinds: list[Kind],
+    rows: dict[int, int],
+    graphics: a.Graphics,
+    shapes: list[str],
+    contacts: dict[int, int],
+    places: int,
+    slots: int,
+    memory: int,
+) -> a.Crowds:
+    """Return the contacts whose near pairs are found as they move."""
+    n, ng = len(plans.crowds), len(graphics.body)
+    row_of = {kind: k for k, kind in enumerate(kinds)}
+    made = a.Crowds(
+        contact=np.array([contacts[crowd.contact] for crowd in plans.crowds], dtype=np.int64),
+        same=np.array([crowd.same for crowd in plans.crowds], dtype=np.int64),
+        first=np.zeros((n, 4), dtype=np.int64),
+        member=np.array([rows[g] for c in plans.crowds for g in (*c.i, *c.j)], dtype=np.int64),
+        kind=np.full((n, len(shapes) ** 2), -1, dtype=np.int64),
+        swap=np.zeros((n, len(shapes) ** 2), dtype=np.int64),
+        size=np.zeros(2),
+        reference=np.zeros((ng if n else 0, 7)),
+        room=np.full(ng, math.inf),
+        box=np.zeros((ng if n else 0, 6)),
+        cell=np.zeros(ng if n else 0, dtype=np.int64),
+        order=np.zeros(ng if n else 0, dtype=np.int64),
+        start=np.zeros(CELLS_EACH * ng + 64 if n else 0, dtype=np.int64),
+        head=np.zeros(ng if n else 0, dtype=np.int64),
+        next=np.zeros(places if n else 0, dtype=np.int64),
+        moved=np.zeros((places if n else 0, 5), dtype=np.int64),
+        spare=np.zeros((slots if n else 0, a.SPARE + 2 * memory)),
+    )
+    at = 0
+    for k, crowd in enumerate(plans.crowds):
+        middle, end = at + len(crowd.i), at + len(crowd.i) + len(crowd.j)
+        made.first[k] = at, middle, middle, end
+        at = end
+        for (shape_i, shape_j), kind in crowd.kinds.items():
+            i, j = shapes.index(shape_i), shapes.index(shape_j)
+            both = [(i, j, 0), (j, i, 1)] if crowd.same and i != j else [(i, j, 0)]
+            for p, q, other in both:
+                made.kind[k, p * len(shapes) + q] = row_of[kind]
+                made.swap[k, p * len(shapes) + q] = int(kind.swapped) ^ other
+    if n:
+        sizes = graphics.reach[made.member]
+        usual = float(np.median(sizes[np.isfinite(sizes)]))
+        made.size[:] = SKIN * usual, usual
+    return made
+
+
+def _or(value: float | None, default: float) -> float:
+    """Return `value`, or the default where the deck says nothing."""
+    return default if value is None else value
+
+
+def _full_damping_depth(contact: Contact) -> float:
+    """Return dmax [L] where the normal law has a damper that comes in over it, else 0."""
+    if contact.cnf_type == "USERCNF":
+        return 0.0
+    read = "dmax" in NORMAL_LAWS[contact.cnf_type].parameters
+    return _or(contact.dmax, 0.0) if read and contact.damping else 0.0
+
+
+def contacts_table(
+    contacts: list[Contact],
+    user: dict[int, UserFriction],
+    user_normal: Mapping[int, UserNormal],
+) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
+    """Return the contacts, and for each whether X has to be carried."""
+    n = len(contacts)
+    normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
+    memory, carried = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for k, contact in enumerate(contacts):
+        if contact.id in user_normal:
+            own = user_normal[contact.id]
+            normal.append((own.address, own.row))
+        else:
+            law = NORMAL_LAWS[contact.cnf_type]
+            normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
+        if contact.cff_type == "USERCFF":
+            friction.append(user[contact.id].row)
+            addresses.append(user[contact.id].address)
+            uses_x[k], memory[k] = user[contact.id].uses_x, user[contact.id].states
+        elif contact.cff_type == "COULOMB_OFF":
+            friction.append(np.zeros(0))
+            addresses.append(0)
+        else:
+            friction_law = friction_law_of(contact)
+            friction.append(abi.friction_parameters(friction_law, contact))
+            addresses.append(abi.friction_address(friction_law))
+            uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
+            carried[k] = friction_law.carried
+
+    def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
+        wide = np.zeros((n, max([1, *map(len, rows)])))
+        for k, values in enumerate(rows):
+            wide[k, : len(values)] = values
+        return wide
+
+    sliding = [
+        (user[c.id].address, user[c.id].row)
+        if c.id in user and c.cff_type != "USERCFF"
+        else (0, np.zeros(0))
+        for c in contacts
+    ]
+    made = a.Contacts(
+        id=np.array([contact.id for contact in contacts], dtype=np.int64),
+        normal_law=np.array([address for address, _ in normal], dtype=np.int64),
+        normal_par=table([values for _, values in normal]),
+        friction_law=np.array(addresses, dtype=np.int64),
+        friction_par=table(friction),
+        sliding_law=np.array([at for at, _ in sliding], dtype=np.int64),
+        sliding_par=table([par for _, par in sliding]),
+        interpreted=np.array(
+            [c.id in user and not user[c.id].compiled for c in contacts], dtype=np.int64
+        ),
+        framed=np.array(
+            [c.id in user or memory[k] > 0 for k, c in enumerate(contacts)], dtype=np.int64
+        ),
+        memory=memory,
+        carried=carried,
+        ignore_deeper=np.array(
+            [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
+        ),
+        dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
+        reads_x=np.array(
+            [c.cff_type != "USERCFF" or user[c.id].reads_x for c in contacts], dtype=np.int64
+        ),
+        user_normal=np.array(
+            [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
+            dtype=np.int64,
+        ),
+        rigid=np.array([c.rigid for c in contacts], dtype=np.int64),
+    )
+    return made, uses_x

@@ -1,0 +1,597 @@
+"""Joints, motions and other constraints as a tree of bodies and equations that close its loops.
+
+The tree takes, body by body from ground, the joint that holds most; a joint whose equations
+are plain offsets and cosines can hang a body on its parent. All other equations are kept as sums
+of terms (`constraints.equations`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from mbsim.arrays import scene as a
+from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.programs import ProgramTable
+from mbsim.errors import DeckError, Fault
+from mbsim.joints.catalog import JOINTS, Row, angle, offset
+from mbsim.model.elements import (
+    Array,
+    Coupler,
+    DryFriction,
+    GeneralConstraint,
+    Joint,
+    Model,
+    Motion,
+)
+from mbsim.model.frames import quaternion
+from mbsim.model.names import element_name
+
+_AXES = "xyz"
+_KINDS = {
+    "offset": a.OFFSET,
+    "perp": a.PERP,
+    "angle": a.ANGLE,
+    "spin": a.ANGLE,
+    "distance": a.DISTANCE,
+    "twist": a.TWIST,
+}
+#: What of a rotation is left free by these cosines held at 0 (axis of I, axis of J).
+_TURNS = {
+    frozenset[tuple[str, str]](): a.TURN_FREE,
+    frozenset({("z", "x"), ("z", "y")}): a.TURN_AXIS,
+    frozenset({("z", "x"), ("z", "y"), ("x", "y")}): a.TURN_LOCKED,
+}
+#: A joint that holds less than this is cheaper as equations than as a limb of the tree.
+_LEAST_ROWS = 3
+#: Sine of an angle below which axes are parallel.
+_PARALLEL = 1e-6
+#: Cosine of half the bend of shafts that are folded back: no twist can be told from it.
+_FOLDED = 1e-8
+_LEVELS = {"A": 0, "V": 1, "D": 2}
+#: What a motion's direction means.
+_DIRECTIONS = {
+    "R": angle(),
+    "B1": angle(),  # of markers turned by `MarkerTable.turned`
+    "B2": angle(),
+    "B3": angle(),
+    "T": offset("z"),
+    "X": offset("x"),
+    "Y": offset("y"),
+    "Z": offset("z"),
+}
+#: Directions free at each kind of turn.
+_FREE_TURNS = {a.TURN_LOCKED: 0, a.TURN_AXIS: 1, a.TURN_CROSS: 2, a.TURN_FREE: 3, a.TURN_ROOT: 6}
+
+
+@dataclass(frozen=True)
+class Limb:
+    """A joint that can hang a body on another: what it leaves free; bodies and markers by rows."""
+
+    connection: int
+    i: int
+    j: int
+    turn: int
+    slide: tuple[int, int, int]
+    axis_i: int = 0
+    axis_j: int = 0
+
+    @property
+    def held(self) -> int:
+        """Number of directions that the joint holds."""
+        return 6 - _FREE_TURNS[self.turn] - sum(self.slide)
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether I's body may be the parent: slides are then along I's axes as well."""
+        return self.turn in (a.TURN_LOCKED, a.TURN_AXIS) or sum(self.slide) in (0, 3)
+
+
+@dataclass
+class _Sums:
+    """Equations and their terms as they are found."""
+
+    first: list[int] = field(default_factory=lambda: [0])
+    program: list[int] = field(default_factory=list)
+    level: list[int] = field(default_factory=list)
+    general: list[int] = field(default_factory=list)
+    constant: list[float] = field(default_factory=list)
+    start: list[tuple[float, float]] = field(default_factory=list)
+    unit: list[float] = field(default_factory=list)
+    connection: list[int] = field(default_factory=list)
+    dry: list[int] = field(default_factory=list)
+    slot: list[int] = field(default_factory=list)
+    terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+    def close(
+        self,
+        connection: int,
+        name: str,
+        constant: float,
+        unit: float,
+        program: int = -1,
+        level: int = 2,
+        general: int = 0,
+        start: tuple[float | None, float | None] = (None, None),
+    ) -> None:
+        """End an equation whose terms have been added."""
+        self.first.append(len(self.terms))
+        self.program.append(program)
+        self.level.append(level)
+        self.general.append(general)
+        self.constant.append(constant)
+        self.start.append(tuple(np.nan if value is None else value for value in start))
+        self.unit.append(unit)
+        self.connection.append(connection)
+        self.dry.append(-1)
+        self.slot.append(-1)
+        self.names.append(name)
+
+    def arrays(self) -> a.Equations:
+        """Return the equations as arrays, all in use."""
+        n = len(self.program)
+
+        def ints(values: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+            return np.array(list(values), dtype=np.int64)
+
+        return a.Equations(
+            first=ints(self.first),
+            program=ints(self.program),
+            level=ints(self.level),
+            general=ints(self.general),
+            constant=np.array(self.constant, dtype=np.float64),
+            start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
+            unit=np.array(self.unit, dtype=np.float64),
+            connection=ints(self.connection),
+            dry=ints(self.dry),
+            slot=ints(self.slot),
+            kind=ints(t[0] for t in self.terms),
+            i=ints(t[1] for t in self.terms),
+            j=ints(t[2] for t in self.terms),
+            axis=np.array([t[3:5] for t in self.terms], dtype=np.int64).reshape(-1, 2),
+            factor=np.array([t[5] for t in self.terms], dtype=np.float64),
+            angle=ints(t[6] for t in self.terms),
+            active=np.append(np.arange(n), n),
+        )
+
+
+@dataclass
+class Mechanism:
+    """The constraints of a model as arrays; `elements` has (statement, id) of each connection.
+
+    `names` says for each equation which it is, for messages.
+    """
+
+    tree: a.Tree
+    equations: a.Equations
+    connections: a.Connections
+    elements: list[tuple[str, int]]
+    names: list[str]
+
+
+class Grip(NamedTuple):
+    """A slot whose friction is rigid."""
+
+    contact: int  # id
+    slot: int
+    i: int  # marker rows on the bodies of the contact's I and J
+    j: int
+
+
+class _Builder:
+    """Collects connections, limbs and equations of one model."""
+
+    def __init__(self, model: Model, markers: MarkerTable, programs: ProgramTable) -> None:
+        self.model, self.markers, self.programs = model, markers, programs
+        self.length = markers.length
+        self.sums = _Sums()
+        self.elements: list[tuple[str, int]] = []
+        self.pairs: list[tuple[int, int]] = []
+        self.limbs: dict[int, Limb] = {}
+        self.joints: dict[int, Joint] = {}
+
+    def row_value(self, row: Row, i: int, j: int) -> float:
+        """Return what a row is at the start."""
+        (p_i, R_i), (p_j, R_j) = self.markers.frame(i), self.markers.frame(j)
+        if row.kind == "offset":
+            return float(R_j[:, _AXES.index(row.j)] @ (p_i - p_j))
+        if row.kind == "perp":
+            return float(R_i[:, _AXES.index(row.i)] @ R_j[:, _AXES.index(row.j)])
+        if row.kind == "distance":
+            return float(np.linalg.norm(p_i - p_j))
+        if row.kind == "twist":
+            return 0.0
+        return self.markers.start_angle(i, j)
+
+    def aligned(self, i: int, j: int) -> int:
+        """Return a new marker row on J's body with I's axes at the start."""
+        body_j, _, _ = self.markers.frames[j]
+        axes = self.markers.frame(i)[1]
+        bodies = list(self.markers.placement.bodies.values())
+        R = bodies[body_j].R if body_j < len(bodies) else np.eye(3)
+        return self.markers.add(body_j, self.markers.frames[j][1], R.T @ axes)
+
+    def untwisted(self, i: int, j: int) -> int:
+        """Return a new marker row on J's body, J turned about its z so that I is only bent."""
+        w, _, _, z = quaternion(self.markers.frame(j)[1].T @ self.markers.frame(i)[1])
+        twist = 2.0 * math.atan2(z, w) if math.hypot(z, w) > _FOLDED else 0.0
+        c, s = math.cos(twist), math.sin(twist)
+        body, p, R = self.markers.frames[j]
+        return self.markers.add(body, p, R @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+    # connections
+
+    def connect(self, statement: str, id: int, i: int, j: int) -> int:
+        """Return the row of a new connection."""
+        self.elements.append((statement, id))
+        self.pairs.append((i, j))
+        return len(self.elements) - 1
+
+    def add_term(self, row: Row, i: int, j: int, factor: float) -> float:
+        """Add a term to the equation being made; return what it is at the start."""
+        if row.kind == "spin":
+            j = self.aligned(i, j)
+        elif row.kind == "twist":
+            j = self.untwisted(i, j)
+        slot = self.markers.angle(i, j) if row.kind in ("angle", "spin") else -1
+        axis_i = _AXES.index(row.i) if row.i else 0
+        axis_j = _AXES.index(row.j) if row.j else 0
+        self.sums.terms.append((_KINDS[row.kind], i, j, axis_i, axis_j, factor, slot))
+        return factor * self.row_value(row, i, j)
+
+    def unit(self, rows: Iterable[Row]) -> float:
+        """Return what the residual of a sum is measured by."""
+        lengths = any(row.kind in ("offset", "distance") for row in rows)
+        return self.length if lengths else 1.0
+
+    def add_equation(
+        self, connection: int, joint: Joint, rows: tuple[Row, ...], last: bool
+    ) -> None:
+        """Add an equation of a joint."""
+        i, j = self.pairs[connection]
+        total = sum(self.add_term(row, i, j, row.factor(joint)) for row in rows)
+        kind = JOINTS[joint.type]
+        given = kind.value(joint) if kind.value is not None and last else None
+        zero = len(rows) == 1 and rows[0].kind in ("offset", "perp")
+        constant = given if given is not None else (0.0 if zero else total)
+        self.sums.close(connection, _describe(rows), constant, self.unit(rows))
+
+    def add_joint(self, statement: str, joint: Joint) -> None:
+        """Add a joint; what it may be as a limb is noted, its other equations are added."""
+        i, j = self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
+        connection = self.connect(statement, joint.id, i, j)
+        self.joints[connection] = joint
+        limb = _limb(connection, i, j, JOINTS[joint.type].equations)
+        if limb is not None and limb.turn == a.TURN_CROSS:
+            self.check_cross(statement, joint, limb)
+        if limb is not None and limb.held >= _LEAST_ROWS:
+            self.limbs[connection] = limb
+
+    def check_cross(self, statement: str, joint: Joint, limb: Limb) -> None:
+        """Refuse a cross whose arms start parallel: which way they are to turn is not said."""
+        arm_i = self.markers.frame(limb.i)[1][:, limb.axis_i]
+        arm_j = self.markers.frame(limb.j)[1][:, limb.axis_j]
+        if float(np.linalg.norm(np.cross(arm_i, arm_j))) < _PARALLEL:
+            name = f"Constraint_J{'oint' if statement == 'JOINT' else 'prim'}[{joint.id}]"
+            message = (
+                f"{_AXES[limb.axis_i]} of marker {joint.i_marker_id} (I) and {_AXES[limb.axis_j]} "
+                f"of marker {joint.j_marker_id} (J) are parallel; must be at right angles "
+                f"({joint.type})"
+            )
+            raise DeckError([Fault(joint.source.file, joint.source.line, name, message)])
+
+    def add_joint_equations(self, in_tree: set[int]) -> None:
+        """Add the equations of all joints that the tree does not hold."""
+        for connection, joint in self.joints.items():
+            equations = JOINTS[joint.type].equations
+            for k, rows in enumerate(equations):
+                if not (connection in in_tree and _is_plain(rows)):
+                    self.add_equation(connection, joint, rows, k == len(equations) - 1)
+
+    def joint_markers(self, joint_id: int) -> tuple[int, int]:
+        """Return the marker rows of a joint."""
+        joint = self.model.joints[joint_id]
+        return self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
+
+    def add_motion(self, motion: Motion) -> None:
+        """Add a motion: one row less a function of TIME."""
+        if motion.joint_id is not None:
+            i, j = self.joint_markers(motion.joint_id)
+        else:
+            i, j = self.markers.row(motion.i_marker_id), self.markers.row(motion.j_marker_id)
+        connection = self.connect("MOTION", motion.id, i, j)
+        row = _DIRECTIONS[motion.direction]
+        if motion.direction in ("B1", "B2"):
+            axis = int(motion.direction == "B2")
+            i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
+        self.add_term(row, i, j, 1.0)
+        assert motion.expr is not None
+        program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
+        level = _LEVELS[motion.val_type]
+        start = (motion.ic_disp, motion.ic_vel)
+        self.sums.close(
+            connection, "its motion", 0.0, self.unit([row]), program, level, start=start
+        )
+
+    def add_coupler(self, coupler: Coupler) -> None:
+        """Add a coupler: a sum of displacements of joints stays what it is."""
+        connection = self.connect("COUPLER", coupler.id, *self.joint_markers(coupler.joint_ids[0]))
+        total, rows = 0.0, []
+        for joint_id, kind, scale in zip(
+            coupler.joint_ids, coupler.motion_types, coupler.scales, strict=True
+        ):
+            rows.append(_DIRECTIONS[kind])
+            total += self.add_term(rows[-1], *self.joint_markers(joint_id), scale)
+        self.sums.close(connection, "its ratio", total, self.unit(rows))
+
+    def add_general(self, constraint: GeneralConstraint) -> None:
+        """Add an expression that is 0: one term for each body that it looks at."""
+        program = self.programs.add(constraint.expr, constraint, differentiable=True)
+        rows = self.programs.looks_at(program)
+        bodies = {self.markers.frames[row][0]: row for row in rows}
+        fixed = bodies.pop(self.markers.ground, 0)
+        if not bodies:
+            name = element_name(self.model.file, "Constraint_General", constraint.id)
+            message = f"expr={constraint.expr.text!r}: must depend on where a moving body is"
+            raise DeckError([Fault(constraint.source.file, constraint.source.line, name, message)])
+        i, j = ([*bodies.values(), fixed, 0])[:2]
+        connection = self.connect("GCON", constraint.id, i, j)
+        for row in bodies.values():
+            self.sums.terms.append((a.GENERAL, row, 0, 0, 0, 1.0, -1))
+        self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
+
+    def add_dry(self, friction: DryFriction) -> None:
+        """Add the velocity that rigid dry friction holds while it sticks; it is no connection."""
+        i, j = self.markers.row(friction.i_marker_id), self.markers.row(friction.j_marker_id)
+        axis = "XYZ".index(friction.type[1])
+        if friction.type[0] == "R":
+            row = angle()
+            i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
+        else:
+            row = offset(_AXES[axis])
+        self.add_term(row, i, j, 1.0)
+        self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
+
+    def add_grip(self, grip: Grip) -> None:
+        """Add the two velocities that rigid friction of a slot holds while it sticks."""
+        for way in range(2):
+            self.sums.terms.append((a.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
+            self.sums.close(-1, f"Force_Contact[{grip.contact}]", 0.0, self.length, level=1)
+            self.sums.slot[-1] = grip.slot
+
+    # the tree
+
+    def bodies_in_equations(self) -> Iterator[int]:
+        """Yield the rows of all moving bodies that a constraint holds."""
+        for _, i, j, *_ in self.sums.terms:
+            yield from (self.markers.frames[row][0] for row in (i, j))
+        for i, j in self.pairs:
+            yield from (self.markers.frames[row][0] for row in (i, j))
+
+    def grow(self, others: list[int]) -> dict[int, tuple[int, Limb | None, bool]]:
+        """Return for each body its parent, the limb it hangs on, and whether I is on the parent.
+
+        From ground, and then from each body that is not reached, the limb that holds most is
+        taken first; of equals the one nearest to the root.
+        """
+        ground = self.markers.ground
+        held = {*self.bodies_in_equations(), *(self._body(row) for row in others)} - {ground}
+        hung: dict[int, tuple[int, Limb | None, bool]] = {}
+        depth = {ground: 0}
+        waiting = sorted(held)
+        while True:
+            options = []
+            for limb in self.limbs.values():
+                body_i, body_j = self._body(limb.i), self._body(limb.j)
+                if body_j in depth and body_i not in depth:
+                    options.append((-limb.held, depth[body_j], limb.connection, False))
+                elif body_i in depth and body_j not in depth and limb.both_ways:
+                    options.append((-limb.held, depth[body_i], limb.connection, True))
+            if options:
+                _, level, connection, flip = min(options)
+                limb = self.limbs[connection]
+                child, parent = self._body(limb.i), self._body(limb.j)
+                if flip:
+                    child, parent = parent, child
+                hung[child], depth[child] = (parent, limb, flip), level + 1
+                continue
+            root = next((body for body in waiting if body not in depth), None)
+            if root is None:
+                return hung
+            hung[root], depth[root] = (ground, None, False), 0
+
+    def _body(self, row: int) -> int:
+        return self.markers.frames[row][0]
+
+    def tree(self, others: list[int]) -> tuple[a.Tree, dict[int, tuple[int, bool]]]:
+        """Return the tree; for each connection in it its place and whether I is on the parent."""
+        ground = self.markers.ground
+        hung = self.grow(others)
+        children: dict[int, list[int]] = {}
+        for child, (parent, limb, _) in hung.items():
+            children.setdefault(-1 if limb is None else parent, []).append(child)
+        order: list[int] = []
+        root_of: dict[int, int] = {}
+        for top in [*children.get(ground, []), *children.get(-1, [])]:
+            stack = [top]
+            while stack:
+                body = stack.pop()
+                order.append(body)
+                root_of[body] = top
+                stack.extend(reversed(children.get(body, [])))
+        # bodies of one root follow each other
+        n, place = len(order), {body: k for k, body in enumerate(order)}
+        made = empty_tree(ground, n)
+        of_connection: dict[int, tuple[int, bool]] = {}
+        for k, body in enumerate(order):
+            parent, limb, flip = hung[body]
+            made.body[k], made.of_body[body] = body, k
+            made.parent[k] = place[parent] if limb is not None and parent != ground else -1
+            made.root[k] = place[root_of[body]]
+            made.end[made.root[k]] = k + 1
+            if limb is None:
+                made.turn[k], made.free[k] = a.TURN_ROOT, 6
+                continue
+            of_connection[limb.connection] = (k, flip)
+            child_row, parent_row = (limb.j, limb.i) if flip else (limb.i, limb.j)
+            made.turn[k], made.slide[k] = limb.turn, limb.slide
+            made.free[k] = 6 - limb.held
+            axes = (limb.axis_i, limb.axis_j)
+            made.axis[k] = axes[::-1] if flip else axes
+            made.child_p[k] = self.markers.frames[child_row][1]
+            made.parent_p[k] = self.markers.frames[parent_row][1]
+            made.parent_R[k] = self.markers.frames[parent_row][2]
+            relative = self.markers.frame(parent_row)[1].T @ self.markers.frame(child_row)[1]
+            made.child_R[k] = self.markers.frames[child_row][2] @ _nearest_flip(limb.turn, relative)
+        made.end[:] = made.end[made.root]
+        return made, of_connection
+
+
+def _nearest_flip(turn: int, relative: Array) -> Array:
+    """Return the half turn (or none) of the child's axes that brings them nearest to the parent's.
+
+    Cosines held at 0 do not tell an axis from its opposite.
+    """
+    if turn == a.TURN_AXIS:
+        return np.eye(3) if relative[2, 2] >= 0.0 else np.diag([1.0, -1.0, -1.0])
+    if turn == a.TURN_LOCKED:
+        flips = [np.diag([x, y, x * y]) for x, y in product((1.0, -1.0), repeat=2)]
+        return max(flips, key=lambda flip: float(np.trace(relative @ flip)))
+    return np.eye(3)
+
+
+def _is_plain(rows: tuple[Row, ...]) -> bool:
+    """Return whether an equation is one offset or one cosine, which a limb can hold."""
+    return len(rows) == 1 and rows[0].kind in ("offset", "perp")
+
+
+def _limb(connection: int, i: int, j: int, equations: tuple[tuple[Row, ...], ...]) -> Limb | None:
+    """Return what a joint is as a limb, None where it cannot be one."""
+    plain = [rows[0] for rows in equations if _is_plain(rows)]
+    held = {row.j for row in plain if row.kind == "offset"}
+    cosines = [(row.i, row.j) for row in plain if row.kind == "perp"]
+    slide = (int("x" not in held), int("y" not in held), int("z" not in held))
+    if len(cosines) == 1:
+        axis_i, axis_j = (_AXES.index(axis) for axis in cosines[0])
+        return Limb(connection, i, j, a.TURN_CROSS, slide, axis_i, axis_j)
+    turn = _TURNS.get(frozenset(cosines))
+    return None if turn is None else Limb(connection, i, j, turn, slide)
+
+
+def _describe(rows: tuple[Row, ...]) -> str:
+    """Return which equation of a joint this is, in words."""
+    words = {
+        "offset": "offset along J's {j}",
+        "perp": "angle of I's {i} and J's {j}",
+        "angle": "angle about z",
+        "spin": "spin about I's z",
+        "distance": "distance",
+        "twist": "twist about the shafts",
+    }
+    return " with ".join(words[row.kind].format(i=row.i, j=row.j) for row in rows)
+
+
+def empty_tree(ground: int, n: int) -> a.Tree:
+    """Return a tree of n places to be filled."""
+
+    def ints(*shape: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+        return np.zeros(shape, dtype=np.int64)
+
+    return a.Tree(
+        body=ints(n),
+        parent=ints(n),
+        of_body=np.full(ground + 1, -1, dtype=np.int64),
+        root=ints(n),
+        end=ints(n),
+        turn=ints(n),
+        slide=ints(n, 3),
+        axis=ints(n, 2),
+        child_p=np.zeros((n, 3)),
+        child_R=np.zeros((n, 3, 3)),
+        parent_p=np.zeros((n, 3)),
+        parent_R=np.zeros((n, 3, 3)),
+        free=ints(n),
+    )
+
+
+def constrain(
+    model: Model, markers: MarkerTable, programs: ProgramTable, grips: Sequence[Grip] = ()
+) -> Mechanism:
+    """Return the constraints of a model."""
+    builder = _Builder(model, markers, programs)
+    for joint in model.joints.values():
+        builder.add_joint("JOINT", joint)
+    for joint in model.primitives.values():
+        builder.add_joint("JPRIM", joint)
+    for coupler in model.couplers.values():
+        builder.add_coupler(coupler)
+    for motion in model.motions.values():
+        builder.add_motion(motion)
+    for constraint in model.general_constraints.values():
+        builder.add_general(constraint)
+    # friction is held by none of the tree, and its equations are the last
+    rigid = [friction for friction in model.dry_frictions.values() if friction.dx == 0.0]
+    held = [marker for f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
+    others = [markers.row(marker) for marker in held]
+    others += [marker for grip in grips for marker in (grip.i, grip.j)]
+    tree, places = builder.tree(others)
+    builder.add_joint_equations(set(places))
+    for friction in rigid:
+        builder.add_dry(friction)
+    for grip in grips:
+        builder.add_grip(grip)
+    n = len(builder.pairs)
+    pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
+    connections = a.Connections(
+        i=pairs[:, 0].copy(),
+        j=pairs[:, 1].copy(),
+        tree=np.array([places.get(c, (-1, False))[0] for c in range(n)], dtype=np.int64),
+        flip=np.array([places.get(c, (-1, False))[1] for c in range(n)], dtype=np.int64),
+    )
+    return Mechanism(tree, builder.sums.arrays(), connections, builder.elements, builder.sums.names)
+
+
+def sweep(mechanism: Mechanism) -> a.Sweep:
+    """Return scratch for the recursion and the equations."""
+    nt, ne = len(mechanism.tree.body), len(mechanism.equations.program)
+    nh = int((mechanism.equations.slot >= 0).sum())
+    return a.Sweep(
+        H=np.zeros((nt, 6, 6)),
+        S=np.zeros((nt, 6, 6)),
+        W=np.zeros((nt, 6, 6)),
+        L=np.zeros((nt, 6, 6)),
+        c=np.zeros((nt, 6)),
+        p=np.zeros((nt, 6)),
+        z=np.zeros((nt, 6)),
+        a=np.zeros((nt, 6)),
+        arm=np.zeros((nt, 3)),
+        bias=np.zeros((nt, 6)),
+        answer=np.zeros((nt, 6)),
+        mark=np.zeros(nt, dtype=np.int64),
+        chosen=np.zeros(ne + 1, dtype=np.int64),
+        G=np.zeros((len(mechanism.equations.kind), 12)),
+        rate=np.zeros((ne, 4)),
+        A=np.zeros((ne, ne)),
+        multiplier=np.zeros(ne),
+        rhs=np.zeros(ne),
+        skyline=np.zeros(ne, dtype=np.int64),
+        size=np.ones(ne),
+        released=np.zeros(ne, dtype=np.int64),
+        wanted=np.zeros(ne),
+        kept_at=np.zeros(8),
+        kept_power=np.zeros(8),
+        kept_a=np.zeros((8, nt if ne else 0, 6)),
+        quality=np.zeros(18),
+        stress=np.zeros((ne, 6 * len(mechanism.elements))),
+        jet=np.zeros(12),
+        share=np.zeros((nh, nh)),
+        mix=np.zeros((nh, nh)),
+        cone=np.zeros((a.CONE_ROWS, nh)),
+        kept_p=np.zeros((nt if nh else 0, 6)),
+    )

@@ -1,0 +1,322 @@
+"""Which graphics may touch, and what detects them: a closed form or FCL.
+
+A contact tests every I graphic with every J graphic. Up to `MOST_LISTED` pairs are listed for
+good; the pairs of a larger contact, a *crowd*, are too many to look at and are found as
+they come near (`contact.broadphase`). A crowd whose I and J are the same graphics is a set in
+contact with itself: each pair once, none on one body.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, replace
+
+from mbsim.errors import DeckError, Fault
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS
+from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
+from mbsim.model import hull
+from mbsim.model.elements import Contact, Graphic, Model
+
+#: Shapes with flat sides: FCL gives several points for two of them, one for all others.
+_FLAT = {"BOX", "PLANE"}
+FCL_SLOTS = 8
+#: Shapes with round sides that are flat at their ends.
+_ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
+#: Points on which a round end rests in a closed form, and a face of a box on one.
+_UNDER_AN_END, _UNDER_A_FACE = 3, 4
+#: Contacts with more pairs than this are crowds. Every pair listed for good costs some 5 ns an
+#: evaluation: in a heap a crowd is cheaper from 30 pairs on, by a sixth at 300. But steps end
+#: where its list does: bodies in free flight take twice as long at 300 pairs
+#: (tests/bench/test_crowd.py).
+MOST_LISTED = 300
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How two shapes of a contact are tested, in the order that their detector wants."""
+
+    contact: int  # id
+    shape_i: str
+    shape_j: str
+    swapped: bool
+    closed_form: str  # name in PAIRS, or empty where FCL does it
+    slots: int
+    region: bool = False  # whether its points are summed up to one incident
+
+    @property
+    def regroups(self) -> bool:
+        """Whether a contact that goes on may begin another slot, which is then no impact."""
+        if self.region:
+            return False
+        return not self.closed_form or PAIRS[self.closed_form].regroups
+
+    @property
+    def detector(self) -> str:
+        """How `mbsim check` names it."""
+        one = ", one region" if self.region else ""
+        if self.closed_form:
+            return f"closed form {self.closed_form}{one}"
+        shapes = {self.shape_i, self.shape_j}
+        if self.slots > 1 or not shapes <= _FLAT | _ROUND_ENDED:
+            return "FCL"
+        points = f"{_UNDER_AN_END} or {_UNDER_A_FACE}" if "BOX" in shapes else f"{_UNDER_AN_END}"
+        return (
+            "FCL, one point: what rests on a flat end may tip, and is n^(1/exponent) times as deep "
+            f"as on the n = {points} points of the closed form"
+        )
+
+
+@dataclass(frozen=True)
+class PairPlan:
+    """One pair of graphics (ids), in the order of its kind."""
+
+    kind: Kind
+    graphic_i: int
+    graphic_j: int
+
+
+@dataclass(frozen=True)
+class CrowdPlan:
+    """A contact of many graphics (ids), with its kinds by shape class of the contact's I and J."""
+
+    contact: int
+    i: tuple[int, ...]
+    j: tuple[int, ...]
+    same: bool
+    kinds: dict[tuple[str, str], Kind]
+
+    @property
+    def pairs(self) -> int:
+        """Return how many pairs there could be."""
+        n = len(self.i)
+        return n * (n - 1) // 2 if self.same else n * len(self.j)
+
+
+@dataclass(frozen=True)
+class Plans:
+    """All pairs of a model: listed one by one, or as crowds."""
+
+    pairs: tuple[PairPlan, ...]
+    crowds: tuple[CrowdPlan, ...]
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """Return every kind once, listed pairs' first."""
+        listed = [plan.kind for plan in self.pairs]
+        crowded = [kind for crowd in self.crowds for kind in crowd.kinds.values()]
+        return list(dict.fromkeys([*listed, *crowded]))
+
+
+def _convex(*graphics: Graphic) -> bool:
+    """Whether every mesh among the graphics is convex: the closed forms know no others."""
+    return all(graphic.shape != "MESH" or graphic.hull is not None for graphic in graphics)
+
+
+def _mesh_slots(i: Graphic, j: Graphic) -> int:
+    """Return the rows of a pair with convex meshes, 0 where it is too large for a closed form."""
+    if i.hull is None:
+        assert j.hull is not None
+        return 1 if j.hull[hull.EDGES] <= MOST_EDGES else 0
+    if j.shape == "PLANE":
+        return int(i.hull[hull.ROWS])
+    other = CUBE if j.hull is None else j.hull
+    slots = hull_slots(i.hull, other)
+    edges = i.hull[hull.EDGES] * other[hull.EDGES]
+    return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
+
+
+def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
+    """Return how graphics like these two are tested."""
+    flat = i.shape in _FLAT and j.shape in _FLAT
+    fcl_slots = FCL_SLOTS if flat else 1
+    for a, b, swapped in ((i, j, False), (j, i, True)):
+        name = f"{a.shape}-{b.shape}"
+        if name in PAIRS and detector != "fcl" and _convex(a, b):
+            if "MESH" in name:
+                slots = _mesh_slots(a, b)
+                if slots == 0:
+                    break
+                return Kind(contact, a.shape, b.shape, swapped, name, slots)
+            return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
+    return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
+
+
+def _region_fault(model: Model, contact: Contact, i: Graphic, j: Graphic, why: str) -> Fault:
+    """Return the fault of a pair whose area is asked for and not known."""
+    return Fault(
+        model.file,
+        contact.source.line,
+        f"Force_Contact[{contact.id}]",
+        f'contact_points="REGION": Post_Graphic[{i.id}] on Post_Graphic[{j.id}] '
+        f"({i.shape} on {j.shape}) {why}",
+    )
+
+
+def _one_region(
+    model: Model, contact: Contact, i: Graphic, j: Graphic, kind: Kind, faults: list[Fault]
+) -> Kind:
+    """Return a kind as the contact wants it: as it is, or one incident with an area.
+
+    A pair of shapes that touch in one point only is one incident without area as it is.
+    """
+    if contact.contact_points != "REGION":
+        return kind
+    if kind.closed_form in REGIONS:
+        return replace(kind, slots=kind.slots + REGION_ROWS, region=True)
+    if not kind.closed_form:
+        why = "is found by FCL, which gives no area"
+    elif PAIRS[kind.closed_form].slots > 1:
+        why = "has no closed form of its area"
+    elif contact.needs_area:
+        why = f"touches in a point, so cff_type={contact.cff_type} needs patch_radius"
+    else:
+        return kind
+    if "needs" not in why:
+        why += '; give contact_points="POINTS"'
+    faults.append(_region_fault(model, contact, i, j, why))
+    return kind
+
+
+def shape_class(graphic: Graphic) -> str:
+    """Return what graphics have in common that are tested in the same way."""
+    if graphic.vertices is None:
+        return graphic.shape
+    return f"{graphic.shape} {hashlib.sha256(graphic.vertices.tobytes()).hexdigest()[:12]}"
+
+
+def _two_planes(model: Model, contact: Contact, i: int, j: int) -> Fault:
+    """Return the fault of a plane against a plane."""
+    return Fault(
+        model.file,
+        contact.source.line,
+        f"Force_Contact[{contact.id}]",
+        f"Post_Graphic[{i}] and Post_Graphic[{j}] are both planes; "
+        "give one of them a body of finite size",
+    )
+
+
+def _crowd(
+    model: Model, contact: Contact, same: bool, detector: str
+) -> tuple[CrowdPlan, list[Fault]]:
+    """Return a contact of many graphics, and what is wrong with it."""
+    kinds: dict[tuple[str, str], Kind] = {}
+    faults = []
+    i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
+    first: list[dict[str, int]] = [{}, {}]
+    for side, ids in zip(first, (i_ids, j_ids), strict=True):
+        for id in ids:
+            side.setdefault(shape_class(model.graphics[id]), id)
+    for shape_i, i in first[0].items():
+        for shape_j, j in first[1].items():
+            if shape_i == shape_j == "PLANE":
+                if same and sum(model.graphics[id].shape == "PLANE" for id in i_ids) == 1:
+                    continue
+                faults.append(_two_planes(model, contact, i, j))
+            elif (shape_j, shape_i) not in kinds or not same:
+                a, b = model.graphics[i], model.graphics[j]
+                kind = _kind(contact.id, a, b, detector)
+                kinds[shape_i, shape_j] = _one_region(model, contact, a, b, kind, faults)
+    return CrowdPlan(contact.id, i_ids, j_ids, same, kinds), faults
+
+
+def plan_pairs(model: Model, detector: str = "auto") -> Plans:
+    """Return every I graphic with every J graphic of every contact.
+
+    Parameters
+    ----------
+    model : Model
+    detector : {"auto", "fcl"}
+        "fcl" sends all pairs through FCL.
+
+    Raises
+    ------
+    DeckError
+        If two shapes cannot be tested against each other (two planes), or have no area that is
+        known where the contact asks for it.
+    """
+    pairs, crowds, faults = [], [], []
+    for contact in model.contacts.values():
+        i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
+        same = contact.with_itself
+        many = len(i_ids) * (len(i_ids) - 1) // 2 if same else len(i_ids) * len(j_ids)
+        if many > MOST_LISTED:
+            crowd, wrong = _crowd(model, contact, same, detector)
+            crowds.append(crowd)
+            faults += wrong
+            continue
+        for place, i in enumerate(i_ids):
+            for j in j_ids[place + 1 :] if same else j_ids:
+                a, b = model.graphics[i], model.graphics[j]
+                if (
+                    same
+                    and model.markers[a.marker_id].body_id == model.markers[b.marker_id].body_id
+                ):
+                    continue
+                if a.shape == b.shape == "PLANE":
+                    faults.append(_two_planes(model, contact, i, j))
+                    continue
+                kind = _kind(contact.id, a, b, detector)
+                kind = _one_region(model, contact, a, b, kind, faults)
+                pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
+    if faults:
+        raise DeckError(faults)
+    return Plans(tuple(pairs), tuple(crowds))
+
+
+def thinnest(graphic: Graphic) -> float:
+    """Return half of the thinnest side; inf for a plane."""
+    return min(half_extent(graphic))
+
+
+def half_extent(graphic: Graphic) -> tuple[float, float, float]:
+    """Return the half edges of the box, in the shape's axes, that holds the shape."""
+    size = graphic.size
+    if graphic.shape == "SPHERE":
+        return (size[0], size[0], size[0])
+    if graphic.shape == "ELLIPSOID":
+        return (size[0], size[1], size[2])
+    if graphic.shape == "BOX":
+        return (0.5 * size[0], 0.5 * size[1], 0.5 * size[2])
+    if graphic.shape == "CYLINDER":
+        return (size[0], size[0], 0.5 * size[1])
+    if graphic.shape == "FRUSTUM":
+        widest = max(size[0], size[1])
+        return (widest, widest, 0.5 * size[2])
+    if graphic.shape == "PLANE":
+        return (math.inf, math.inf, math.inf)
+    assert graphic.vertices is not None
+    x, y, z = abs(graphic.vertices).max(axis=0)
+    return (float(x), float(y), float(z))
+
+
+def reach(graphic: Graphic) -> float:
+    """Return the radius of the ball around the shape's centre that holds it."""
+    if graphic.shape == "SPHERE":
+        return graphic.size[0]
+    if graphic.shape == "ELLIPSOID":
+        return max(graphic.size)
+    if graphic.shape == "CYLINDER":
+        return math.hypot(graphic.size[0], 0.5 * graphic.size[1])
+    if graphic.shape == "FRUSTUM":
+        return math.hypot(max(graphic.size[:2]), 0.5 * graphic.size[2])
+    if graphic.shape == "MESH":
+        assert graphic.vertices is not None
+        return float((graphic.vertices**2).sum(axis=1).max() ** 0.5)
+    return math.sqrt(sum(half * half for half in half_extent(graphic)))
+
+
+def kernel_size(graphic: Graphic) -> tuple[float, float, float]:
+    """Return the three numbers that the closed forms take (see `geometry.catalog`)."""
+    if graphic.shape == "CYLINDER":
+        return (graphic.size[0], 0.5 * graphic.size[1], 0.0)
+    if graphic.shape == "FRUSTUM":
+        return (graphic.size[0], graphic.size[1], 0.5 * graphic.size[2])
+    if graphic.shape == "SPHERE":
+        return (graphic.size[0], 0.0, 0.0)
+    if graphic.hull is not None:
+        # the model keeps the polyhedron for as long as the scene lives
+        return (float(graphic.hull.ctypes.data), float(len(graphic.hull)), 0.0)
+    if graphic.shape in ("PLANE", "MESH"):
+        return (0.0, 0.0, 0.0)
+    return half_extent(graphic)

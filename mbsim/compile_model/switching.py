@@ -1,0 +1,163 @@
+"""Where forces by expressions have kinks: on which sides of their switches they are, as numbers.
+
+A switch is a function that is 0 where an expression goes from one branch to another. Of each
+expression one more program is made, the sum of 2^k over the switches k that are above 0, so that it
+differs where a branch does:
+
+| function            | switches                                                              |
+|---------------------|-----------------------------------------------------------------------|
+| ABS(x), IF(x: ..)   | x                                                                     |
+| SIGN(a, b)          | a, b                                                                  |
+| DIM, MIN, MAX       | a - b, one argument after the other                                   |
+| MOD(a, b)           | sin(pi a / b), 0 wherever a / b is whole                              |
+| AINT(x), ANINT(x)   | sin(pi x), cos(pi x)                                                  |
+| STEP, STEP5, HAVSIN | x - x0, x - x1                                                        |
+| SWEEP               | the same, and x - x0 - dx                                             |
+| IMPACT, BISTOP      | depth d; with a damper d - dmax, and what the force is without its bound |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mbsim.arrays import scene as a
+from mbsim.compile_model.programs import ELEMENT, NET, USER, Instruction, ProgramTable
+from mbsim.expressions.elementary import NUMBER
+from mbsim.expressions.tree import Call, Expression, Node, Number
+from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.model.elements import Model
+
+#: Switches of one expression that are watched at most: so many bits a number has.
+MOST_SWITCHES = 48
+#: Instructions of the program of an expression's switches at most; with more none is watched.
+LONGEST = 2000
+
+#: A user's function is not to be asked more often than forces are; forces are not known yet.
+_NOT_ASKED = (USER, NET, ELEMENT)
+
+_NAUGHT = Number(0.0)
+
+
+def _call(name: str, *args: Node) -> Call:
+    return Call(name, args)
+
+
+def _stop(depth: Node, rate: Node, law: tuple[Node, ...]) -> Iterator[Node]:
+    """Yield the switches of a stop."""
+    k, e, c, dmax = law
+    yield depth
+    if c == _NAUGHT:
+        return
+    yield _call("SUB", depth, dmax)
+    spring = _call("MUL", k, _call("POW", _call("MAX", depth, _NAUGHT), e))
+    damper = _call("MUL", _call("STEP", depth, _NAUGHT, _NAUGHT, dmax, c), rate)
+    yield _call("ADD", spring, damper)
+
+
+def _of_call(node: Call) -> Iterator[Node]:
+    """Yield the switches of one function."""
+    name, x = node.name, node.args
+    if name in ("ABS", "IF"):
+        yield x[0]
+    elif name == "SIGN":
+        yield from x
+    elif name in ("DIM", "MIN", "MAX"):
+        best = x[0]
+        for other in x[1:]:
+            yield _call("SUB", best, other)
+            best = _call(name, best, other)
+    elif name == "MOD":
+        yield _call("SIN", _call("MUL", Number(math.pi), _call("DIV", *x)))
+    elif name in ("AINT", "ANINT"):
+        yield _call("SIN" if name == "AINT" else "COS", _call("MUL", Number(math.pi), x[0]))
+    elif name in ("STEP", "STEP5", "HAVSIN"):
+        yield from (_call("SUB", x[0], x[1]), _call("SUB", x[0], x[3]))
+    elif name == "SWEEP":
+        yield from (_call("SUB", x[0], x[2]), _call("SUB", x[0], x[4]))
+        yield _call("SUB", x[0], _call("ADD", x[2], x[6]))
+    elif name == "IMPACT":
+        yield from _stop(_call("SUB", x[2], x[0]), _call("NEG", x[1]), x[3:7])
+    elif name == "BISTOP":
+        yield from _stop(_call("SUB", x[2], x[0]), _call("NEG", x[1]), x[4:8])
+        yield from _stop(_call("SUB", x[0], x[3]), x[1], x[4:8])
+
+
+def switches(root: Node, variables: Mapping[int, Expression]) -> list[Node]:
+    """Return the switches of an expression and of the variables that it uses, each once."""
+    found: dict[Node, None] = {}
+    waiting, seen = [root], set[int]()
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, Call):
+            continue
+        if node.name == "VARVAL":
+            id = int(node.args[0].value) if isinstance(node.args[0], Number) else 0
+            if id in variables and id not in seen:
+                seen.add(id)
+                waiting.append(variables[id].root)
+            continue
+        for switch in _of_call(node):
+            found[switch] = None
+        waiting.extend(node.args)
+    return list(found)
+
+
+def _sides(found: list[Node]) -> Node:
+    """Return the expression whose value tells the sides of all switches."""
+    total: Node = _NAUGHT
+    for k, switch in enumerate(found[:MOST_SWITCHES]):
+        bit = _call("IF", switch, _NAUGHT, _NAUGHT, Number(2.0**k))
+        total = bit if k == 0 else _call("ADD", total, bit)
+    return total
+
+
+def _acting(model: Model) -> Iterator[Expression]:
+    """Yield the expressions of forces and of slopes of states."""
+    for force in model.scalar_forces.values():
+        yield force.expr
+    for group in (model.vector_forces, model.body_forces):
+        for element in group.values():
+            yield from (expression for expression in element.exprs if expression is not None)
+    for state in model.differentials.values():
+        yield state.expr
+
+
+def has_modes(model: Model) -> bool:
+    """Return whether some friction is one that sticks or slips."""
+    if model.dry_frictions:
+        return True
+    laws = [contact.cff_type for contact in model.contacts.values()]
+    return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
+
+
+def kinks_table(
+    model: Model, programs: ProgramTable, applied: a.Applied, modes: Sequence[int] = ()
+) -> a.Kinks:
+    """Return what is watched: a program for each expression, limits, dry friction, modes.
+
+    `modes` are programs that tell the modes of users' elements.
+    """
+    variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
+    rows, any_found = [], any(s.changes for s in model.simulations)
+    still = [Instruction(NUMBER, value=0.0)]
+    for expression in _acting(model):
+        found = switches(expression.root, variables)
+        row = programs.add(Expression(expression.text, _sides(found)), forces=True)
+        made = programs.programs[row]
+        if len(made) > LONGEST or any(made_op.op in _NOT_ASKED for made_op in made):
+            programs.programs[row] = made = still
+        any_found = any_found or len(made) > 1
+        rows.append(row)
+    if not any_found:
+        rows = []
+    rows += modes
+    watched = (a.SLIDE_LIMIT, a.TURN_LIMIT, a.DRY_SLIDE, a.DRY_TURN)
+    limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
+    last = [-1] if has_modes(model) else []
+    return a.Kinks(
+        np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),
+        np.array([*(-1 for _ in rows), *limits, *last], dtype=np.int64),
+    )

@@ -1,0 +1,273 @@
+"""Arrays of the linearised mechanism, made only for implicit methods.
+
+Unknown are displacements xi of bodies, spatial vectors (angular, linear) about O: the cg of the
+root of a body's tree, or the body's own cg. Blocks are 6 x 6, rows and columns by body. A body
+that hangs on a joint is not an unknown of its own: xi = xi of its parent + S' dq.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mbsim.arrays.scene import MEMORY_DOOR, MEMORY_PAIR_DOOR, TURN_ROOT, Scene
+from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
+
+#: Blocks that are made room for beside those of a model whose bodies are all coupled.
+_ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
+#: Bodies of the largest model that implicit methods take: a table of their pairs is kept.
+MOST_BODIES = 4000
+#: Fields with one entry a block: room is made for more than are in use.
+_BY_BLOCK = {"pair", "neighbour", "K", "D", "A"}
+#: Fields that a run does not change, those that mean nothing from one call to the next, and
+#: `place`, whose entries in use are kept as a list.
+_CONSTANT = {"joint", "parent", "children"}
+_SCRATCH = {"waiting", "degree", "basis", "law", "rise", "rates", "g", "rate", "extra", "work", "r"}
+_LEFT_OUT = _CONSTANT | _SCRATCH | {"place"}
+
+
+class Pattern(NamedTuple):
+    """Which bodies are coupled, and in what order they are eliminated."""
+
+    place: I2  # (nb, nb) block of a pair, -1 for none
+    pair: I2  # (couplings, 2) bodies of the blocks that forces fill
+    order: I1  # (nb,) bodies
+    start: I1  # (nb + 1,) first neighbour of each step
+    neighbour: I1  # (blocks,) bodies that are eliminated later
+    count: I1  # (3,) couplings, blocks, 1 where the order is to be found anew
+    joint: I1  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
+    parent: I1  # (nb,) body row, -1 for ground
+    children: I1  # (nb,) that hang on it
+    waiting: I1  # (nb,) scratch: children not yet eliminated, -1 when done itself
+    degree: I1  # (nb,) scratch
+
+
+class Linear(NamedTuple):
+    """The mechanism linearised at one state: what does not depend on the step."""
+
+    R: F3  # (nb, 3, 3)
+    q: F2  # (nb, 4)
+    w: F2  # (nb, 3) angular velocity, body axes
+    r: F2  # (nb, 3) cg from O
+    spin: F2  # (nb, 3) angular velocity, global
+    torque: F2  # (nb, 3) of inertia about the cg, global: J alpha + w x J w
+    force: F2  # (nb, 3) of joints and equations
+    S: F3  # (nt, 6, 6) free directions of joints by rows
+    U: F3  # (nt, 12, 6) how S'f changes with xi of the child and of the parent, f the joint's force
+    f: F2  # (nt, 6) joint forces about O
+    K: F3  # (couplings, 6, 6) of forces by xi
+    D: F3  # (couplings, 6, 6) of forces by their rates
+    column: F3  # (border, nb, 6) force of a unit multiplier, or of a unit of a state
+    row: F3  # (border, nb, 6) gradient of an equation, or of a state's slope by xi
+    row_rate: F3  # (border, nb, 6) of a state's slope by the rates
+    released: I1  # (border,) rows of equations that do not hold while a loop passes a fold
+    slopes: F2  # (states, states) of states by states
+    basis: F3  # (2, 9, 6) scratch
+    law: F2  # (6, 12) scratch
+    rise: F1  # (13,) scratch
+    rates: F1  # (3,) scratch
+
+
+class Real(NamedTuple):
+    """A factorisation with real coefficients."""
+
+    A: F3  # (blocks, 6, 6)
+    pivot: F3  # (nb, 6, 6)
+    swap: I2  # (nb, 6)
+    B: F3  # (nb, 3, 3) d(spin)/d(turn), body axes
+    answer: F3  # (border, nb, 6)
+    border: F2  # (border, border)
+    border_swap: I1  # (border,)
+    g: F2  # (nb + 1, 6) right side, then solution; scratch
+    rate: F2  # (nb, 6) change of velocities that residuals alone ask for
+    extra: F2  # (2, border) right side and solution
+    work: F3  # (4, 6, 6) scratch
+    c: F2  # (1, 4) coefficients c1, c2, c3, form
+    r: F2  # (2, n) residual and answer in the layout of y
+    keep: F3  # (slots + 1, carried, carried) Z of `linearization.memory_slopes`, scratch last
+    door: I1  # (1,) entry of `World.doors` at which that is asked for
+
+
+class Pair(NamedTuple):
+    """The same with complex coefficients."""
+
+    A: C3
+    pivot: C3
+    swap: I2
+    B: C3
+    answer: C3
+    border: C2
+    border_swap: I1
+    g: C2
+    rate: C2
+    extra: C2
+    work: C3
+    c: C2
+    r: C2
+    keep: C3
+    door: I1
+
+
+class Keeps(NamedTuple):
+    """Friction that looks at X or integrates memory, see `linearization.memory_slopes`."""
+
+    held: I1  # (slots + 1,) slots in contact, their number last
+    body: I2  # (slots, 2) I's and J's, as lists of pairs may have changed since
+    carries: I2  # (slots, carried) where what is carried stands in y, -1 behind the last
+    table: F3  # (slots, 5 + carried, 6 + carried) forces, then rates of what is carried; by slip,
+    # spin and normal force, then by what is carried
+    lever: F4  # (slots, 2, 6, 6) wrenches on I's and on J's body of units along n, x, y, and about
+    # x, y, n
+    press: F2  # (slots, 2) of the normal force by depth and by its rate
+    scratch: F2  # (2, 5 + carried)
+
+
+class Depends(NamedTuple):
+    """What programs depend on."""
+
+    body_start: I1  # (programs + 1,)
+    body: I1
+    state_start: I1  # (programs + 1,)
+    state: I1  # rows of states
+    user: I1  # (programs,) 1 where a subroutine is called
+
+
+class Tangent(NamedTuple):
+    """All of it; `Pair` is of length zero where no method asks for it."""
+
+    pattern: Pattern
+    linear: Linear
+    keeps: Keeps
+    depends: Depends
+    real: Real
+    pair: Pair
+
+
+def border_size(scene: Scene) -> int:
+    """Return the number of equations and states."""
+    return len(scene.equations.program) + len(scene.states.program)
+
+
+def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
+    """Return empty arrays for a scene; `pair`: for complex coefficients as well."""
+    nb, nt, m = len(scene.bodies.mass), len(scene.tree.body), border_size(scene)
+    nz, n = len(scene.states.program), scene.rows.y.shape[1]
+    blocks = nb * nb if nb <= _ALL_COUPLED else min(nb * nb, _BLOCKS_A_BODY * nb)
+    joint, parent = np.full(nb, -1, dtype=np.int64), np.full(nb, -1, dtype=np.int64)
+    children = np.zeros(nb, dtype=np.int64)
+    for k in range(nt):
+        if scene.tree.turn[k] != TURN_ROOT:
+            joint[scene.tree.body[k]] = k
+            if scene.tree.parent[k] >= 0:
+                parent[scene.tree.body[k]] = scene.tree.body[scene.tree.parent[k]]
+                children[parent[scene.tree.body[k]]] += 1
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    pattern = Pattern(
+        np.full((nb, nb), -1, dtype=np.int64),
+        whole(blocks, 2),
+        whole(nb),
+        whole(nb + 1),
+        whole(blocks),
+        np.array([0, 0, 1], dtype=np.int64),
+        joint,
+        parent,
+        children,
+        whole(nb),
+        whole(nb),
+    )
+    linear = Linear(
+        np.zeros((nb, 3, 3)),
+        np.zeros((nb, 4)),
+        *(np.zeros((nb, 3)) for _ in range(5)),
+        np.zeros((nt, 6, 6)),
+        np.zeros((nt, 12, 6)),
+        np.zeros((nt, 6)),
+        np.zeros((blocks, 6, 6)),
+        np.zeros((blocks, 6, 6)),
+        *(np.zeros((m, nb, 6)) for _ in range(3)),
+        np.zeros(m, dtype=np.int64),
+        np.zeros((nz, nz)),
+        np.zeros((2, 9, 6)),
+        np.zeros((6, 12)),
+        np.zeros(13),
+        np.zeros(3),
+    )
+    slots, wide = _carried(scene)
+    keeps = Keeps(
+        whole(slots + 1),
+        whole(slots, 2),
+        whole(slots, wide),
+        np.zeros((slots, 5 + wide, 6 + wide)),
+        np.zeros((slots, 2, 6, 6)),
+        np.zeros((slots, 2)),
+        np.zeros((2, 5 + wide)),
+    )
+    sizes = nb, m, n, blocks, slots + 1, wide
+    real = Real(*_factor_arrays(*sizes, np.float64), np.array([MEMORY_DOOR]))
+    sizes = sizes if pair else (0, 0, 0, 0, 0, 0)
+    both = Pair(*_factor_arrays(*sizes, np.complex128), np.array([MEMORY_PAIR_DOOR]))
+    return Tangent(pattern, linear, keeps, depends, real, both)
+
+
+def _carried(scene: Scene) -> tuple[int, int]:
+    """Return how many slots carry X or memory in y, and the most numbers that one carries."""
+    x, z = scene.slots.x >= 0, scene.slots.z >= 0
+    any_slot = int(np.count_nonzero(x | z))
+    most = 3 * int(x.any()) + int(scene.contacts.carried.max(initial=0))
+    return any_slot, most
+
+
+def _factor_arrays(
+    nb: int, m: int, n: int, blocks: int, slots: int, wide: int, kind: type
+) -> tuple[np.ndarray, ...]:
+    """Return the arrays of a factorisation."""
+    return (
+        np.zeros((blocks, 6, 6), dtype=kind),
+        np.zeros((nb, 6, 6), dtype=kind),
+        np.zeros((nb, 6), dtype=np.int64),
+        np.zeros((nb, 3, 3), dtype=kind),
+        np.zeros((m, nb, 6), dtype=kind),
+        np.zeros((m, m), dtype=kind),
+        np.zeros(m, dtype=np.int64),
+        np.zeros((nb + 1, 6), dtype=kind),
+        np.zeros((nb, 6), dtype=kind),
+        np.zeros((2, m), dtype=kind),
+        np.zeros((4, 6, 6), dtype=kind),
+        np.zeros((1, 4), dtype=kind),
+        np.zeros((2, n), dtype=kind),
+        np.zeros((slots, wide, wide), dtype=kind),
+    )
+
+
+def _in_use(tangent: Tangent) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield names and arrays of all that a linearisation and its factors consist of."""
+    blocks = int(tangent.pattern.count[:2].max())
+    for group in ("pattern", "linear", "keeps", "real", "pair"):
+        arrays = getattr(tangent, group)
+        for field, array in zip(arrays._fields, arrays, strict=True):
+            # the linearisation needs its r, which a factorisation has for scratch
+            if field not in _LEFT_OUT or (group, field) == ("linear", "r"):
+                yield f"tangent/{group}/{field}", array[:blocks] if field in _BY_BLOCK else array
+
+
+def saved(tangent: Tangent) -> dict[str, Any]:
+    """Return what a run needs to go on with the same linearisation and factors, by name."""
+    place = tangent.pattern.place.ravel()
+    found = {name: np.array(array) for name, array in _in_use(tangent)}
+    found["tangent/where"] = np.flatnonzero(place >= 0)
+    found["tangent/block"] = place[found["tangent/where"]]
+    return found
+
+
+def restore(tangent: Tangent, kept: Mapping[str, Any]) -> None:
+    """Fill the arrays with what `saved` returned."""
+    tangent.pattern.count[...] = kept["tangent/pattern/count"]
+    for name, array in _in_use(tangent):
+        array[...] = kept[name]
+    tangent.pattern.place[...] = -1
+    tangent.pattern.place.ravel()[kept["tangent/where"]] = kept["tangent/block"]

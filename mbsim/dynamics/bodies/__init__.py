@@ -1,0 +1,1 @@
+"""Where bodies and markers are, and how they move."""

@@ -1,0 +1,37 @@
+"""Accelerations of bodies from the forces on them."""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import BODY_SIZE
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
+
+
+@jitable
+def accelerate(scene, y, dy):
+    """Fill y' of every body: x' = v, q' = q (0, w)/2, m v' = F, I w' = T - w x I w in cg axes."""
+    bodies, work = scene.bodies, scene.work
+    total = 0.0
+    for b in range(len(bodies.mass)):
+        at = BODY_SIZE * b
+        w = (y[at + 10], y[at + 11], y[at + 12])
+        qw, qx, qy, qz = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        dy[at + 3] = 0.5 * (-qx * w[0] - qy * w[1] - qz * w[2])
+        dy[at + 4] = 0.5 * (qw * w[0] + qy * w[2] - qz * w[1])
+        dy[at + 5] = 0.5 * (qw * w[1] + qz * w[0] - qx * w[2])
+        dy[at + 6] = 0.5 * (qw * w[2] + qx * w[1] - qy * w[0])
+
+        for k in range(3):
+            dy[at + k] = y[at + 7 + k]
+        if scene.tree.of_body[b] >= 0:
+            # joints have their say first
+            continue
+        torque = unrotate(work.R[b], vector(work.torque[b]))
+        gyroscopic = cross(w, rotate(bodies.inertia[b], w))
+        alpha = rotate(bodies.inverse[b], sub(torque, gyroscopic))
+        for k in range(3):
+            a = work.force[b, k] / bodies.mass[b]
+            dy[at + 7 + k] = a
+            dy[at + 10 + k] = alpha[k]
+            total += a + alpha[k]
+    return total

@@ -1,0 +1,87 @@
+"""Where bodies and shapes are, and how they move."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import BODY_SIZE
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import matrix_from_quaternion, rotate
+
+
+@jitable
+def place_body(scene, y, b):
+    """Fill R, v and w (global) of moving body b from y."""
+    work, at = scene.work, BODY_SIZE * b
+    matrix_from_quaternion(y[at + 3 : at + 7], work.R[b])
+    w = rotate(work.R[b], (y[at + 10], y[at + 11], y[at + 12]))
+    for k in range(3):
+        work.v[b, k] = y[at + 7 + k]
+        work.w[b, k] = w[k]
+
+
+@jitable
+def place_bodies(scene, y):
+    """Fill R, v and w (global) of every moving body from y; the ground's rows stay as made."""
+    for b in range(len(scene.bodies.mass)):
+        place_body(scene, y, b)
+
+
+@jitable
+def position(scene, y, b):
+    """Return the cg position of body b; ground's is the global origin."""
+    if b == len(scene.bodies.mass):
+        return (0.0, 0.0, 0.0)
+    at = BODY_SIZE * b
+    return (y[at], y[at + 1], y[at + 2])
+
+
+@jitable
+def place_graphic(scene, y, g):
+    """Fill the frame (centre, rotation by rows) of graphic g."""
+    graphics, frame = scene.graphics, scene.work.frames[g]
+    b = graphics.body[g]
+    R, S = scene.work.R[b], graphics.R[g]
+    x = position(scene, y, b)
+    c = rotate(R, (graphics.p[g, 0], graphics.p[g, 1], graphics.p[g, 2]))
+    for r in range(3):
+        frame[r] = x[r] + c[r]
+    if graphics.turns[g] == 0:
+        # nobody asks for the axes of a sphere
+        return
+    for r in range(3):
+        for k in range(3):
+            frame[3 + 3 * r + k] = R[r, 0] * S[0, k] + R[r, 1] * S[1, k] + R[r, 2] * S[2, k]
+
+
+@jitable
+def place_graphics(scene, y):
+    """Place every shape that moves, and bound how far any of its points has come.
+
+    Since the committed state the centre moved by |dx|, and a turn by angle a moves points at
+    radius r by at most 2 r sin(a/2), cos(a/2) = |q.q0|. Return whether all shapes are where
+    the list of near pairs still holds.
+    """
+    graphics, work, state = scene.graphics, scene.work, scene.state
+    listed = True
+    for g in range(len(graphics.body)):
+        b = graphics.body[g]
+        if b == len(scene.bodies.mass):
+            continue
+        place_graphic(scene, y, g)
+        way = math.inf
+        if graphics.reach[g] < math.inf:
+            frame, centre = work.frames[g], state.centre[g]
+            dx, dy, dz = frame[0] - centre[0], frame[1] - centre[1], frame[2] - centre[2]
+            way = math.sqrt(dx * dx + dy * dy + dz * dz)
+            if graphics.turns[g] == 1:
+                at, before = BODY_SIZE * b + 3, state.q[b]
+                d, qq = 0.0, 0.0
+                for k in range(4):
+                    d += y[at + k] * before[k]
+                    qq += y[at + k] * y[at + k]
+                way += 2.0 * graphics.reach[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
+        work.way[g] = way
+        if way > scene.crowds.room[g]:
+            listed = False
+    return listed

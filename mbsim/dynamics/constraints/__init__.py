@@ -1,0 +1,1 @@
+"""What joints and motions hold: tree, equations, projection, reactions."""

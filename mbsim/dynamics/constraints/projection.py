@@ -1,0 +1,200 @@
+"""Back onto the constraints: positions joint by joint from the root, then equations by Newton.
+
+What is left of loops and motions, once the tree is seated (`seating`), is closed by displacements
+that the tree allows, weighted by inertia; last, velocities are treated likewise.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import BODY_SIZE, DRIFT, DRIFTER
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, vector
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.constraints.equations import (
+    MISMATCH,
+    RESIDUAL,
+    active_count,
+    add_wrench,
+    factor_matrix,
+    fill_equations,
+    fill_matrix,
+    is_held,
+    near_fold,
+    solve_matrix,
+)
+from mbsim.dynamics.constraints.tree import prepare, respond
+from mbsim.dynamics.constraints.tree_projection import (
+    carry_all,
+    seat_all,
+    set_spin,
+    set_velocity,
+    turn_body,
+)
+
+#: Newton ends when no residual is above this part of its unit, or after so many rounds.
+CLOSED = 2e-14
+MOST_ROUNDS = 8
+#: The same near a position in which a loop can fold: what is left leads astray there.
+ROUNDED = 1e-15
+#: A residual, over its unit, whose square is rounding.
+SMALL = 1e-8
+#: What of the way back onto the constraints counts as a step's error: its own estimate is to
+#: rule, unless the constraints themselves moved in a way that no stage of the step has met.
+FORGIVEN = 0.1
+
+
+@jitable
+def correct(scene, level, column):
+    """Fill `answer` with the motion that takes the residuals of that level and column away."""
+    sweep, active = scene.sweep, scene.equations.active
+    n = active_count(scene)
+    for r in range(n):
+        held = scene.equations.level[active[r]] >= level
+        sweep.rhs[r] = -sweep.rate[active[r], column] if held else 0.0
+    solve_matrix(scene)
+    push(scene)
+
+
+@jitable
+def push(scene):
+    """Fill `answer` with the motion that the multipliers cause."""
+    sweep, active = scene.sweep, scene.equations.active
+    for k in range(len(scene.tree.body)):
+        for c in range(6):
+            sweep.p[k, c] = 0.0
+    for r in range(active_count(scene)):
+        add_wrench(scene, active[r], sweep.multiplier[r])
+    respond(scene, 0, len(scene.tree.body), 0, sweep.answer)
+
+
+@jitable
+def displace(scene, y):
+    """Move all bodies by the spatial displacement in `answer`.
+
+    All moves are found before the first is made: they are about points that move too.
+    """
+    for k in range(len(scene.tree.body)):
+        b = scene.tree.body[k]
+        D = scene.sweep.answer[k]
+        turn = (D[0], D[1], D[2])
+        r = vector(scene.sweep.arm[k])
+        move = add((D[3], D[4], D[5]), cross(turn, r))
+        for i in range(3):
+            scene.sweep.c[k, i] = move[i]
+            scene.sweep.c[k, 3 + i] = turn[i]
+    for k in range(len(scene.tree.body)):
+        b, c = scene.tree.body[k], scene.sweep.c[k]
+        for i in range(3):
+            y[BODY_SIZE * b + i] += c[i]
+        turn_body(scene, y, b, (c[3], c[4], c[5]))
+
+
+@jitable
+def speed_up(scene, y):
+    """Add the spatial velocities in `answer` to those of all bodies."""
+    for k in range(len(scene.tree.body)):
+        b = scene.tree.body[k]
+        D = scene.sweep.answer[k]
+        turn = (D[0], D[1], D[2])
+        r = vector(scene.sweep.arm[k])
+        rise = add((D[3], D[4], D[5]), cross(turn, r))
+        set_velocity(scene, y, b, add(vector(scene.work.v[b]), rise))
+        set_spin(scene, y, b, add(vector(scene.work.w[b]), turn))
+
+
+@jitable
+def largest_residual(scene, level, column, t):
+    """Return the largest residual over its unit of the equations in use that hold at t."""
+    largest = 0.0
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        if scene.equations.level[e] >= level and is_held(scene, e, t):
+            largest = max(largest, abs(scene.sweep.rate[e, column]) / scene.equations.unit[e])
+    return largest
+
+
+@jitable
+def note_drift(scene, level, column, part):
+    """Note the largest residual of motions, over its unit and times `part`, if none was larger."""
+    quality = scene.sweep.quality
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        if scene.equations.program[e] >= 0 and scene.equations.level[e] >= level:
+            drift = part * abs(scene.sweep.rate[e, column]) / scene.equations.unit[e]
+            if not drift <= quality[DRIFT]:
+                quality[DRIFT], quality[DRIFTER] = drift, e
+
+
+@jitable
+def note_gap(scene, t):
+    """Note as drift, over `SMALL`, a residual that Newton has left: the step is to be refused.
+
+    A motion that asked for more than that of the step keeps its name: it is the cause.
+    """
+    quality = scene.sweep.quality
+    asked, worst = quality[DRIFT], 0.0
+    for r in range(active_count(scene)):
+        e = scene.equations.active[r]
+        gap = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
+        held = scene.equations.level[e] >= 2 and is_held(scene, e, t)
+        if held and gap > max(SMALL, worst):
+            worst = gap
+            if asked <= SMALL:
+                quality[DRIFTER] = e
+    if worst > 0.0:
+        quality[DRIFT] = max(asked, worst / SMALL)
+
+
+@jitable
+def prepare_equations(scene, t, y):
+    """Fill all that follows from y: bodies, tree, equations."""
+    place_bodies(scene, y)
+    prepare(scene, y)
+    fill_equations(scene, t, y)
+
+
+@jitable
+def close_loops(scene, t, y):
+    """Move the bodies until no equation has a residual; leave the factor of there.
+
+    Newton leaves the square of a residual: after a small one neither bodies nor factor are so
+    different that the last round, or the velocities, would notice.
+    """
+    prepare_equations(scene, t, y)
+    note_drift(scene, 2, RESIDUAL, FORGIVEN)
+    fill_matrix(scene)
+    factor_matrix(scene, t)
+    for _ in range(MOST_ROUNDS):
+        size = largest_residual(scene, 2, RESIDUAL, t)
+        if size <= (ROUNDED if near_fold(scene) else CLOSED):
+            return
+        correct(scene, 2, RESIDUAL)
+        displace(scene, y)
+        seat_all(scene, y)
+        if size <= SMALL:
+            return
+        prepare_equations(scene, t, y)
+        fill_matrix(scene)
+        factor_matrix(scene, t)
+    note_gap(scene, t)
+
+
+@jitable
+def project(scene, t, y, level):
+    """Bring y back onto all constraints, positions first.
+
+    Of velocities, what equations of that level and above hold: with 2, velocities are
+    displacements, which motions of velocities leave free.
+    """
+    scene.sweep.quality[DRIFT] = 0.0
+    place_bodies(scene, y)
+    seat_all(scene, y)
+    if active_count(scene) > 0:
+        close_loops(scene, t, y)
+    carry_all(scene, y)
+    if active_count(scene) > 0:
+        fill_equations(scene, t, y)
+        part = FORGIVEN * scene.world.scale[0] / scene.world.scale[1]
+        note_drift(scene, level, MISMATCH, part)
+        correct(scene, level, MISMATCH)
+        speed_up(scene, y)

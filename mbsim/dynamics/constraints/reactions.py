@@ -1,0 +1,143 @@
+"""Reactions of joints and motions: force and torque on the body of marker I, at marker I.
+
+Where equations follow from others, internal forces are not known: any sum of the self-stresses,
+one for each implied equation, may be added. Those reactions are given whose sum of
+|F|^2 + |T|^2 / L^2 over all connections is least (L the model's size).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.constraints.equations import (
+    active_count,
+    add_wrench,
+    along,
+    fill_equation,
+    is_active,
+    is_friction,
+    side_place,
+    solve_matrix,
+)
+from mbsim.dynamics.constraints.tree import respond
+from mbsim.dynamics.constraints.tree_reactions import add_reaction, add_tree_reactions
+
+#: A self-stress that others leave less of than this part is none of its own.
+_NEW = 1e-9
+
+
+@jitable
+def add_equation_reaction(scene, y, e, multiplier, out):
+    """Add what a multiplier of equation e does to the body of I."""
+    eq, sweep = scene.equations, scene.sweep
+    c = eq.connection[e]
+    if c < 0:
+        # friction shows its force itself
+        return
+    body = scene.markers.body[scene.connections.i[c]]
+    other = scene.markers.body[scene.connections.j[c]]
+    for k in range(eq.first[e], eq.first[e + 1]):
+        for side in range(2):
+            m = eq.i[k] if side == 0 else eq.j[k]
+            place = side_place(scene, m)
+            G = sweep.G[k, 6 * side : 6 * side + 6]
+            if place >= 0 and scene.markers.body[m] == body:
+                add_reaction(scene, y, c, place, G, multiplier, out)
+            elif place >= 0 and body == len(scene.bodies.mass) and scene.markers.body[m] == other:
+                # on ground acts the opposite of what acts on J
+                add_reaction(scene, y, c, place, G, -multiplier, out)
+
+
+@jitable
+def add_reactions(scene, y, motion, out):
+    """Add the reactions of all connections for forces p, accelerations and multipliers."""
+    add_tree_reactions(scene, y, motion, out)
+    for r in range(active_count(scene)):
+        add_equation_reaction(scene, y, scene.equations.active[r], scene.sweep.multiplier[r], out)
+
+
+@jitable
+def self_stress(scene, t, y, e, out):
+    """Fill the reactions by which equation e, implied by others, and those hold each other."""
+    sweep, active, n = scene.sweep, scene.equations.active, active_count(scene)
+    nt = len(scene.tree.body)
+    fill_equation(scene, t, y, e)
+    for last in range(2):
+        for k in range(nt):
+            for i in range(6):
+                sweep.p[k, i] = 0.0
+        add_wrench(scene, e, 1.0)
+        if last == 1:
+            for r in range(n):
+                add_wrench(scene, active[r], sweep.multiplier[r])
+        respond(scene, 0, nt, 0, sweep.answer)
+        if last == 0:
+            for r in range(n):
+                sweep.rhs[r] = -along(scene, active[r], sweep.answer, -1)
+            solve_matrix(scene)
+    for i in range(len(out)):
+        out[i] = 0.0
+    add_reactions(scene, y, sweep.answer, out)
+    add_equation_reaction(scene, y, e, 1.0, out)
+
+
+@jitable
+def product(scene, a, b):
+    """Return the sum of F.F' + T.T'/L^2 over all connections."""
+    L2, total = scene.world.scale[0] ** 2, 0.0
+    for c in range(len(scene.connections.i)):
+        for i in range(3):
+            at = 6 * c + i
+            total += a[at] * b[at] + a[at + 3] * b[at + 3] / L2
+    return total
+
+
+@jitable
+def fill_stresses(scene, t, y):
+    """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
+    stress, count = scene.sweep.stress, 0
+    for e in range(len(scene.equations.program)):
+        if is_active(scene, e) or is_friction(scene, e):
+            continue
+        new = stress[count]
+        self_stress(scene, t, y, e, new)
+        whole = math.sqrt(product(scene, new, new))
+        for k in range(count):
+            part = product(scene, new, stress[k])
+            for i in range(len(new)):
+                new[i] -= part * stress[k, i]
+        size = math.sqrt(product(scene, new, new))
+        if not size > _NEW * whole:
+            continue
+        for i in range(len(new)):
+            new[i] /= size
+        count += 1
+    return count
+
+
+@jitable
+def sum_reactions(scene, y):
+    """Fill reactions that hold, not yet the least of all; the state has just been evaluated."""
+    out = scene.work.reaction
+    for i in range(len(out)):
+        out[i] = 0.0
+    add_reactions(scene, y, scene.sweep.a, out)
+
+
+@jitable
+def take_stresses(scene, count):
+    """Take the self-stresses out of the reactions, so that these are the least."""
+    out = scene.work.reaction
+    for k in range(count):
+        stress = scene.sweep.stress[k]
+        part = product(scene, out, stress)
+        for i in range(len(out)):
+            out[i] -= part * stress[i]
+
+
+@jitable
+def fill_reactions(scene, t, y):
+    """Fill the reactions of all connections; the state has just been evaluated."""
+    sum_reactions(scene, y)
+    take_stresses(scene, fill_stresses(scene, t, y))

@@ -1,0 +1,100 @@
+"""Who touches whom: the motion bound, the closed-form kernels, the door to FCL.
+
+A pair that has `left` between it at the committed state cannot touch while its shapes have
+moved by less since. That is a pure function of the trial point and the committed state, so
+skipping a pair never changes a result; it only saves the kernel.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.bodies.kinematics import place_graphics
+from mbsim.geometry.catalog import COUPLE
+
+#: Code of a trial point too far away for the list of near pairs; the step has to be shorter.
+TOO_FAR = 6
+#: Code of more near pairs than there are places for.
+CROWDED = 7
+
+
+@jitable
+def measure_pair(scene, pair):
+    """Run a pair's closed form into its rows of `points`; False where FCL has to do it."""
+    pairs, kinds, work = scene.pairs, scene.kinds, scene.work
+    kind = pairs.kind[pair]
+    if kinds.kernel[kind] == 0:
+        return False
+    i, j, first = pairs.graphic_i[pair], pairs.graphic_j[pair], pairs.slot[pair]
+    call_int(
+        kinds.kernel[kind],
+        (
+            work.frames[i],
+            scene.graphics.size[i],
+            work.frames[j],
+            scene.graphics.size[j],
+            work.points[first:],
+        ),
+    )
+    if kinds.swapped[kind] == 1:
+        for s in range(first, first + kinds.slots[kind]):
+            for k in range(3):
+                work.points[s, 4 + k] = -work.points[s, 4 + k]
+                work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
+    return True
+
+
+@jitable
+def gather(scene, pair):
+    """Append the slots of a pair that touch to the list of hits."""
+    work, hit = scene.work, scene.work.hit
+    kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
+    last = len(hit) - 1
+    # of one region the points behind the first row are in that
+    count = scene.kinds.slots[kind] if scene.kinds.whole[kind] == 0.0 else 1
+    for s in range(first, first + count):
+        depth = work.points[s, 0]
+        if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
+            work.touching[s] = 1
+            hit[hit[last]] = s
+            hit[last] += 1
+
+
+@jitable
+def find_contacts(scene, y):
+    """Fill the list of slots that touch, with their points; return 0, or a code."""
+    pairs, work, log = scene.pairs, scene.work, scene.log
+    hit, last = work.hit, len(work.hit) - 1
+    for k in range(hit[last]):
+        work.touching[hit[k]] = 0
+    hit[last] = 0
+    if not place_graphics(scene, y):
+        return TOO_FAR
+    if pairs.count[WANTED] > 0:
+        return CROWDED
+
+    waiting, measured = 0, 0
+    for k in range(pairs.count[LIVE]):
+        pair = pairs.live[k]
+        if work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]] < pairs.left[pair]:
+            continue
+        measured += 1
+        if measure_pair(scene, pair):
+            gather(scene, pair)
+        else:
+            work.fcl[waiting] = pair
+            waiting += 1
+
+    log.counters[NARROWPHASE] += measured
+    log.counters[SKIPPED] += pairs.count[LIVE] - measured
+
+    # one visit to Python for all pairs that need it
+    if waiting > 0:
+        log.counters[FCL_CALLS] += waiting
+        code = call_int(scene.world.doors[FCL_DOOR], (waiting,))
+        if code != 0:
+            return code
+        for k in range(waiting):
+            gather(scene, work.fcl[k])
+    return 0

@@ -1,0 +1,481 @@
+"""What pushes where shapes touch: the incident marker, the two laws, the wrench on both bodies.
+
+At the contact point p, n the unit normal from J into I, v the velocity of I's material
+point relative to J's:
+
+    depth rate = -v.n        slip = v - (v.n) n        spin = (w_I - w_J).n
+    F_on_I = N n + Fx tx + Fy ty       T_on_I = (p - x_I) x F + Mx tx + My ty + Tz n
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    AGAIN,
+    BODY_SIZE,
+    FRICTION_CALLS,
+    NORMAL_CALLS,
+    NOW,
+    PYTHON_CALLS,
+)
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import (
+    add,
+    any_tangent,
+    cross,
+    dot,
+    norm,
+    rotate,
+    scale,
+    spin,
+    sub,
+    turn_about,
+    turn_with_normal,
+    unrotate,
+    vector,
+)
+from mbsim.dynamics.bodies.kinematics import position
+from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
+from mbsim.laws.abi import (
+    BRANCH_OUT,
+    FRICTION_INPUTS,
+    FROZEN,
+    GROWTH,
+    LIMIT_RATE,
+    MEMORY_OUT,
+    MODE_OUT,
+    NORMAL_RATE,
+    NORMAL_STIFFNESS,
+    SLIDING_LIMIT,
+    SLIPPING_MASS,
+    STORED_OUT,
+    UNIT_OUT,
+)
+from mbsim.laws.user_normal import AREA as PLACE_AREA
+from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
+from mbsim.laws.user_normal import (
+    EVALUATE,
+    EXPLORE,
+    LOCI,
+    LOCJ,
+    NI,
+    NJ,
+    PLACE,
+    PYTHON,
+    TIME,
+    USER_NORMAL_FAILED,
+)
+from mbsim.laws.user_normal import MODE as PLACE_MODE
+from mbsim.laws.user_normal import RATE as PLACE_RATE
+
+# columns of `Work.slot`
+DEPTH, RATE, NORMAL, SLIP = range(4)
+FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
+# of friction with memory: dF/d(depth) of the normal force, energy stored, mode
+STIFFNESS, HELD, MODE = 12, 13, 14
+# of a pair that is one incident: its area, and how its normal force damps tilting
+PATCH, TILTING = 15, 16
+# of friction with memory: its branch, the velocity as which an error of 1 in what it integrates
+# counts, its force along x and y of the incident marker; growth of STIFFNESS over itself, the
+# user's own friction of sliding
+BRANCH, UNIT, ALONG_X, ALONG_Y, STIFFENS, LIMIT = range(17, 23)
+# the rates of normal force and of that, as found at a time; both as they were there
+NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN = range(23, 28)
+
+# part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
+CHANGES = 1e-9
+
+# part of the friction that would stop a slip in one step, which a fixed-step method may use
+HELD_BACK = 0.25
+
+# code of a user's law that made something else than numbers of finite input
+USER_NOT_FINITE = 5
+
+
+@jitable
+def velocity_at(scene, y, b, p):
+    """Return the velocity of body b's material point at p."""
+    arm = sub(p, position(scene, y, b))
+    return add(vector(scene.work.v[b]), cross(vector(scene.work.w[b]), arm))
+
+
+@jitable
+def turned(scene, t, y, b, n, n0):
+    """Return the angle by which body b turned about n since the committed state, where it was n0.
+
+    What follows a frame through many steps must not depend on how long they are.
+    """
+    if b == len(scene.bodies.mass):
+        return 0.0
+    state, at = scene.state, BODY_SIZE * b + 3
+    q, w, w0 = (y[at], y[at + 1], y[at + 2], y[at + 3]), scene.work.w[b], state.w[b]
+    return turn_about(q, state.q[b], vector(w), vector(w0), n, n0, t - state.since[0])
+
+
+@jitable
+def birth_tangent(scene, graphic_i, n):
+    """Return the x-axis of a new incident marker: I's marker x-axis (or y), projected."""
+    R = scene.work.R[scene.graphics.body[graphic_i]]
+    S = scene.graphics.marker_R[graphic_i]
+    x = rotate(R, (S[0, 0], S[1, 0], S[2, 0]))
+    if abs(dot(x, n)) > 0.9:
+        x = rotate(R, (S[0, 1], S[1, 1], S[2, 1]))
+    x = sub(x, scale(dot(x, n), n))
+    return scale(1.0 / math.sqrt(dot(x, x)), x)
+
+
+@jitable
+def tangent(scene, time, y, s, c, graphic_i, bi, bj, n):
+    """Return the x-axis of the incident marker of slot s of contact c at the trial point.
+
+    Since the committed state it has turned with the normal by the shortest rotation and about
+    the normal by the mean of both bodies' turns; a new incident gets its axes by birth.
+    """
+    state = scene.state
+    if scene.contacts.framed[c] == 0:
+        # the law is the same in every tangent frame
+        return any_tangent(n)
+    if scene.world.past[0] == AGAIN:
+        return vector(state.t[s])
+    if state.touching[s] == 0:
+        return birth_tangent(scene, graphic_i, n)
+    n0 = vector(state.n[s])
+    t = turn_with_normal(vector(state.t[s]), n0, n)
+    both = turned(scene, time, y, bi, n, n0) + turned(scene, time, y, bj, n, n0)
+    return spin(t, n, 0.5 * both)
+
+
+@jitable
+def in_marker(scene, y, g, p):
+    """Return point p from the origin of graphic g's reference marker, in that marker's axes."""
+    b = scene.graphics.body[g]
+    in_body = unrotate(scene.work.R[b], sub(p, position(scene, y, b)))
+    return unrotate(scene.graphics.marker_R[g], sub(in_body, vector(scene.graphics.marker_p[g])))
+
+
+@jitable
+def along_marker(scene, g, v):
+    """Return a vector along the axes of graphic g's reference marker."""
+    in_body = unrotate(scene.work.R[scene.graphics.body[g]], v)
+    return unrotate(scene.graphics.marker_R[g], in_body)
+
+
+@jitable
+def sides(scene, s):
+    """Return the graphics of a slot in the contact's order: I, J."""
+    pair = scene.slots.pair[s]
+    i, j = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
+    if scene.kinds.swapped[scene.pairs.kind[pair]] == 1:
+        return j, i
+    return i, j
+
+
+@jitable
+def contact_of(scene, s):
+    """Return the contact of slot s."""
+    return scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
+
+
+@jitable
+def whole_of(scene, s):
+    """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
+    return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
+
+
+@jitable
+def patch(scene, s):
+    """Return the area of contact of slot s, 0 for a point."""
+    return scene.work.slot[s, PATCH] if whole_of(scene, s) > 0.0 else 0.0
+
+
+@jitable
+def add_wrench(scene, y, b, p, force, torque):
+    """Add a force at p and a torque to body b."""
+    arm = sub(p, position(scene, y, b))
+    moment = add(cross(arm, force), torque)
+    for k in range(3):
+        scene.work.force[b, k] += force[k]
+        scene.work.torque[b, k] += moment[k]
+
+
+@jitable
+def slipping_mass(scene, s):
+    """Return the mass of both bodies of slot s as one slips on the other, a part for each point."""
+    inverse = 0.0
+    for g in sides(scene, s):
+        b = scene.graphics.body[g]
+        if b < len(scene.bodies.mass):
+            inverse += 1.0 / scene.bodies.mass[b]
+    points = max(1, scene.pairs.touches[scene.slots.pair[s]])
+    return 1.0 / (points * inverse) if inverse > 0.0 else 0.0
+
+
+@jitable
+def remember(scene, y, s, c, given):
+    """Give a friction law what it kept, and what only laws with memory look at."""
+    state, at, z, row = scene.state, FRICTION_INPUTS, scene.slots.z[s], scene.work.slot[s]
+    carried = scene.contacts.carried[c]
+    given[FROZEN] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+    given[NORMAL_STIFFNESS], given[GROWTH] = row[STIFFNESS], row[STIFFENS]
+    given[SLIPPING_MASS] = slipping_mass(scene, s)
+    given[SLIDING_LIMIT] = math.nan
+    known = row[FOUND_AT] == given[0]
+    given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
+    given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
+    for k in range(scene.contacts.memory[c]):
+        if k < carried:
+            given[at + k] = y[z + k]
+        elif scene.world.past[0] != NOW:
+            given[at + k] = state.before[s, k]
+        else:
+            given[at + k] = state.memory[s, k]
+
+
+@jitable
+def keep(scene, dy, s, c, out):
+    """Keep what a friction law with memory made of it."""
+    row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
+    row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
+    row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[0], out[1]
+    for k in range(n):
+        scene.work.memory[s, k] = out[MEMORY_OUT + k]
+    for k in range(scene.contacts.carried[c]):
+        dy[z + k] = out[MEMORY_OUT + n + k]
+
+
+@jitable
+def show_state(scene, y):
+    """Let interpreted laws that ask for it see the trial point."""
+    for k in range(len(scene.users.seen)):
+        scene.users.seen[k] = y[k]
+
+
+@jitable
+def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
+    """Call the friction law of contact c for slot s into `law_out`; return its code."""
+    contacts, work = scene.contacts, scene.work
+    given = work.law_in
+    at = scene.slots.x[s]
+    given[0] = t
+    given[1] = h
+    for k in range(3):
+        given[2 + k] = y[at + k] if at >= 0 else 0.0
+        given[13 + k] = loci[k]
+        given[16 + k] = locj[k]
+    given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
+    given[8], given[9] = spin_rates[0], spin_rates[1]
+    given[10] = normal
+    area = patch(scene, s)
+    given[11] = area
+    given[12] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
+    if contacts.memory[c] > 0:
+        remember(scene, y, s, c, given)
+    scene.log.counters[FRICTION_CALLS] += 1
+    scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
+    if contacts.interpreted[c] == 1:
+        show_state(scene, y)
+    out = work.law_out
+    if contacts.sliding_law[c] != 0:
+        call = (contacts.id[c], given, contacts.sliding_par[c], out)
+        code = call_int(contacts.sliding_law[c], call)
+        if code != 0:
+            return code
+        given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[0], out[1])
+    call = (contacts.id[c], given, contacts.friction_par[c], out)
+    return call_int(contacts.friction_law[c], call)
+
+
+@jitable
+def ask_normal(scene, t, y, c, at, depth, rate, out):
+    """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal, area."""
+    contacts = scene.contacts
+    if contacts.user_normal[c] == 0:
+        return call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    # a user's law looks at more, as if in the middle of a question for forces
+    gi, gj, p, n, area = at
+    place = floats_at(contacts.user_normal[c], PLACE)
+    place[TIME], place[PLACE_DEPTH], place[PLACE_RATE] = t, depth, rate
+    place[PLACE_AREA] = area
+    loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
+    locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
+    ni, nj = along_marker(scene, gi, scale(-1.0, n)), along_marker(scene, gj, n)
+    for k in range(3):
+        place[LOCI + k], place[NI + k] = loci[k], ni[k]
+        place[LOCJ + k], place[NJ + k] = locj[k], nj[k]
+    if place[PYTHON] == 1.0:
+        scene.log.counters[PYTHON_CALLS] += 1
+        show_state(scene, y)
+    place[PLACE_MODE] = EVALUATE
+    code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
+    place[PLACE_MODE] = EXPLORE
+    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[0]):
+        return USER_NORMAL_FAILED
+    return code
+
+
+@jitable
+def yielding(scene, y, b, p, n):
+    """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
+    bodies = scene.bodies
+    if b == len(bodies.mass):
+        return 0.0
+    arm = sub(p, position(scene, y, b))
+    inverse, square = bodies.inverse[b], dot(arm, arm)
+    return 1.0 / bodies.mass[b] + square * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+
+
+@jitable
+def hold_back(scene, y, bi, bj, p, n, h, slip, out):
+    """Reduce a friction force to a quarter of what would stop the slip within the step.
+
+    Friction that turns sign from step to step would shake what rests; a quarter, since some
+    eight contacts share a body. Explicit methods of fixed step need this, as their step does not
+    follow the slope of friction; it fades as the step goes to 0.
+    """
+    force = math.hypot(out[0], out[1])
+    inverse = yielding(scene, y, bi, p, n) + yielding(scene, y, bj, p, n)
+    most = HELD_BACK * math.hypot(slip[0], slip[1]) / (h * inverse)
+    if force > most:
+        for k in range(2):
+            out[k] *= most / force
+
+
+@jitable
+def tilting(scene, t, y, c, s, at, depth, normal, w):
+    """Return code, couple on I and power lost of the points of slot s that are damped one by one.
+
+    With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
+    parts about the incident, in `plane_axes` x, y,
+
+        couple = -c [(Jyy wx - Jxy wy) x + (Jxx wy - Jxy wx) y]
+
+    asked of the law at the mean rate at which points come and go. It is no more than the normal
+    force has at their mean distance, for none of them pulls.
+    """
+    work, out, none = scene.work, scene.work.law_out, (0.0, 0.0, 0.0)
+    numbers, row, whole = work.points[s + 1], work.slot[s], whole_of(scene, s)
+    xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
+    row[TILTING] = 0.0
+    x, y_axis = plane_axes(at[3])
+    wx, wy = dot(w, x), dot(w, y_axis)
+    square = (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy) / whole
+    if square <= 0.0 or normal <= 0.0:
+        return 0, none, 0.0
+    rate = math.sqrt(square)
+    code = ask_normal(scene, t, y, c, at, depth, rate, out)
+    closing = out[0]
+    if code == 0:
+        code = ask_normal(scene, t, y, c, at, depth, -rate, out)
+    if code != 0:
+        return code, none, 0.0
+    damping = (closing - out[0]) / (2.0 * rate)
+    about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
+    size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
+    part = most / size if size > most else 1.0
+    row[TILTING] = part * damping
+    couple = add(scale(-part * about_x, x), scale(-part * about_y, y_axis))
+    return 0, couple, part * damping * whole * square
+
+
+@jitable
+def add_contact(scene, t, h, y, dy, s):
+    """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
+    contacts, work = scene.contacts, scene.work
+    c = contact_of(scene, s)
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    point = work.points[s]
+    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+
+    # how the surfaces move at p
+    v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
+    w = sub(vector(work.w[bi]), vector(work.w[bj]))
+    rate = -dot(v, n)
+    tx = tangent(scene, t, y, s, c, gi, bi, bj, n)
+    ty = cross(n, tx)
+    slip = (dot(v, tx), dot(v, ty))
+    spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
+
+    row, whole = work.slot[s], whole_of(scene, s)
+    if whole > 0.0:
+        row[PATCH] = work.points[s + 1, AREA]
+
+    torque = (0.0, 0.0, 0.0)
+
+    # normal force; out: force, force at rate 0, stored energy
+    out = work.law_out
+    scene.log.counters[NORMAL_CALLS] += 1
+    at_place = (gi, gj, p, n, patch(scene, s))
+    code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
+    if code != 0:
+        return code
+    share = point[7]
+    normal, elastic, stored = share * out[0], share * out[1], share * out[2]
+    lost = (normal - elastic) * rate
+    # of shares that turn with the shapes
+    couple = scale(out[1] if whole > 0.0 else out[2], vector(point[COUPLE:]))
+    row[HELD] = row[MODE] = row[BRANCH] = 0.0
+    if contacts.memory[c] > 0:
+        # of a power law F = k d^e, whose energy is F d / (e + 1)
+        row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
+        over = elastic * depth / stored - 2.0 if stored > 0.0 else 0.0
+        row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
+    if whole > 0.0:
+        # see geometry.region
+        stored = whole * out[2]
+        code, torque, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
+        if code != 0:
+            return code
+        lost += damped
+    torque = add(torque, couple)
+
+    force = scale(normal, n)
+    if contacts.friction_law[c] != 0:
+        if contacts.framed[c] == 1:
+            loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
+            locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
+        else:
+            loci, locj = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        # what a user's law pulls with rubs nothing
+        pressed = max(normal, 0.0)
+        code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, pressed)
+        if code != 0:
+            return code
+        finite = math.isfinite(out[0] + out[1] + out[4])
+        if not finite and contacts.framed[c] == 1 and math.isfinite(normal + slip[0] + slip[1]):
+            return USER_NOT_FINITE
+        if scene.world.fixed_step[0] == 1 and h > 0.0:
+            hold_back(scene, y, bi, bj, p, n, h, slip, out)
+        if contacts.memory[c] > 0:
+            keep(scene, dy, s, c, out)
+        fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
+        force = add(force, add(scale(fx, tx), scale(fy, ty)))
+        torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))
+        lost -= fx * slip[0] + fy * slip[1]
+        lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
+    add_wrench(scene, y, bi, p, force, torque)
+    add_wrench(scene, y, bj, p, scale(-1.0, force), scale(-1.0, torque))
+    noise = scene.kinds.noise[scene.pairs.kind[scene.slots.pair[s]]]
+    if noise > 0.0:
+        for b in (bi, bj):
+            work.noise[b, 0] += noise * normal
+            work.noise[b, 1] += noise * normal * norm(sub(p, position(scene, y, b)))
+
+    # X of the incident follows the slip
+    at = scene.slots.x[s]
+    if at >= 0:
+        dy[at], dy[at + 1], dy[at + 2] = slip[0], slip[1], spin_rates[2]
+    dy[len(dy) - len(contacts.id) + c] += lost
+
+    # what recorder, log and commit want to know
+    row[DEPTH], row[RATE], row[NORMAL] = depth, rate, normal
+    row[SLIP] = math.hypot(slip[0], slip[1])
+    for k in range(3):
+        work.t[s, k] = tx[k]
+        row[FORCE + k] = force[k]
+        row[TORQUE + k] = torque[k]
+    row[STORED], row[LOST] = stored, lost
+    return 0

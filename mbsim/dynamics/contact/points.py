@@ -1,0 +1,422 @@
+"""What happens to incidents when a step is tried, accepted, and watched.
+
+`first_depth` guards the beginning of an impact, `commit` writes the incident table after an
+accepted step, `reversal` says where in a step a contact force may have peaked.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ANGLES_DOOR,
+    APPROACH,
+    BODY_SIZE,
+    DRY_DOOR,
+    ENERGY_LOST,
+    FIRST_TOUCH,
+    HELD_OTHERWISE,
+    KEEP_DRY,
+    LEAVE,
+    LIVE,
+    NEAR_DOOR,
+    PEAK_DEPTH,
+    PEAK_FORCE,
+    PEAK_FORCE_TIME,
+    PEAK_SLIP,
+    REBOUND,
+    STICK,
+    TOUCH,
+    TOUCHES,
+)
+from mbsim.arrays.scene import SLIP as SLIP_EVENT
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
+from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.contact.detection import measure_pair
+from mbsim.dynamics.contact.forces import (
+    BRANCH,
+    DEPTH,
+    FORCE,
+    NORMAL,
+    RATE,
+    SLIP,
+    STORED,
+    contact_of,
+    sides,
+    velocity_at,
+)
+from mbsim.geometry.catalog import axis
+from mbsim.laws import catalog
+
+
+@jitable
+def effective_mass(scene, y, s):
+    """Return the mass that meets in slot s along its normal: 1 / (n J M^-1 J' n)."""
+    point = scene.work.points[s]
+    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    inverse = 0.0
+    gi, gj = sides(scene, s)
+    for g in (gi, gj):
+        b = scene.graphics.body[g]
+        if b < len(scene.bodies.mass):
+            arm = unrotate(scene.work.R[b], cross(sub(p, position(scene, y, b)), n))
+            inverse += 1.0 / scene.bodies.mass[b]
+            inverse += dot(arm, rotate(scene.bodies.inverse[b], arm))
+    return 1.0 / inverse if inverse > 0.0 else 0.0
+
+
+@jitable
+def deepest_of_impact(scene, c, energy):
+    """Return the depth at which contact c has stored `energy`: how deep an impact goes, to 1 %.
+
+    Newton for log E over log d, whose slope is F d / E: exact at once for a power law.
+    """
+    contacts, out = scene.contacts, scene.work.law_out
+    if energy <= 0.0:
+        return 0.0
+    depth = 1e-4 * scene.world.scale[0]
+    for _ in range(50):
+        call_int(contacts.normal_law[c], (depth, 0.0, contacts.normal_par[c], out))
+        if out[2] <= 0.0 or not out[1] > 0.0:
+            depth *= 16.0
+            continue
+        ratio = energy / out[2]
+        if 0.99 < ratio < 1.01:
+            break
+        change = ratio ** (out[2] / (out[1] * depth))
+        depth *= min(1e4, max(1e-4, change))
+    return depth
+
+
+@jitable
+def first_depth(scene, t, h, y):
+    """Return 1, or the part of the step to take so that a new incident begins shallow.
+
+    The first depth of an impact is at most max(v Tc/70, 1e-3 dmax), with v the closing speed
+    and Tc the contact time: about 3 times the deepest depth over v (pi for a linear
+    spring, 2.943 for Hertz).
+    """
+    work, state, contacts = scene.work, scene.state, scene.contacts
+    part = 1.0
+    hit = work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if state.touching[s] == 1 or work.slot[s, RATE] <= 0.0:
+            continue
+        pair = scene.slots.pair[s]
+        kind = scene.pairs.kind[pair]
+        if scene.kinds.regroups[kind] == 1 and scene.pairs.touches[pair] > 0:
+            # not an impact: the points of a contact that goes on were chosen anew
+            continue
+        c = scene.kinds.contact[kind]
+        depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
+        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, 7]
+        deepest = deepest_of_impact(scene, c, energy)
+        allowed = max(3.0 * deepest / 70.0, 1e-3 * contacts.dmax[c])
+        if depth > allowed:
+            # at this speed it was half as deep as allowed so much earlier
+            earlier = (depth - 0.5 * allowed) / (speed * h)
+            wanted = 1.0 - earlier if earlier < 0.98 else 0.5
+            if wanted < part:
+                part = wanted
+                work.trouble[1] = c
+    return part
+
+
+@jitable
+def record_event(scene, t, kind, s):
+    """Append an event; the driver empties the table before it can overflow."""
+    rows = scene.rows
+    k = rows.used[2]
+    if k < len(rows.events):
+        rows.events[k, 0] = t
+        rows.events[k, 1] = kind
+        rows.events[k, 2] = scene.contacts.id[contact_of(scene, s)]
+        rows.events[k, 3] = s
+        rows.used[2] = k + 1
+
+
+@jitable
+def crossing(depth0, rate0, depth1, rate1, h):
+    """Return the part of the step at which the depth crosses zero, by its Hermite cubic."""
+    low, high = 0.0, 1.0
+    rising = depth1 > depth0
+    for _ in range(40):
+        s = 0.5 * (low + high)
+        h00 = (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s)
+        h10 = s * (1.0 - s) * (1.0 - s)
+        h01 = s * s * (3.0 - 2.0 * s)
+        h11 = s * s * (s - 1.0)
+        depth = h00 * depth0 + h10 * h * rate0 + h01 * depth1 + h11 * h * rate1
+        if (depth > 0.0) == rising:
+            high = s
+        else:
+            low = s
+    return 0.5 * (low + high)
+
+
+@jitable
+def log_touch(scene, t, h, y, s):
+    """Note that slot s began to touch within the step that ends at t."""
+    row, log = scene.work.slot[s], scene.log.contacts[contact_of(scene, s)]
+    speed = max(row[RATE], 0.0)
+    # the depth is small by the guard: the way back at closing speed, within the step
+    back = min(row[DEPTH] / speed, h) if speed > 0.0 else 0.0
+    if math.isnan(log[FIRST_TOUCH]):
+        log[FIRST_TOUCH] = t - back
+    log[TOUCHES] += 1.0
+    # spring and damper have already taken some of the speed at the touch
+    mass, c = effective_mass(scene, y, s), contact_of(scene, s)
+    lost = y[len(y) - len(scene.contacts.id) + c] - log[ENERGY_LOST]
+    taken = 2.0 * (row[STORED] + max(0.0, lost)) / mass if mass > 0.0 else 0.0
+    log[APPROACH] = math.sqrt(speed * speed + taken) if h > 0.0 else 0.0
+    record_event(scene, t - back, TOUCH, s)
+
+
+@jitable
+def log_leave(scene, t, h, y, s):
+    """Note that slot s ceased to touch within the step that ends at t."""
+    state, log = scene.state, scene.log.contacts[contact_of(scene, s)]
+    depth, rate = state.depth[s], state.rate[s]
+    after = scene.work.points[s, 0]
+    if after < 0.0 and after > -1e3 * depth:
+        part = crossing(depth, rate, after, min(rate, (after - depth) / h), h)
+    else:
+        part = min(1.0, -depth / (rate * h)) if rate < 0.0 else 0.5
+    if math.isnan(log[REBOUND]) and log[APPROACH] > 0.0:
+        # how fast the points of the last touch part, now that nothing acts on them
+        gi, gj = sides(scene, s)
+        p, graphics = vector(state.p[s]), scene.graphics
+        v = sub(
+            velocity_at(scene, y, graphics.body[gi], p), velocity_at(scene, y, graphics.body[gj], p)
+        )
+        log[REBOUND] = max(dot(v, vector(state.n[s])), 0.0) / log[APPROACH]
+    record_event(scene, t - (1.0 - part) * h, LEAVE, s)
+
+
+@jitable
+def watch_peaks(scene, t):
+    """Keep the largest force, depth and slip of every contact at the point just evaluated."""
+    work, net, hit = scene.work, scene.work.net, scene.work.hit
+    if hit[len(hit) - 1] == 0:
+        return
+    for c in range(len(net)):
+        net[c, 0] = net[c, 1] = net[c, 2] = 0.0
+    for k in range(hit[len(hit) - 1]):
+        row, c = work.slot[hit[k]], contact_of(scene, hit[k])
+        log = scene.log.contacts[c]
+        for j in range(3):
+            net[c, j] += row[FORCE + j]
+        log[PEAK_DEPTH] = max(log[PEAK_DEPTH], row[DEPTH])
+        if row[NORMAL] > 0.0:
+            log[PEAK_SLIP] = max(log[PEAK_SLIP], row[SLIP])
+    for c in range(len(net)):
+        force = norm(vector(net[c]))
+        if force > scene.log.contacts[c, PEAK_FORCE]:
+            scene.log.contacts[c, PEAK_FORCE] = force
+            scene.log.contacts[c, PEAK_FORCE_TIME] = t
+
+
+@jitable
+def reversal(scene, h):
+    """Return where in the step (0..1) a contact was deepest, or -1: closing before, opening after.
+
+    Called before `commit`: the committed table holds the begin of the step, `work` its end.
+    """
+    work, state, hit = scene.work, scene.state, scene.state.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if work.touching[s] == 1:
+            before, after = state.rate[s], work.slot[s, RATE]
+            if before > 0.0 and after <= 0.0:
+                return before / (before - after)
+    return -1.0
+
+
+@jitable
+def bounding_gap(scene, pair):
+    """Return a lower bound of two shapes' distance: ball of one to box or plane of the other."""
+    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
+    best = -math.inf
+    for side in range(2):
+        g = pairs.graphic_i[pair] if side == 0 else pairs.graphic_j[pair]
+        other = pairs.graphic_j[pair] if side == 0 else pairs.graphic_i[pair]
+        frame, half = work.frames[other], graphics.half[other]
+        d = sub(vector(work.frames[g]), vector(frame))
+        if math.isinf(half[2]):
+            best = max(best, dot(d, axis(frame, 2)) - graphics.reach[g])
+            continue
+        square = 0.0
+        for k in range(3):
+            out = max(0.0, abs(dot(d, axis(frame, k))) - half[k])
+            square += out * out
+        best = max(best, math.sqrt(square) - graphics.reach[g])
+    return best
+
+
+@jitable
+def measure_gap(scene, pair, measured):
+    """Store how far apart the pair is at the accepted point, where it may be `measured` already."""
+    pairs, work = scene.pairs, scene.work
+    closed_form = scene.kinds.kernel[pairs.kind[pair]] != 0
+    if (measured and closed_form) or measure_pair(scene, pair):
+        first, deepest = pairs.slot[pair], -math.inf
+        for s in range(first, first + scene.kinds.slots[pairs.kind[pair]]):
+            deepest = max(deepest, work.points[s, 0])
+        gap = -deepest
+    else:
+        gap = bounding_gap(scene, pair)
+    pairs.gap[pair] = pairs.left[pair] = gap
+
+
+@jitable
+def another_point(scene, y, h, s):
+    """Return whether the point that FCL gives for slot s is too far to be the one before."""
+    point, before = scene.work.points[s], scene.state.p[s]
+    p = (point[1], point[2], point[3])
+    gi, gj = sides(scene, s)
+    graphics = scene.graphics
+    speed = norm(velocity_at(scene, y, graphics.body[gi], p))
+    speed += norm(velocity_at(scene, y, graphics.body[gj], p))
+    size = min(graphics.reach[gi], graphics.reach[gj])
+    # the point of touch may run ahead of both surfaces; a hundredth of the shape is near
+    return norm(sub(p, vector(before))) > 2.0 * h * speed + 0.01 * size
+
+
+@jitable
+def commit_memory(scene, t, y, s, fresh):
+    """Keep what friction in slot s makes of the step, anew if `fresh`.
+
+    Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
+    """
+    state, work, z = scene.state, scene.work, scene.slots.z[s]
+    for k in range(state.memory.shape[1]):
+        state.before[s, k] = state.memory[s, k]
+        state.memory[s, k] = 0.0 if fresh else work.memory[s, k]
+    branch = 0.0 if fresh else work.slot[s, BRANCH]
+    if branch == catalog.UNDECIDED or branch == state.mode[s]:
+        return 0
+    mode, before = branch % catalog.BRANCHES, state.mode[s] % catalog.BRANCHES
+    if mode != before and mode > 0.0 and before > 0.0:
+        record_event(scene, t, STICK if mode == catalog.STICK else SLIP_EVENT, s)
+    if mode != before:
+        # which decides what the carried numbers are
+        for k in range(scene.contacts.carried[contact_of(scene, s)]):
+            y[z + k] = state.memory[s, k]
+    state.mode[s] = branch
+    return HELD_OTHERWISE if mode != before else 1
+
+
+@jitable
+def commit_slot(scene, t, h, y, s):
+    """Write the incident of slot s for the accepted point; return what `commit` does."""
+    state, work = scene.state, scene.work
+    now, before = work.touching[s], state.touching[s]
+    changed = 0
+    fresh = now != before
+    kind = scene.pairs.kind[scene.slots.pair[s]]
+    if now == 1 and before == 1 and scene.kinds.kernel[kind] == 0:
+        fresh = another_point(scene, y, h, s)
+        changed = 1 if fresh else 0
+    if now == 1 and before == 0:
+        log_touch(scene, t, h, y, s)
+    elif now == 0 and before == 1:
+        log_leave(scene, t, h, y, s)
+        for k in range(4):
+            # what it was linearised at tells nothing of another touch
+            work.grip[s, k] = 0.0
+    # X and memory of an incident that ended, or that is another than before, begin again at 0;
+    # at touch they have gathered since the touch within the step and stay
+    x, z, begins = scene.slots.x[s], scene.slots.z[s], now == 1 and before == 0
+    if fresh and not begins and (x >= 0 or z >= 0):
+        for k in range(3):
+            if x >= 0:
+                y[x + k] = 0.0
+        for k in range(scene.contacts.carried[contact_of(scene, s)]):
+            y[z + k] = 0.0
+    else:
+        changed = 0
+    if scene.contacts.memory[contact_of(scene, s)] > 0:
+        changed = max(changed, commit_memory(scene, t, y, s, fresh and not begins))
+    state.touching[s] = now
+    if now == 1:
+        state.depth[s] = work.slot[s, DEPTH]
+        state.rate[s] = work.slot[s, RATE]
+        state.normal[s] = work.slot[s, NORMAL]
+        if scene.world.fixed_step[0] == 0 or scene.contacts.framed[contact_of(scene, s)] == 1:
+            for k in range(3):
+                state.p[s, k] = work.points[s, 1 + k]
+                state.n[s, k] = work.points[s, 4 + k]
+                state.t[s, k] = work.t[s, k]
+    return changed
+
+
+@jitable
+def commit_incidents(scene, t, h, y):
+    """Write the incident table for the accepted point; return what `commit` does."""
+    state, work, pairs = scene.state, scene.work, scene.pairs
+    old, new, last = state.hit, work.hit, len(work.hit) - 1
+    changed = 0
+    for k in range(old[last]):
+        pairs.touches[scene.slots.pair[old[k]]] = 0
+        if work.touching[old[k]] == 0:
+            changed = max(changed, commit_slot(scene, t, h, y, old[k]))
+    for k in range(new[last]):
+        changed = max(changed, commit_slot(scene, t, h, y, new[k]))
+        old[k] = new[k]
+    for k in range(new[last]):
+        pairs.touches[scene.slots.pair[new[k]]] += 1
+    old[last] = new[last]
+    return changed
+
+
+@jitable
+def commit_gaps(scene):
+    """Take what the shapes moved from the distance of every pair; measure where half is gone."""
+    pairs, work = scene.pairs, scene.work
+    for k in range(pairs.count[LIVE]):
+        pair = pairs.live[k]
+        if pairs.touches[pair] > 0:
+            pairs.gap[pair] = pairs.left[pair] = 0.0
+            continue
+        way = work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]]
+        if not way < pairs.left[pair]:
+            measure_gap(scene, pair, True)
+        elif way > 0.0:
+            pairs.left[pair] -= way
+            if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
+                measure_gap(scene, pair, False)
+
+
+@jitable
+def commit(scene, t, h, y):
+    """Take the point evaluated last as accepted.
+
+    Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.
+    """
+    state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
+    changed = commit_incidents(scene, t, h, y)
+    if scene.world.doors[DRY_DOOR] != 0:
+        changed = max(changed, call_int(scene.world.doors[DRY_DOOR], (scene, KEEP_DRY, t, y)))
+    watch_peaks(scene, t)
+    contacts = len(scene.contacts.id)
+    for c in range(contacts):
+        scene.log.contacts[c, ENERGY_LOST] = y[len(y) - contacts + c]
+    commit_gaps(scene)
+    for b in range(ground):
+        for k in range(4):
+            state.q[b, k] = y[BODY_SIZE * b + 3 + k]
+        for k in range(3):
+            state.w[b, k] = scene.work.w[b, k]
+    state.since[0] = t
+    for g in range(len(graphics.body)):
+        if graphics.body[g] < ground:
+            for k in range(3):
+                state.centre[g, k] = scene.work.frames[g, k]
+    if scene.world.doors[ANGLES_DOOR] != 0:
+        call_int(scene.world.doors[ANGLES_DOOR], (scene,))
+    if len(scene.crowds.contact) > 0:
+        call_int(scene.world.doors[NEAR_DOOR], (scene, y))
+    return changed

@@ -1,0 +1,318 @@
+"""How long a step may be before it is tried, and where it should end.
+
+Nothing may pass through anything, and a step ends where a contact is about to begin and where its
+force ends or comes back.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import AUDIT_TOL, BODY_SIZE, LIVE
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import dot, norm, sub, vector
+from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
+from mbsim.dynamics.contact.detection import measure_pair
+from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
+from mbsim.dynamics.contact.points import deepest_of_impact, effective_mass
+
+#: Halvings of the way out in which a force is looked for, and of where it ends.
+SHALLOWEST = 12
+#: How long before a touch a step ends, over the next one, which meets it, and the same over tol: a
+#: kink in the midst of a step makes wrong what its error hardly shows.
+BEFORE, BEFORE_OVER_TOL = 1e-4, 100.0
+#: A step that begins or ends where a force d^e does is wrong by this part of force times step, at
+#: most, where e is no whole number: what the weights and nodes of DOPRI5 and RADAU5 make of t^e,
+#: those of DOP853 a third of it. Their error estimates see a hundredth to a half of that.
+BLIND = 5e-4
+#: What such a step may make wrong of a velocity, over tol: too little for it to add up.
+BLIND_SHARE = 0.1
+#: The same part where a force jumps: the weight of DOPRI5's first stage, which does not see it. Its
+#: error estimate sees a 74th of that. A force jumps that has come at this part of the first depth.
+BLIND_JUMP, AT_ONCE = 0.1, 1e-4
+#: The longest step towards the end of a force, over the time until then, whose error is seen.
+SEEN = 0.6
+#: The end of a damper's ramp that is met within this part of a step is as good as at its begin.
+AT_BEGIN = 0.02
+#: Part of the scene's length below which a depth is rounding.
+ROUNDING = 1e-13
+
+
+@jitable
+def seen_part(scene, c, depth, per_mass):
+    """Return the part of the way out from a depth, or in to it, that may be one step; 1 for all.
+
+    The spring of contact c is F ~ d^e there, e + 1 = F d/E, so that a step over the part x of this
+    way, next to the surface, makes wrong x^(e + 1) of BLIND F h/m. `per_mass` is h/m of the whole.
+    """
+    out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    if not out[2] > 0.0:
+        return 1.0
+    e = out[1] * depth / out[2] - 1.0
+    wrong = min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0))) * BLIND * out[1] * per_mass
+    allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
+    return (allowed / wrong) ** (1.0 / (e + 1.0)) if wrong > allowed > 0.0 else 1.0
+
+
+@jitable
+def is_over(scene, c, depth, normal, per_mass):
+    """Return whether all that contact c may still do before it leaves is too little to matter.
+
+    `per_mass` is h/m of a step over it, whose first stage takes it to last. Where points of a patch
+    move with it their depth goes on otherwise than their rate has it, and steps that end where they
+    would leave get shorter and shorter but never there.
+    """
+    out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
+    return BLIND_JUMP * max(normal, out[1]) * per_mass <= allowed
+
+
+@jitable
+def longest_at_jump(scene, c, depth, speed, mass):
+    """Return the longest step that may begin just before a touch at which the force jumps.
+
+    It does where a damper comes in over nothing; inf where what is there at AT_ONCE of `depth`,
+    how deep a step would lead otherwise, is nothing.
+    """
+    out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
+    call_int(
+        scene.contacts.normal_law[c], (AT_ONCE * depth, speed, scene.contacts.normal_par[c], out)
+    )
+    allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
+    return allowed * mass / (BLIND_JUMP * out[0]) if out[0] > 0.0 else math.inf
+
+
+@jitable
+def pushes_at(scene, c, t, depth, rate, bend):
+    """Return whether contact c would push after a time t in which depth goes on as it does."""
+    out = scene.work.law_out
+    d = depth + t * (rate + 0.5 * t * bend)
+    par = scene.contacts.normal_par[c]
+    call_int(scene.contacts.normal_law[c], (d, rate + t * bend, par, out))
+    return out[0] > 0.0
+
+
+@jitable
+def thrust(scene, f, b):
+    """Return the acceleration of body b's cg."""
+    if b == len(scene.bodies.mass):
+        return (0.0, 0.0, 0.0)
+    at = BODY_SIZE * b + 7
+    return (f[at], f[at + 1], f[at + 2])
+
+
+@jitable
+def depth_bend(scene, f, s):
+    """Return the second rate of the depth of slot s that accelerations make, d'' of d."""
+    gi, gj = sides(scene, s)
+    i, j = thrust(scene, f, scene.graphics.body[gi]), thrust(scene, f, scene.graphics.body[gj])
+    return -dot(sub(i, j), vector(scene.state.n[s]))
+
+
+@jitable
+def step_to_leave(scene, f, s, h):
+    """Return the step that ends where the force of the parting slot s ends or comes back.
+
+    A step across such a place is one whose error estimate may vanish by chance, and those
+    that do are the ones that are taken; one that ends there may be too long to see its error, and
+    ends sooner then, as `seen_part` has it. d + d' t + d'' t^2 / 2 = 0 when it leaves; the force
+    falls on the way, so this is too soon at first and exact at last. The damper of a fast
+    separation can outweigh the spring: then the force is 0 sooner, and as the damper fades with
+    depth it comes back just before the shapes part.
+    """
+    state, c, m = scene.state, contact_of(scene, s), scene.bodies.mass
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    depth, rate, bend = state.depth[s], state.rate[s], depth_bend(scene, f, s)
+    square = rate * rate - 2.0 * bend * depth
+    if square < 0.0:
+        return math.inf
+    leave = 2.0 * depth / (math.sqrt(square) - rate)
+    pushes = state.normal[s] > 0.0
+    inverse = (1.0 / m[bi] if bi < len(m) else 0.0) + (1.0 / m[bj] if bj < len(m) else 0.0)
+    # what friction keeps ends with the contact, which is to be seen
+    keeps = scene.contacts.memory[c] > 0
+    if not keeps and leave < h and is_over(scene, c, depth, state.normal[s], h * inverse):
+        return h
+    if pushes and leave < 2.0 * h:
+        last = seen_part(scene, c, depth, leave * inverse)
+        if last < 0.9:
+            h = min(h, max(min(SEEN, 1.0 - last) * leave, ROUNDING * scene.world.scale[0] / -rate))
+    if leave > h and pushes_at(scene, c, h, depth, rate, bend) == pushes:
+        return h
+    before, part = 0.0, 1.0
+    for _ in range(SHALLOWEST):
+        part *= 0.5
+        after = min(h, leave * (1.0 - part))
+        if pushes_at(scene, c, after, depth, rate, bend) != pushes:
+            for _ in range(SHALLOWEST):
+                middle = 0.5 * (before + after)
+                if pushes_at(scene, c, middle, depth, rate, bend) != pushes:
+                    after = middle
+                else:
+                    before = middle
+            leave = after
+            break
+        before = after
+    # a little more, so that it is over then; a way that rounding swallows would never be gone
+    return max(1.0001 * leave, ROUNDING * scene.world.scale[0] / -rate)
+
+
+@jitable
+def step_to_ramp(scene, f, s, h):
+    """Return the step that ends where the depth of slot s passes dmax; h where it does not in h.
+
+    There the damper's curvature jumps, so that a step across it is taken where its error estimate
+    vanishes by chance. dmax = d + d' t + d'' t^2 / 2, the first such t.
+    """
+    state, dmax = scene.state, scene.contacts.dmax[contact_of(scene, s)]
+    if dmax == 0.0:
+        return h
+    way, rate, bend = dmax - state.depth[s], state.rate[s], depth_bend(scene, f, s)
+    square = rate * rate + 2.0 * bend * way
+    if not way * rate > 0.0 or square < 0.0:
+        return h
+    t = 2.0 * way / (rate + math.copysign(math.sqrt(square), rate))
+    return t if AT_BEGIN * h < t < h else h
+
+
+@jitable
+def longest_touching(scene, f, h):
+    """Return how much of a step h may be tried so that no force bends sharply or ends within it."""
+    state, longest = scene.state, h
+    for k in range(state.hit[len(state.hit) - 1]):
+        s = state.hit[k]
+        if state.rate[s] < 0.0:
+            longest = min(longest, step_to_leave(scene, f, s, longest))
+        longest = step_to_ramp(scene, f, s, longest)
+    return longest
+
+
+@jitable
+def time_for(way, speed, push):
+    """Return the time in which a shape can come `way` far: way = speed h + push h^2 / 2."""
+    if speed == 0.0 and push == 0.0:
+        return math.inf
+    return 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
+
+
+@jitable
+def place_side(scene, y, g):
+    """Place graphic g and its body at y."""
+    if scene.graphics.body[g] < len(scene.bodies.mass):
+        place_body(scene, y, scene.graphics.body[g])
+        place_graphic(scene, y, g)
+
+
+@jitable
+def step_to_touch(scene, y, f, pair, h):
+    """Return the step that ends where a pair is about to touch, or begins its contact; else inf.
+
+    A step much longer than the contact would meet it with a force out of all proportion, and
+    be cut down by error control again and again. With the gap g, closing speed v and its rate
+    a at the committed point the pair touches after t, g = v t + a t^2 / 2. From
+    there the first step is a part of the contact time that the guard of `first_depth` allows.
+    """
+    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
+    gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
+    place_side(scene, y, gi)
+    place_side(scene, y, gj)
+    if not measure_pair(scene, pair):
+        return math.inf
+    s = pairs.slot[pair]
+    for k in range(s + 1, s + scene.kinds.slots[pairs.kind[pair]]):
+        if work.points[k, 0] > work.points[s, 0]:
+            s = k
+    gap, bi, bj = -work.points[s, 0], graphics.body[gi], graphics.body[gj]
+    if gap < 0.0:
+        return math.inf
+    p, n = vector(work.points[s, 1:4]), vector(work.points[s, 4:7])
+    if scene.kinds.swapped[pairs.kind[pair]] == 1:
+        bi, bj = bj, bi
+    v = dot(sub(velocity_at(scene, y, bj, p), velocity_at(scene, y, bi, p)), n)
+    a = dot(sub(thrust(scene, f, bj), thrust(scene, f, bi)), n)
+    square = v * v + 2.0 * a * gap
+    if square <= 0.0 or v + math.sqrt(square) <= 0.0:
+        return math.inf
+    speed = math.sqrt(square)
+    t = 2.0 * gap / (v + speed)
+    mass = effective_mass(scene, y, s)
+    contact_time = 3.0 * deepest_of_impact(scene, contact_of(scene, s), 0.5 * mass * square) / speed
+    if t > h or h < 0.1 * contact_time:
+        return math.inf
+    # the damper comes in over dmax
+    ramp = 0.33 * scene.contacts.dmax[contact_of(scene, s)] / speed
+    first = contact_time / 80.0
+    if ramp > 0.01 * first:
+        first = min(first, ramp)
+    if scene.kinds.kernel[pairs.kind[pair]] == 0:
+        # found by iterations, which leave more than rounding
+        return t + first if t < first else (1.0 - 1e-6) * t
+    shortest = ROUNDING * scene.world.scale[0] / speed
+    c = contact_of(scene, s)
+    first *= seen_part(scene, c, first * speed, first / mass)
+    first = min(first, max(longest_at_jump(scene, c, first * speed, speed, mass), shortest))
+    part = min(BEFORE, BEFORE_OVER_TOL * scene.audit.plan[AUDIT_TOL])
+    before = max(part * first, shortest)
+    return t + first if t < 10.0 * before else t - before
+
+
+@jitable
+def longest_stay(scene, y, f):
+    """Return a step in which no shape of a crowd leaves where the list of near pairs holds.
+
+    Speed and acceleration of all shapes are left in `work.speed`.
+    """
+    graphics, work = scene.graphics, scene.work
+    longest = math.inf
+    for g in range(len(graphics.body)):
+        b = graphics.body[g]
+        if b < len(scene.bodies.mass):
+            reach = graphics.reach[g] + norm(vector(graphics.p[g]))
+            at = BODY_SIZE * b
+            turning = norm((y[at + 10], y[at + 11], y[at + 12]))
+            speed = norm((y[at + 7], y[at + 8], y[at + 9]))
+            # a plane, which has no reach, is never passed through
+            speed += turning * reach if reach < math.inf else 0.0
+            push = norm((f[at + 7], f[at + 8], f[at + 9]))
+            work.speed[g, 0], work.speed[g, 1] = speed, push
+            room = scene.crowds.room[g]
+            if room < math.inf:
+                longest = min(longest, time_for(0.9 * room, speed, push))
+    return longest
+
+
+@jitable
+def longest_way(scene, y, f, h):
+    """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
+
+    A step of length h, the one intended, ends where a pair begins to touch.
+    """
+    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
+    longest = longest_stay(scene, y, f)
+    for k in range(pairs.count[LIVE]):
+        pair = pairs.live[k]
+        i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        # in touch the stages feel the force, and sliding along is no approach
+        if pairs.touches[pair] > 0:
+            continue
+        left = max(pairs.left[pair], 0.0)
+        speed = work.speed[i, 0] + work.speed[j, 0]
+        push = work.speed[i, 1] + work.speed[j, 1]
+        # half of the thinner shape: a step may bury it no deeper before it is seen; what a
+        # half-space has swallowed it still pushes out, so nothing passes through a plane
+        thin = 0.5 * min(graphics.thin[i], graphics.thin[j])
+        if not (math.isinf(graphics.thin[i]) or math.isinf(graphics.thin[j])):
+            longest = min(longest, time_for(left + thin, speed, push))
+        if time_for(left, speed, push) < min(h, longest):
+            longest = min(longest, step_to_touch(scene, y, f, pair, min(h, longest)))
+    return longest
+
+
+@jitable
+def longest_step(scene, y, f, h):
+    """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
+    return min(longest_touching(scene, f, h), longest_way(scene, y, f, h))

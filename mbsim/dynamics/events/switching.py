@@ -1,0 +1,340 @@
+"""Where the step under trial leaves the branch that a force was on: see `compile_model.switching`.
+
+What an expression or a limit is on is a number, its side; so is what all incidents do whose
+friction has modes. The driver ends a step where a side
+becomes another than it was at the committed state.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ASK_HELD,
+    AUDIT_TOL,
+    EVALUATE_DOOR,
+    HEAT,
+    HOT,
+    LOAD_HELD,
+    RIGID_DOOR,
+    SIDE,
+    SLIDE_LIMIT,
+    SLIDES,
+    Scene,
+)
+from mbsim.core.address import call_float, call_int, vector_at, view
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.constraints.equations import is_friction
+from mbsim.dynamics.contact.forces import (
+    ALONG_X,
+    ALONG_Y,
+    BRANCH,
+    DEPTH,
+    FOUND_AT,
+    LIMIT,
+    LIMIT_SLOPE,
+    LIMIT_THEN,
+    MODE,
+    NORMAL,
+    NORMAL_SLOPE,
+    NORMAL_THEN,
+    RATE,
+    SLIP,
+    STIFFNESS,
+    UNIT,
+    contact_of,
+    slipping_mass,
+)
+from mbsim.dynamics.expressions.jets import value
+from mbsim.dynamics.forces.applied import along_axis, along_slide, at_limit
+from mbsim.dynamics.forces.dry_friction import STATIC, holding_force, is_dry, side_of_dry
+from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
+from mbsim.laws.catalog import SLIP as SLIPS
+
+#: Each change of side heats by 1, each step takes a tenth of the heat.
+COOLING = 0.9
+#: Modes of contacts are many: four points of a block come to rest and slip again one by one. With a
+#: change in every step heat rises to 10.
+HOT_MODES = 8.0
+#: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
+#: time in which it would be left.
+AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
+#: A load that changes by less of itself within a step passes no limit unseen.
+EVEN = 1e-3
+
+
+@jitable
+def side_of_limit(scene, y, f):
+    """Return 0 between the bounds, 1 below, 2 above, and 2 more where the limit pushes."""
+    if scene.applied.kind[f] == SLIDE_LIMIT:
+        _, x, rate = along_slide(scene, y, f)
+    else:
+        _, x, rate = along_axis(scene, f)
+    lower, upper = scene.applied.bounds[f, 0], scene.applied.bounds[f, 1]
+    if lower <= x <= upper:
+        return 0.0
+    size, _, _ = at_limit(scene, f, x, rate)
+    return (1.0 if x < lower else 2.0) + (2.0 if size != 0.0 else 0.0)
+
+
+@jitable
+def modes(scene):
+    """Return a number that tells what the incidents that go on do: stick or slip."""
+    total, hit = 0.0, scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if scene.state.touching[s] == 1:
+            branch = scene.work.slot[s, BRANCH]
+            total += (1.0 + s) * (scene.state.mode[s] if branch == UNDECIDED else branch)
+    return total
+
+
+@jitable
+def leaves_branch(scene):
+    """Return whether an incident that goes on asks for another branch than it is committed to."""
+    hit, state = scene.work.hit, scene.state
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        branch = scene.work.slot[s, BRANCH]
+        if state.touching[s] == 1 and branch != UNDECIDED and branch != state.mode[s]:
+            return True
+    return False
+
+
+@jitable
+def decide(scene, context, t, y):
+    """Evaluate again with the rates of normal forces, where a branch depends on them."""
+    hit, work, h = scene.work.hit, scene.work, math.inf
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row = work.slot[s]
+        if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
+            swings = math.sqrt(row[STIFFNESS] / slipping_mass(scene, s))
+            h = min(h, AHEAD / swings, BEFORE_LEAVE * row[DEPTH] / max(abs(row[RATE]), 1e-300))
+    if math.isinf(h) or h == 0.0:
+        return
+    for k in range(hit[len(hit) - 1]):
+        row = work.slot[hit[k]]
+        row[NORMAL_THEN], row[LIMIT_THEN] = row[NORMAL], row[LIMIT]
+        row[FOUND_AT] = t
+    for i in range(len(y)):
+        work.ahead[0, i] = y[i] + h * work.idle[i]
+    there, then = work.ahead[0], work.ahead[1]
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t + h, 0.0, there, then))
+    for s in range(len(work.slot)):
+        row = work.slot[s]
+        if row[FOUND_AT] == t:
+            row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
+            row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+
+
+@jitable
+def side(scene, t, y, k):
+    """Return on which side row k of `Kinks` is; the bodies have been placed."""
+    program = scene.kinks.program[k]
+    if program >= 0:
+        return value(scene, t, y, program)
+    if scene.kinks.limit[k] < 0:
+        return modes(scene)
+    f = scene.kinks.limit[k]
+    return side_of_dry(scene, y, f) if is_dry(scene.applied.kind[f]) else side_of_limit(scene, y, f)
+
+
+@jitable
+def watch_held(scene, t, y, what):
+    """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
+
+    A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
+    leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
+    """
+    heat, differs = scene.state.heat, 0.0
+    if what == PASS:
+        heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
+        heat[1] = 0.0
+    elif heat[0] <= HOT:
+        if call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y)) == 1:
+            heat[1], differs = 1.0, 2.0
+    return differs
+
+
+@jitable
+def load(scene, context, t, y):
+    """Return the largest force by which friction without give holds, over its limit.
+
+    -1 where nothing is held so, and -1 too where modes are left to each evaluation.
+    """
+    active, most = scene.equations.active, -1.0
+    for r in range(active[len(active) - 1]):
+        if is_friction(scene, active[r]):
+            most = 0.0
+    if most < 0.0 or scene.state.frozen[0] == 0:
+        return -1.0
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+    for f in range(len(scene.applied.kind)):
+        if scene.applied.equation[f] >= 0:
+            force = holding_force(scene, f)
+            if not math.isnan(force):
+                most = max(most, abs(force) / scene.applied.par[f, STATIC])
+    if scene.world.doors[RIGID_DOOR] != 0:
+        held = call_int(scene.world.doors[RIGID_DOOR], (scene, LOAD_HELD, t, y))
+        most = max(most, 1e-6 * held)
+    return most
+
+
+@jitable
+def watch(scene, context, t, y, what):
+    """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
+
+    Unless it is only asked, the sides are kept.
+    """
+    sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
+    if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
+        # what friction does follows from all the rest
+        call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+        if what == ASK and len(scene.work.ahead) > 0:
+            decide(scene, context, t, y)
+    else:
+        place_bodies(scene, y)
+    for k in range(len(scene.kinks.program)):
+        now = side(scene, t, y, k)
+        other = now != sides[k, SIDE]
+        f = scene.kinks.limit[k]
+        dry = f >= 0 and is_dry(scene.applied.kind[f])
+        # friction with a memory of its own is on the side that it keeps
+        exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
+        leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
+        if leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
+            differs = max(differs, 2.0 if exact else 1.0)
+        if what == PASS:
+            sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
+        if what != ASK:
+            sides[k, SIDE] = now
+    if scene.world.doors[RIGID_DOOR] != 0:
+        differs = max(differs, watch_held(scene, t, y, what))
+    # where modes change at nearly every step they are left to each evaluation
+    hot = sides[last, HEAT] > HOT_MODES
+    for k in range(last):
+        f = scene.kinks.limit[k]
+        if f >= 0 and is_dry(scene.applied.kind[f]):
+            hot = hot or sides[k, HEAT] > HOT
+    scene.state.frozen[0] = 0 if hot else 1
+    return differs
+
+
+@jitable
+def follows(scene, s):
+    """Return whether friction in slot s follows the way of its slip in closed form."""
+    slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIPS
+    return slips and scene.contacts.carried[contact_of(scene, s)] > 0
+
+
+@jitable
+def counts_as(scene, s):
+    """Return the part of the norm of errors that a change of friction in slot s by all of it is."""
+    squares, group = scene.work.squares, scene.scales.of_contact[contact_of(scene, s)]
+    return scene.work.slot[s, UNIT] / math.sqrt(squares[group])
+
+
+@jitable
+def bends(scene, y, before):
+    """Return whether the way of some slip since y `before` is another than friction's direction.
+
+    By an angle that tol sees: less changes its direction by less.
+    """
+    hit, tol = scene.work.hit, scene.audit.plan[AUDIT_TOL]
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if not follows(scene, s):
+            continue
+        row, z = scene.work.slot[s], scene.slots.z[s]
+        mx, my = y[z] - before[z], y[z + 1] - before[z + 1]
+        size = math.hypot(row[ALONG_X], row[ALONG_Y]) * math.hypot(mx, my)
+        if counts_as(scene, s) * abs(row[ALONG_X] * my - row[ALONG_Y] * mx) > tol * size:
+            return True
+    return False
+
+
+@jitable
+def hides(scene, t, y, before):
+    """Return whether a spring that sticks may have slipped since y `before` and stick again.
+
+    So it is where load and normal force change by more within the step than is left to the limit.
+    """
+    state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
+        if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
+            continue
+        most = scene.audit.cone[c] * row[NORMAL]
+        if scene.contacts.carried[c] == 0 or most == math.inf:
+            continue
+        stretch = math.hypot(y[z], y[z + 1])
+        if most <= 0.0 or stretch == 0.0:
+            continue
+        closes = max(abs(row[RATE]) / row[DEPTH], abs(state.rate[s]) / max(state.depth[s], 1e-300))
+        moves = abs(stretch - math.hypot(before[z], before[z + 1])) + h * row[SLIP]
+        part, change = math.hypot(row[ALONG_X], row[ALONG_Y]) / most, h * closes + moves / stretch
+        if part * (1.0 + change) > 1.0 and change > EVEN:
+            return True
+    return False
+
+
+@jitable
+def follow_half(scene, context, t, y):
+    """Go on from a step's middle y as if that were committed, as far as friction is concerned."""
+    state, work, hit = scene.state, scene.work, scene.state.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, kept = work.slot[s], work.kept[s]
+        kept[0], kept[1], kept[2] = row[ALONG_X], row[ALONG_Y], counts_as(scene, s)
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        for j in range(state.memory.shape[1]):
+            work.kept[s, 3 + j] = state.memory[s, j]
+        if follows(scene, s) and work.touching[s] == 1 and work.slot[s, MODE] == SLIPS:
+            for j in range(state.memory.shape[1]):
+                state.memory[s, j] = work.memory[s, j]
+        else:
+            work.kept[s, 2] = 0.0
+
+
+@jitable
+def follow_halves(scene, context, t, y):
+    """Return how far friction at a step's end is from that of its second half, as an error."""
+    state, work, hit, worst = scene.state, scene.work, scene.state.hit, 0.0
+    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        row, kept = work.slot[s], work.kept[s]
+        for j in range(state.memory.shape[1]):
+            state.memory[s, j] = kept[3 + j]
+        size = math.hypot(kept[0], kept[1])
+        if kept[2] > 0.0 and size > 0.0 and work.touching[s] == 1:
+            off = math.hypot(row[ALONG_X] - kept[0], row[ALONG_Y] - kept[1])
+            worst = max(worst, kept[2] * off / size)
+    return worst
+
+
+def kinks_hook(context, t, h, a, b):
+    """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    if h == LOAD:
+        return load(scene, context, t, vector_at(a, n))
+    if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
+        return 0.0
+    if h == HIDES:
+        return 1.0 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0.0
+    if h == BENDS:
+        return 1.0 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0.0
+    if h == HALF:
+        follow_half(scene, context, t, vector_at(a, n))
+        return 0.0
+    if h == HALVES:
+        return follow_halves(scene, context, t, vector_at(a, n))
+    return watch(scene, context, t, vector_at(a, n), h)

@@ -1,0 +1,1 @@
+"""Programs of expressions: values, and derivatives where they are asked for."""

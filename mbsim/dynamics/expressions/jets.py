@@ -1,0 +1,81 @@
+"""Values, jets and gradients of the programs of expressions; `place_bodies` has been called.
+
+In compiled code the interpreter stands behind a door, so that what asks for a value does
+not compile it anew; plain Python runs it directly.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.extending import overload
+
+from mbsim.arrays.scene import EXPRESSION_DOOR, VALUE_DOOR
+from mbsim.core.address import call_float, call_int
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.expressions.interpreter import interpret
+from mbsim.dynamics.expressions.measures import AS_THEY_ARE
+from mbsim.dynamics.expressions.values import evaluate_program
+
+
+def run(scene, t, y, program, body, way):
+    """Leave the jet of a program in the first row of the stack."""
+    return interpret(scene, t, y, program, body, way)
+
+
+@overload(run)
+def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
+    """Give compiled code its form of `run`: a call through the door."""
+
+    def compiled(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
+        return call_int(scene.world.doors[EXPRESSION_DOOR], (scene, t, y, program, body, way))
+
+    return compiled
+
+
+def value(scene, t, y, program):
+    """Return the value of a program at time t and state y."""
+    return evaluate_program(scene, t, y, program)
+
+
+@overload(value)
+def _value(scene: Any, t: Any, y: Any, program: Any) -> Any:
+    """Give compiled code its form of `value`: a call through the door."""
+
+    def compiled(scene: Any, t: Any, y: Any, program: Any) -> Any:
+        return call_float(scene.world.doors[VALUE_DOOR], (scene, t, y, program))
+
+    return compiled
+
+
+@jitable
+def jet(scene, t, y, program):
+    """Return value, rate and second rate of a program of displacements and TIME.
+
+    In the second rate the bodies' own accelerations (of cg and angular velocity) are zero: what
+    they add is the gradient times them.
+    """
+    run(scene, t, y, program, AS_THEY_ARE, 0)
+    stack = scene.programs.stack
+    return stack[0, 0], stack[0, 1], stack[0, 2]
+
+
+@jitable
+def gradient(scene, t, y, program, body, out):
+    """Write how the rate follows from the velocity of a body's cg and its angular velocity.
+
+    `out` (6,): d rate / d (v, w), both in global axes.
+    """
+    for way in range(6):
+        run(scene, t, y, program, body, way)
+        out[way] = scene.programs.stack[0, 1]
+
+
+@jitable
+def fill_values(scene, t, y):
+    """Write the expressions of requests, which are the last programs, to the row; return 0."""
+    row = scene.rows.value[scene.rows.used[0]]
+    first = len(scene.programs.start) - 1 - len(row)
+    for k in range(len(row)):
+        row[k] = value(scene, t, y, first + k)
+    return 0

@@ -1,0 +1,118 @@
+"""How velocity measures of markers and states change with one number of the state.
+
+`body`, `way`: a body and a direction. Ways 0 to 5 displace it by a unit twist (cg along global x,
+y, z; turn about them), velocities staying as they are; ways 6 to 11 add a unit velocity of the cg
+or a unit angular velocity, global. `A_STATE` for `body` is the number of y that stands at `way`.
+With arm r of marker m on the body, theta the turn and dv, dw the added velocities:
+
+    d r = theta x r      d v_m = dv + dw x r + w x (theta x r)      d e = theta x e
+"""
+
+from __future__ import annotations
+
+from mbsim.compile_model.programs import CLOSING, SPEED, SPIN, STATE, TURNING, VELOCITY
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, sub, vector
+from mbsim.dynamics.bodies.markers import marker_arm, marker_point, marker_velocity
+from mbsim.dynamics.expressions.measures import (
+    axis_jet,
+    point_jet,
+    relative_spin,
+    relative_velocity,
+    unit,
+)
+
+#: Instead of a body: the way is a place in y.
+A_STATE = -3
+#: Ways of a body that displace it, and all.
+POSES, WAYS = 6, 12
+
+
+@jitable
+def velocity_rise(scene, m, body, way):
+    """Return the change of the velocity of marker m's origin."""
+    b = scene.markers.body[m]
+    if b != body:
+        return 0.0, 0.0, 0.0
+    arm = marker_arm(scene, m)
+    if way < POSES:
+        return cross(vector(scene.work.w[b]), cross(unit(way - 3), arm))
+    return add(unit(way - 6), cross(unit(way - 9), arm))
+
+
+@jitable
+def spin_rise(scene, m, body, way):
+    """Return the change of the angular velocity of marker m."""
+    if scene.markers.body[m] != body or way < POSES:
+        return 0.0, 0.0, 0.0
+    return unit(way - 9)
+
+
+@jitable
+def between_rise(scene, y, i, j, body, way):
+    """Return the change of P_i - P_j."""
+    if way >= POSES:
+        return 0.0, 0.0, 0.0
+    return sub(point_jet(scene, y, i, body, way)[1], point_jet(scene, y, j, body, way)[1])
+
+
+@jitable
+def along_unit(u, rise):
+    """Return the change of |u|; 0 where u is."""
+    size = norm(u)
+    return dot(u, rise) / size if size > 0.0 else 0.0
+
+
+@jitable
+def relative_rise(scene, y, i, j, k, body, way):
+    """Return the change of the velocity of i against j as seen from k's body."""
+    apart = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    rise = sub(velocity_rise(scene, i, body, way), velocity_rise(scene, j, body, way))
+    turned = cross(spin_rise(scene, k, body, way), apart)
+    w = vector(scene.work.w[scene.markers.body[k]])
+    return sub(rise, add(turned, cross(w, between_rise(scene, y, i, j, body, way))))
+
+
+@jitable
+def closing_rise(scene, y, i, j, body, way):
+    """Return the change of VR = r.v/d: (dr.v + r.dv - VR dd)/d, dd = r.dr/d."""
+    r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
+    d = norm(r)
+    if d == 0.0:
+        return 0.0
+    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    dr = between_rise(scene, y, i, j, body, way)
+    dv = sub(velocity_rise(scene, i, body, way), velocity_rise(scene, j, body, way))
+    return (dot(dr, v) + dot(r, dv) - dot(r, v) * dot(r, dr) / (d * d)) / d
+
+
+@jitable
+def slope(scene, y, code, body, way):
+    """Return how a velocity measure or a state changes; 0 for what is not one of these.
+
+    Accelerations and forces of other elements count as they are.
+    """
+    op = code[0]
+    if op == STATE:
+        return 1.0 if body == A_STATE and code[1] == way else 0.0
+    if body < 0:
+        return 0.0
+    if op == SPEED:
+        u = relative_velocity(scene, y, code[1], code[2], code[3])
+        return along_unit(u, relative_rise(scene, y, code[1], code[2], code[3], body, way))
+    if op == CLOSING:
+        return closing_rise(scene, y, code[1], code[2], body, way)
+    if op == VELOCITY:
+        e = axis_jet(scene, code[3], code[5], body, way)
+        v = relative_velocity(scene, y, code[1], code[2], code[4])
+        return dot(relative_rise(scene, y, code[1], code[2], code[4], body, way), e[0]) + dot(
+            v, e[1]
+        )
+    if op == TURNING or op == SPIN:
+        w = relative_spin(scene, code[1], code[2])
+        rise = sub(spin_rise(scene, code[1], body, way), spin_rise(scene, code[2], body, way))
+        if op == TURNING:
+            return along_unit(w, rise)
+        e = axis_jet(scene, code[3], code[4], body, way)
+        return dot(rise, e[0]) + dot(w, e[1])
+    return 0.0

@@ -1,0 +1,21 @@
+"""Slopes of the user's own states; `place_bodies` has been called."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.dynamics.expressions.jets import value
+
+
+@jitable
+def add_slopes(scene, t, y, dy):
+    """Write z' of every state into y'; return 0 or that one is no number."""
+    states = scene.states
+    for k in range(len(states.program)):
+        slope = value(scene, t, y, states.program[k])
+        dy[states.place[k]] = slope
+        if not math.isfinite(slope):
+            return NOT_FINITE
+    return 0

@@ -1,0 +1,1 @@
+"""Forces between markers, in joints, and by the user's own equations."""

@@ -1,0 +1,25 @@
+"""Weight by an acceleration that is given over time."""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.expressions.jets import value
+
+
+@jitable
+def add_weight(scene, t, y, dy):
+    """Add m g(t) to every body, and its work, with the sign turned, to what is lost; return 0.
+
+    Only of the components that are expressions: the constant ones have a potential.
+    """
+    bodies, work, lost = scene.bodies, scene.work, 0.0
+    for k in range(3):
+        program = scene.world.weight[0, k]
+        if program < 0:
+            continue
+        g = value(scene, t, y, program)
+        for b in range(len(bodies.mass)):
+            work.force[b, k] += bodies.mass[b] * g
+            lost -= bodies.mass[b] * g * work.v[b, k]
+    dy[scene.world.ledger[1]] += lost
+    return 0

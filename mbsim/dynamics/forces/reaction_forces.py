@@ -1,0 +1,309 @@
+"""Forces by expressions of reactions, settled with the friction in joints.
+
+With x all of them, scalars, components of vectors and frictions, and g(x) what their expressions
+and laws make of the reactions under x, x = g(x) is sought from x = 0. With r = g(x) - x and J
+its derivative a step is dx = -H r, H = -1 at first and J^-1 after C. G. Broyden's update
+(Math. Comp. 19 (1965) 577-593),
+
+    H <- H + (dx - H dr) (dx' H) / (dx' H dr),
+
+which ends after at most 2 n steps where g is linear (D. M. Gay, SIAM J. Numer. Anal. 16 (1979)
+623-630), whether reactions are raised or lowered by what they cause, and is the secant's for one
+unknown.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    AXIS_FORCE,
+    AXIS_TORQUE,
+    LATE,
+    LINE_FORCE,
+    LOST_POWER,
+    RUBBING,
+    SCALAR,
+)
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.core.rotation import dot, scale, sub, vector
+from mbsim.dynamics.bodies.acceleration import accelerate
+from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.constraints.equations import active_count, hold_again
+from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
+from mbsim.dynamics.expressions.jets import value
+from mbsim.dynamics.expressions.subroutines import failure_or
+from mbsim.dynamics.forces.applied import along_axis, along_line, push
+from mbsim.dynamics.forces.joint_friction import (
+    GOOD_ENOUGH,
+    JAMMED,
+    SETTLED,
+    SPEED,
+    add_force,
+    ask_law,
+    fill_slip,
+)
+from mbsim.dynamics.forces.wrenches import push_at, velocity_at
+
+# columns of `Work.late`
+SIZE, MISS, STEP, CHANGE, ROW = range(5)
+
+#: Code of forces and reactions that do not settle.
+UNSETTLED = 13
+
+#: Rounding of reactions, in parts of the largest.
+ROUNDING = 1e-15
+MOST_ROUNDS = 60
+#: Forces this many times larger than what is asked for at first agree by rounding alone.
+TOO_LARGE = 1e9
+
+
+@jitable
+def fill_direction(scene, y, f):
+    """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
+    applied, row = scene.applied, scene.work.rub[f]
+    i, j, kind = applied.i[f], applied.j[f], applied.kind[f] - LATE
+    n, rate = (0.0, 0.0, 0.0), 0.0
+    if kind == LINE_FORCE:
+        n, _, rate = along_line(scene, y, f)
+    elif kind == AXIS_FORCE:
+        n = marker_axis(scene, j, 2)
+        rate = dot(n, marker_velocity(scene, i))
+    else:
+        n, _, rate = along_axis(scene, f)
+        if applied.alone[f] == 1:
+            rate = dot(n, vector(scene.work.w[scene.markers.body[i]]))
+    for k in range(3):
+        row[k] = 0.0 if kind == AXIS_TORQUE else n[k]
+        row[3 + k] = n[k] if kind == AXIS_TORQUE else 0.0
+    row[SPEED] = rate
+
+
+@jitable
+def push_scalar(scene, f, size):
+    """Add `size` of scalar force f to its bodies."""
+    applied, row = scene.applied, scene.work.rub[f]
+    force = scale(size, (row[0], row[1], row[2]))
+    torque = scale(size, (row[3], row[4], row[5]))
+    push(scene, applied.i[f], force, torque)
+    if applied.alone[f] == 0:
+        push(scene, applied.j[f], scale(-1.0, force), scale(-1.0, torque))
+
+
+@jitable
+def push_component(scene, y, f, c, size):
+    """Add `size` of component c of vector force f to its bodies."""
+    applied, none = scene.applied, (0.0, 0.0, 0.0)
+    e = scale(size, marker_axis(scene, applied.axes[f], c % 3))
+    force, torque = (e, none) if c < 3 else (none, e)
+    p = marker_point(scene, y, applied.i[f])
+    push_at(scene, y, scene.markers.body[applied.i[f]], p, force, torque)
+    if applied.alone[f] == 0:
+        other = scene.markers.body[applied.j[f]]
+        push_at(scene, y, other, p, scale(-1.0, force), scale(-1.0, torque))
+
+
+@jitable
+def add_to_all(scene, y):
+    """Add the last step of every unknown to the bodies."""
+    late, work = scene.applied.late, scene.work.late
+    for u in range(len(late)):
+        f, c, size = late[u, 0], late[u, 1], work[u, STEP]
+        work[u, SIZE] += size
+        if c == RUBBING:
+            add_force(scene, f, size)
+        elif c == SCALAR:
+            push_scalar(scene, f, size)
+        else:
+            push_component(scene, y, f, c, size)
+
+
+@jitable
+def add_to_row(scene, f, c, size):
+    """Add an unknown to the force and torque of its row of `Work.applied`."""
+    row = scene.work.applied[f]
+    if c >= SCALAR:
+        for k in range(6):
+            row[k] += size * scene.work.rub[f, k]
+        return
+    e = marker_axis(scene, scene.applied.axes[f], c % 3)
+    at = 0 if c < 3 else 3
+    for k in range(3):
+        row[at + k] += size * e[k]
+
+
+@jitable
+def fill_rows(scene):
+    """Fill force and torque of all rows that are settled."""
+    late, work = scene.applied.late, scene.work
+    for u in range(len(late)):
+        for k in range(len(work.applied[late[u, 0]])):
+            work.applied[late[u, 0], k] = 0.0
+    for u in range(len(late)):
+        add_to_row(scene, late[u, 0], late[u, 1], work.late[u, SIZE])
+
+
+@jitable
+def measure_misses(scene, t, y):
+    """Fill by how much each unknown misses its law or expression, and the change of that.
+
+    Returns the first that is no number or -1, and the largest force, torque (over the length)
+    and reaction.
+    """
+    late, work = scene.applied.late, scene.work
+    length = scene.world.scale[0]
+    largest, reaction = 0.0, 0.0
+    for k in range(len(work.reaction)):
+        reaction = max(reaction, abs(work.reaction[k]) / (1.0 if k % 6 < 3 else length))
+    for u in range(len(late)):
+        f, row = late[u, 0], work.late[u]
+        if late[u, 1] == RUBBING:
+            asked = ask_law(scene, t, f)
+        else:
+            asked = value(scene, t, y, late[u, 2])
+        if not math.isfinite(asked):
+            work.applied[f, 0] = asked
+            return u, largest, reaction
+        miss = asked - row[SIZE]
+        row[CHANGE] = miss - row[MISS]
+        row[MISS] = miss
+        largest = max(largest, max(abs(asked), abs(row[SIZE])) / unit(scene, u))
+    return -1, largest, reaction
+
+
+@jitable
+def unit(scene, u):
+    """Return what makes a force of unknown u: the length for torques, else 1."""
+    f, c = scene.applied.late[u, 0], scene.applied.late[u, 1]
+    turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE + LATE
+    return scene.world.scale[0] if turns else 1.0
+
+
+@jitable
+def worst_unknown(scene):
+    """Return the unknown that misses most, and by how much."""
+    worst, at = 0.0, 0
+    for u in range(len(scene.applied.late)):
+        miss = abs(scene.work.late[u, MISS]) / unit(scene, u)
+        if miss > worst:
+            worst, at = miss, u
+    return at, worst
+
+
+@jitable
+def update_secant(scene):
+    """Let H take the last change of the misses to the last step."""
+    H, work = scene.work.secant, scene.work.late
+    n, below = len(H), 0.0
+    for i in range(n):
+        row = 0.0
+        for j in range(n):
+            row += H[i, j] * work[j, CHANGE]
+        work[i, ROW] = row
+        below += work[i, STEP] * row
+    if below == 0.0:
+        return
+    for j in range(n):
+        # column j of dx' H, which only later columns of H do not need
+        along = 0.0
+        for i in range(n):
+            along += work[i, STEP] * H[i, j]
+        for i in range(n):
+            H[i, j] += (work[i, STEP] - work[i, ROW]) * along / below
+
+
+@jitable
+def next_step(scene):
+    """Fill the next step, -H r."""
+    H, work = scene.work.secant, scene.work.late
+    for i in range(len(H)):
+        total = 0.0
+        for j in range(len(H)):
+            total -= H[i, j] * work[j, MISS]
+        work[i, STEP] = total
+
+
+@jitable
+def begin(scene, y):
+    """Set all unknowns to 0, H to -1, and fill the directions in which they act."""
+    late, work = scene.applied.late, scene.work
+    for u in range(len(late)):
+        f = late[u, 0]
+        if late[u, 1] == RUBBING:
+            fill_slip(scene, f)
+        elif late[u, 1] == SCALAR:
+            fill_direction(scene, y, f)
+        for k in range(work.late.shape[1]):
+            work.late[u, k] = 0.0
+        for k in range(len(late)):
+            work.secant[u, k] = -1.0 if k == u else 0.0
+
+
+@jitable
+def settle(scene, t, y, stresses):
+    """Find the unknowns and the accelerations under them; return 0 or a code."""
+    late, work = scene.applied.late, scene.work
+    most, bound = MOST_ROUNDS + 2 * len(late), 0.0
+    for k in range(most):
+        sum_reactions(scene, y)
+        take_stresses(scene, stresses)
+        fill_rows(scene)
+        broken, largest, reaction = measure_misses(scene, t, y)
+        if broken >= 0:
+            # the row of `Work.applied` tells which it is, and no contact is at fault
+            work.trouble[1] = -1
+            return NOT_FINITE
+        if k == 0:
+            bound = TOO_LARGE * max(largest, reaction)
+        at, worst = worst_unknown(scene)
+        part = SETTLED if k < most - 1 else GOOD_ENOUGH
+        if largest <= bound and worst <= max(part * largest, ROUNDING * reaction):
+            work.trouble[1] = -1
+            return 0
+        work.trouble[1] = late[at, 0]
+        if k > 0:
+            update_secant(scene)
+        next_step(scene)
+        add_to_all(scene, y)
+        hold_again(scene, t)
+    return JAMMED if scene.applied.late[at, 1] == RUBBING else UNSETTLED
+
+
+@jitable
+def lost_power(scene, y, u):
+    """Return the power of unknown u with the sign turned."""
+    applied, f, c = scene.applied, scene.applied.late[u, 0], scene.applied.late[u, 1]
+    size = scene.work.late[u, SIZE]
+    if c >= SCALAR:
+        return -size * scene.work.rub[f, SPEED]
+    i, j = applied.i[f], applied.j[f]
+    b = scene.markers.body[i]
+    other = len(scene.bodies.mass) if applied.alone[f] == 1 else scene.markers.body[j]
+    e = marker_axis(scene, applied.axes[f], c % 3)
+    if c >= 3:
+        w = scene.work.w
+        return -size * dot(e, sub(vector(w[b]), vector(w[other])))
+    p = marker_point(scene, y, i)
+    return -size * dot(e, sub(velocity_at(scene, y, b, p), velocity_at(scene, y, other, p)))
+
+
+@jitable
+def add_late(scene, t, y, dy):
+    """Add late forces and friction to the accelerations, what they dissipate to y'; return 0."""
+    late, work, lost = scene.applied.late, scene.work, 0.0
+    begin(scene, y)
+    stresses = 0
+    if active_count(scene) < len(scene.equations.program):
+        stresses = fill_stresses(scene, t, y)
+        hold_again(scene, t)
+    code = failure_or(scene, settle(scene, t, y, stresses))
+    if code != 0:
+        return code
+    for u in range(len(late)):
+        power = lost_power(scene, y, u)
+        work.applied[late[u, 0], LOST_POWER] += power
+        lost += power
+    dy[scene.world.ledger[1]] += lost
+    # bodies that no joint holds may be pushed too
+    return 0 if math.isfinite(accelerate(scene, y, dy)) else NOT_FINITE

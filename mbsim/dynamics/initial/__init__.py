@@ -1,0 +1,1 @@
+"""Before a run: assembly, velocities to start with, static equilibrium."""

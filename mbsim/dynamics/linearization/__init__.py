@@ -1,0 +1,1 @@
+"""The linearised mechanism, for implicit methods."""

@@ -1,0 +1,430 @@
+"""The linear systems of implicit methods, for a step's coefficients c1, c2, c3.
+
+Sought is d = (dx, dq, dv, dw, dz) with, for residuals r,
+
+    dv = c1 dx - r_x,   dw = B theta - rho,   c3 dz - d(z') = r_z,
+    da = c2 dx - r_a,   d(alpha) = c2/c1 B theta - r_alpha,
+
+da and d(alpha) the accelerations that the linearised mechanism gives; theta is the turn in body
+axes, dq = q (0, theta/2), r_q = q (., rho/2). A first-order method (form 0) linearises q' = q (0,
+w)/2, so that B = c1 + [w]x/2, r_a = c1 r_x + r_v and r_alpha = c1 rho + r_w. A second-order method
+(form 1) turns by the exponential, B = c1 (1 + h [w]x/2), and gives r_a and r_alpha itself.
+
+Displacements xi keep to joints and equations: what a residual asks for across them (M-orthogonal)
+is left to the projection of the states, which takes the part of the multipliers of a stabilised
+formulation of index 2. With K and D of forces and eta = E xi - e the change of velocities,
+
+    (M(c2) - K - D E) xi = M r_a - D e + what joints and equations exert.
+
+An equation that holds velocities, C v = g(t), asks for P xi + C (E xi - e) = 0, P being how C v
+changes with poses; one of accelerations, C a + s(q, v) = g(t), for
+P xi + V (E xi - e) + C da = 0 with the above da and d(alpha), V how s changes with velocities.
+Both are taken over c1 or c2, so that rows of the border have one size.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import BODY_SIZE
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import SINGULAR
+from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
+from mbsim.dynamics.constraints.equations import active_count
+from mbsim.dynamics.linearization.blocks import (
+    BLOCKS,
+    COUPLINGS,
+    eliminate,
+    factor_border,
+    solve_bodies,
+    solve_small,
+)
+
+# what is asked for at the doors of `memory_slopes`
+FACTOR, RIGHT, RECOVER = range(1, 4)
+
+
+@jitable
+def fill_turns(T, M, h):
+    """Fill B of every body."""
+    L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
+    for b in range(len(L.w)):
+        w, B = L.w[b], M.B[b]
+        for i in range(3):
+            for j in range(3):
+                B[i, j] = c1 if i == j else 0.0
+        half = 0.5 if form == 0.0 else 0.5 * h * c1
+        B[0, 1] -= half * w[2]
+        B[0, 2] += half * w[1]
+        B[1, 0] += half * w[2]
+        B[1, 2] -= half * w[0]
+        B[2, 0] -= half * w[1]
+        B[2, 1] += half * w[0]
+
+
+@jitable
+def times_rate(L, M, b, out):
+    """Write E of body b, 6 x 6: rates of spin and of the point at O by xi.
+
+    spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
+    """
+    R, B, c1, w, r = L.R[b], M.B[b], M.c[0, 0], L.spin[b], L.r[b]
+    for j in range(B.shape[0]):
+        column = (R[j, 0], R[j, 1], R[j, 2])
+        # R B R' e_j
+        u0 = B[0, 0] * column[0] + B[0, 1] * column[1] + B[0, 2] * column[2]
+        u1 = B[1, 0] * column[0] + B[1, 1] * column[1] + B[1, 2] * column[2]
+        u2 = B[2, 0] * column[0] + B[2, 1] * column[1] + B[2, 2] * column[2]
+        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        around = cross(e, (w[0], w[1], w[2]))
+        s0 = R[0, 0] * u0 + R[0, 1] * u1 + R[0, 2] * u2 + around[0]
+        s1 = R[1, 0] * u0 + R[1, 1] * u1 + R[1, 2] * u2 + around[1]
+        s2 = R[2, 0] * u0 + R[2, 1] * u1 + R[2, 2] * u2 + around[2]
+        arm = cross(e, (r[0], r[1], r[2]))
+        out[0, j], out[1, j], out[2, j] = s0, s1, s2
+        out[3, j] = c1 * arm[0] - (s1 * r[2] - s2 * r[1])
+        out[4, j] = c1 * arm[1] - (s2 * r[0] - s0 * r[2])
+        out[5, j] = c1 * arm[2] - (s0 * r[1] - s1 * r[0])
+        for i in range(3):
+            out[i, 3 + j] = 0.0
+            out[3 + i, 3 + j] = c1 if i == j else 0.0
+
+
+@jitable
+def gyration(scene, L, b, u):
+    """Return how J alpha + w x J w changes with a change u of w, in body axes."""
+    J, w = scene.bodies.inertia[b], vector(L.w[b])
+    first = cross(u, rotate(J, w))
+    second = cross(w, rotate(J, u))
+    return (first[0] + second[0], first[1] + second[1], first[2] + second[2])
+
+
+@jitable
+def add_inertia(scene, L, M, b, A):
+    """Add inertia and the wrench that joints and equations exert on body b, by xi, to A."""
+    m, c1, c2 = scene.bodies.mass[b], M.c[0, 0], M.c[0, 1]
+    R, B, J = L.R[b], M.B[b], scene.bodies.inertia[b]
+    r, f, N = vector(L.r[b]), vector(L.force[b]), vector(L.torque[b])
+    for j in range(B.shape[0]):
+        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        # a turn about O
+        own = (R[j, 0], R[j, 1], R[j, 2])
+        u = (
+            B[0, 0] * own[0] + B[0, 1] * own[1] + B[0, 2] * own[2],
+            B[1, 0] * own[0] + B[1, 1] * own[1] + B[1, 2] * own[2],
+            B[2, 0] * own[0] + B[2, 1] * own[1] + B[2, 2] * own[2],
+        )
+        spun, gyro = rotate(J, u), gyration(scene, L, b, u)
+        ratio = c2 / c1
+        local = (
+            ratio * spun[0] + gyro[0],
+            ratio * spun[1] + gyro[1],
+            ratio * spun[2] + gyro[2],
+        )
+        torque, turned, arm = rotate(R, local), cross(e, N), cross(e, r)
+        force = (m * c2 * arm[0], m * c2 * arm[1], m * c2 * arm[2])
+        moment, bend = cross(r, force), cross(arm, f)
+        for i in range(3):
+            A[i, j] += torque[i] + turned[i] + moment[i] + bend[i]
+            A[3 + i, j] += force[i]
+        # a displacement
+        push = (m * c2 * e[0], m * c2 * e[1], m * c2 * e[2])
+        moment, bend = cross(r, push), cross(e, f)
+        for i in range(3):
+            A[i, 3 + j] += moment[i] + bend[i]
+            A[3 + i, 3 + j] += push[i]
+
+
+@jitable
+def fill_matrix(scene, T, M):
+    """Fill A."""
+    P, L = T.pattern, T.linear
+    for k in range(P.count[COUPLINGS], P.count[BLOCKS]):
+        for i in range(M.A.shape[1]):
+            for j in range(M.A.shape[2]):
+                M.A[k, i, j] = 0.0
+    E, last = M.work[2], -1
+    for k in range(P.count[COUPLINGS]):
+        b, K, D, A = P.pair[k, 1], L.K[k], L.D[k], M.A[k]
+        if b != last:
+            times_rate(L, M, b, E)
+            last = b
+        for i in range(A.shape[0]):
+            for j in range(A.shape[1]):
+                A[i, j] = -K[i, j]
+            for q in range(A.shape[1]):
+                part = D[i, q]
+                if part != 0.0:
+                    for j in range(A.shape[1]):
+                        A[i, j] -= part * E[q, j]
+    for b in range(len(P.order)):
+        add_inertia(scene, L, M, b, M.A[P.place[b, b]])
+
+
+@jitable
+def ask_memory(scene, M, what, r, d):
+    """Let friction that carries numbers in y add its part, see `memory_slopes`."""
+    door = scene.world.doors[M.door[0]]
+    if door != 0:
+        call_int(door, (scene, what, r, d))
+
+
+@jitable
+def factor(scene, T, M, h):
+    """Factor the matrix for the coefficients in M.c; return 0 or a code."""
+    P, L, free = T.pattern, T.linear, scene.tree.free
+    fill_turns(T, M, h)
+    fill_matrix(scene, T, M)
+    ask_memory(scene, M, FACTOR, M.r[0], M.r[1])
+    if not eliminate(P, M, L, free):
+        return SINGULAR
+    return factor_rest(scene, T, M)
+
+
+@jitable
+def bordered(scene, k):
+    """Return the row of `Linear.column` of the k-th unknown of the border."""
+    n = active_count(scene)
+    return k if k < n else len(scene.equations.program) + k - n
+
+
+@jitable
+def border_count(scene):
+    """Return the number of unknowns of the border: equations in use, then states."""
+    return active_count(scene) + len(scene.states.program)
+
+
+@jitable
+def along_row(L, M, row, slope, x):
+    """Return a row of the border times displacements; of a state's slope with their rates."""
+    total = 0.0 * x[0, 0]
+    for b in range(len(L.w)):
+        for i in range(x.shape[1]):
+            if L.row[row, b, i] != 0.0:
+                total += L.row[row, b, i] * x[b, i]
+    if slope == 0:
+        return total
+    E = M.work[2]
+    for b in range(len(L.w)):
+        used = False
+        for i in range(x.shape[1]):
+            used = used or L.row_rate[row, b, i] != 0.0
+        if used:
+            times_rate(L, M, b, E)
+            for i in range(x.shape[1]):
+                for j in range(x.shape[1]):
+                    total += L.row_rate[row, b, i] * E[i, j] * x[b, j]
+    return total
+
+
+@jitable
+def wrench_at_cg(L, row, b):
+    """Return force and torque, in body axes, of an equation's gradient on body b about its cg."""
+    C, r = L.column[row, b], vector(L.r[b])
+    force = (C[3], C[4], C[5])
+    torque = sub((C[0], C[1], C[2]), cross(r, force))
+    return force, unrotate(L.R[b], torque)
+
+
+@jitable
+def acceleration_row(L, M, row, x):
+    """Return what displacements make of an equation's accelerations: C (c2 dx, c2/c1 B theta)."""
+    total, c2 = 0.0 * x[0, 0], M.c[0, 1]
+    ratio = c2 / M.c[0, 0]
+    for b in range(len(L.w)):
+        force, torque = wrench_at_cg(L, row, b)
+        theta = (x[b, 0], x[b, 1], x[b, 2])
+        shift = add((x[b, 3], x[b, 4], x[b, 5]), cross(theta, vector(L.r[b])))
+        turn = rotate(M.B[b], unrotate(L.R[b], theta))
+        total += c2 * dot(force, shift) + ratio * dot(torque, turn)
+    return total
+
+
+@jitable
+def level_of(scene, row):
+    """Return what an equation in use holds: 2 displacements, 1 velocities, 0 accelerations."""
+    return scene.equations.level[scene.equations.active[row]]
+
+
+@jitable
+def held_row(scene, L, M, row, x):
+    """Return what displacements make of what an equation in use holds, as a displacement."""
+    level = level_of(scene, row)
+    if level == 2:
+        return along_row(L, M, row, 0, x)
+    total = along_row(L, M, row, 1, x)
+    if level == 1:
+        return total / M.c[0, 0]
+    return (total + acceleration_row(L, M, row, x)) / M.c[0, 1]
+
+
+@jitable
+def held_residual(scene, L, M, row, r):
+    """Return what residuals make of the same."""
+    total, level = 0.0 * M.rate[0, 0], level_of(scene, row)
+    if level == 2:
+        return total
+    for b in range(len(L.w)):
+        for i in range(M.rate.shape[1]):
+            # M.rate is -e
+            total -= L.row_rate[row, b, i] * M.rate[b, i]
+    if level == 1:
+        return total / M.c[0, 0]
+    for b in range(len(L.w)):
+        force, torque = wrench_at_cg(L, row, b)
+        shift, turn = asked_of(L, M, b, r)
+        total += dot(force, shift) + dot(torque, turn)
+    return total / M.c[0, 1]
+
+
+@jitable
+def factor_rest(scene, T, M):
+    """Factor the border: what equations and states ask of the bodies."""
+    P, L = T.pattern, T.linear
+    held, size = active_count(scene), border_count(scene)
+    for k in range(size):
+        row, y = bordered(scene, k), M.answer[k]
+        for b in range(len(P.order)):
+            for i in range(y.shape[1]):
+                y[b, i] = L.column[row, b, i]
+        solve_bodies(P, M, L, scene.tree.free, y)
+    for k in range(size):
+        row = bordered(scene, k)
+        for other in range(size):
+            if k < held:
+                M.border[k, other] = held_row(scene, L, M, row, M.answer[other])
+                if L.released[k] == 1:
+                    # its multiplier is 0
+                    M.border[k, other] = 1.0 if k == other else 0.0
+                continue
+            M.border[k, other] = -along_row(L, M, row, 1, M.answer[other])
+            if other >= held:
+                M.border[k, other] -= L.slopes[k - held, other - held]
+            if other == k:
+                M.border[k, other] += M.c[0, 2]
+    factor_border(M.border, M.border_swap, size)
+    return 0
+
+
+@jitable
+def turn_residual(L, b, r):
+    """Return rho of body b: twice the vector part of conj(q) r_q, q being of unit length."""
+    q, at = L.q[b], BODY_SIZE * b + 3
+    s0, s1, s2, s3 = r[at], r[at + 1], r[at + 2], r[at + 3]
+    return (
+        2.0 * (q[0] * s1 - q[1] * s0 - q[2] * s3 + q[3] * s2),
+        2.0 * (q[0] * s2 + q[1] * s3 - q[2] * s0 - q[3] * s1),
+        2.0 * (q[0] * s3 - q[1] * s2 + q[2] * s1 - q[3] * s0),
+    )
+
+
+@jitable
+def asked_of(L, M, b, r):
+    """Return r_a and r_alpha of body b."""
+    at, form = BODY_SIZE * b, M.c[0, 3].real
+    first = M.c[0, 0] if form == 0.0 else 0.0 * M.c[0, 0]
+    rho = turn_residual(L, b, r)
+    shift = (
+        first * r[at] + r[at + 7],
+        first * r[at + 1] + r[at + 8],
+        first * r[at + 2] + r[at + 9],
+    )
+    turn = (
+        first * rho[0] + r[at + 10],
+        first * rho[1] + r[at + 11],
+        first * rho[2] + r[at + 12],
+    )
+    return shift, turn
+
+
+@jitable
+def ask_body(scene, L, M, b, r):
+    """Fill g of body b with what its residuals ask of inertia, and its rate with -e."""
+    at, m, R, arm = BODY_SIZE * b, scene.bodies.mass[b], L.R[b], vector(L.r[b])
+    rho = turn_residual(L, b, r)
+    shift, ask = asked_of(L, M, b, r)
+    spun, gyro = rotate(scene.bodies.inertia[b], ask), gyration(scene, L, b, rho)
+    torque = rotate(R, (spun[0] + gyro[0], spun[1] + gyro[1], spun[2] + gyro[2]))
+    force = (m * shift[0], m * shift[1], m * shift[2])
+    moment, slower = cross(arm, force), rotate(R, rho)
+    carried = cross(slower, arm)
+    for i in range(3):
+        M.g[b, i] = torque[i] + moment[i]
+        M.g[b, 3 + i] = force[i]
+        M.rate[b, i] = -slower[i]
+        M.rate[b, 3 + i] = carried[i] - r[at + i]
+
+
+@jitable
+def fill_right_side(scene, T, M, r):
+    """Fill g: what residuals ask of inertia and of forces by velocities."""
+    P, L = T.pattern, T.linear
+    for b in range(len(P.order)):
+        ask_body(scene, L, M, b, r)
+    for k in range(P.count[COUPLINGS]):
+        a, b, D = P.pair[k, 0], P.pair[k, 1], L.D[k]
+        for i in range(D.shape[0]):
+            for j in range(D.shape[1]):
+                M.g[a, i] += D[i, j] * M.rate[b, j]
+
+
+@jitable
+def solve_border_part(scene, T, M, r):
+    """Solve for multipliers and states, and add what they do to g, which holds displacements."""
+    P, L = T.pattern, T.linear
+    held, size = active_count(scene), border_count(scene)
+    x = M.extra[1]
+    for k in range(size):
+        row = bordered(scene, k)
+        if k < held:
+            x[k] = held_residual(scene, L, M, row, r) - held_row(scene, L, M, row, M.g)
+            if L.released[k] == 1:
+                x[k] = 0.0 * x[k]
+            continue
+        place = scene.states.place[k - held]
+        x[k] = r[place] + along_row(L, M, row, 1, M.g)
+        for b in range(len(P.order)):
+            for i in range(M.rate.shape[1]):
+                x[k] += L.row_rate[row, b, i] * M.rate[b, i]
+    solve_small(M.border, M.border_swap, size, x)
+    for k in range(size):
+        for b in range(len(P.order)):
+            for i in range(M.g.shape[1]):
+                M.g[b, i] += M.answer[k, b, i] * x[k]
+
+
+@jitable
+def write_answer(scene, T, M, r, d):
+    """Write the displacements of bodies in the layout of y."""
+    L, c1 = T.linear, M.c[0, 0]
+    for b in range(len(L.w)):
+        at, B, q = BODY_SIZE * b, M.B[b], L.q[b]
+        theta = (M.g[b, 0], M.g[b, 1], M.g[b, 2])
+        swing, rho = cross(theta, vector(L.r[b])), turn_residual(L, b, r)
+        turn = unrotate(L.R[b], theta)
+        for i in range(3):
+            d[at + i] = M.g[b, 3 + i] + swing[i]
+            d[at + 7 + i] = c1 * d[at + i] - r[at + i]
+            d[at + 10 + i] = B[i, 0] * turn[0] + B[i, 1] * turn[1] + B[i, 2] * turn[2] - rho[i]
+        e = (0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])
+        d[at + 3] = -q[1] * e[0] - q[2] * e[1] - q[3] * e[2]
+        d[at + 4] = q[0] * e[0] + q[2] * e[2] - q[3] * e[1]
+        d[at + 5] = q[0] * e[1] + q[3] * e[0] - q[1] * e[2]
+        d[at + 6] = q[0] * e[2] + q[1] * e[1] - q[2] * e[0]
+
+
+@jitable
+def solve(scene, T, M, r, d):
+    """Solve for the residual r; r and d (n,) in the layout of y."""
+    fill_right_side(scene, T, M, r)
+    ask_memory(scene, M, RIGHT, r, d)
+    solve_bodies(T.pattern, M, T.linear, scene.tree.free, M.g)
+    solve_border_part(scene, T, M, r)
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
+        # work and losses are sums of what bodies do
+        d[k] = r[k] / M.c[0, 2]
+    ask_memory(scene, M, RECOVER, r, d)
+    write_answer(scene, T, M, r, d)
+    held = active_count(scene)
+    for z in range(len(scene.states.program)):
+        d[scene.states.place[z]] = M.extra[1, held + z]
+    return 0

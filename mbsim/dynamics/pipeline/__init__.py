@@ -1,0 +1,1 @@
+"""The stages of an evaluation, and the hooks that integrators call."""

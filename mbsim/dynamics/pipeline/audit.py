@@ -1,0 +1,297 @@
+"""What a run judges itself by: sums over what has just been evaluated, now and then at its steps.
+
+At an accepted step, every so many of them and where a contact begins or ends, a *sample* is taken:
+
+* energy: B = kinetic + potential + dissipated - work of motions, all but the first two integrated
+  with the motion, against what it was at first, and against the last sample;
+* momentum: of a group of bodies that nothing outside acts on but its weight, P grows by M g dt and
+  the angular momentum about its cg not at all;
+* residuals of the constraints in use, and their rates; what slips although friction holds it;
+* friction over mu N.
+
+What a local error of e explains is e times a usual size: the energy error of a step that is wrong
+by e V in velocities is e m v V. Steps give e, the tolerance is what they may be wrong by unseen
+(`allowed`). A sample costs about as much as one evaluation of the bodies without contacts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ANEW,
+    AUDIT_EVERY,
+    AUDIT_TOL,
+    AUDIT_UNTIL,
+    BODY_SIZE,
+    CLOSED_AT,
+    CONE,
+    CONTACT_THEN,
+    DISSIPATED_FIRST,
+    ENERGY,
+    ENERGY_STEP,
+    ERROR_NOW,
+    ERRORS_ALL,
+    ERRORS_SINCE,
+    FOLD,
+    FOLD_AT,
+    FOLD_OFF,
+    FOUND_ALLOWED,
+    FOUND_ELEMENT,
+    FOUND_TIME,
+    FOUND_VALUE,
+    HELD_SLIP,
+    HITS_THEN,
+    LARGEST_ENERGY,
+    MOMENTUM,
+    OPEN_BY,
+    POSITION,
+    POTENTIAL_FIRST,
+    SPIN,
+    STEPS_ALL,
+    STEPS_SINCE,
+    TIME_THEN,
+    USUAL_ENERGY,
+    VELOCITY,
+    WORK_FIRST,
+    WORST_OPEN,
+    WORST_TIME,
+)
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
+from mbsim.dynamics.constraints.equations import (
+    MISMATCH,
+    RESIDUAL,
+    active_count,
+    is_friction,
+    is_held,
+)
+from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
+from mbsim.dynamics.pipeline.output import fill_energy
+from mbsim.dynamics.pipeline.scales import fill_squares
+
+#: Rounding of a sum of energies or momenta, over the sum of their sizes.
+ROUNDING = 1e-13
+#: Rounding of constraints' residuals and rates, over their units.
+CLOSED = 1e-10
+#: What rounding makes of velocities across a fold behind it, over the usual ones, for each loop.
+PASSED = 1e-8
+#: Rounding of a force whose friction is looked at, over its part along the normal.
+CONE_ROUNDING = 1e-12
+#: Bodies of the largest model that is sampled where contacts begin and end: of many, one always
+#: does.
+FEW = 16
+# columns of `Audit.sums`: mass; sums of m d and m u; of m d x u + J w; of m |u| and of the size of
+# angular momentum; d and u are from the group's first body
+MASS, SHIFT, FLOW, TURN, SPEEDS, SPINS = 0, 1, 4, 7, 10, 11
+
+
+@jitable
+def note(scene, row, value, allowed, t, element):
+    """Keep a value if it is larger over what is allowed than those before."""
+    found = scene.audit.found[row]
+    if not value * found[FOUND_ALLOWED] <= found[FOUND_VALUE] * allowed:
+        found[FOUND_VALUE], found[FOUND_ALLOWED] = value, allowed
+        found[FOUND_TIME], found[FOUND_ELEMENT] = t, element
+
+
+@jitable
+def hardest(scene):
+    """Return the contact that presses hardest, their number for none."""
+    hit, largest, found = scene.work.hit, 0.0, len(scene.contacts.id)
+    for k in range(hit[len(hit) - 1]):
+        force = scene.work.slot[hit[k], NORMAL]
+        if force >= largest:
+            largest, found = force, contact_of(scene, hit[k])
+    return found
+
+
+@jitable
+def examine_energy(scene, t, y, steps, local):
+    """Compare the energy with what it was; `local` is the sum of local errors of those steps."""
+    audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
+    fill_energy(scene, y, energy)
+    total = energy[0] + energy[1] + energy[2] - energy[3]
+    contact, none = hardest(scene), len(scene.contacts.id)
+    if tally[ANEW] == 1.0:
+        tally[CLOSED_AT] = total - tally[OPEN_BY]
+        tally[POTENTIAL_FIRST], tally[DISSIPATED_FIRST] = energy[1], energy[2]
+        tally[WORK_FIRST] = energy[3]
+        tally[CONTACT_THEN] = contact
+        return
+    tally[LARGEST_ENERGY] = max(
+        max(tally[LARGEST_ENERGY], energy[0]),
+        max(
+            abs(energy[1] - tally[POTENTIAL_FIRST]),
+            max(abs(energy[2] - tally[DISSIPATED_FIRST]), abs(energy[3] - tally[WORK_FIRST])),
+        ),
+    )
+    open_by = total - tally[CLOSED_AT]
+    change = open_by - tally[OPEN_BY]
+    size = max(tally[LARGEST_ENERGY], tally[USUAL_ENERGY])
+    rounding = ROUNDING * (energy[0] + abs(energy[1]) + abs(energy[2]) + abs(energy[3]))
+    # a contact that ended since counts still
+    who = contact if contact < none else int(tally[CONTACT_THEN])
+    tol = audit.plan[AUDIT_TOL]
+    note(scene, ENERGY_STEP, abs(change), size * (local + steps * tol) + rounding, t, who)
+    errors = tally[ERRORS_ALL] + tol * math.sqrt(tally[STEPS_ALL])
+    rounding *= math.sqrt(tally[STEPS_ALL])
+    note(scene, ENERGY, abs(open_by), size * errors + rounding, t, who)
+    row = audit.contact[who]
+    row[0] += change
+    if abs(change) > abs(row[1]):
+        row[1], row[2] = change, t
+    if abs(open_by) > abs(tally[WORST_OPEN]):
+        tally[WORST_OPEN], tally[WORST_TIME] = open_by, t
+    tally[OPEN_BY], tally[CONTACT_THEN] = open_by, contact
+
+
+@jitable
+def examine_momentum(scene, t, y, steps, local):
+    """Compare the momentum of groups that ground does not touch with what their weight gives."""
+    audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
+    sums = audit.sums
+    for g in range(len(sums)):
+        if audit.tied[g] == 0:
+            for k in range(sums.shape[1]):
+                sums[g, k] = 0.0
+    for b in range(nb):
+        g = scene.scales.group[b]
+        if audit.tied[g] == 1:
+            continue
+        at, first, m, row = BODY_SIZE * b, BODY_SIZE * audit.first[g], bodies.mass[b], sums[g]
+        d = (y[at] - y[first], y[at + 1] - y[first + 1], y[at + 2] - y[first + 2])
+        u = (y[at + 7] - y[first + 7], y[at + 8] - y[first + 8], y[at + 9] - y[first + 9])
+        spin = rotate(bodies.inertia[b], (y[at + 10], y[at + 11], y[at + 12]))
+        turn = add(scale(m, cross(d, u)), rotate(scene.work.R[b], spin))
+        row[MASS] += m
+        for k in range(3):
+            row[SHIFT + k] += m * d[k]
+            row[FLOW + k] += m * u[k]
+            row[TURN + k] += turn[k]
+        row[SPEEDS] += m * norm(u)
+        row[SPINS] += m * norm(d) * norm(u) + norm(spin)
+    hit, graphics = scene.work.hit, scene.graphics
+    for k in range(hit[len(hit) - 1]):
+        gi, gj = sides(scene, hit[k])
+        bi, bj = graphics.body[gi], graphics.body[gj]
+        if bi == nb and bj < nb:
+            sums[scene.scales.group[bj], SPINS + 1] = 1.0
+        elif bj == nb and bi < nb:
+            sums[scene.scales.group[bi], SPINS + 1] = 1.0
+    dt, gravity = t - audit.tally[TIME_THEN], vector(scene.world.gravity)
+    errors = local + steps * audit.plan[AUDIT_TOL]
+    for g in range(len(sums)):
+        if audit.tied[g] == 1:
+            continue
+        row, then = sums[g], audit.momentum[g]
+        length, speed = scene.scales.length[g], math.sqrt(scene.work.squares[g])
+        first, m, touched = BODY_SIZE * audit.first[g], row[MASS], row[SPINS + 1]
+        v = (y[first + 7], y[first + 8], y[first + 9])
+        flow = vector(row[FLOW : FLOW + 3])
+        P = add(scale(m, v), flow)
+        L = sub(
+            vector(row[TURN : TURN + 3]),
+            scale(1.0 / m, cross(vector(row[SHIFT : SHIFT + 3]), flow)),
+        )
+        if then[6] == 0.0 and touched == 0.0 and audit.tally[ANEW] == 0.0:
+            missed = sub(sub(P, vector(then[0:3])), scale(m * dt, gravity))
+            size = m * norm(v) + row[SPEEDS]
+            allowed = errors * (size + m * speed) + ROUNDING * (size + m * dt * norm(gravity))
+            note(scene, MOMENTUM, norm(missed), allowed, t, audit.first[g])
+            turned = norm(sub(L, vector(then[3:6])))
+            size = row[SPINS] + m * length * speed
+            note(scene, SPIN, turned, errors * size + ROUNDING * size, t, audit.first[g])
+        for k in range(3):
+            then[k], then[3 + k] = P[k], L[k]
+        then[6] = touched
+
+
+@jitable
+def own_time(scene, e):
+    """Return L/V of the bodies that equation e holds."""
+    eq, k = scene.equations, scene.equations.first[e]
+    b = scene.markers.body[eq.i[k]]
+    if b == len(scene.bodies.mass):
+        b = scene.markers.body[eq.j[k]]
+    # an expression alone may begin at ground
+    g = scene.scales.group[b] if b < len(scene.bodies.mass) else 0
+    return scene.scales.length[g] / math.sqrt(scene.work.squares[g])
+
+
+@jitable
+def examine_equations(scene, t):
+    """Look at the residuals of the equations in use, and at what slips although it is held."""
+    eq, sweep = scene.equations, scene.sweep
+    allowed = scene.audit.plan[AUDIT_TOL] + CLOSED
+    for r in range(active_count(scene)):
+        e = eq.active[r]
+        rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e] * own_time(scene, e)
+        if is_friction(scene, e):
+            note(scene, HELD_SLIP, rate, allowed, t, e)
+            continue
+        if not is_held(scene, e, t):
+            continue
+        if eq.level[e] == 2:
+            note(scene, POSITION, abs(sweep.rate[e, RESIDUAL]) / eq.unit[e], allowed, t, e)
+        if eq.level[e] >= 1:
+            note(scene, VELOCITY, rate, allowed, t, e)
+
+
+@jitable
+def examine_fold(scene, t):
+    """Look at how far velocities were off when a fold was left behind."""
+    quality, tol = scene.sweep.quality, scene.audit.plan[AUDIT_TOL]
+    count = 0
+    for e in range(len(scene.sweep.released)):
+        count += scene.sweep.released[e]
+    note(scene, FOLD, quality[FOLD_OFF], tol + PASSED * count, t, int(quality[FOLD_AT]))
+
+
+@jitable
+def examine_friction(scene, t):
+    """Look whether friction is within its cone at every incident."""
+    audit, work, hit = scene.audit, scene.work, scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        c = contact_of(scene, s)
+        if audit.cone[c] == math.inf:
+            continue
+        force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, 4:7])
+        normal = dot(force, n)
+        rubs = norm(sub(force, scale(normal, n)))
+        most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
+        row = audit.contact[c]
+        row[3] = max(row[3], most)
+        if rubs > most + CONE_ROUNDING * abs(normal):
+            note(scene, CONE, (rubs - most) / max(row[3], rubs), audit.plan[AUDIT_TOL], t, c)
+
+
+@jitable
+def examine(scene, t, h, y):
+    """Take a sample at an accepted step that is due for one; of no length, h = 0, begin anew."""
+    audit, tally = scene.audit, scene.audit.tally
+    hits = scene.work.hit[len(scene.work.hit) - 1]
+    if h == 0.0:
+        tally[ANEW] = 1.0
+    else:
+        tally[STEPS_SINCE] += 1.0
+        tally[ERRORS_SINCE] += tally[ERROR_NOW]
+        due = tally[STEPS_SINCE] >= audit.plan[AUDIT_EVERY]
+        due = due or t + 1e-9 * h >= audit.plan[AUDIT_UNTIL]
+        if not due and (hits == tally[HITS_THEN] or len(scene.bodies.mass) > FEW):
+            return
+    steps, local = tally[STEPS_SINCE], tally[ERRORS_SINCE]
+    tally[STEPS_ALL] += steps
+    tally[ERRORS_ALL] += local
+    tally[STEPS_SINCE] = tally[ERRORS_SINCE] = 0.0
+    fill_squares(scene, y)
+    for g in range(len(scene.work.squares)):
+        energy = scene.scales.mass[g] * scene.work.squares[g]
+        tally[USUAL_ENERGY] = max(tally[USUAL_ENERGY], energy)
+    examine_energy(scene, t, y, steps, local)
+    examine_momentum(scene, t, y, steps, local)
+    if tally[ANEW] == 0.0:
+        examine_equations(scene, t)
+        examine_friction(scene, t)
+    tally[HITS_THEN], tally[TIME_THEN], tally[ANEW] = hits, t, 0.0

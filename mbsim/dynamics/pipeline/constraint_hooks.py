@@ -1,0 +1,148 @@
+"""What joints are asked for, behind one door: accelerations, projection, reactions, assembly."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ACCELERATE,
+    ALONG_JOINTS,
+    CHOOSE,
+    DISPLACE,
+    DRIFT,
+    DRIFTER,
+    FOLD_AT,
+    FOLD_BEGINS,
+    FOLD_OFF,
+    FOLD_POWER,
+    FRICTION_DOOR,
+    KEEP,
+    MATRIX,
+    NEAR_FOLD,
+    PROJECT,
+    REACT,
+    SEAT,
+    SPEED_UP,
+)
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.core.rotation import add, cross, dot, vector
+from mbsim.dynamics.constraints.equations import (
+    MISMATCH,
+    active_count,
+    fill_matrix,
+    hold,
+    passes_fold,
+    power_of_equations,
+)
+from mbsim.dynamics.constraints.projection import (
+    displace,
+    prepare_equations,
+    project,
+    push,
+    speed_up,
+)
+from mbsim.dynamics.constraints.reactions import fill_reactions
+from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_choice, use_all
+from mbsim.dynamics.constraints.tree import prepare, write_accelerations
+from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
+from mbsim.dynamics.forces.dry_friction import show_held
+
+
+@jitable
+def constrain(scene, t, y, dy):
+    """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
+    prepare(scene, y)
+    hold(scene, t, y)
+    if scene.world.doors[FRICTION_DOOR] != 0:
+        # friction follows from reactions, and these from friction
+        code = call_int(scene.world.doors[FRICTION_DOOR], (scene, t, y, dy))
+        if code != 0:
+            return code
+    show_held(scene)
+    total = write_accelerations(scene, dy)
+    ledger = scene.world.ledger[0]
+    if ledger >= 0:
+        passing = passes_fold(scene, t)
+        power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
+        dy[ledger] = power
+    return 0 if math.isfinite(total) else NOT_FINITE
+
+
+@jitable
+def hold_all(scene, t, y):
+    """Fill accelerations and multipliers as if nothing was released: reactions are those."""
+    quality = scene.sweep.quality
+    begins = quality[FOLD_BEGINS]
+    quality[FOLD_BEGINS] = math.inf
+    hold(scene, t, y)
+    quality[FOLD_BEGINS] = begins
+
+
+@jitable
+def return_to_equations(scene, t, y):
+    """Bring y back onto what was released while a loop passed a fold; note how far off that was.
+
+    What was foreseen is off along the constraints as much as across them, which is seen here.
+    """
+    sweep, scales, quality, eq = scene.sweep, scene.scales, scene.sweep.quality, scene.equations
+    project(scene, t, y, 1)
+    quality[FOLD_OFF], worst = 0.0, 0.0
+    for p in range(len(scene.tree.body)):
+        g, D, r = scales.group[scene.tree.body[p]], sweep.answer[p], vector(sweep.arm[p])
+        shift = add((D[3], D[4], D[5]), cross((D[0], D[1], D[2]), r))
+        off = math.sqrt(dot(shift, shift) / scene.work.squares[g])
+        quality[FOLD_OFF] = max(quality[FOLD_OFF], off)
+    for k in range(active_count(scene)):
+        e = eq.active[k]
+        rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e]
+        if sweep.released[e] == 1 and rate >= worst:
+            worst, quality[FOLD_AT] = rate, e
+    prepare_equations(scene, t, y)
+    quality[NEAR_FOLD] = 1.0
+
+
+@jitable
+def serve(scene, what, t, y, dy):
+    """Do what is asked for at the door of joints; return 0 or a code.
+
+    The last four are for assembly, in Python: residuals and matrix of all equations at y; bodies
+    displaced, or sped up, by the multipliers as they stand; the choice of equations.
+    """
+    if what == ACCELERATE:
+        return constrain(scene, t, y, dy)
+    if what == SEAT:
+        quality = scene.sweep.quality
+        drift, drifter = quality[DRIFT], quality[DRIFTER]
+        project(scene, t, y, 1)
+        quality[DRIFT], quality[DRIFTER] = drift, drifter
+    elif what == PROJECT or what == ALONG_JOINTS:
+        project(scene, t, y, 1 if what == PROJECT else 2)
+    elif what == REACT:
+        if passes_fold(scene, t):
+            hold_all(scene, t, y)
+        fill_reactions(scene, t, y)
+    elif what == KEEP:
+        code = keep_choice(scene, t, y)
+        if code == LEFT:
+            return_to_equations(scene, t, y)
+        return code
+    elif what == MATRIX:
+        use_all(scene, 0)
+        prepare_equations(scene, t, y)
+        fill_matrix(scene)
+        for e in range(active_count(scene)):
+            fill_size(scene, e)
+    elif what == CHOOSE:
+        prepare_equations(scene, t, y)
+        choose(scene, t, y)
+    elif what == DISPLACE:
+        push(scene)
+        displace(scene, y)
+        seat_all(scene, y)
+    elif what == SPEED_UP:
+        push(scene)
+        speed_up(scene, y)
+        carry_all(scene, y)
+    return 0

@@ -1,0 +1,99 @@
+"""The pipeline, the file to read first: y' = f(t, y) in stages, each one call."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ACCELERATE,
+    APPLIED_DOOR,
+    BODY_SIZE,
+    DRY_DOOR,
+    HOLD_AGAIN,
+    JOINTS_DOOR,
+    NEAR_FOLD,
+    NOW,
+    RIGID_DOOR,
+    SEAT,
+    SHARE_HELD,
+    WITHIN,
+)
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.dynamics.bodies.acceleration import accelerate
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.contact.detection import find_contacts
+from mbsim.dynamics.contact.forces import add_contact, contact_of
+
+
+@jitable
+def add_gravity(scene):
+    """Start the forces of every body with its weight."""
+    bodies, work, g = scene.bodies, scene.work, scene.world.gravity
+    for b in range(len(bodies.mass) + 1):
+        mass = bodies.mass[b] if b < len(bodies.mass) else 0.0
+        for k in range(3):
+            work.force[b, k] = mass * g[k]
+            work.torque[b, k] = 0.0
+        work.noise[b, 0] = work.noise[b, 1] = 0.0
+
+
+@jitable
+def add_contacts(scene, t, h, y, dy):
+    """Add the forces of every touching slot; return 0 or a law's code."""
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
+        dy[k] = 0.0
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        code = add_contact(scene, t, h, y, dy, hit[k])
+        if code != 0:
+            scene.work.trouble[1] = contact_of(scene, hit[k])
+            return code
+    return 0
+
+
+@jitable
+def evaluate(scene, t, h, y, dy):
+    """Fill dy = f(t, y), `h` after the committed state; return 0 or why it cannot be."""
+    # where things are
+    place_bodies(scene, y)
+    if scene.sweep.quality[NEAR_FOLD] == 1.0:
+        # near a position in which a loop can fold, equations are sound only where they hold
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, SEAT, t, y, dy))
+
+    # who touches whom
+    code = find_contacts(scene, y)
+    if code != 0:
+        return code
+
+    # what pushes
+    add_gravity(scene)
+    code = add_contacts(scene, t, h, y, dy)
+    if code != 0:
+        return code
+
+    if scene.world.doors[APPLIED_DOOR] != 0:
+        code = call_int(scene.world.doors[APPLIED_DOOR], (scene, t, y, dy))
+        if code != 0:
+            return code
+
+    # what follows
+    if not math.isfinite(accelerate(scene, y, dy)):
+        return NOT_FINITE
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        return call_int(scene.world.doors[JOINTS_DOOR], (scene, ACCELERATE, t, y, dy))
+    return 0
+
+
+@jitable
+def evaluate_past(scene, t, h, y, dy):
+    """Do the same at a point within the last step, where friction knows what it did before it."""
+    scene.world.past[0] = WITHIN
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, y))
+    code = evaluate(scene, t, h, y, dy)
+    if code == 0 and scene.world.doors[RIGID_DOOR] != 0:
+        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, y))
+    scene.world.past[0] = NOW
+    return code

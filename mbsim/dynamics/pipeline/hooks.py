@@ -1,0 +1,250 @@
+"""The mechanism as a `Problem`: its hooks behind addresses, all given one packed `Scene`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from mbsim.arrays.scene import (
+    ALONG_JOINTS,
+    BODY_SIZE,
+    DRY_DOOR,
+    ERROR_NOW,
+    EVALUATE_DOOR,
+    FOLD_HALT,
+    FOLDS,
+    HELD_OTHERWISE,
+    HOLD_AGAIN,
+    JOINTS_DOOR,
+    KEEP,
+    LISTINGS,
+    NEAR_DOOR,
+    PROJECT,
+    RIGID_DOOR,
+    SHARE_HELD,
+    Scene,
+)
+from mbsim.core import jit
+from mbsim.core.address import call_int, pack, vector_at, view
+from mbsim.core.problem import (
+    ALONG,
+    BEGIN_ANEW,
+    BY_CHECK,
+    FRICTION_ALONE,
+    HOOK,
+    IMPACTS_ALONE,
+    Problem,
+)
+from mbsim.dynamics.contact.broadphase import follow
+from mbsim.dynamics.contact.points import commit, first_depth, reversal, watch_peaks
+from mbsim.dynamics.events.stability import stable_step
+from mbsim.dynamics.events.step_limits import longest_step
+from mbsim.dynamics.pipeline.audit import examine, examine_fold
+from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
+from mbsim.dynamics.pipeline.output import (
+    blame,
+    friction_left,
+    impact_left,
+    no_room,
+    scaled_error,
+    write_row,
+)
+from mbsim.dynamics.pipeline.scales import take_speeds
+
+PAUSE_FOR_EVENTS = 2.0
+STEP_IS_STALE = 4.0
+
+
+def _rhs(context, t, h, a, b):
+    """f(t, y)."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = evaluate(scene, t, h, vector_at(a, n), vector_at(b, n))
+    return float(code)
+
+
+def _project(context, t, h, a, b):
+    """Quaternions back to unit length, and bodies onto their constraints."""
+    scene = view(context, Scene)
+    y = vector_at(a, scene.rows.y.shape[1])
+    for body in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * body + 3
+        length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
+        for k in range(4):
+            y[at + k] /= length
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        what = ALONG_JOINTS if h == ALONG else PROJECT
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, what, t, y, y))
+    return 0.0
+
+
+def _norm(context, t, h, a, b):
+    """The scaled local error."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    if h == IMPACTS_ALONE:
+        return impact_left(scene, t, vector_at(a, n), vector_at(b, n))
+    if h == FRICTION_ALONE:
+        return friction_left(scene, vector_at(a, n), vector_at(b, n), False)
+    error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
+    if h > 0.0:
+        scene.audit.tally[ERROR_NOW] = error
+    return error
+
+
+def _check(context, t, h, a, b):
+    """The guard of first penetration."""
+    scene = view(context, Scene)
+    return first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
+
+
+def _commit(context, t, h, a, b):
+    """The incident table, events and peaks.
+
+    Bit 1: y changed, bit 2: empty the events first, bit 3: a stable step is to be found anew.
+    """
+    scene = view(context, Scene)
+    listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
+    if scene.world.doors[RIGID_DOOR] != 0:
+        # before equations may be chosen anew
+        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, a))
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
+        if code > 0:
+            return -float(code)
+    y = vector_at(a, scene.rows.y.shape[1])
+    take_speeds(scene, y, scene.state.fastest)
+    changed = commit(scene, t, h, y)
+    examine(scene, t, h, y)
+    passes = scene.sweep.quality[FOLDS] == 1.0
+    left = passed and not passes
+    if left:
+        examine_fold(scene, t)
+    word = (1.0 if changed > 0 or left else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    if changed == HELD_OTHERWISE or passed != passes:
+        word += BEGIN_ANEW
+    # pairs that were not near, and so not counted, are now
+    return word + (STEP_IS_STALE if scene.log.counters[LISTINGS] > listings else 0.0)
+
+
+def _look(context, t, h, a, b):
+    """Peaks at an inner point of a step."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    code = evaluate_past(scene, t, h, vector_at(a, n), vector_at(b, n))
+    if code == 0:
+        watch_peaks(scene, t)
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
+    return float(code)
+
+
+def _inner(context, t, h, a, b):
+    """Where in the step a contact turned from closing to opening."""
+    return reversal(view(context, Scene), h)
+
+
+def _limit(context, t, h, a, b):
+    """The step that lets nothing pass through anything."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    halt = scene.sweep.quality[FOLD_HALT]
+    return min(longest, halt - t) if halt > t else longest
+
+
+def _output(context, t, h, a, b):
+    """A row of results at an interpolated, projected state."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    f = vector_at(b, n)
+    code = evaluate_past(scene, t, h, vector_at(a, n), f)
+    if code != 0:
+        return -float(code)
+    full = write_row(scene, t, h, vector_at(a, n), f)
+    if scene.world.doors[DRY_DOOR] != 0:
+        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
+    if scene.users.failed[0] != 0:
+        # a subroutine that only a request asks for
+        return -float(scene.users.failed[0])
+    return 1.0 if full else 0.0
+
+
+def _reject(context, t, h, a, b):
+    """Count a rejected step by reason and contact."""
+    scene = view(context, Scene)
+    reason = int(h)
+    contact = scene.work.trouble[1] if reason == BY_CHECK else blame(scene)
+    row = contact if contact >= 0 else len(scene.contacts.id)
+    scene.work.trouble[1] = contact
+    scene.log.rejections[row, reason] += 1
+    return 0.0
+
+
+def _stable(context, t, h, a, b):
+    """The step for a method without error estimate, h being the tolerance."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return stable_step(scene, h, vector_at(a, n), vector_at(b, n))
+
+
+def _follow(context, y):
+    """The lists of near pairs; behind an address so that small scenes need not compile it."""
+    scene = view(context, Scene)
+    follow(scene, vector_at(y, scene.rows.y.shape[1]))
+    return 0
+
+
+_FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
+_HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
+
+
+def needs_expressions(scene: Scene) -> bool:
+    """Return whether there are applied forces, expressions or followed angles."""
+    return bool(len(scene.applied.kind) or len(scene.programs.start) > 1 or len(scene.angles.i))
+
+
+def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
+    """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
+
+    Only a method without error estimate, `fixed_step`, needs the last hook.
+    """
+    table = pack(scene)
+    hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
+    if len(scene.angles.i) > 0:
+        from mbsim.dynamics.pipeline.force_hooks import limit_turn
+
+        hooks = tuple(limit_turn if hook is _limit else hook for hook in hooks)
+    addresses = [jit.address(hook, HOOK) for hook in hooks]
+    if needs_expressions(scene):
+        # only then: what they are made of need not be imported
+        from mbsim.dynamics.pipeline.force_hooks import open_expressions
+
+        open_expressions(scene)
+    if scene.contacts.rigid.any():
+        from mbsim.dynamics.pipeline.force_hooks import open_held
+
+        open_held(scene)
+    if len(scene.crowds.contact) > 0:
+        scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
+    if len(scene.tree.body) > 0:
+        from mbsim.dynamics.pipeline.joint_hooks import open_joints
+
+        open_joints(scene)
+    problem = Problem(int(table.ctypes.data), *addresses)
+    if len(scene.sensors.id) > 0:
+        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
+
+        arrive = jit.address(arrive_hook, HOOK)
+        # where none is located, steps need not be looked into
+        happens = jit.address(happens_hook, HOOK) if scene.sensors.located.any() else 0
+        problem = problem._replace(happens=happens, arrive=arrive)
+    if len(scene.kinks.program) > 0 and not fixed_step:
+        from mbsim.dynamics.events.switching import kinks_hook
+
+        scene.world.doors[EVALUATE_DOOR] = problem.rhs
+        scene.state.frozen[0] = int(len(scene.work.idle) > 0)
+        problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
+    return problem, table

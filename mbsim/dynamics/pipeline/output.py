@@ -1,0 +1,388 @@
+"""One output row: the state, and the forces and accelerations that follow from it."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    BODY_SIZE,
+    CONTACT_COLUMNS,
+    DRIFT,
+    INC_COUPLE,
+    INC_DEPTH,
+    INC_FROZEN,
+    INC_GRAPHIC_I,
+    INC_GRAPHIC_J,
+    INC_HELD,
+    INC_KIND,
+    INC_MEMORY,
+    INC_NORMAL,
+    INC_POINT,
+    INC_REGION,
+    INC_SHARE,
+    INC_SLOT,
+    INC_STEP,
+    INC_TANGENT,
+    INC_TOUCHES,
+    INC_X,
+    JOINTS_DOOR,
+    LIVE,
+    REACT,
+    STORED_ENERGY,
+    VALUES_DOOR,
+)
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
+from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.contact.forces import (
+    ALONG_X,
+    ALONG_Y,
+    DEPTH,
+    FORCE,
+    HELD,
+    MODE,
+    NORMAL,
+    RATE,
+    SLIP,
+    STORED,
+    TORQUE,
+    UNIT,
+    contact_of,
+    patch,
+    sides,
+    whole_of,
+)
+from mbsim.dynamics.contact.points import effective_mass
+from mbsim.dynamics.pipeline.scales import fill_squares
+from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.laws.catalog import BRANCHES, STICK
+from mbsim.laws.catalog import SLIP as SLIDING
+
+#: The least speed of an impact, over its group's V, that it is judged by, slower ones having little
+#: of the energy; what counts least of its own speed.
+FAST, SLIGHT = 0.2, 5e-4
+
+
+@jitable
+def fill_energy(scene, y, row):
+    """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
+    bodies = scene.bodies
+    kinetic, potential, dissipated = 0.0, 0.0, 0.0
+    for b in range(len(bodies.mass)):
+        at = BODY_SIZE * b
+        v = (y[at + 7], y[at + 8], y[at + 9])
+        w = (y[at + 10], y[at + 11], y[at + 12])
+        kinetic += 0.5 * (bodies.mass[b] * dot(v, v) + dot(w, rotate(bodies.inertia[b], w)))
+        potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        potential += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], HELD]
+        dissipated -= scene.work.slot[hit[k], HELD]
+    for c in range(len(scene.contacts.id)):
+        dissipated += y[len(y) - len(scene.contacts.id) + c]
+    for f in range(len(scene.applied.kind)):
+        potential += scene.work.applied[f, STORED_ENERGY]
+    work, damped = scene.world.ledger[0], scene.world.ledger[1]
+    if damped >= 0:
+        dissipated += y[damped]
+    row[0], row[1], row[2] = kinetic, potential, dissipated
+    row[3] = y[work] if work >= 0 else 0.0
+
+
+@jitable
+def fill_contacts(scene, y, row):
+    """Write net force, net torque about I's cg, deepest depth, fastest slip, incidents, area."""
+    work = scene.work
+    for k in range(len(row)):
+        row[k] = 0.0
+    for h in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[h]
+        at = CONTACT_COLUMNS * contact_of(scene, s)
+        values, point = work.slot[s], work.points[s]
+        gi = sides(scene, s)[0]
+        force = vector(values[FORCE : FORCE + 3])
+        arm = sub((point[1], point[2], point[3]), position(scene, y, scene.graphics.body[gi]))
+        moment = cross(arm, force)
+        for k in range(3):
+            row[at + k] += force[k]
+            row[at + 3 + k] += moment[k] + values[TORQUE + k]
+        row[at + 6] = max(row[at + 6], values[DEPTH])
+        row[at + 7] = max(row[at + 7], values[SLIP])
+        row[at + 8] += 1.0
+        row[at + 9] += patch(scene, s)
+
+
+@jitable
+def fill_incidents(scene, h, y):
+    """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
+    rows, work, state = scene.rows, scene.work, scene.state
+    first = rows.used[1]
+    k = first
+    for place in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[place]
+        row = rows.incidents[k]
+        at = scene.slots.x[s]
+        row[INC_SLOT] = s
+        for j in range(3):
+            row[INC_POINT + j] = work.points[s, 1 + j]
+            row[INC_NORMAL + j] = work.points[s, 4 + j]
+            row[INC_COUPLE + j] = work.points[s, COUPLE + j]
+            row[INC_TANGENT + j] = work.t[s, j]
+            row[INC_X + j] = y[at + j] if at >= 0 else 0.0
+        row[INC_DEPTH] = work.slot[s, DEPTH]
+        # what its force followed from besides y: see pipeline.replay
+        pair = scene.slots.pair[s]
+        row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
+        row[INC_FROZEN] = 1.0 if scene.state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
+        row[INC_TOUCHES] = scene.pairs.touches[pair]
+        row[INC_KIND] = scene.pairs.kind[pair]
+        row[INC_GRAPHIC_I] = scene.pairs.graphic_i[pair]
+        row[INC_GRAPHIC_J] = scene.pairs.graphic_j[pair]
+        for j in range(state.before.shape[1]):
+            row[INC_MEMORY + j] = state.before[s, j]
+        if len(row) > INC_MEMORY + state.before.shape[1]:
+            at = len(row) - INC_REGION
+            for j in range(INC_REGION):
+                row[at + j] = 0.0
+            if whole_of(scene, s) > 0.0:
+                numbers = work.points[s + 1]
+                row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
+                row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
+        rigid = scene.contacts.rigid[contact_of(scene, s)]
+        if rigid == 1 and work.slot[s, MODE] == STICK:
+            # what equations hold, the law can tell only from here
+            for j in range(2):
+                row[INC_HELD + j] = work.held[s, j]
+        k += 1
+    rows.used[1] = k
+    return k - first
+
+
+@jitable
+def write_row(scene, t, h, y, f):
+    """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
+    rows, work = scene.rows, scene.work
+    k = rows.used[0]
+    rows.time[k] = t
+    for j in range(len(y)):
+        rows.y[k, j] = y[j]
+    for b in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * b
+        alpha = rotate(work.R[b], (f[at + 10], f[at + 11], f[at + 12]))
+        for j in range(3):
+            rows.accel[k, 6 * b + j] = f[at + 7 + j]
+            rows.accel[k, 6 * b + 3 + j] = alpha[j]
+    fill_contacts(scene, y, rows.contact[k])
+    if scene.world.doors[JOINTS_DOOR] != 0:
+        call_int(scene.world.doors[JOINTS_DOOR], (scene, REACT, t, y, f))
+    for j in range(len(scene.applied.kind)):
+        for c in range(6):
+            rows.applied[k, 6 * j + c] = work.applied[j, c]
+    for j in range(len(work.reaction)):
+        rows.joint[k, j] = work.reaction[j]
+    if scene.world.doors[VALUES_DOOR] != 0:
+        call_int(scene.world.doors[VALUES_DOOR], (scene, t, y))
+    fill_energy(scene, y, rows.energy[k])
+    rows.incident_count[k] = fill_incidents(scene, h, y)
+    rows.used[0] = k + 1
+    return k + 1 >= len(rows.time) or no_room(scene)
+
+
+@jitable
+def no_room(scene):
+    """Return whether another step or row could overflow the tables of events and incidents."""
+    rows, pairs, slots = scene.rows, scene.pairs, 0
+    room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
+    if room >= 2 * len(scene.slots.pair):
+        return False
+    for k in range(pairs.count[LIVE]):
+        slots += pairs.last[pairs.live[k]] - pairs.slot[pairs.live[k]]
+    return room < 2 * slots
+
+
+@jitable
+def beyond_noise(scene, b, h, dv, dw):
+    """Return the squares of a velocity error less what detection noise does in a step h."""
+    bodies, noise = scene.bodies, scene.work.noise
+    if noise[b, 0] == 0.0:
+        return dv, dw
+    ease = h * noise[b, 0] / bodies.mass[b]
+    least = min(bodies.inertia[b, 0, 0], min(bodies.inertia[b, 1, 1], bodies.inertia[b, 2, 2]))
+    turn = h * noise[b, 1] / least
+    return max(0.0, math.sqrt(dv) - ease) ** 2, max(0.0, math.sqrt(dw) - turn) ** 2
+
+
+@jitable
+def speed_change(scene, e, y, b, p):
+    """Return by how much body b's point at p is faster with velocities that differ by e."""
+    if b == len(scene.bodies.mass):
+        return 0.0, 0.0, 0.0
+    at = BODY_SIZE * b
+    turn = rotate(scene.work.R[b], (e[at + 10], e[at + 11], e[at + 12]))
+    return add((e[at + 7], e[at + 8], e[at + 9]), cross(turn, sub(p, position(scene, y, b))))
+
+
+@jitable
+def friction_left(scene, e, y, turns):
+    """Return the largest change of friction that e causes, over the normal force.
+
+    By friction's slopes where it was linearised last, 0 where none was; and, if `turns`, by a slip
+    that it turns round.
+    """
+    work, contacts, largest = scene.work, scene.contacts, 0.0
+    for k in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[k]
+        grip, point = work.grip[s], work.points[s]
+        if work.slot[s, NORMAL] <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
+            continue
+        gi, gj = sides(scene, s)
+        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        tx = vector(work.t[s])
+        v = sub(
+            speed_change(scene, e, y, scene.graphics.body[gi], p),
+            speed_change(scene, e, y, scene.graphics.body[gj], p),
+        )
+        u, w = dot(v, tx), dot(v, cross(n, tx))
+        change = max(abs(grip[0] * u + grip[1] * w), abs(grip[2] * u + grip[3] * w))
+        c = contact_of(scene, s)
+        if turns and contacts.memory[c] == 0 and contacts.rigid[c] == 0:
+            # what turns the slip round turns friction round, whose slope along it knows of no such
+            row, force = work.slot[s], vector(work.slot[s, FORCE : FORCE + 3])
+            fx, fy = dot(force, tx), dot(force, cross(n, tx))
+            rubs = math.hypot(fx, fy)
+            if fx * u + fy * w > rubs * row[SLIP]:
+                change = max(change, 2.0 * rubs / row[NORMAL])
+        if not change <= largest:
+            largest = change
+    return largest
+
+
+@jitable
+def impact_left(scene, h, e, y):
+    """Return the largest change of a closing speed that e causes, over that in the step h.
+
+    That is of the motion or, where a weight is nearly balanced, what the contact's force would make
+    it: there the errors of very many steps add up, though none is large. What hardly changes, as
+    just behind a touch, counts as SLIGHT of the closing motion with what is stored of it. So does
+    an error of what is lost, over the energy that changes. Of slow impacts as much energy may be
+    wrong as of the least that count.
+    """
+    work, state, largest = scene.work, scene.state, 0.0
+    first = len(e) - max(1, len(scene.contacts.id))
+    for k in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[k]
+        mass, rate, point = effective_mass(scene, y, s), work.slot[s, RATE], work.points[s]
+        speed = math.sqrt(rate * rate + 2.0 * max(0.0, work.slot[s, STORED]) / mass)
+        if state.touching[s] == 0 or speed == 0.0:
+            continue
+        c = contact_of(scene, s)
+        least = FAST * math.sqrt(work.squares[scene.scales.of_contact[c]])
+        gi, gj = sides(scene, s)
+        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        v = sub(
+            speed_change(scene, e, y, scene.graphics.body[gi], p),
+            speed_change(scene, e, y, scene.graphics.body[gj], p),
+        )
+        change = max(abs(rate - state.rate[s]), h * work.slot[s, NORMAL] / mass)
+        change = max(change, SLIGHT * speed) * max(1.0, least / speed) ** 2
+        off = max(abs(dot(v, n)), abs(e[first + c]) / (mass * speed))
+        if not off <= largest * change:
+            largest = off / change
+    return largest
+
+
+@jitable
+def carried_error(scene, e, s):
+    """Return the velocity as which e in what friction in slot s integrates counts.
+
+    Where it slips that is the way of slip over the spring's length, which acts only across the
+    force.
+    """
+    row, at = scene.work.slot[s], scene.slots.z[s]
+    if scene.state.mode[s] % BRANCHES == SLIDING:
+        force = math.hypot(row[ALONG_X], row[ALONG_Y])
+        across = row[ALONG_X] * e[at + 1] - row[ALONG_Y] * e[at]
+        return row[UNIT] * across / force if force > 0.0 else 0.0
+    square = 0.0
+    for j in range(scene.contacts.carried[contact_of(scene, s)]):
+        square += e[at + j] * e[at + j]
+    return row[UNIT] * math.sqrt(square)
+
+
+@jitable
+def scaled_error(scene, h, e, y):
+    """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
+
+    L and V are those of the group of connected bodies (`pipeline.scales`), the energy is that of
+    its heaviest body at V. Detection that is exact only to a given noise makes forces uncertain;
+    what the noise of a step can do to a velocity is not chased. With h = 0, `e` is no step's error,
+    and what it does to friction, over the normal force, counts as well. The worst body
+    is left in `trouble[0]`.
+    """
+    scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
+    fill_squares(scene, y)
+    for b in range(len(scene.bodies.mass)):
+        at = BODY_SIZE * b
+        dx = e[at] ** 2 + e[at + 1] ** 2 + e[at + 2] ** 2
+        dq = e[at + 3] ** 2 + e[at + 4] ** 2 + e[at + 5] ** 2 + e[at + 6] ** 2
+        dv = e[at + 7] ** 2 + e[at + 8] ** 2 + e[at + 9] ** 2
+        dw = e[at + 10] ** 2 + e[at + 11] ** 2 + e[at + 12] ** 2
+        dv, dw = beyond_noise(scene, b, h, dv, dw)
+        g = scales.group[b]
+        area, fast = scales.length[g] ** 2, squares[g]
+        # |dtheta| = 2 |dq| for a unit quaternion
+        square = max(
+            max(dx / area, 4.0 * dq),
+            max(dv / fast, dw * area / fast),
+        )
+        if not square <= largest:
+            largest, worst = square, b
+    for side in range(2):
+        hit = scene.work.hit if side == 0 else scene.state.hit
+        for k in range(hit[len(hit) - 1]):
+            at = scene.slots.x[hit[k]]
+            if at >= 0 and scene.contacts.reads_x[contact_of(scene, hit[k])] == 1:
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                square = (e[at] ** 2 + e[at + 1] ** 2) / scales.length[g] ** 2
+                largest = max(largest, max(square, e[at + 2] ** 2))
+            if scene.slots.z[hit[k]] >= 0:
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                largest = max(largest, carried_error(scene, e, hit[k]) ** 2 / squares[g])
+    # the energy balance closes as well as the motion
+    first, most = len(e) - max(1, len(scene.contacts.id)), 0.0
+    for c in range(len(scene.contacts.id)):
+        g = scales.of_contact[c]
+        largest = max(largest, (e[first + c] / (scales.mass[g] * squares[g])) ** 2)
+    for g in range(len(squares)):
+        most = max(most, scales.mass[g] * squares[g])
+    for kept in scene.world.ledger:
+        if kept >= 0:
+            largest = max(largest, (e[kept] / most) ** 2)
+    states = scene.states
+    for k in range(len(states.place)):
+        at = states.place[k]
+        largest = max(largest, (e[at] / max(abs(y[at]), states.scale[k])) ** 2)
+    if h > 0.0:
+        # what was not integrated but put right, as after a motion that jumps
+        largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
+    else:
+        largest = max(largest, friction_left(scene, e, y, True) ** 2)
+    scene.work.trouble[0] = worst
+    return math.sqrt(largest)
+
+
+@jitable
+def blame(scene):
+    """Return the contact that presses hardest on the body with the worst error, -1 for none."""
+    worst, hardest, contact = scene.work.trouble[0], 0.0, -1
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        gi, gj = sides(scene, s)
+        of_body = scene.graphics.body[gi] == worst or scene.graphics.body[gj] == worst
+        force = vector(scene.work.slot[s, FORCE : FORCE + 3])
+        size = dot(force, force)
+        if of_body and size >= hardest:
+            hardest, contact = size, contact_of(scene, s)
+    return contact

@@ -1,0 +1,36 @@
+"""What the door of joints opens to where the tree holds all of them: no equations to compile."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import ACCELERATE, ALONG_JOINTS, MATRIX, PROJECT, REACT
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import NOT_FINITE
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
+from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
+from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
+
+
+@jitable
+def serve_limbs(scene, what, t, y, dy):
+    """Do what `constraints.serve` does, for a scene without equations."""
+    if what == ACCELERATE:
+        prepare(scene, y)
+        load(scene)
+        respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
+        return 0 if math.isfinite(write_accelerations(scene, dy)) else NOT_FINITE
+    if what == REACT:
+        reaction = scene.work.reaction
+        for i in range(len(reaction)):
+            reaction[i] = 0.0
+        add_tree_reactions(scene, y, scene.sweep.a, reaction)
+    elif what == MATRIX:
+        place_bodies(scene, y)
+        prepare(scene, y)
+    elif what == PROJECT or what == ALONG_JOINTS:
+        place_bodies(scene, y)
+        seat_all(scene, y)
+        carry_all(scene, y)
+    return 0

@@ -1,0 +1,1 @@
+"""Friction without give: what sticks is held by equations."""

@@ -1,0 +1,654 @@
+"""STICTION of contacts without give: what sticks is held by two equations of velocities a slot.
+
+As `stiction.rigid_friction`, which takes equations into use and out of it, and keeps what it does
+for contacts here, behind one door. The equations are those of `equations.touching_term`; how the
+contact point and its normal move is found by differences of the closed form along the velocities
+of both bodies. Where equations follow from others (four points of a block) multipliers are not
+known point by point: forces are taken whose largest part of mu_s N is least (`stiction.cones`).
+Where it is above 1 no forces can hold what sticks, and only there something begins to slip: what
+then moves, and where to, follows from the accelerations of all that is at rest, by Gauss's
+principle. A slot that those that stick hold sticks too: it cannot move.
+
+What a slot keeps is in `State.memory`, see `laws.friction.stiction.rigid`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import (
+    ASK_HELD,
+    BEGIN_HELD,
+    BODY_SIZE,
+    CHANGED_HELD,
+    CONE_ROWS,
+    EVALUATE_DOOR,
+    LOAD_HELD,
+    PLACE_HELD,
+    RECORD_HELD,
+    RELEASE_HELD,
+    SHARE_HELD,
+    TOLERANCE,
+)
+from mbsim.arrays.scene import SLIP as SLIP_EVENT
+from mbsim.arrays.scene import STICK as STICK_EVENT
+from mbsim.core.address import call_float, call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
+from mbsim.dynamics.constraints.equations import (
+    active_count,
+    add_wrench,
+    along,
+    fill_equation,
+)
+from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
+from mbsim.dynamics.constraints.tree import respond
+from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides, tangent, velocity_at
+from mbsim.dynamics.contact.points import record_event
+from mbsim.dynamics.forces.dry_friction import AT_REST, ROUNDING
+from mbsim.dynamics.stiction.cones import (
+    CAPACITY,
+    LOAD,
+    MOVES,
+    SHARED,
+    SLIDE,
+    SLIPPING,
+    solve_cones,
+)
+from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
+from mbsim.laws.catalog import BEGUN, SLIP, STICK
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
+
+#: Half of the time over which rates of a contact's place are found, over that in which the model's
+#: speed goes its length: truncation and rounding are about as large.
+MOMENT = 1e-5
+#: What of a second difference, over the model's length, is no jump of the point from one place to
+#: another.
+SMOOTH = 1e-8
+#: A slip that turns below this part of the tolerance, over the model's speed, has come to rest.
+SETTLED = 0.1
+#: Slip whose part against the way it had is larger than this part of it goes back, and has not only
+#: turned.
+BACK = 0.7
+#: What is let go while it moves goes back only where it is so many times faster, and keeps to the
+#: way in which it is accelerated until it is that many times faster again.
+BEYOND = 3.0
+#: What presses less than this part of what presses most counts as that: no limit is 0.
+LEAST_PART = 1e-9
+#: Slots that slip are sought with limits that are lower by this part: where they are just reached
+#: accelerations are 0, and do not tell the way.
+OVER = 1e-5
+# last rows of `Sweep.cone`, by slots that stick: what they hold and rub with, and their equation
+STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
+
+
+@jitable
+def move_on(scene, y, b, time):
+    """Let body b go on for a time as it moves."""
+    if b == len(scene.bodies.mass):
+        return
+    at, half = BODY_SIZE * b, 0.5 * time
+    w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+    a, c, d = y[at + 10], y[at + 11], y[at + 12]
+    for k in range(3):
+        y[at + k] += time * y[at + 7 + k]
+    y[at + 3] += half * (-x * a - yy * c - z * d)
+    y[at + 4] += half * (w * a + yy * d - z * c)
+    y[at + 5] += half * (w * c + z * a - x * d)
+    y[at + 6] += half * (w * d + x * c - yy * a)
+    place_body(scene, y, b)
+
+
+@jitable
+def pose(scene, y, b):
+    """Return position and quaternion of body b; anything for ground."""
+    at = BODY_SIZE * b if b < len(scene.bodies.mass) else 0
+    return (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
+
+
+@jitable
+def put_pose(scene, y, b, kept):
+    """Put body b back to a pose."""
+    if b == len(scene.bodies.mass):
+        return
+    for k in range(7):
+        y[BODY_SIZE * b + k] = kept[k]
+    place_body(scene, y, b)
+
+
+@jitable
+def look(scene, y, pair, row):
+    """Fill a row of `Work.look` with the candidates of a pair."""
+    pairs, kinds, graphics, work = scene.pairs, scene.kinds, scene.graphics, scene.work
+    kind, i, j = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
+    for g in (i, j):
+        if graphics.body[g] < len(scene.bodies.mass):
+            place_graphic(scene, y, g)
+    points = work.look[row]
+    frames, size = work.frames, graphics.size
+    call_int(kinds.kernel[kind], (frames[i], size[i], frames[j], size[j], points))
+    if kinds.swapped[kind] == 1:
+        for s in range(kinds.slots[kind]):
+            for k in range(4, 7):
+                points[s, k] = -points[s, k]
+
+
+@jitable
+def look_around(scene, y, pair, moment):
+    """Fill all rows of `Work.look`: now, a moment later, a moment before."""
+    graphics, pairs = scene.graphics, scene.pairs
+    bi = graphics.body[pairs.graphic_i[pair]]
+    bj = graphics.body[pairs.graphic_j[pair]]
+    kept_i, kept_j = pose(scene, y, bi), pose(scene, y, bj)
+    for row in range(3):
+        # the last as it is
+        time = moment if row == 0 else -moment
+        if row < 2:
+            move_on(scene, y, bi, time)
+            move_on(scene, y, bj, time)
+        look(scene, y, pair, (row + 1) % 3)
+        put_pose(scene, y, bi, kept_i)
+        put_pose(scene, y, bj, kept_j)
+
+
+@jitable
+def fill_hold(scene, t, y, s, moment):
+    """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
+    points, row = scene.work.look, scene.work.hold[s]
+    k = s - scene.pairs.slot[scene.slots.pair[s]]
+    now, later, before = points[0, k], points[1, k], points[2, k]
+    ahead = sub(vector(later[1:4]), vector(now[1:4]))
+    back = sub(vector(now[1:4]), vector(before[1:4]))
+    jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
+    first, last, time = 2, 1, 2.0 * moment
+    if jump > 0.1 * way + SMOOTH * scene.world.scale[0]:
+        # the shapes touch at another corner: the side on which they do not
+        if norm(ahead) < norm(back):
+            first, time = 0, moment
+        else:
+            last, time = 0, moment
+    n = vector(now[4:7])
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
+    for i in range(3):
+        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], x[i]
+        row[9 + i] = (points[last, k, 1 + i] - points[first, k, 1 + i]) / time
+        row[12 + i] = (points[last, k, 4 + i] - points[first, k, 4 + i]) / time
+
+
+@jitable
+def place_held(scene, t, y):
+    """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
+    slot, last = scene.equations.slot, -1
+    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if not sticks(scene, e):
+            continue
+        pair = scene.slots.pair[slot[e]]
+        if pair != last:
+            look_around(scene, y, pair, moment)
+            last = pair
+        fill_hold(scene, t, y, slot[e], moment)
+
+
+@jitable
+def first_of_slots(scene):
+    """Return the first equation of slots: they are the last."""
+    return len(scene.equations.slot) - len(scene.sweep.share)
+
+
+@jitable
+def fill_slip(scene, t, y, e, first, row):
+    """Fill row e of S of `stiction.cones`, from the equation in use `first` on.
+
+    Of A = L L' of the equations in use and b how they act on e, it is the end of L^-1 b. Returns
+    what is left of e, of a slip that they do not imply. p is lost.
+    """
+    sweep, active = scene.sweep, scene.equations.active
+    nt, n, z = len(scene.tree.body), active_count(scene), scene.sweep.rhs
+    fill_equation(scene, t, y, e)
+    for k in range(nt):
+        for i in range(6):
+            sweep.p[k, i] = 0.0
+    add_wrench(scene, e, 1.0)
+    respond(scene, 0, nt, 0, sweep.answer)
+    left = along(scene, e, sweep.answer, -1)
+    for i in range(n):
+        total = along(scene, active[i], sweep.answer, -1)
+        for k in range(sweep.skyline[i], i):
+            total -= sweep.A[i, k] * z[k]
+        z[i] = total / sweep.A[i, i]
+        left -= z[i] * z[i]
+    for k in range(first, n):
+        row[k - first] = z[k]
+    return left
+
+
+@jitable
+def fill_load(scene, first, m):
+    """Fill what is held of m of `stiction.cones`: L' times the multipliers."""
+    sweep, n = scene.sweep, active_count(scene)
+    for k in range(first, n):
+        m[k - first] = 0.0
+        for j in range(k, n):
+            # a multiplier of a pivot that is infinite is none
+            if sweep.skyline[j] <= k and sweep.multiplier[j] != 0.0:
+                m[k - first] += sweep.A[j, k] * sweep.multiplier[j]
+
+
+@jitable
+def capacity(scene, s):
+    """Return what slot s holds at most."""
+    held = scene.contacts.friction_par[contact_of(scene, s), 0]
+    return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
+
+
+@jitable
+def most_capacity(scene):
+    """Return what the slot that sticks best holds at most."""
+    slot, most = scene.equations.slot, 0.0
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if sticks(scene, e):
+            most = max(most, capacity(scene, slot[e]))
+    return most
+
+
+@jitable
+def fill_cones(scene, t, y, most):
+    """Fill limits, slips and load of all slots that stick; return rows and equations in use.
+
+    p and multipliers stay.
+    """
+    sweep, slot, active = scene.sweep, scene.equations.slot, scene.equations.active
+    first, begin, count, n = first_of_slots(scene), 0, 0, active_count(scene)
+    while begin < n and active[begin] < first:
+        begin += 1
+    fill_load(scene, begin, sweep.cone[LOAD])
+    for k in range(len(sweep.p)):
+        for i in range(6):
+            sweep.kept_p[k, i] = sweep.p[k, i]
+    for e in range(first, len(slot), 2):
+        if sticks(scene, e):
+            sweep.cone[WHICH, count // 2] = e
+            sweep.cone[CAPACITY, count // 2] = max(capacity(scene, slot[e]), LEAST_PART * most)
+            fill_slip(scene, t, y, e, begin, sweep.share[count])
+            fill_slip(scene, t, y, e + 1, begin, sweep.share[count + 1])
+            count += 2
+    for k in range(len(sweep.p)):
+        for i in range(6):
+            sweep.p[k, i] = sweep.kept_p[k, i]
+    return count, n - begin
+
+
+@jitable
+def is_loaded(scene, r):
+    """Return whether anything is to be held."""
+    for k in range(r):
+        if scene.sweep.cone[LOAD, k] != 0.0:
+            return True
+    return False
+
+
+@jitable
+def spread(scene, t, y, most):
+    """Share what is held out over all slots that stick, in `Work.held`."""
+    sweep, slot = scene.sweep, scene.equations.slot
+    count, r = fill_cones(scene, t, y, most)
+    if not is_loaded(scene, r):
+        return
+    level, _ = solve_cones(sweep.share, count, r, sweep.cone, sweep.mix, SHARED)
+    for k in range(count):
+        s = slot[int(sweep.cone[WHICH, k // 2])]
+        scene.work.held[s, k % 2] = sweep.cone[HELD_BY, k] / level
+
+
+@jitable
+def share_held(scene, t, y):
+    """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
+    held, active, first = scene.work.held, scene.equations.active, first_of_slots(scene)
+    slot, count = scene.equations.slot, 0
+    for e in range(first, len(slot), 2):
+        held[slot[e], 0] = held[slot[e], 1] = 0.0
+        count += 2 if sticks(scene, e) else 0
+    if count == 0:
+        return
+    for r in range(active_count(scene)):
+        if active[r] >= first:
+            held[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
+            count -= 1
+    most = most_capacity(scene)
+    if count > 0 and most > 0.0:
+        spread(scene, t, y, most)
+    for e in range(first, len(slot), 2):
+        if sticks(scene, e) and scene.work.touching[slot[e]] == 1:
+            show_held(scene, slot[e])
+
+
+@jitable
+def show_held(scene, s):
+    """Write the force on slot s with what holds it."""
+    row, held = scene.work.slot[s], scene.work.held[s]
+    point = scene.work.points[s]
+    n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+    rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))
+    force = add(scale(row[NORMAL], n), rubs)
+    for k in range(3):
+        row[FORCE + k] = force[k]
+
+
+@jitable
+def slip_of(scene, y, s):
+    """Return slip along x and y of slot s at the point evaluated last."""
+    gi, gj = sides(scene, s)
+    point = scene.work.points[s]
+    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    v = sub(
+        velocity_at(scene, y, scene.graphics.body[gi], p),
+        velocity_at(scene, y, scene.graphics.body[gj], p),
+    )
+    tx = vector(scene.work.t[s])
+    return dot(v, tx), dot(v, cross(n, tx))
+
+
+@jitable
+def settled(scene):
+    """Return what slip is none to the tolerance."""
+    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[1]
+
+
+@jitable
+def held_part(scene):
+    """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
+
+    What presses next to nothing has no limit of its own: the least is a part of the largest.
+    """
+    slot, part, least = scene.equations.slot, 0.0, LEAST_PART * most_capacity(scene)
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if not sticks(scene, e):
+            continue
+        held, able = scene.work.held[slot[e]], max(capacity(scene, slot[e]), least)
+        force = math.hypot(held[0], held[1])
+        if able > 0.0:
+            part = max(part, force / able)
+        elif force > 0.0:
+            return math.inf
+    return part
+
+
+@jitable
+def onward(scene, s, v):
+    """Return the part of slip along the direction in which slot s began to slip."""
+    kept = scene.state.memory[s]
+    size = math.hypot(kept[KEPT_X], kept[KEPT_Y])
+    return (v[0] * kept[KEPT_X] + v[1] * kept[KEPT_Y]) / size
+
+
+@jitable
+def rest(scene):
+    """Return what is no slip but rounding."""
+    return ROUNDING * scene.world.scale[1]
+
+
+@jitable
+def ask_held(scene, y):
+    """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
+    if held_part(scene) > 1.0:
+        return 1
+    slot = scene.equations.slot
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        if scene.work.touching[s] == 1 and scene.state.memory[s, KEPT_MODE] == SLIP:
+            if goes_back(scene, s, onward(scene, s, slip_of(scene, y, s))):
+                return 1
+    return 0
+
+
+@jitable
+def load_held(scene):
+    """Return the largest force that holds a slot, in millionths of what holds at most."""
+    return int(1e6 * min(held_part(scene), 1e6))
+
+
+@jitable
+def goes_back(scene, s, along):
+    """Return whether slot s goes back that slips by so much along the way it had."""
+    return along < -(rest(scene) + BEYOND * scene.state.memory[s, KEPT_PLAY])
+
+
+@jitable
+def let_slip(scene, s, x, y, speed, play):
+    """Let slot s slip along (x, y) from here on, at a speed, let go with some play."""
+    kept = scene.state.memory[s]
+    size = (rest(scene) + settled(scene) + BEYOND**2 * play) / math.hypot(x, y)
+    kept[KEPT_MODE], kept[KEPT_X], kept[KEPT_Y] = SLIP, size * x, size * y
+    kept[KEPT_SPEED], kept[KEPT_PLAY] = speed, play
+
+
+@jitable
+def let_stick(scene, s):
+    """Let slot s stick from here on."""
+    kept = scene.state.memory[s]
+    kept[KEPT_MODE], kept[KEPT_SPEED], kept[KEPT_PLAY] = STICK, 0.0, 0.0
+
+
+@jitable
+def begin_slot(scene, y, s):
+    """Set the mode of slot s, which does not stick; return 1 where it turns.
+
+    What turns at a speed that the tolerance explains has come to rest, and so has what went back:
+    where that is is not located, or not so well.
+    """
+    kept, v = scene.state.memory[s], slip_of(scene, y, s)
+    speed = math.hypot(v[0], v[1])
+    turns, rests = 0, speed <= AT_REST * rest(scene)
+    if kept[KEPT_MODE] == SLIP:
+        along = onward(scene, s, v)
+        turns = 1 if goes_back(scene, s, along) else 0
+        rests = rests or (turns == 1 and speed <= settled(scene))
+        rests = rests or (turns == 1 and -along > BACK * speed)
+    if not rests and kept[KEPT_MODE] == SLIP and turns == 0:
+        # the way that friction is against
+        let_slip(scene, s, v[0] + kept[KEPT_X], v[1] + kept[KEPT_Y], speed, kept[KEPT_PLAY])
+    elif not rests:
+        let_slip(scene, s, v[0], v[1], speed, 0.0)
+    elif kept[KEPT_MODE] == BEGUN or turns == 1:
+        let_stick(scene, s)
+    return turns
+
+
+@jitable
+def came_to_rest(scene, pair):
+    """Return whether a slot of a pair sticks that did not."""
+    slot = scene.equations.slot
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        if scene.slots.pair[s] == pair and scene.state.memory[s, KEPT_MODE] == STICK:
+            if not was_held(scene, s):
+                return True
+    return False
+
+
+@jitable
+def begin_held(scene, y):
+    """Set the modes that the point evaluated last asks for; return whether equations change.
+
+    What is at rest is first taken to stick wherever something changes, and what is as good as at
+    rest beside what comes to rest: what of it slips is found for all together (`release_held`).
+    """
+    state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
+    changed, held, begun = 1 if held_part(scene) > 1.0 else 0, 0, 0
+    for e in range(first, len(slot), 2):
+        s = slot[e]
+        mode = state.memory[s, KEPT_MODE]
+        if state.touching[s] == 1 and mode != STICK:
+            begun = max(begun, 1 if mode == BEGUN else 0)
+            changed = max(changed, begin_slot(scene, y, s))
+        mode = state.memory[s, KEPT_MODE]
+        held = max(held, 1 if mode == STICK else 0)
+        if (mode == STICK) != was_held(scene, s):
+            changed = 1
+    # what begins to touch beside what sticks may be held by that
+    if changed == 0 and (held == 0 or begun == 0):
+        return 0
+    for e in range(first, len(slot), 2):
+        s = slot[e]
+        if state.memory[s, KEPT_MODE] == SLIP and state.touching[s] == 1:
+            v, least = slip_of(scene, y, s), AT_REST * rest(scene)
+            if came_to_rest(scene, scene.slots.pair[s]):
+                least = max(least, settled(scene))
+            if math.hypot(v[0], v[1]) <= least:
+                let_stick(scene, s)
+    return 1
+
+
+@jitable
+def was_held(scene, s):
+    """Return whether slot s has been held so far."""
+    return scene.state.before[s, KEPT_MODE] == STICK
+
+
+@jitable
+def hold_implied(scene, t, y):
+    """Let all slots stick whose slip those that stick imply: they move by rounding at most.
+
+    What has been released for this very change does slip.
+    """
+    slot, first = scene.equations.slot, first_of_slots(scene)
+    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    for e in range(first, len(slot), 2):
+        s, implied = slot[e], True
+        kept = scene.state.memory[s]
+        released = kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0
+        if scene.state.touching[s] == 0 or kept[KEPT_MODE] == STICK or released:
+            continue
+        look_around(scene, y, scene.slots.pair[s], moment)
+        fill_hold(scene, t, y, s, moment)
+        for q in (e, e + 1):
+            left = fill_slip(scene, t, y, q, active_count(scene), scene.sweep.share[0])
+            fill_size(scene, q)
+            implied = implied and left <= LEVER * scene.sweep.size[q] ** 2
+        if implied:
+            let_stick(scene, s)
+
+
+@jitable
+def fill_sliding(scene, t, y, count):
+    """Fill what friction would be where the slots of so many rows slid against what holds them."""
+    cone = scene.sweep.cone
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        x, z = scene.work.held[s, 0], scene.work.held[s, 1]
+        let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
+    call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
+        n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+        rubs = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
+        cone[SLIDING, k] = rubs if scene.work.touching[s] == 1 else 0.0
+        let_stick(scene, s)
+
+
+@jitable
+def solve_slips(scene, count, r):
+    """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
+    cone, most, grows = scene.sweep.cone, 0.0, True
+    for k in range(count // 2):
+        cone[STATIC, k] = cone[CAPACITY, k]
+        most = max(most, cone[CAPACITY, k])
+    eps = 0.0
+    while grows:
+        grows = False
+        for k in range(count // 2):
+            cone[CAPACITY, k] = max((1.0 - OVER) * cone[STATIC, k], LEAST_PART * most)
+        _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SLIPPING)
+        for k in range(count // 2):
+            slips = math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]) > MOVES * eps
+            if slips and cone[STATIC, k] != cone[SLIDING, k]:
+                cone[STATIC, k] = cone[SLIDING, k]
+                grows = True
+    return MOVES * eps
+
+
+@jitable
+def release_held(scene, t, y):
+    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
+    hold_implied(scene, t, y)
+    share_held(scene, t, y)
+    if held_part(scene) <= 1.0:
+        return 0
+    count, r = fill_cones(scene, t, y, most_capacity(scene))
+    fill_sliding(scene, t, y, count)
+    released, least, cone = 0, solve_slips(scene, count, r), scene.sweep.cone
+    for k in range(count // 2):
+        x, z = cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]
+        if math.hypot(x, z) > least:
+            s = scene.equations.slot[int(cone[WHICH, k])]
+            v = slip_of(scene, y, s)
+            let_slip(scene, s, -x, -z, 0.0, math.hypot(v[0], v[1]))
+            released += 1
+    if released == 0:
+        # sliding would rub more than sticking holds: it goes on to stick
+        call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+        share_held(scene, t, y)
+    return released
+
+
+@jitable
+def record_held(scene, t):
+    """Append events of the slots that go on otherwise than before."""
+    state, slot = scene.state, scene.equations.slot
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        kept, before = state.memory[s], state.before[s]
+        if state.touching[s] == 0:
+            before[KEPT_MODE] = BEGUN
+            continue
+        if before[KEPT_MODE] == BEGUN:
+            # rows of the step in which it began show what holds from there on
+            for k in range(len(before)):
+                before[k] = kept[k]
+        turned = kept[KEPT_X] * before[KEPT_X] + kept[KEPT_Y] * before[KEPT_Y] < 0.0
+        if kept[KEPT_MODE] == STICK and before[KEPT_MODE] == SLIP:
+            record_event(scene, t, STICK_EVENT, s)
+        elif kept[KEPT_MODE] == SLIP and (before[KEPT_MODE] == STICK or turned):
+            record_event(scene, t, SLIP_EVENT, s)
+        state.mode[s] = kept[KEPT_MODE]
+
+
+@jitable
+def changed_held(scene):
+    """Return 1 if other slots stick than in the last step, else 0."""
+    state, slot = scene.state, scene.equations.slot
+    for e in range(first_of_slots(scene), len(slot), 2):
+        s = slot[e]
+        within = was_held(scene, s) and state.touching[s] == 1
+        if within != (state.memory[s, KEPT_MODE] == STICK):
+            return 1
+    return 0
+
+
+@jitable
+def serve_held(scene, what, t, y):
+    """Do what is asked for at the door of rigid contacts; return an answer or 0."""
+    if what == PLACE_HELD:
+        place_held(scene, t, y)
+    elif what == SHARE_HELD:
+        share_held(scene, t, y)
+    elif what == ASK_HELD:
+        share_held(scene, t, y)
+        return ask_held(scene, y)
+    elif what == BEGIN_HELD:
+        return begin_held(scene, y)
+    elif what == RELEASE_HELD:
+        return release_held(scene, t, y)
+    elif what == RECORD_HELD:
+        record_held(scene, t)
+    elif what == CHANGED_HELD:
+        return changed_held(scene)
+    elif what == LOAD_HELD:
+        share_held(scene, t, y)
+        return load_held(scene)
+    return 0

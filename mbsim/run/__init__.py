@@ -1,0 +1,1 @@
+"""A run: its settings, its loop, what may end it, and what is asked of it afterwards."""

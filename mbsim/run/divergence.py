@@ -1,0 +1,117 @@
+"""When a run makes no progress: a motion that runs off to a pole is told, not followed for hours.
+
+A watch looks every `core.problem.WATCH_EVERY` steps, and gives up where either holds:
+
+* the last STALLED steps were on average shorter than a SLIVER of the time that has passed;
+* at the pace of the last FEW steps HOPELESS more are to come, while the fastest body is FAST times
+  the model's own speed V and GROWTH times as fast as when a hundredth of the time was left out.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from mbsim.errors import SolverError
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+
+STALLED, SLIVER = 200_000, 1e-9
+FEW, HOPELESS, FAST, GROWTH = 20_000, 1e7, 1e6, 100.0
+#: Part of the time that has passed over which speeds are compared.
+LATELY = 0.01
+_NAMES = ("displacement", "velocity", "acceleration")
+
+
+class Pace:
+    """Steps, time and speed of one Simulate, as far back as they are asked for."""
+
+    def __init__(self, start: float, end: float) -> None:
+        self.start, self.end = start, end
+        self.seen: deque[tuple[int, float, float]] = deque()
+
+    def saved(self) -> dict[str, Any]:
+        """Return what a resumed run needs: it gives up where the straight one does."""
+        return {"pace/seen": np.array(self.seen, dtype=np.float64).reshape(-1, 3)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go back to a checkpoint of the same Simulate."""
+        self.seen = deque((int(n), float(t), float(v)) for n, t, v in saved["pace/seen"])
+
+    def watch(self, system: System, y: Any, t: float, steps: int) -> None:
+        """Note where the run is at time t; raise SolverError where it gets nowhere."""
+        speed = _fastest(system, y)
+        self.seen.append((steps, t, speed))
+        passed = t - self.start
+        # two of them before the span that counts, so that the deque stays short
+        while len(self.seen) > 2 and self._is_old(self.seen[1], steps, t):
+            self.seen.popleft()
+        pace = self._pace(FEW)
+        if pace is not None and (self.end - t) / max(pace, 1e-300) > HOPELESS:
+            long_ago = t - LATELY * passed
+            before = next((v for _, when, v in reversed(self.seen) if when <= long_ago), 0.0)
+            if speed > max(FAST * system.scene.world.scale[1], GROWTH * before):
+                _give_up(system, y, t, pace, "the motion leaves all bounds")
+        pace = self._pace(STALLED)
+        if pace is not None and pace < SLIVER * passed:
+            _give_up(system, y, t, pace, "the run would not end")
+
+    def _is_old(self, seen: tuple[int, float, float], steps: int, t: float) -> bool:
+        return seen[0] <= steps - STALLED and seen[1] <= t - LATELY * (t - self.start)
+
+    def _pace(self, count: int) -> float | None:
+        """Return the average of at least `count` last steps, None where there are fewer."""
+        last, t, _ = self.seen[-1]
+        for steps, when, _ in reversed(self.seen):
+            if last - steps >= count:
+                return (t - when) / (last - steps)
+        return None
+
+
+def _speeds(system: System, y: Any) -> Any:
+    """Return the speed of each body: of its cg, or of a point L away as it turns."""
+    from mbsim.core.layout import BODY_SIZE
+
+    nb = len(system.body_ids)
+    rows = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)
+    turning = np.linalg.norm(rows[:, 10:13], axis=1) * system.scene.world.scale[0]
+    return np.maximum(np.linalg.norm(rows[:, 7:10], axis=1), turning)
+
+
+def _fastest(system: System, y: Any) -> float:
+    return float(_speeds(system, y).max(initial=0.0))
+
+
+def _give_up(system: System, y: Any, t: float, pace: float, why: str) -> NoReturn:
+    raise SolverError(
+        f"no progress at time {t:.9g}: steps are {pace:.3g} on average and {why}; "
+        f"{_culprit(system, y, t)}. Results up to there are kept."
+    )
+
+
+def _culprit(system: System, y: Any, t: float) -> str:
+    """Return the motion that asks for most, or else the fastest body, and what it does."""
+    from mbsim.dynamics.expressions.jets import jet
+    from mbsim.dynamics.initial.assembly import equation_name
+
+    scene, found = system.scene, []
+    for e in np.flatnonzero((scene.equations.program >= 0) & (scene.equations.general == 0)):
+        level = int(scene.equations.level[e])
+        try:
+            jets = jet(scene, t, y, int(scene.equations.program[e]))[: 1 + level]
+        except ArithmeticError:
+            continue
+        names = _NAMES[2 - level :]
+        said = ", ".join(f"{name} {float(u):.3g}" for name, u in zip(names, jets, strict=True))
+        # its highest rate grows most
+        size = abs(float(jets[-1])) / scene.equations.unit[e]
+        found.append((size, f"{equation_name(system, int(e))} asks for {said}"))
+    speeds = _speeds(system, y)
+    if found and max(found)[0] * scene.world.scale[0] > speeds.max():
+        return max(found)[1]
+    body = int(speeds.argmax())
+    return f"{system.body_name(body)} has the speed {speeds[body]:.3g}"

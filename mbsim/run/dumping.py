@@ -1,0 +1,232 @@
+"""Contacts of a run as frictional contact problems, for solvers of rigid contact: `--dump-fclib`.
+
+At the end of every N-th accepted step the problem of a time step h, that step's, is written as a
+local problem of FCLIB:
+
+    u = W r + q,   W = H' T H,   q = H' (v + h a),
+
+H the wrenches of unit impulses (normal, two tangents) at the contact points, T what accelerations
+follow from forces, joints and constraint equations included, a the accelerations without contacts.
+u_N >= 0 opens. What the contacts of the run push is in the file too, times h, as a guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.errors import ModelError, ResultsError
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+
+Array = np.ndarray[Any, Any]
+
+#: Forces of unit wrenches are of this size times the lightest body's mass: accelerations of use.
+_PUSH = 10.0
+
+
+class ContactProblems:
+    """Writes the contact problems of a run.
+
+    Parameters
+    ----------
+    system
+        What runs.
+    every
+        Steps from one problem to the next.
+    folder
+        Where files go, `<model>-i<step>-<contacts>.hdf5`; it must hold none, unless `resumed`.
+    evaluate
+        Evaluates the model at (t, y): afterwards `Scene.work` holds forces and contacts.
+    accelerate
+        Fills y' of bodies on joints from the forces in `Scene.work`: (t, y, dy).
+    """
+
+    def __init__(
+        self,
+        system: System,
+        every: int,
+        folder: Path,
+        evaluate: Callable[[float, Array], float],
+        accelerate: Callable[[float, Array, Array], None],
+        resumed: bool,
+    ) -> None:
+        self.system, self.every, self.folder = system, every, folder
+        self._evaluate, self._accelerate = evaluate, accelerate
+        self.written, self.next = 0, every
+        if every < 1:
+            raise ModelError(f"dump_fclib={every}: must be a whole number > 0")
+        for contact in system.model.contacts.values():
+            if contact.rigid:
+                # its equations would stand in W
+                raise ModelError(
+                    f"Force_Contact[{contact.id}]: dump_fclib does not go with "
+                    'tangential_stiffness="INFINITE"; leave that out for this run'
+                )
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not resumed and any(folder.glob("*.hdf5")):
+                raise ResultsError(
+                    f"{folder}: holds problems of an earlier run; move them, or choose another "
+                    "folder with -o"
+                )
+        except OSError as error:
+            raise ResultsError(f"{folder}: {error.strerror}") from None
+
+    def watch(self, step: int, t: float, h: float, y: Array) -> None:
+        """Write the problem if this step's turn has come and something touches."""
+        if step < self.next:
+            return
+        self.next = step - step % self.every + self.every
+        made = self._problem(t, h, y)
+        if made is None:
+            return
+        from mbsim.fclib import hdf5
+
+        problem, guess = made
+        name = f"{self.system.model.name}-i{step}-{problem.contacts}.hdf5"
+        hdf5.write(self.folder / name, problem, guesses=[guess])
+        self.written += 1
+
+    def _problem(self, t: float, h: float, y: Array) -> Any:
+        """Return the problem of a step h from a state, and what contacts do there as a guess."""
+        from mbsim.fclib.problem import Info, Local, Solution, matrix
+
+        if self._evaluate(t, y) != 0.0:
+            raise ModelError(f"time {t:.9g}: the model cannot be evaluated for --dump-fclib")
+        work = self.system.scene.work
+        hit = work.hit[: work.hit[-1]].copy()
+        if len(hit) == 0:
+            return None
+        H, force = self._directions(y, hit)
+        W, u = self._responses(t, h, y, H, H @ force)
+        mu = np.array([self._friction(s, force[3 * k : 3 * k + 3]) for k, s in enumerate(hit)])
+        info = Info(
+            title=self.system.model.name,
+            description=f"time {t!r}, step {h!r}",
+            math_info="local frictional contact problem of one time step; joints are in W",
+        )
+        problem = Local(3, matrix(W), u, mu, info=info)
+        return problem, Solution(u + W @ (h * force), h * force)
+
+    def _directions(self, y: Array, hit: Array) -> tuple[Any, Array]:
+        """Return H (6 nb, 3 nc), force then torque about the cg in global axes, and forces."""
+        from scipy import sparse
+
+        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.dynamics.contact import forces as at
+
+        scene = self.system.scene
+        nb = len(scene.bodies.mass)
+        rows, columns, values, force = [], [], [], np.zeros(3 * len(hit))
+        for k, s in enumerate(hit):
+            point = scene.work.points[s]
+            p, n, tx = point[1:4], point[4:7], scene.work.t[s]
+            axes = np.array([n, tx, np.cross(n, tx)])
+            force[3 * k : 3 * k + 3] = axes @ scene.work.slot[s, at.FORCE : at.FORCE + 3]
+            for g, sign in zip(at.sides(scene, s), (1.0, -1.0), strict=True):
+                b = int(scene.graphics.body[g])
+                if b == nb:
+                    continue
+                arm = p - y[BODY_SIZE * b : BODY_SIZE * b + 3]
+                wrench = sign * np.hstack([axes, np.cross(arm, axes)])
+                rows.append(np.tile(np.arange(6 * b, 6 * b + 6), 3))
+                columns.append(np.repeat(np.arange(3 * k, 3 * k + 3), 6))
+                values.append(wrench.ravel())
+        shape = (6 * nb, 3 * len(hit))
+        if not rows:
+            return sparse.csc_array(shape), force
+        places = (np.concatenate(rows), np.concatenate(columns))
+        return sparse.coo_array((np.concatenate(values), places), shape=shape).tocsc(), force
+
+    def _responses(self, t: float, h: float, y: Array, H: Any, pushed: Array) -> tuple[Any, Array]:
+        """Return W, and the velocities q of the contacts after h without them."""
+        from scipy import sparse
+
+        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.dynamics.contact import forces as at
+
+        scene = self.system.scene
+        nb, work = len(scene.bodies.mass), scene.work
+        total = np.hstack([work.force[:nb], work.torque[:nb]])
+        for s in work.hit[: work.hit[-1]]:
+            # torques of the laws themselves are none of the impulses at the point
+            for g, sign in zip(at.sides(scene, s), (1.0, -1.0), strict=True):
+                b = int(scene.graphics.body[g])
+                if b < nb:
+                    total[b, 3:] -= sign * work.slot[s, at.TORQUE : at.TORQUE + 3]
+        free = total.ravel() - pushed
+        base = self._accelerations(t, y, free)
+        bodies = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)
+        spin = np.einsum("bij,bj->bi", work.R[:nb], bodies[:, 10:13])
+        velocity = np.hstack([bodies[:, 7:10], spin]).ravel()
+        q = H.T @ (velocity + h * base)
+
+        jointed = np.repeat(scene.tree.of_body[:nb] >= 0, 6)
+        answers = self._inverse_masses() @ H
+        if jointed.any():
+            size = _PUSH * float(scene.bodies.mass.min())
+            columns = []
+            for c in range(H.shape[1]):
+                wrench = H[:, [c]].toarray().ravel()
+                moved = np.zeros(6 * nb)
+                if wrench[jointed].any():
+                    moved = (self._accelerations(t, y, free + size * wrench) - base) / size
+                columns.append(np.where(jointed, moved, 0.0))
+            keep = sparse.diags_array(np.where(jointed, 0.0, 1.0))
+            answers = keep @ answers + sparse.csc_array(np.array(columns).T)
+        W = (H.T @ answers).tocsr()
+        W = 0.5 * (W + W.T)
+        W.eliminate_zeros()
+        return W.tocsr(), q
+
+    def _inverse_masses(self) -> Any:
+        """Return the inverse masses of single bodies, (6 nb, 6 nb), global axes."""
+        from scipy import sparse
+
+        scene = self.system.scene
+        blocks = []
+        for b, mass in enumerate(scene.bodies.mass):
+            R = scene.work.R[b]
+            blocks += [np.eye(3) / mass, R @ scene.bodies.inverse[b] @ R.T]
+        return sparse.block_diag(blocks, format="csc")
+
+    def _accelerations(self, t: float, y: Array, forces: Array) -> Array:
+        """Return accelerations, linear then angular in global axes, under all forces (6 nb,)."""
+        from mbsim.arrays.scene import BODY_SIZE
+
+        scene = self.system.scene
+        nb, work = len(scene.bodies.mass), scene.work
+        given = forces.reshape(nb, 6)
+        w = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)[:, 10:13]
+        found = np.empty((nb, 6))
+        for b in range(nb):
+            R, inertia = work.R[b], scene.bodies.inertia[b]
+            gyroscopic = np.cross(w[b], inertia @ w[b])
+            found[b, :3] = given[b, :3] / scene.bodies.mass[b]
+            found[b, 3:] = R @ (scene.bodies.inverse[b] @ (R.T @ given[b, 3:] - gyroscopic))
+        if len(scene.tree.body):
+            work.force[:nb], work.torque[:nb] = given[:, :3], given[:, 3:]
+            dy = np.zeros(len(y))
+            self._accelerate(t, y, dy)
+            for b in np.flatnonzero(scene.tree.of_body[:nb] >= 0):
+                at = BODY_SIZE * int(b) + 7
+                found[b] = np.hstack([dy[at : at + 3], work.R[b] @ dy[at + 3 : at + 6]])
+        return found.ravel()
+
+    def _friction(self, s: int, force: Array) -> float:
+        """Return the coefficient of a slot: of sliding, or what a user's function gives there."""
+        from mbsim.dynamics.contact.forces import contact_of
+        from mbsim.laws.catalog import FRICTION_LAWS
+
+        contact = self.system.model.contacts[
+            self.system.contact_ids[int(contact_of(self.system.scene, s))]
+        ]
+        if contact.cff_type in FRICTION_LAWS:
+            return float(contact.mu_dynamic)
+        across = float(np.hypot(force[1], force[2]))
+        return across / float(force[0]) if across > 0.0 and force[0] > 0.0 else 0.0

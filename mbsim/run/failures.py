@@ -1,0 +1,197 @@
+"""Why a run ends before its time, in the user's words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from mbsim.errors import PluginError, SolverError
+from mbsim.model.names import element_name
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.run.settings import Settings
+
+
+def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
+    """Raise why the step became too small."""
+    from mbsim.core import problem
+    from mbsim.integrators import scheme
+
+    memory, counts, trouble = (
+        method.memory,
+        method.counts,
+        system.scene.work.trouble,
+    )
+    reason = {
+        problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
+        problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
+        problem.BY_NOT_FINITE: "a force or acceleration is not finite",
+        problem.BY_NEWTON: "Newton's iteration does not converge",
+    }[int(counts[scheme.LAST_REASON])]
+    unsolved = counts[scheme.LAST_REASON] == problem.BY_NEWTON
+    if unsolved:
+        reason += _corrections(memory[scheme.CORRECTION_BEFORE], memory[scheme.CORRECTION])
+    body, contact = int(trouble[0]), int(trouble[1])
+    where = []
+    by_body = unsolved or counts[scheme.LAST_REASON] == problem.BY_ERROR
+    if by_body and 0 <= body < len(system.body_ids):
+        where.append(system.body_name(body))
+    where.extend(_out_of_reach(system, settings))
+    if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
+        where.extend(_not_finite(system)[:1])
+    if 0 <= contact < len(system.contact_ids):
+        where.append(f"Force_Contact[{system.contact_ids[contact]}]")
+    elif unsolved:
+        where.extend(_held_by(system, body))
+    raise SolverError(
+        f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
+        f"because {reason}; at {', '.join(where) or 'no single element'}. "
+        "Results up to there are kept."
+    )
+
+
+def _corrections(before: float, last: float) -> str:
+    """Return what is said of the last two corrections [parts of the scale that tol is of]."""
+    if last == 0.0:
+        return " (no correction was found: its linear equations are singular)"
+    return f" (its last corrections were {before:.3g} and {last:.3g}, over the scale of tol)"
+
+
+def _held_by(system: System, body: int) -> list[str]:
+    """Return the joints and motions that hold a body."""
+    scene = system.scene
+    markers, ends = scene.markers.body, scene.connections
+    found = []
+    for row in range(len(system.connections)):
+        ends_of = [int(m) for m in (ends.i[row], ends.j[row]) if m >= 0]
+        if body in markers[ends_of]:
+            found.append(system.connection_name(row))
+    return found
+
+
+def _out_of_reach(system: System, settings: Settings) -> list[str]:
+    """Return the equation that the step tried last left by more than its error may be."""
+    from mbsim.arrays.scene import DRIFT, DRIFTER
+
+    quality = system.scene.sweep.quality
+    if not quality[DRIFT] > settings.tol:
+        return []
+    from mbsim.dynamics.initial.assembly import equation_name
+
+    return [equation_name(system, int(quality[DRIFTER]))]
+
+
+def _not_finite(system: System) -> list[str]:
+    """Return the applied forces that were no numbers when last evaluated."""
+    from mbsim.results.elements import GROUPS
+
+    applied = system.scene.work.applied
+    broken = np.flatnonzero(~np.isfinite(applied).all(axis=1))
+    file = system.model.file
+    elements = (system.applied[k] for k in broken)
+    return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
+
+
+def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
+    """Raise what the hooks' code says."""
+    from mbsim.core.problem import NOT_FINITE
+    from mbsim.dynamics.contact.detection import CROWDED
+    from mbsim.dynamics.contact.forces import USER_NOT_FINITE
+    from mbsim.geometry.fcl_detector import DETECTOR_FAILED
+    from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.laws.user_normal import USER_NORMAL_FAILED
+
+    if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
+        from mbsim.plugins import raise_failure
+
+        raise_failure()
+    from mbsim.dynamics.constraints.equations import CONTRADICTION
+
+    contact = int(system.scene.work.trouble[1])
+    if code == CONTRADICTION:
+        from mbsim.dynamics.initial.assembly import equation_name
+
+        raise SolverError(
+            f"{equation_name(system, contact)} contradicts other constraints from time "
+            f"{t:.9g} on; results up to there are kept"
+        )
+    from mbsim.dynamics.forces.joint_friction import JAMMED
+
+    if code == JAMMED:
+        raise SolverError(_jammed(system, contact, t))
+    from mbsim.dynamics.forces.reaction_forces import UNSETTLED
+
+    if code == UNSETTLED:
+        raise SolverError(_unsettled(system, contact, t))
+    from mbsim.dynamics.forces.force_element import UNSOLVED_ELEMENT
+
+    if code == UNSOLVED_ELEMENT:
+        raise SolverError(_unsolved(system, t))
+    element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
+    if code == USER_NORMAL_FAILED:
+        from mbsim.plugins.normal import reproduce_normal
+
+        reproduce_normal(system.user_normal[element])
+    if code in (RAISED_COMPILED, USER_NOT_FINITE) and element in system.user_friction:
+        from mbsim.plugins import reproduce
+
+        user = system.user_friction[element]
+        if user.function is None:
+            out = system.scene.work.law_out
+            force = [float(out[k]) for k in (0, 1, 4)]
+            raise PluginError(
+                f"Force_Contact[{element}]: {user.name} failed at time {t:.12g}: returned {force}, "
+                f"not 3 finite numbers [Fx, Fy, Tz] ({user.source}); nan is also what it left unset"
+            )
+        reproduce(system.user_friction[element], system.scene.work.law_in, element)
+        raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
+    if code == DETECTOR_FAILED and detector is not None:
+        raise SolverError(f"FCL failed at time {t:.9g}: {detector.failure}")
+    if code == CROWDED:
+        raise SolverError(
+            f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
+        )
+    if code in (NOT_FINITE, USER_NOT_FINITE):
+        where = "".join(f" of {name}" for name in _not_finite(system)[:1])
+        raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
+    raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
+
+
+def _jammed(system: System, row: int, t: float) -> str:
+    """Return what is said of friction that no acceleration can bear."""
+    id = system.applied[row][1]
+    joint = system.model.joint_frictions[id].joint_id
+    return (
+        f"Force_JointFriction[{id}]: Constraint_Joint[{joint}] jams at time {t:.9g}: friction "
+        "and the reaction that it causes raise each other without end; results up to there "
+        "are kept"
+    )
+
+
+def _unsettled(system: System, row: int, t: float) -> str:
+    """Return what is said of a force that no reactions agree with."""
+    from mbsim.results.elements import GROUPS
+
+    statement, id = system.applied[row]
+    name = element_name(system.model.file, GROUPS[statement].title, id)
+    return (
+        f"{name} does not settle at time {t:.9g}: it follows from reactions that follow from it, "
+        "and no value was found that agrees with both; results up to there are kept"
+    )
+
+
+def _unsolved(system: System, t: float) -> str:
+    """Return what is said of an element whose residual is not made 0."""
+    from mbsim.plugins.residual import title_of
+
+    residuals = system.scene.residuals
+    id = int(residuals.id[residuals.trouble[0]])
+    user = system.residuals[id]
+    return (
+        f"{title_of(system.model.force_elements[id])}: no unknowns ({', '.join(user.about())}) "
+        f"were found that make the residual {user.name} of {user.source} 0 at time {t:.9g}: it may "
+        "have no zero there, jump over it, or not depend on an unknown; results up to there are "
+        "kept"
+    )

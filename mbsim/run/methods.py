@@ -1,0 +1,154 @@
+"""Which method runs: the one that was asked for, or those between which AUTO changes over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.arrays.scene import AUDIT_EVERY
+from mbsim.compile_model import tangent
+from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
+from mbsim.errors import ModelError
+from mbsim.integrators import catalog, scheme
+from mbsim.integrators.changing import FIRST_PATIENCE
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.core.problem import Problem
+
+#: Bodies of the largest model for which AUTO looks whether it is stiff.
+MOST_BODIES = 300
+#: Steps from one sample of `pipeline.audit` to the next, of explicit methods, those with more than
+#: FEW bodies, and implicit ones: what samples cost is then about 1 % of the steps, or less.
+EVERY, EVERY_OF_MANY, EVERY_IMPLICIT = 8.0, 16.0, 1.0
+FEW = 16
+
+
+class Methods:
+    """The arrays of a run's method, and its functions bound to the mechanism.
+
+    AUTO's two methods have their arrays in common, so that one goes on where the other ends.
+    """
+
+    def __init__(self, system: System, name: str, start: float, timed: bool = False) -> None:
+        from mbsim.compile_model.timetable import ROWS
+        from mbsim.dynamics.pipeline.hooks import mechanism
+
+        self.system = system
+        changing = name == catalog.AUTO
+        self.explicit = catalog.load(catalog.EXPLICIT if changing else name)
+        self.other = catalog.load(catalog.IMPLICIT) if changing else None
+        bodies = len(system.body_ids)
+        held = scheme.both(self.explicit, self.other) if self.other else self.explicit
+        self.arrays = scheme.make(held, system.y0, start, bodies, ROWS if timed else 1)
+        # where a contact may close or stick, Newton's iteration that fails with what held at the
+        # step's begin is what finds it
+        touches = len(system.scene.contacts.id) > 0
+        self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
+        length, speed = system.scene.world.scale[:2]
+        self.arrays.memory[scheme.OWN_TIME] = length / speed
+        fixed = self.explicit.order == 0.0
+        system.scene.world.fixed_step[0] = int(fixed)
+        self.problem: Problem
+        self.problem, self._table = mechanism(system.scene, fixed)
+        self._tangent: Any = None
+        self.steps: scheme.Steps
+        if self.explicit.implicit and bodies > MOST_LINEARISED:
+            raise ModelError(
+                f"{system.model.file}: integrator={name}: {bodies} bodies are more than the "
+                f"{MOST_LINEARISED} that implicit methods take; take VERLET or DOPRI5"
+            )
+        if changing and bodies <= MOST_BODIES:
+            self.arrays.memory[scheme.WATCH] = 1.0
+            self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
+            self.arrays.memory[scheme.BEGUN] = start
+        self.changes = 0
+        self.bind()
+
+    @property
+    def is_stiff(self) -> bool:
+        """Whether AUTO's implicit method runs."""
+        return bool(self.arrays.memory[scheme.STIFF] == 1.0)
+
+    def bind(self) -> None:
+        """Bind the method that memory names."""
+        running = self.explicit
+        if self.other is not None and self.is_stiff:
+            running = self.other
+        if running.implicit and self._tangent is None:
+            from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+
+            made = implicit_hooks(self.system.scene, self.problem, running.pair)
+            self.problem, self._tangent = made
+        every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
+        self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
+        probe = self.explicit if running is self.other else None
+        self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
+
+    def saved(self) -> dict[str, Any]:
+        """Return what a running implicit method keeps beside its arrays, by name."""
+        kept: dict[str, Any] = {"changes": np.array(self.changes)}
+        if self.steps.implicit:
+            kept |= tangent.saved(self._tangent[0])
+            kept["tangent/grip"] = np.array(self.system.scene.work.grip)
+        return kept
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Bind the method that ran, whose arrays are as they were, to what it kept."""
+        self.changes = int(kept["changes"])
+        self.bind()
+        if self.steps.implicit:
+            tangent.restore(self._tangent[0], kept)
+            self.system.scene.work.grip[...] = kept["tangent/grip"]
+
+    def _forget(self) -> None:
+        """Leave nothing of a linearisation to what comes later: only a running one is saved."""
+        self.arrays.memory[scheme.HAVE_JACOBIAN] = 0.0
+        self.system.scene.work.grip[...] = 0.0
+        if self._tangent is not None:
+            # no couplings: they are found anew
+            self._tangent[0].pattern.count[...] = (0, 0, 1)
+
+    def change_over(self) -> str:
+        """Let AUTO's other method go on from the committed point; return what is to be said."""
+        memory = self.arrays.memory
+        stiff = not self.is_stiff
+        bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
+        memory[scheme.STIFF] = float(stiff)
+        memory[scheme.FRESH] = 1.0
+        memory[scheme.ERROR_BEFORE] = 1.0
+        memory[scheme.GROWTH] = math.inf
+        memory[scheme.BEGUN] = memory[scheme.TIME]
+        if stiff:
+            memory[scheme.COSTLY] = memory[scheme.PACE]
+        # one over the length of the steps that were too short
+        often = max(memory[scheme.PACE], 1.0 / memory[scheme.STEP])
+        memory[scheme.PACE] = often if stiff else 0.0
+        memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
+        memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
+        if stiff:
+            # one that goes to and fro waits longer each time
+            memory[scheme.PATIENCE] *= 1.5
+        self.arrays.dense[...] = 0.0
+        self._forget()
+        self.changes += 1
+        self.bind()
+        now, h = memory[scheme.TIME], memory[scheme.STEP]
+        if stiff:
+            why = "stability bounds the step of" if bound else "too many steps are ahead, of"
+            return f"time {now:.9g}: {why} {h:.3g}: {catalog.IMPLICIT} from here on"
+        return f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
+
+    def retreat(self) -> bool:
+        """Let AUTO's explicit method try where the implicit one cannot; return whether it can."""
+        if self.other is None or not self.is_stiff:
+            return False
+        self.change_over()
+        memory = self.arrays.memory
+        memory[scheme.WATCH] = 0.0
+        memory[scheme.STEP] = 0.0
+        memory[scheme.HAVE_F] = 0.0
+        return True

@@ -1,0 +1,128 @@
+"""Simulate analysis_type="Static": the search for an equilibrium at the time of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core.layout import BODY_SIZE
+from mbsim.dynamics.initial.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balance, Hooks, balance
+from mbsim.dynamics.initial.equilibrium_states import Rest, settle_states
+from mbsim.errors import SolverError
+from mbsim.expressions.elementary import NUMBER, TIME
+from mbsim.model.elements import Static
+from mbsim.model.names import element_name
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+
+Array = np.ndarray[Any, Any]
+
+
+@contextmanager
+def standing_still(system: System, t: float) -> Iterator[None]:
+    """Let TIME be a constant in all expressions, so that motions hold their displacements.
+
+    Motions that give velocities or accelerations hold what they act on where it is.
+    """
+    programs, equations = system.scene.programs, system.scene.equations
+    given = equations.program.copy()
+    rates = (given >= 0) & (equations.level < 2) & (equations.general == 0)
+    times = programs.code[:, 0] == TIME
+    kept = programs.code.copy()
+    if times.any():
+        programs.number[-1] = t
+        programs.code[times, 0] = NUMBER
+        programs.code[times, 1] = len(programs.number) - 1
+    equations.program[rates] = -1
+    try:
+        yield
+    finally:
+        programs.code[...] = kept
+        equations.program[...] = given
+
+
+def find(
+    system: System,
+    y: Array,
+    t: float,
+    hooks: Hooks,
+    given: Static,
+    tell: Callable[[str], None],
+) -> None:
+    """Put the bodies of `y` into an equilibrium at time t, with velocities 0, and states with them.
+
+    Raises
+    ------
+    SolverError
+        If there is none, or none is found; `y` stays as it was.
+    """
+    most = given.max_num_iter or MOST_ITERATIONS
+    with standing_still(system, t):
+        found, where = balance(system.scene, y, hooks, most, given.imbalance)
+        if len(system.scene.states.program):
+            # bodies that rest while states stand still are a start, or else what was given
+            start = where if found.balanced else y
+            rest = settle_states(system.scene, start, hooks, most)
+            if rest.state >= 0:
+                raise SolverError(_unsettled(system, rest, t))
+            found, where = balance(system.scene, rest.y, hooks, most, given.imbalance)
+    if not found.balanced:
+        raise SolverError(_failure(system, found, t))
+    for line in _report(system, found, y, where, t):
+        tell(line)
+    if len(system.scene.states.program):
+        tell(f"static: states at rest after {rest.iterations} iterations")
+    y[...] = where
+
+
+def _share(found: Balance) -> str:
+    """Return the residual in words."""
+    return f"residual {found.residual:.3g}, {found.residual / found.scale:.3g} of the largest load"
+
+
+def _report(system: System, found: Balance, before: Array, y: Array, t: float) -> list[str]:
+    """Return what the log says of an equilibrium."""
+    count = len(system.body_ids)
+    n = BODY_SIZE * count
+    way = (y[:n] - before[:n]).reshape(-1, BODY_SIZE)[:, :3]
+    ways = np.linalg.norm(way, axis=1)
+    lines = [
+        f"static at time {t:.9g}: {found.iterations} iterations, {found.evaluations} evaluations, "
+        + _share(found)
+    ]
+    if count:
+        b = int(ways.argmax())
+        lines.append(f"static: {system.body_name(b)} moved furthest, by {ways[b]:.6g}")
+    if found.unstable:
+        lines.append("static: without friction this equilibrium is unstable")
+    return lines
+
+
+def _unsettled(system: System, rest: Rest, t: float) -> str:
+    """Return which state has no equilibrium."""
+    states = [("Control_Diff", id) for id in system.model.differentials]
+    states += [("Force_Element", id) for id, user in system.residuals.items() for _ in user.states]
+    name = element_name(system.model.file, *states[rest.state])
+    return (
+        f"no static equilibrium found at time {t:.9g}: the rate of {name} stays "
+        f"{rest.rate:.6g} after {rest.iterations} iterations, which is not 0"
+    )
+
+
+def _failure(system: System, found: Balance, t: float) -> str:
+    """Return why there is no equilibrium."""
+    name = system.body_name(found.worst)
+    if found.far:
+        why = f"{name} went further than {FAR_AWAY:g} times the model's size: it rests on nothing"
+    elif found.loose:
+        why = f"nothing holds {name} against the force on it"
+    else:
+        why = f"the largest is on {name}"
+    return (
+        f"no static equilibrium found at time {t:.9g} in {found.iterations} iterations: "
+        f"{_share(found)}; {why}"
+    )
