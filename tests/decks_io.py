@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mbsim
 from mbsim.errors import Interrupted
-from mbsim.run import simulation
+from mbsim.run import loop
 
 ROOT = Path(__file__).resolve().parent.parent
 MODELS = ROOT / "models"
@@ -48,8 +48,8 @@ def run_in_pieces(model, folder, monkeypatch, pieces=(9, 14, 6), **settings):
 
     It looks as often as it can from here on.
     """
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     for k, most in enumerate(pieces):
         left = [most]
 

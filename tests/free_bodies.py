@@ -6,8 +6,9 @@ import numpy as np
 
 from mbsim.compile_model.build import build
 from mbsim.model.elements import Body, Gravity, Marker, Model, Simulation, Units
+from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
-from mbsim.run.simulation import Runner
+from mbsim.run.start import settle_contacts
 
 
 def rotation(axis, angle):
@@ -75,7 +76,9 @@ def run(model, tol=1e-9, integrator=None):
     system = build(model)
     kept = Kept(system.scene.rows)
     runner = Runner(system, settings, kept, None, print)
-    runner.settle_contacts(False)
+    settle_contacts(
+        system, runner.hooks, settings, None, method.y, method.k[0], False, print, print
+    )
     runner.run(None, False)
     kept.take()
     joined = [np.concatenate(parts) for parts in zip(*kept.blocks, strict=True)]

@@ -26,7 +26,7 @@ import numpy as np
 
 import mbsim
 from mbsim.errors import Interrupted, MbsimError, ModelError
-from mbsim.run import simulation
+from mbsim.run import loop
 
 #: Names of units of force, mass, length, time, and what they are in N, kg, m, s.
 UNITS = (
@@ -335,7 +335,7 @@ class Found:
 @contextmanager
 def stopping(seconds):
     """Let a run be interrupted after so many seconds of its own, however busy the machine is."""
-    plain, running = simulation.Runner.__init__, []
+    plain, running = loop.Runner.__init__, []
 
     def begin(runner, *given, **named):
         plain(runner, *given, **named)
@@ -345,7 +345,7 @@ def stopping(seconds):
         for runner in running:
             runner.interrupted = True
 
-    simulation.Runner.__init__ = begin
+    loop.Runner.__init__ = begin
     before = signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)
     try:
@@ -353,7 +353,7 @@ def stopping(seconds):
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
-        simulation.Runner.__init__ = plain
+        loop.Runner.__init__ = plain
 
 
 def poses_of(results, scale):

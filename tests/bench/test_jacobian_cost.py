@@ -20,8 +20,9 @@ import joint_chain
 import mbsim
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
-from mbsim.run.simulation import Runner
+from mbsim.run.start import assemble_model
 
 pytestmark = pytest.mark.bench
 
@@ -46,7 +47,7 @@ def costs(folder, count):
     settings = settle(model)
     system = build(model)
     runner = Runner(system, settings, None, Silent(), lambda text: None)
-    runner.assemble()
+    assemble_model(system, runner.hooks, 0.0, runner.method.y, print, print)
     problem, _kept = implicit_hooks(system.scene, runner.problem, True)
     y = runner.method.y.copy()
     y[np.arange(len(y)) % 13 >= 7] += 0.1

@@ -27,7 +27,7 @@ from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.audit import examine
 from mbsim.integrators import scheme
 from mbsim.results.audit import ENTRIES, audit_of
-from mbsim.run import simulation
+from mbsim.run import loop
 
 ENERGY = {"energy", "energy_step"}
 
@@ -40,7 +40,7 @@ def names_of(warnings):
 
 def with_fault(monkeypatch, when, fault):
     """Let `fault(runner)` happen at the first step that ends at `when` or later."""
-    plain = simulation.Runner.__init__
+    plain = loop.Runner.__init__
 
     def begin(runner, *given, **named):
         plain(runner, *given, **named)
@@ -57,7 +57,7 @@ def with_fault(monkeypatch, when, fault):
 
         runner._advance = advance_to_fault
 
-    monkeypatch.setattr(simulation.Runner, "__init__", begin)
+    monkeypatch.setattr(loop.Runner, "__init__", begin)
 
 
 @pytest.mark.parametrize("integrator", ["DOPRI5", "GALPHA"])

@@ -52,15 +52,15 @@ def small(results):
 @pytest.fixture
 def counters(monkeypatch):
     """Return the counters of the run that failed."""
-    from mbsim.run import simulation
+    from mbsim.run import loop
 
-    found, kept = {}, simulation.Runner.stats
+    found, kept = {}, loop.Runner.stats
 
     def stats(self, *arguments):
         found.update(kept(self, *arguments))
         return found
 
-    monkeypatch.setattr(simulation.Runner, "stats", stats)
+    monkeypatch.setattr(loop.Runner, "stats", stats)
     return found
 
 

@@ -19,7 +19,7 @@ from models.reference import jenkins_block
 
 import mbsim
 from mbsim.errors import DeckError, Interrupted, ModelError, PluginError, SolverError
-from mbsim.run import simulation
+from mbsim.run import loop
 
 DRY = USERFUNCS / "dry_friction_element.py"
 
@@ -450,8 +450,8 @@ def test_friction_about_an_axis_stops_a_spin(tmp_path):
 
 
 def test_a_run_goes_on_with_the_script_with_which_it_began(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     script = tmp_path / "mine.py"
     script.write_text(DRY.read_text("utf-8"), encoding="utf-8")
     text = GROUND + body(2, 1.0, v=1.0) + spring(4.0) + element("dry_friction", "1, 0.02", script)
