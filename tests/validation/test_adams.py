@@ -17,20 +17,15 @@ last digit; those are put into the decks here, and the decks as they are held ag
 from __future__ import annotations
 
 import functools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from decks_io import ROOT
-
 import mbsim
+from helpers import mechanics as mech
+from helpers.folders import SHARED
 
-DATA = ROOT.parent / "shared/data/adams"
+DATA = SHARED / "adams"
 G = (0.0, 0.0, -9.80665)
 BAR = (0.04, 0.1, 0.1)  # inertia of the pendulum [kg m^2]; its mass is 1 kg
 EYE = np.eye(3)

@@ -1,17 +1,14 @@
 """Where the shared problems are, for the tests that use them."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest
 
-FOLDER = next(
-    (
-        place
-        for folder in Path(__file__).resolve().parents
-        if (place := folder / "shared" / "data" / "fclib").is_dir()
-    ),
-    Path("../shared/data/fclib"),
-)
+from helpers.folders import SHARED
+
+FOLDER = SHARED / "fclib"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.hdf5"))
 
 
