@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from helpers.folders import ROOT, SHARED
+from helpers.folders import ROOT, data_file
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions.tree import Call, Number
@@ -22,8 +22,6 @@ from mbsim.model.placement import place
 from mbsim.reader.adm.lexer import split_statements, unique
 from mbsim.reader.xml import read_model
 from mbsim.run.settings import settle
-
-ADAMS = SHARED / "adams"
 
 # one statement a line, so that tests can name the line
 PENDULUM = """a pendulum, this line is the title
@@ -493,10 +491,9 @@ REAL = {
 }
 
 
-@pytest.mark.skipif(not ADAMS.is_dir(), reason=f"no Adams decks at {ADAMS}")
 @pytest.mark.parametrize("name", sorted(REAL))
 def test_real_decks(name: str) -> None:
-    model = read_model(ADAMS / f"test_{name}.adm")
+    model = read_model(data_file(f"adams/test_{name}.adm"))
     joint, constraints, forces, position = REAL[name]
     assert [j.type for j in model.joints.values()] == ([joint] if joint else [])
     assert len(model.general_constraints) == constraints
