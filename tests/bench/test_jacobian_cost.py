@@ -6,18 +6,13 @@ python -m pytest -q -m bench -s tests/bench/test_jacobian_cost.py
 from __future__ import annotations
 
 import ctypes
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-import joint_chain
-
 import mbsim
+from helpers import joint_chain
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.run.loop import Runner

@@ -8,20 +8,17 @@ not unknowns: their rows are left out.
 from __future__ import annotations
 
 import ctypes
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, write_deck
-from mechanics import Body
-from mechanism_decks import Joint, Scene, marker
 from scipy.spatial.transform import Rotation
 
 import mbsim
+from helpers.decks import write_deck
+from helpers.folders import MODELS
+from helpers.mechanics import Body
+from helpers.mechanism_decks import Joint, Scene, marker
 from mbsim.arrays.scene import CHOOSE
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks

@@ -8,19 +8,15 @@ earlier versions are kept as arrays of what their samples saw.
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from audit_runs import FREE_FLIGHT, INCLINE, LOOPS
 from click.testing import CliRunner
-from decks_io import GROUND, MODELS, contact, run_in_pieces, run_model, sphere, write_deck
 
 import mbsim
+from helpers.audit_runs import FREE_FLIGHT, INCLINE, LOOPS
+from helpers.decks import GROUND, contact, run_in_pieces, run_model, sphere, write_deck
+from helpers.folders import MODELS
 from mbsim.arrays import scene as a
 from mbsim.cli.main import main
 from mbsim.compile_model.build import build

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, sphere
-
 import mbsim
+from helpers.decks import GROUND, sphere
 from mbsim.compile_model.build import build
 from mbsim.errors import Interrupted, ModelError
 from mbsim.model import elements

@@ -10,11 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
 from mbsim.errors import ModelError, PluginError, SolverError
 
 CLI = [sys.executable, "-c", "from mbsim.cli.main import main; main()"]

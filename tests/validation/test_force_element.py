@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 import random
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import USERFUNCS, run_deck, run_in_pieces, write_deck
-from models.reference import jenkins_block
-
 import mbsim
+from helpers.decks import run_deck, run_in_pieces, write_deck
+from helpers.folders import USERFUNCS
+from helpers.reference import jenkins_block
 from mbsim.errors import DeckError, Interrupted, ModelError, PluginError, SolverError
 from mbsim.run import loop
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from crowd_decks import SHAPES, balls, block, pile, random_axes, sets, shape_graphic, solid, surface
-from decks_io import COULOMB, GRAVITY, GROUND, run_deck, write_deck
-
 import mbsim
+from helpers.crowd_decks import (
+    SHAPES,
+    balls,
+    block,
+    pile,
+    random_axes,
+    sets,
+    shape_graphic,
+    solid,
+    surface,
+)
+from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
 from mbsim.arrays.scene import FREE, LISTINGS, LIVE, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics

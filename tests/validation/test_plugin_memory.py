@@ -5,18 +5,17 @@ from __future__ import annotations
 import ctypes
 import math
 import random
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mbsim
+from helpers.folders import USERFUNCS
 from mbsim.dynamics.pipeline import hooks
 from mbsim.errors import Interrupted, ModelError, PluginError
 from mbsim.plugins import failure
 from mbsim.run import loop
 
-USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
 KEEPS = USERFUNCS / "stiction_with_state.py"
 STICTION = 'cff_type="STICTION" mu_static="0.4" mu_dynamic="0.4" tangential_stiffness="2e4"'
 PLUGIN = (

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from numba import njit
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from contracts.test_pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
-
+from helpers.pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
 from mbsim.compile_model.contacts import pair_address, region_address
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS

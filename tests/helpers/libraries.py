@@ -8,7 +8,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from decks_io import USERFUNCS
+
+from helpers.folders import USERFUNCS
 
 
 def need(program):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from decks_io import GROUND, contact
+
+from helpers.decks import GROUND, contact
 
 #: shape attributes, a mesh's text, and points of its surface in shape axes
 SHAPES = ("SPHERE", "BOX", "ELLIPSOID", "CYLINDER", "FRUSTUM", "MESH")

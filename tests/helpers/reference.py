@@ -636,3 +636,19 @@ def jenkins_block(
             slider, slides, v = x - slides * dx, 0.0, 0.0
         else:
             slides = np.sign(v)
+
+
+# IMPACT at 1 m/s, m = 1 kg, k = 1e5, e = 1.5, dmax = 1e-3, no gravity (rtol 1e-12)
+RESTITUTION = [(50.0, 0.4813434809, 0.0357468168, 0.0080820827),
+               (200.0, 0.1078059064, 0.0551703767, 0.0043920515)]  # fmt: skip
+
+
+def rotation_matrices(q):
+    w, x, y, z = q.T
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from decks import added, read
 
+from helpers.minimal_deck import added, read
 from mbsim.arrays import scene as a
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.pairing import plan_pairs

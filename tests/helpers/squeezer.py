@@ -5,9 +5,10 @@ Points: crank O-P, link P-E, triangle B-E-D (spring C-D), links E-H and H-A, E-G
 
 from __future__ import annotations
 
-import mechanics as mech
 import numpy as np
-from mechanism_decks import Joint, Scene
+
+from helpers import mechanics as mech
+from helpers.mechanism_decks import Joint, Scene
 
 MASS = (0.04325, 0.00365, 0.02373, 0.00706, 0.0705, 0.00706, 0.05498)
 INERTIA = (2.194e-6, 4.41e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5)

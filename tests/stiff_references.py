@@ -1,6 +1,6 @@
 """Writes the tables that the decks of `models/stiff/` are held to.
 
-python tests/models/stiff_references.py [NAME]...
+python tests/stiff_references.py [NAME]...
 
 Closed forms and touch-to-touch solutions where there are such; else explicit DOP853 at tol 1e-11,
 whose table says how far it is from that at 1e-10. `test_stiff_decks.py` has what else is known.
@@ -9,15 +9,11 @@ whose table says how far it is from that at 1e-10. `test_stiff_decks.py` has wha
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from models.reference import drop_height
-
 import mbsim
+from helpers.reference import drop_height
 from mbsim.bench import stiff
 from mbsim.bench.ours import outcome
 
@@ -101,7 +97,7 @@ def write(deck):
     times, exact, note = reference(deck)
     lines = [
         f"# positions [m] of centres of mass: {note}",
-        f"# python tests/models/stiff_references.py {deck.name}",
+        f"# python tests/stiff_references.py {deck.name}",
         ",".join(["time", *deck.columns]),
         *(",".join(map(repr, map(float, (t, *row)))) for t, row in zip(times, exact, strict=True)),
     ]

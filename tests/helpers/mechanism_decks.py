@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import mechanics as mech
 import numpy as np
-from decks_io import write_deck
 
 import mbsim
+from helpers import mechanics as mech
+from helpers.decks import write_deck
 
 #: Name of a joint's type to what it does, as geometry.
 ROWS = {

@@ -41,22 +41,20 @@ int main(int argc, char **argv) {
 """
 
 
-@pytest.fixture(scope="session")
-def libfclib(tmp_path_factory):
+def built(folder):
     """Return how to ask libfclib what it reads from a file."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
-    folder = tmp_path_factory.mktemp("libfclib")
     (folder / "ask.c").write_text(PROGRAM)
-    built = subprocess.run(
+    made = subprocess.run(
         ["gcc", "-w", "-I/usr/include/hdf5/serial", "ask.c", "-o", "ask", "-lfclib", "-lm"],
         cwd=folder,
         capture_output=True,
         text=True,
         check=False,
     )
-    if built.returncode:
-        pytest.skip(f"libfclib-dev is not installed: {built.stderr.splitlines()[0]}")
+    if made.returncode:
+        pytest.skip(f"libfclib-dev is not installed: {made.stderr.splitlines()[0]}")
 
     def ask(kind, path, *more):
         done = subprocess.run(
