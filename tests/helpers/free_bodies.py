@@ -76,9 +76,8 @@ def run(model, tol=1e-9, integrator=None):
     system = build(model)
     kept = Kept(system.scene.rows)
     runner = Runner(system, settings, kept, None, print)
-    settle_contacts(
-        system, runner.hooks, settings, None, method.y, method.k[0], False, print, print
-    )
+    y, f = runner.method.y, runner.method.k[0]
+    settle_contacts(system, runner.hooks, settings, None, y, f, False, print, print)
     runner.run(None, False)
     kept.take()
     joined = [np.concatenate(parts) for parts in zip(*kept.blocks, strict=True)]
