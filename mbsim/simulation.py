@@ -89,11 +89,16 @@ class Runner:
         self.detector = self._open_fcl_door()
         system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
-        self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
+        timed = follows_time(system.scene)
+        self._advance, self.methods = jit.planned(
+            lambda: (
+                jit.awaited(driver.advance),
+                Methods(system, settings.integrator, start, timed),
+            )
+        )
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.method.counts[scheme.NEXT_WATCH] = 0
-        self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
             ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
@@ -674,6 +679,8 @@ def simulate(
     jit.on_first_compile = lambda: tell(
         "compiling what this model needs (a quarter of a minute to one); later runs load it"
     )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
     for file in files:
