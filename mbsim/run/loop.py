@@ -70,12 +70,17 @@ class Runner:
         self.detector = self._open_fcl_door()
         system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
-        self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
+        timed = follows_time(system.scene)
+        self._advance, self.methods = jit.planned(
+            lambda: (
+                jit.awaited(driver.advance),
+                Methods(system, settings.integrator, start, timed),
+            )
+        )
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem)
         self.method.counts[scheme.NEXT_WATCH] = 0
-        self._advance = jit.function(driver.advance)
         self.changes = changes or []  # parameters of every Simulate, where some differ
         self.stage = 0  # which Simulate
         self.pace = Pace(start, start)  # of that one

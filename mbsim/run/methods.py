@@ -11,6 +11,7 @@ import numpy as np
 from mbsim.arrays.scene import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
+from mbsim.core import jit
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import FIRST_PATIENCE
@@ -75,18 +76,21 @@ class Methods:
 
     def bind(self) -> None:
         """Bind the method that memory names."""
-        running = self.explicit
+        self.problem, self._tangent, (self.steps, self._bench) = jit.planned(self._bound)
+
+    def _bound(self) -> tuple[Problem, Any, tuple[scheme.Steps, Any]]:
+        """Return the problem, what its linearisation lives in, and the method bound to it."""
+        running, problem, linearised = self.explicit, self.problem, self._tangent
         if self.other is not None and self.is_stiff:
             running = self.other
-        if running.implicit and self._tangent is None:
+        if running.implicit and linearised is None:
             from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 
-            made = implicit_hooks(self.system.scene, self.problem, running.pair)
-            self.problem, self._tangent = made
+            problem, linearised = implicit_hooks(self.system.scene, problem, running.pair)
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
-        self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
+        return problem, linearised, scheme.bind(running, problem, self.arrays, probe)
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""
