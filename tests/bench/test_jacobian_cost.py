@@ -13,6 +13,7 @@ import pytest
 
 import mbsim
 from helpers import joint_chain
+from helpers.free_bodies import Silent
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.run.loop import Runner
@@ -25,13 +26,6 @@ pytestmark = pytest.mark.bench
 #: this may grow from a chain of 10.
 MOST, GROWTH = 30.0, 5.0
 ROUNDS = 200
-
-
-class Silent:
-    """A log that keeps nothing."""
-
-    def line(self, text):
-        pass
 
 
 def costs(folder, count):

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 from numba import carray
 
+from helpers.equations import far, none, observed, one, oscillation, zero
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, I1
@@ -303,23 +304,7 @@ def _keep(context, t, h, a, b):
     return 0.0
 
 
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
-
-
-HOOKS = (_rhs, _zero, _norm, _one, _zero, _zero, _none, _far, _keep, _zero)
+HOOKS = (_rhs, zero, _norm, one, zero, zero, none, far, _keep, zero)
 BOTH = pytest.mark.parametrize("name", ["RADAU5", "GALPHA"])
 LINEAR = ("linearise", "factor", "solve", "factor_pair", "solve_pair")
 
@@ -354,7 +339,7 @@ class Run:
         )
         self._table = pack(self.box)
         named = list(HOOKS)
-        named[1] = _unit if bodies else _zero
+        named[1] = _unit if bodies else zero
         plain = [jit.address(hook, HOOK) for hook in named]
         problem = Problem(int(self._table.ctypes.data), *plain)
         hooks = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
@@ -372,17 +357,6 @@ class Run:
 
     def count(self, name):
         return int(self.state.counts[name])
-
-
-def observed(errors):
-    """Return the order between the first and the last of (h, error)."""
-    (h0, e0), (h1, e1) = errors[0], errors[-1]
-    return math.log(e0 / e1) / math.log(h0 / h1)
-
-
-def oscillation(t):
-    # y'' = -y + sin 2t, y(0) = 1, y'(0) = 0
-    return np.cos(t) + 2.0 / 3.0 * np.sin(t) - np.sin(2.0 * t) / 3.0
 
 
 def fixed_steps(kind, y0, n, end=5.0, tol=1e-10, **more):

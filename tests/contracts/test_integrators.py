@@ -13,6 +13,7 @@ from numba import carray, cfunc
 
 import mbsim
 from helpers.decks import run_model
+from helpers.equations import far, none, observed, one, oscillation, zero
 from helpers.folders import MODELS
 from mbsim.core import jit
 from mbsim.core.address import call_float, pack, view
@@ -93,22 +94,6 @@ def _norm4(context, t, h, a, b):
     return math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
 
 
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
-
-
 class Table(NamedTuple):
     """Rows that `_keep` writes: t, y0, y1; and numbers of the equation."""
 
@@ -139,11 +124,6 @@ def _speed(context, t, h, a, b):
     return max(abs(e[1]), abs(e[0]))
 
 
-def exact(t):
-    # y'' = -y + sin 2t, y(0) = 1, y'(0) = 0
-    return np.cos(t) + 2.0 / 3.0 * np.sin(t) - np.sin(2.0 * t) / 3.0
-
-
 ECCENTRICITY = 0.3
 PERIHELION = (1.0 - ECCENTRICITY, 0.0, 0.0, math.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY)))
 
@@ -157,8 +137,8 @@ def planet(t):
     return np.array([math.cos(anomaly) - ECCENTRICITY, across])
 
 
-def make_problem(rhs, context=0, norm=_norm2, output=_zero, project=_zero):
-    hooks = (rhs, project, norm, _one, _zero, _zero, _none, _far, output, _zero)
+def make_problem(rhs, context=0, norm=_norm2, output=zero, project=zero):
+    hooks = (rhs, project, norm, one, zero, zero, none, far, output, zero)
     return Problem(context, *[jit.address(hook, HOOK) for hook in hooks])
 
 
@@ -188,12 +168,6 @@ class Run:
         return advance(self.steps, end, tol, h_max, 0.0, times, budget)
 
 
-def observed(errors):
-    """Return the order between the first and the last of (h, error)."""
-    (h0, e0), (h1, e1) = errors[0], errors[-1]
-    return math.log(e0 / e1) / math.log(h0 / h1)
-
-
 def at_least_the_order(order, name):
     # DOP853 has small coefficients: the next order shows as well
     return order == pytest.approx(5.0, abs=0.3) if name == "DOPRI5" else 7.5 <= order < 10.0
@@ -207,7 +181,7 @@ def test_observed_order_on_an_oscillator(oscillator, name):
         run = Run(name, oscillator, step=5.0 / n)
         run(5.0, 1e9, h_max=5.0 / n)
         count = run.state.counts[scheme.STEPS]
-        errors.append((5.0 / count, abs(run.state.y[0] - exact(5.0))))
+        errors.append((5.0 / count, abs(run.state.y[0] - oscillation(5.0))))
     assert at_least_the_order(observed(errors), name), errors
 
 
@@ -233,7 +207,7 @@ def test_observed_order_of_dense_output(name):
         run.state.memory[scheme.STEP] = 5.0 / n
         run(5.0, 1e9, h_max=5.0 / n, times=times)
         assert table.rows[:, 0].tolist() == times.tolist()
-        worst = np.abs(table.rows[:, 1] - exact(times)).max()
+        worst = np.abs(table.rows[:, 1] - oscillation(times)).max()
         errors.append((5.0 / run.state.counts[scheme.STEPS], worst))
     assert observed(errors) > ORDERS[name][1] - 0.1, errors
 
@@ -272,7 +246,7 @@ def test_error_falls_with_the_tolerance_down_to_rounding(oscillator, name):
     for tol in 10.0 ** -np.arange(3, 15):
         run = Run(name, oscillator)
         assert run(5.0, tol) == DONE
-        errors.append(abs(run.state.y[0] - exact(5.0)))
+        errors.append(abs(run.state.y[0] - oscillation(5.0)))
     assert errors[-1] < 1e-13
     assert errors[0] / errors[-1] > 1e7
     for looser, tighter in zip(errors, errors[2:], strict=False):
@@ -447,5 +421,5 @@ def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
         assert run.state.counts[scheme.STEPS] == n
         assert run.state.counts[scheme.EVALUATIONS] == n + 1
         assert run.state.memory[scheme.H_LARGEST] == pytest.approx(5.0 / n)
-        errors.append((5.0 / n, abs(run.state.y[0] - exact(5.0))))
+        errors.append((5.0 / n, abs(run.state.y[0] - oscillation(5.0))))
     assert observed(errors) == pytest.approx(2.0, abs=0.1)

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers.decks import write_deck
 from helpers.folders import MODELS
+from helpers.free_bodies import Silent
 from helpers.mechanics import Body
-from helpers.mechanism_decks import Joint, Scene, marker
+from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
 from mbsim.arrays.scene import CHOOSE
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
@@ -30,13 +30,6 @@ from mbsim.run.start import assemble_model
 COEFFICIENTS = (1.0, 10.0, 1e3)
 #: Half of the step of differences, and how many times f is rounded on its way from a state.
 EPS, ROUNDINGS = 1e-5, 16.0
-
-
-class Silent:
-    """A log that keeps nothing."""
-
-    def line(self, text):
-        pass
 
 
 class Linearised:
@@ -175,14 +168,6 @@ def test_models(name):
 # --- joints between moving bodies ---
 
 
-def rotation(axis, angle):
-    """Return a rotation about an axis."""
-    axis = np.array(axis, float)
-    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
-
-
-SKEW = rotation((1, 2, -1), 0.7)
-SIDE = SKEW @ rotation((1, 0, 0), np.pi / 2)
 ABOUT_Y = rotation((0, 1, 1), 0.4)
 #: The joints that a tree or equations hold, and how marker I differs from J at the start.
 JOINTS = {

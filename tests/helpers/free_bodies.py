@@ -19,6 +19,10 @@ def rotation(axis, angle):
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 
 
+#: Axes that are no axes of anything else.
+TILTED = rotation((1, 2, -1), 0.7)
+
+
 def body(id, mass=1.0, inertia=(0.1, 0.1, 0.1), p=(0, 0, 0), v=(0, 0, 0), w=(0, 0, 0)):
     """Return a body and its cg marker, whose id is ten times that of the body."""
     made = Body(
@@ -82,3 +86,16 @@ def run(model, tol=1e-9, integrator=None):
     kept.take()
     joined = [np.concatenate(parts) for parts in zip(*kept.blocks, strict=True)]
     return dict(zip(Kept.FIELDS, joined, strict=True)), runner
+
+
+def imbalance(rows):
+    """Return how far the sum of energies goes from its start, over the largest kinetic energy."""
+    total = rows["energy"][:, :3].sum(axis=1)
+    return np.abs(total - total[0]).max() / rows["energy"][:, 0].max()
+
+
+class Silent:
+    """A log that keeps nothing."""
+
+    def line(self, text):
+        pass

@@ -18,6 +18,7 @@ import numpy as np
 from numba import carray
 from scipy.integrate import solve_ivp
 
+from helpers.equations import far, none, one, zero
 from mbsim.bench import deck as text
 from mbsim.bench import parameters as p
 from mbsim.core import jit
@@ -283,22 +284,6 @@ def _output(context, t, h, a, b):
     return 0.0
 
 
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
-
-
 def make(count: int, samples: int, tilt: float = 0.0) -> Chain:
     """Return a chain of `count` rods with room for `samples` rows."""
     n = count
@@ -331,7 +316,7 @@ def make(count: int, samples: int, tilt: float = 0.0) -> Chain:
 def problem(chain: Chain) -> tuple[Problem, Any]:
     """Return the chain as integrators see it, and what must live as long as it is used."""
     table = pack(chain)
-    hooks = (_rhs, _zero, _norm, _one, _zero, _zero, _none, _far, _output, _zero)
+    hooks = (_rhs, zero, _norm, one, zero, zero, none, far, _output, zero)
     addresses = [jit.address(hook, HOOK) for hook in hooks]
     return Problem(int(table.ctypes.data), *addresses), (table, chain)
 
