@@ -31,6 +31,7 @@ again nearer to the committed one before the run ends, but for codes from AT_ONC
 |        |                             | the caller of `advance` must act on, else 0           |
 | kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
 |        |                             | point, 2 if that shall be found exactly, else 0;      |
+|        |                             | PASS, of a step that was taken: 1 if one changed in it;|
 |        |                             | LOAD: what friction holds over what it can, or < 0;   |
 |        |                             | BENDS (b: y committed): 1 if HALF, at the step's       |
 |        |                             | middle, then HALVES, at its end, are to be asked: the |

@@ -66,6 +66,7 @@ from mbsim.integrators.scheme import (
     H_SMALLEST,
     HAVE_F,
     HAVE_JACOBIAN,
+    KINK_CUT,
     LAST_ERROR,
     LAST_REASON,
     LAST_STEP,
@@ -86,6 +87,7 @@ from mbsim.integrators.scheme import (
     STALE,
     STEP,
     STEPS,
+    STIFFNESS,
     TIME,
     TOL,
     VAIN,
@@ -116,6 +118,8 @@ FARTHER = 10.0
 NEAR_FLOORS = 100.0
 #: So often at most a step is taken again to end at a kink.
 MOST_CUTS = 3
+#: Where steps are cut one after another, whole ones grow so much at most.
+CUT_GROW = 2.0
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol),
 #: and how often a step is shortened for that.
 BENT, MOST_SHORT = 2.0, 20
@@ -483,6 +487,8 @@ def attempt(p, m, steps, t, h, times):
 def attempt_to_event(p, m, steps, t, h, times, floor):
     """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
 
+    And the error of the step before it was made shorter.
+
     A step with a kink ends just behind it, so that none has one in its midst.
     A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
     the state there is no interpolated one; where that ends before the event after all, it is
@@ -492,10 +498,15 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     nudge = 1e-3 * near
     shortened, retakes, cuts, short = False, 0, 0, 0
     whole = max(h, m.memory[CUT_FROM], NEAR_FLOORS / NEAR_CHANGE * floor)
+    uncut, stiffness = -1.0, 0.0
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
         code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
         failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
+        if uncut < 0.0:
+            uncut, stiffness = m.memory[LAST_ERROR], m.memory[STIFFNESS]
+        # whether stability bounds a step is asked of what it would be without the event
+        m.memory[STIFFNESS] = stiffness
         if kinked > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
             cut = first_kink(p, m, t, h, whole, kinked)
@@ -507,10 +518,9 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             if reach * h > floor:
                 h *= reach
                 continue
-        if not failed:
-            m.memory[VAIN] = m.memory[VAIN] + 1.0 if cuts > 0 and kinked == 0.0 else 0.0
+        m.memory[KINK_CUT] = 1.0 if cuts > 0 else 0.0
         if p.happens == 0 or failed:
-            return code, part, asked, h
+            return code, part, asked, h, uncut
         cut = first_event(p, m, t, h, times)
         before = cut > h
         good = (not shortened or nudge > near) if before else (h - cut <= near or h <= floor)
@@ -525,7 +535,7 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             shortened = True
     # the problem's hooks expect its last evaluation at the trial point
     happens_at(p, m, t, h, 1.0)
-    return code, part, asked, h
+    return code, part, asked, h, uncut
 
 
 @jitable
@@ -548,7 +558,9 @@ def accept(p, m, steps, t, h, asked):
     """Take the trial point; return the problem's word on it, or a negative code."""
     word = call_float(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
     if p.kinks != 0:
-        call_float(p.kinks, (p.context, t + h, PASS, m.trial, m.error))
+        changed = call_float(p.kinks, (p.context, t + h, PASS, m.trial, m.error)) > 0.0
+        in_vain = m.memory[KINK_CUT] == 1.0 and not changed
+        m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
@@ -655,7 +667,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         most = min(whole, max(m.memory[REACH] - t, floor))
 
         # try
-        code, part, asked, h = attempt_to_event(p, m, steps, t, most, times, floor)
+        code, part, asked, h, uncut = attempt_to_event(p, m, steps, t, most, times, floor)
         error = m.memory[LAST_ERROR]
         if code != 0.0:
             ends = gives_up(m, code, t, h, floor)
@@ -688,12 +700,16 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             continue
 
         # take
+        may_grow = m.memory[WAS_CUT] == 1.0 and m.memory[AFTER_REJECTION] == 0.0
         choose_next(m, steps, h, h_max)
         if h < whole:
+            m.memory[STEP] = max(m.memory[STEP], whole)
+        if h < most and may_grow and steps.order > 0.0:
             # it was good enough, and ended for an event; where those follow each other, as when
-            # stick and slip take turns, whole steps have to outgrow what they alternate in
-            grows = 2.0 if m.memory[WAS_CUT] == 1.0 and steps.order > 0.0 else 1.0
-            m.memory[STEP] = max(m.memory[STEP], grows * whole)
+            # stick and slip take turns, whole steps outgrow what they alternate in, as far as the
+            # error that they have themselves lets them
+            factor = next_factor(uncut, 1.0, steps.order, steps.memory, False)
+            m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
@@ -716,7 +732,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             if code != 0.0:
                 m.counts[CODE] = int(code)
                 return FAILED
-        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, t_end):
+        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, most, t_end):
             m.memory[CHANGE_DUE] = 1.0
         if full > 0.0 or word >= 2.0:
             return ROWS_FULL

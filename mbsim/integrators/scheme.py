@@ -76,9 +76,14 @@ WAS_CUT = 45
 SHOWN = 46
 # of AUTO: length of the step that was found stiff last
 STIFF_STEP = 47
-# how many steps in a row were cut at a kink and ended before it after all
+# how many steps in a row were cut at a kink and changed no side after all
 VAIN = 48
-MEMORY = 49
+# of AUTO: evaluations when its last window of steps began; how many times as much as at first has
+# to speak for leaving the implicit method
+BEGUN_WORK, RELUCTANCE = range(49, 51)
+# 1 where the step that was tried last was cut at a kink
+KINK_CUT = 51
+MEMORY = 52
 # counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)

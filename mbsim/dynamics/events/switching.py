@@ -147,11 +147,13 @@ def side(scene, t, y, k):
 def watch_held(scene, t, y, what):
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
-    A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
-    leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
+    Of a step that was taken: 1 if it was cut for that. Such a step heats by 1, whether a mode
+    changed then or not; one that was not leaves half of the heat. So where cuts follow each other
+    a whole step is taken now and then.
     """
     heat, differs = scene.state.heat, 0.0
     if what == PASS:
+        differs = heat[1]
         heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
         heat[1] = 0.0
     elif heat[0] <= HOT:
@@ -188,7 +190,7 @@ def load(scene, context, t, y):
 def watch(scene, context, t, y, what):
     """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
-    Unless it is only asked, the sides are kept.
+    Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
     sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
     if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
@@ -206,7 +208,9 @@ def watch(scene, context, t, y, what):
         # friction with a memory of its own is on the side that it keeps
         exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
         leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
-        if leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
+        if what == PASS:
+            differs = 1.0 if other else differs
+        elif leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
             differs = max(differs, 2.0 if exact else 1.0)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
