@@ -203,7 +203,7 @@ def gauss_seidel(
                     kept_error, kept_q = error, error_q
                 elif most == sweeps:
                     most = min(sweeps, 2 * done + grace)
-            elif every == 1 and done >= LEAP:
+            elif every == 1 and done > LEAP:
                 # few contacts: one slow direction is often all that is left
                 phase = done % LEAP
                 if phase == LEAP - 2:
