@@ -76,6 +76,18 @@ def empty_log(nc: int) -> a.Log:
     )
 
 
+def place_fixed(work: a.Work, graphics: a.Graphics) -> None:
+    """Fill what no evaluation fills: rows of ground, of shapes on it, and the axes of spheres."""
+    work.R[-1] = np.eye(3)
+    work.v[-1] = work.w[-1] = 0.0
+    fixed = graphics.body == len(work.R) - 1
+    work.frames[fixed] = np.hstack([graphics.p, graphics.R.reshape(-1, 9)])[fixed]
+    # nobody turns a sphere
+    work.frames[graphics.turns == 0, 3:] = np.eye(3).ravel()
+    work.way[fixed] = 0.0
+    work.speed[fixed] = 0.0
+
+
 def scratch(
     nb: int,
     graphics: a.Graphics,
@@ -91,31 +103,22 @@ def scratch(
     points: int = 0,
     groups: int = 1,
 ) -> a.Work:
-    """Return scratch, with the ground's rows as they stay.
+    """Return scratch, with what stands still in its place.
 
     `ahead`: numbers of y where rates of normal forces are looked for, else 0; `points`: most
     candidates of a pair where friction of contacts is rigid, else 0.
     """
     ng = len(graphics.body)
-    fixed = graphics.body == nb
-    frames = np.full((ng, 12), np.nan)
-    frames[fixed] = np.hstack([graphics.p, graphics.R.reshape(-1, 9)])[fixed]
-    # nobody turns a sphere
-    frames[graphics.turns == 0, 3:] = np.eye(3).ravel()
-    R = np.full((nb + 1, 3, 3), np.nan)
-    R[nb] = np.eye(3)
-    v, w = np.full((nb + 1, 3), np.nan), np.full((nb + 1, 3), np.nan)
-    v[nb] = w[nb] = 0.0
-    return a.Work(
-        R=R,
-        v=v,
-        w=w,
+    work = a.Work(
+        R=np.full((nb + 1, 3, 3), np.nan),
+        v=np.full((nb + 1, 3), np.nan),
+        w=np.full((nb + 1, 3), np.nan),
         force=np.full((nb + 1, 3), np.nan),
         torque=np.full((nb + 1, 3), np.nan),
         noise=np.zeros((nb + 1, 2)),
-        frames=frames,
-        way=np.where(fixed, 0.0, np.nan),
-        speed=np.where(fixed[:, None], 0.0, np.full((ng, 2), np.nan)),
+        frames=np.full((ng, 12), np.nan),
+        way=np.full(ng, np.nan),
+        speed=np.full((ng, 2), np.nan),
         points=np.zeros((ns, POINT)),
         touching=np.zeros(ns, dtype=np.int64),
         hit=np.zeros(ns + 1, dtype=np.int64),
@@ -144,6 +147,8 @@ def scratch(
         held=np.zeros((ns if points else 0, 2)),
         look=np.zeros((3, points, POINT)),
     )
+    place_fixed(work, graphics)
+    return work
 
 
 def empty_rows(

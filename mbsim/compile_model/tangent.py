@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.arrays.scene import MEMORY_DOOR, MEMORY_PAIR_DOOR, TURN_ROOT, Scene
+from mbsim.core import tags
 from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
 
 #: Blocks that are made room for beside those of a model whose bodies are all coupled.
@@ -21,13 +22,11 @@ _ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
 MOST_BODIES = 4000
 #: Fields with one entry a block: room is made for more than are in use.
 _BY_BLOCK = {"pair", "neighbour", "K", "D", "A"}
-#: Fields that a run does not change, those that mean nothing from one call to the next, and
-#: `place`, whose entries in use are kept as a list.
-_CONSTANT = {"joint", "parent", "children"}
-_SCRATCH = {"waiting", "degree", "basis", "law", "rise", "rates", "g", "rate", "extra", "work", "r"}
-_LEFT_OUT = _CONSTANT | _SCRATCH | {"place"}
+#: Of this table of pairs the entries in use are kept as a list.
+_TABLE = "tangent/pattern/place"
 
 
+@tags.state
 class Pattern(NamedTuple):
     """Which bodies are coupled, and in what order they are eliminated."""
 
@@ -37,13 +36,14 @@ class Pattern(NamedTuple):
     start: I1  # (nb + 1,) first neighbour of each step
     neighbour: I1  # (blocks,) bodies that are eliminated later
     count: I1  # (3,) couplings, blocks, 1 where the order is to be found anew
-    joint: I1  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
-    parent: I1  # (nb,) body row, -1 for ground
-    children: I1  # (nb,) that hang on it
-    waiting: I1  # (nb,) scratch: children not yet eliminated, -1 when done itself
-    degree: I1  # (nb,) scratch
+    joint: tags.Constant[I1]  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
+    parent: tags.Constant[I1]  # (nb,) body row, -1 for ground
+    children: tags.Constant[I1]  # (nb,) that hang on it
+    waiting: tags.Scratch[I1]  # (nb,) children not yet eliminated, -1 when done itself
+    degree: tags.Scratch[I1]  # (nb,)
 
 
+@tags.state
 class Linear(NamedTuple):
     """The mechanism linearised at one state: what does not depend on the step."""
 
@@ -64,12 +64,13 @@ class Linear(NamedTuple):
     row_rate: F3  # (border, nb, 6) of a state's slope by the rates
     released: I1  # (border,) rows of equations that do not hold while a loop passes a fold
     slopes: F2  # (states, states) of states by states
-    basis: F3  # (2, 9, 6) scratch
-    law: F2  # (6, 12) scratch
-    rise: F1  # (13,) scratch
-    rates: F1  # (3,) scratch
+    basis: tags.Scratch[F3]  # (2, 9, 6)
+    law: tags.Scratch[F2]  # (6, 12)
+    rise: tags.Scratch[F1]  # (13,)
+    rates: tags.Scratch[F1]  # (3,)
 
 
+@tags.state
 class Real(NamedTuple):
     """A factorisation with real coefficients."""
 
@@ -80,16 +81,17 @@ class Real(NamedTuple):
     answer: F3  # (border, nb, 6)
     border: F2  # (border, border)
     border_swap: I1  # (border,)
-    g: F2  # (nb + 1, 6) right side, then solution; scratch
-    rate: F2  # (nb, 6) change of velocities that residuals alone ask for
-    extra: F2  # (2, border) right side and solution
-    work: F3  # (4, 6, 6) scratch
+    g: tags.Scratch[F2]  # (nb + 1, 6) right side, then solution
+    rate: tags.Scratch[F2]  # (nb, 6) change of velocities that residuals alone ask for
+    extra: tags.Scratch[F2]  # (2, border) right side and solution
+    work: tags.Scratch[F3]  # (4, 6, 6)
     c: F2  # (1, 4) coefficients c1, c2, c3, form
-    r: F2  # (2, n) residual and answer in the layout of y
+    r: tags.Scratch[F2]  # (2, n) residual and answer in the layout of y
     keep: F3  # (slots + 1, carried, carried) Z of `linearization.memory_slopes`, scratch last
-    door: I1  # (1,) entry of `World.doors` at which that is asked for
+    door: tags.Constant[I1]  # (1,) entry of `World.doors` at which that is asked for
 
 
+@tags.state
 class Pair(NamedTuple):
     """The same with complex coefficients."""
 
@@ -100,16 +102,17 @@ class Pair(NamedTuple):
     answer: C3
     border: C2
     border_swap: I1
-    g: C2
-    rate: C2
-    extra: C2
-    work: C3
+    g: tags.Scratch[C2]
+    rate: tags.Scratch[C2]
+    extra: tags.Scratch[C2]
+    work: tags.Scratch[C3]
     c: C2
-    r: C2
+    r: tags.Scratch[C2]
     keep: C3
-    door: I1
+    door: tags.Constant[I1]
 
 
+@tags.state
 class Keeps(NamedTuple):
     """Friction that looks at X or integrates memory, see `linearization.memory_slopes`."""
 
@@ -121,9 +124,10 @@ class Keeps(NamedTuple):
     lever: F4  # (slots, 2, 6, 6) wrenches on I's and on J's body of units along n, x, y, and about
     # x, y, n
     press: F2  # (slots, 2) of the normal force by depth and by its rate
-    scratch: F2  # (2, 5 + carried)
+    scratch: tags.Scratch[F2]  # (2, 5 + carried)
 
 
+@tags.constant
 class Depends(NamedTuple):
     """What programs depend on."""
 
@@ -245,14 +249,11 @@ def _factor_arrays(
 
 
 def _in_use(tangent: Tangent) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield names and arrays of all that a linearisation and its factors consist of."""
+    """Yield paths and arrays of all that a linearisation and its factors consist of."""
     blocks = int(tangent.pattern.count[:2].max())
-    for group in ("pattern", "linear", "keeps", "real", "pair"):
-        arrays = getattr(tangent, group)
-        for field, array in zip(arrays._fields, arrays, strict=True):
-            # the linearisation needs its r, which a factorisation has for scratch
-            if field not in _LEFT_OUT or (group, field) == ("linear", "r"):
-                yield f"tangent/{group}/{field}", array[:blocks] if field in _BY_BLOCK else array
+    for path, array in tags.arrays(tangent, tags.STATE, "tangent/"):
+        if path != _TABLE:
+            yield path, array[:blocks] if path.rpartition("/")[2] in _BY_BLOCK else array
 
 
 def saved(tangent: Tangent) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class GroupType(types.Type):
         word = 0
         for name, hint in typing.get_type_hints(self.group, include_extras=True).items():
             if hasattr(hint, "__metadata__"):
-                dtype, ndim = hint.__metadata__
+                dtype, ndim = hint.__metadata__[:2]
                 found[name] = types.Array(getattr(types, dtype), ndim, "C"), word
                 word += 1 + ndim
             else:

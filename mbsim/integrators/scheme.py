@@ -34,6 +34,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbsim.core import tags
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
@@ -106,22 +107,25 @@ class Scheme(NamedTuple):
     samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
 
 
+@tags.state
 class Method(NamedTuple):
     """What a method keeps."""
 
     y: F1  # (n,) the committed point
     k: F2  # (stages, n); row 0 is f at the committed point
-    trial: F1  # (n,)
-    error: F1  # (n,)
+    trial: tags.Scratch[F1]  # (n,)
+    error: tags.Scratch[F1]  # (n,)
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
     memory: F1  # (MEMORY,) see the names above
     counts: I1  # (COUNTS,) see the names above
-    bodies: I1  # (1,) how many bodies begin y, for methods that know positions from velocities
-    kept: F2  # (carried, n) what the method needs of the step before; saved with the state
-    ahead: F2  # (carried, n) the same of the step that was tried last
+    # (1,) how many bodies begin y, for methods that know positions from velocities
+    bodies: tags.Constant[I1]
+    kept: F2  # (carried, n) what the method needs of the step before
+    ahead: tags.Scratch[F2]  # (carried, n) the same of the step that was tried last
     timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
 
 
+@tags.constant
 class Bench(NamedTuple):
     """What stands behind the context of a method's two functions."""
 

@@ -1,6 +1,7 @@
 """What a run is made of: all that its results follow from, to compare a resumed run with.
 
-The model as it is run (`--set` included), how it is run, and the bytes of users' files. Every
+The model as it is run (`--set` included), how it is run, the bytes of users' files, and which
+arrays a checkpoint of this version holds. Every
 field of every element counts, whatever it is called, but for those that are marked ASIDE where they
 are declared. Facts are kept, so that a message can name what differs.
 """
@@ -14,11 +15,15 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.tangent import Tangent
+from mbsim.core import tags
 from mbsim.expressions import Expression
+from mbsim.integrators.scheme import Method
 from mbsim.model.elements import ASIDE, Source
 from mbsim.model.names import element_name
 from mbsim.results.elements import GROUPS
@@ -43,6 +48,26 @@ _STATEMENTS = {
     "simulations": "Simulate",
     "stages": "Simulate",
 } | {group.member: group.title for group in GROUPS.values()}
+
+
+class Kind(NamedTuple):
+    """Facts of one kind: the result file's attribute of their digest, what another one says."""
+
+    attribute: str
+    differs: str
+
+
+#: Kinds of facts. That of the checkpoint is first: by another version others may differ too.
+KINDS = {
+    "checkpoint": Kind(
+        "checkpoint_sha256", "its checkpoint was written by a version of mbsim with other arrays"
+    ),
+    "model": Kind("system_sha256", "elements of the model have changed (--set?)"),
+    "settings": Kind("settings_sha256", "how it is run has changed"),
+    "subroutines": Kind("subroutines_sha256", "a user subroutine has changed"),
+}
+#: To be raised where anything else in a checkpoint than its arrays changes its form.
+CHECKPOINT = 1
 #: Differences that a message lists.
 MOST_LISTED = 3
 #: What stands for a field that facts leave out, and for an element that is not there.
@@ -140,8 +165,17 @@ def of_users(system: System) -> dict[str, Any]:
     return facts
 
 
+def of_checkpoint() -> dict[str, str]:
+    """Return the form of a checkpoint, and type and number of axes of its arrays by name."""
+    groups = {"": Scene, "method/": Method, "tangent/": Tangent}
+    found = {"form": str(CHECKPOINT)}
+    for path, group in groups.items():
+        found |= tags.layout(group, tags.STATE, path)
+    return found
+
+
 class Identity:
-    """What a run is made of, by kind: `model`, `settings`, `subroutines`.
+    """What a run is made of, by kind.
 
     Parameters
     ----------
@@ -153,6 +187,7 @@ class Identity:
     def __init__(self, system: System, settings: Any = None) -> None:
         file = system.model.file
         self.facts = {
+            "checkpoint": of_checkpoint(),
             "model": of_elements(system.model, file),
             "settings": {} if settings is None else of_elements(settings, file),
             "subroutines": of_users(system),
@@ -161,9 +196,8 @@ class Identity:
     @property
     def digests(self) -> dict[str, str]:
         """Digests by the name of the result file's attribute."""
-        names = {"model": "system_sha256"}
         return {
-            names.get(kind, f"{kind}_sha256"): hashlib.sha256(_text(facts)).hexdigest()
+            KINDS[kind].attribute: hashlib.sha256(_text(facts)).hexdigest()
             for kind, facts in self.facts.items()
         }
 
@@ -173,7 +207,9 @@ class Identity:
 
     def changes(self, packed: np.ndarray[Any, Any], kind: str) -> str:
         """Return what differs from the packed facts of another run, empty if nothing does."""
-        before = json.loads(zlib.decompress(packed.tobytes()))[kind]
+        before = json.loads(zlib.decompress(packed.tobytes())).get(kind)
+        if before is None:
+            return ""  # an earlier version did not say
         now = json.loads(_text(self.facts[kind]))
         found = list(_differences(before, now, ""))
         more = f" and {len(found) - MOST_LISTED} more" if len(found) > MOST_LISTED else ""

@@ -18,7 +18,7 @@ from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import Forces, check_requests
-from mbsim.results.identity import Identity
+from mbsim.results.identity import KINDS, Identity
 from mbsim.results.motion import motion
 from mbsim.results.reading import Results, open_results
 from mbsim.results.requests import columns_of, measures_of, request_table
@@ -41,9 +41,7 @@ _SAID_ELSEWHERE = ("tol_from", "model_file", "overrides", "plugins", "interpret_
 #: What a digest that differs says, and of which facts of `Identity` it is.
 _DIGESTS = {
     "model_sha256": ("the model file has changed", "model"),
-    "system_sha256": ("elements of the model have changed (--set?)", "model"),
-    "settings_sha256": ("how it is run has changed", "settings"),
-    "subroutines_sha256": ("a user subroutine has changed", "subroutines"),
+    **{kind.attribute: (kind.differs, name) for name, kind in KINDS.items()},
 }
 #: Where a checkpoint says what the run is made of.
 MADE_OF = "made_of"

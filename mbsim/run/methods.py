@@ -106,7 +106,6 @@ class Methods:
         kept: dict[str, Any] = {"changes": np.array(self.changes), "since": np.array(self._since)}
         if self.steps.implicit:
             kept |= tangent.saved(self._tangent[0])
-            kept["tangent/grip"] = np.array(self.system.scene.work.grip)
         return kept
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -116,7 +115,6 @@ class Methods:
         self.bind()
         if self.steps.implicit:
             tangent.restore(self._tangent[0], kept)
-            self.system.scene.work.grip[...] = kept["tangent/grip"]
 
     def _forget(self) -> None:
         """Leave nothing of a linearisation to what comes later: only a running one is saved."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core import tags
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.initial.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balance, Hooks, balance
 from mbsim.dynamics.initial.equilibrium_states import Rest, settle_states
@@ -145,8 +146,7 @@ def balance_bodies(
         lambda y, f: hooks.call(problem.commit, t, 0.0, y, f),
         hooks.joints_at(t),
     )
-    groups = (scene.state, scene.pairs, scene.crowds, scene.log, scene.rows)
-    before = [[np.array(array) for array in group] for group in groups]
+    before = tags.copies(scene, tags.STATE)
 
     # there are no steps here that could end where friction changes
     scene.state.frozen[0] = 0
@@ -154,9 +154,7 @@ def balance_bodies(
     find(system, y, t, asked, simulation.static, tell)
     # turns are counted on the way; all else is as if the bodies had jumped
     turns = scene.state.angle.copy()
-    for group, kept in zip(groups, before, strict=True):
-        for array, old in zip(group, kept, strict=True):
-            array[...] = old
+    tags.put_back(scene, tags.STATE, before)
     scene.state.angle[...] = turns
     at[...] = y
     for _ in range(2):

@@ -1,0 +1,235 @@
+"""Numbers with names: columns of tables, kinds, entries of counters, what is asked for."""
+
+from __future__ import annotations
+
+# columns of `Log.contacts`, one row a contact
+(
+    PEAK_FORCE,  # largest net |force| over all steps
+    PEAK_DEPTH,
+    PEAK_SLIP,
+    FIRST_TOUCH,  # time; NaN before
+    APPROACH,  # closing speed of the last touch
+    REBOUND,  # separation speed over closing speed, of the first impact that left again
+    TOUCHES,
+    PEAK_FORCE_TIME,
+    ENERGY_LOST,  # dissipated by the damper and by friction
+) = range(9)
+LOG_COLUMNS = 9
+
+# entries of `Log.counters`
+NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS, LISTINGS = range(7)
+COUNTERS = 7
+
+# entries of `Pairs.count`
+LIVE, FREE, FIXED, WANTED = range(4)
+
+# why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
+REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
+
+# entries of `World.doors`
+(
+    FCL_DOOR,
+    NEAR_DOOR,
+    APPLIED_DOOR,
+    JOINTS_DOOR,
+    EXPRESSION_DOOR,
+    VALUES_DOOR,
+    ANGLES_DOOR,
+    FRICTION_DOOR,
+    WRENCH_DOOR,
+    VALUE_DOOR,
+    TANGENT_DOOR,  # the packed arrays of `compile_model.tangent`, where a method is implicit
+    SLOPES_DOOR,
+    BEND_DOOR,
+    EVALUATE_DOOR,  # the whole rhs
+    MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
+    MEMORY_PAIR_DOOR,  # the same in complex ones
+    DRY_DOOR,  # what Force_DryFriction and Force_Element keep of an accepted step
+    RESIDUAL_DOOR,  # a Force_Element by its residual
+    RIGID_DOOR,  # contacts whose friction holds without give: stiction.rigid_contact
+) = range(19)
+DOORS = 19
+
+# entries of `Applied.kind`
+(
+    LINE_FORCE,
+    AXIS_FORCE,
+    AXIS_TORQUE,
+    VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of forces.wrenches
+    BUSHING,
+    RESIDUAL,  # Force_Element
+    SLIDE_LIMIT,
+    TURN_LIMIT,
+    DRY_SLIDE,  # Force_DryFriction along an axis, then about one: forces.dry_friction
+    DRY_TURN,
+    SLIDE_FRICTION,  # the kinds from here on are frictions in joints
+    TURN_FRICTION,
+    SCREW_FRICTION,  # slides and turns at once
+    BALL_FRICTION,
+) = range(14)
+LATE = 16  # is added to the kind of forces that need reactions, see forces.reaction_forces
+
+# second column of `Applied.late`: components 0 to 5 of a vector force, then
+SCALAR, RUBBING = 6, 7
+
+# what is asked for at JOINTS_DOOR
+ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
+
+# what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
+KEEP_DRY, HOLD_AGAIN = range(2)
+
+# what is asked for at RIGID_DOOR, see stiction.rigid_contact
+(
+    PLACE_HELD,
+    SHARE_HELD,
+    ASK_HELD,
+    BEGIN_HELD,
+    RELEASE_HELD,
+    RECORD_HELD,
+    CHANGED_HELD,
+    LOAD_HELD,
+) = range(8)
+
+# what of a joint's rotation is free: `Tree.turn`
+TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
+
+# kinds of terms: `Equations.kind`
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST = range(7)
+
+# entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
+# the committed state is near a position in which a loop can fold; how far the last step left
+# the equations before it was brought back onto them, as a local error, and which equation most;
+# the least pivot of the factor at hand over its size squared, and
+# how many accelerations `Sweep.kept_a` holds; of the last of those their square in the norm of the
+# inertia, times the square root of the least pivot, and that pivot; at the committed state the
+# least pivot and the time; whether a fold is being passed, when that began and when it ends, and
+# until when the next step may go; how far off velocities were behind it, and at which equation;
+# power of motions within it
+(
+    CHOSEN,
+    USUAL,
+    NEAR_FOLD,
+    DRIFT,
+    DRIFTER,
+    PIVOT,
+    KEPT,
+    ASKED,
+    KEPT_PIVOT,
+    PIVOT_THEN,
+    PIVOT_TIME,
+    FOLDS,
+    FOLD_BEGINS,
+    FOLD_ENDS,
+    FOLD_HALT,
+    FOLD_OFF,
+    FOLD_AT,
+    FOLD_POWER,
+) = range(18)
+
+# columns of `Work.applied`: force 3, torque 3, then
+STORED_ENERGY, LOST_POWER = 6, 7
+
+# rows of `Audit.found`, one for everything that a run is judged by; `results.audit` has their names
+(
+    ENERGY,  # kinetic + potential + dissipated - work of motions, against what it was at first
+    ENERGY_STEP,  # its change from one sample to the next
+    MOMENTUM,  # of a group of bodies that nothing but its weight acts on from outside
+    SPIN,  # its angular momentum about its cg
+    POSITION,  # residual of an equation of joints and motions over its unit
+    VELOCITY,  # of its rate
+    HELD_SLIP,  # slip where friction holds
+    CONE,  # friction over mu N, as a part of the contact's largest mu N
+    NEWTON,  # what Newton's iteration left of an implicit step
+    FOLD,  # velocities across a fold behind it, over the usual ones
+) = range(10)
+AUDITS = 10
+# its columns, of the sample in which the value was largest over what was allowed
+FOUND_VALUE, FOUND_ALLOWED, FOUND_TIME, FOUND_ELEMENT = range(4)
+
+# entries of `Audit.plan`: steps from one sample to the next, tol, a time at which one is taken
+AUDIT_EVERY, AUDIT_TOL, AUDIT_UNTIL = range(3)
+
+# entries of `Audit.tally`: local error of the step tried last, as the norm gave it; steps, and sum
+# of their errors, since the last sample and in all; incidents and contact at the last sample, and
+# its time; the balance that counts as closed, and the last change from it; potential, dissipated
+# energy and work at first; the largest energy of any kind so far; where the balance was worst, and
+# when; whether what it was is to be taken anew; the largest energy scale of the error norm so far
+(
+    ERROR_NOW,
+    STEPS_SINCE,
+    ERRORS_SINCE,
+    STEPS_ALL,
+    ERRORS_ALL,
+    HITS_THEN,
+    CONTACT_THEN,
+    TIME_THEN,
+    CLOSED_AT,
+    OPEN_BY,
+    POTENTIAL_FIRST,
+    DISSIPATED_FIRST,
+    WORK_FIRST,
+    LARGEST_ENERGY,
+    WORST_OPEN,
+    WORST_TIME,
+    ANEW,
+    USUAL_ENERGY,
+) = range(18)
+TALLIES = 18
+
+#: What `commit` returns where the motion is held otherwise from here on: equations were taken into
+#: use or out of it, or what friction carries became something else.
+HELD_OTHERWISE = 2
+
+# kinds of `Rows.events`
+TOUCH, LEAVE, STICK, SLIP, SENSOR = range(5)
+
+# entries of `Sensors.compare`
+NOT_LESS, NOT_MORE, MORE, LESS, EQUAL = range(5)
+
+# columns of `State.sensed`: expression less value at the committed state, whether it was true,
+# what SENVAL shows, what it will show, whether it became true and Python has not yet acted
+EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
+
+# columns of `State.dry`: where the slider is, 0 or the sign in which it slides, and both at the
+# begin of the last step
+SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
+
+# columns of `State.sides`: see events.switching
+SIDE, HEAT = range(2)
+#: What is hotter changes at nearly every step, as the sign of what is at rest does: then steps are
+#: not cut there.
+HOT = 4.0
+
+# entries of `World.past`
+NOW, WITHIN, AGAIN = range(3)
+
+# columns of `Rows.incidents`: what was found, and what the force on it followed from besides y
+INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10, 13
+(
+    INC_SHARE,  # part of the normal force that this point has
+    INC_STEP,  # `h` of the evaluation
+    INC_FROZEN,  # whether friction kept its mode
+    INC_TOUCHES,  # points of its pair at the committed state
+    INC_KIND,
+    INC_GRAPHIC_I,  # of the pair
+    INC_GRAPHIC_J,
+) = range(14, 21)
+#: The couple for a unit of energy (3), and the memory of friction at the begin of the step, as long
+#: as `State.before` is wide.
+INC_COUPLE, INC_MEMORY = 21, 24
+#: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
+#: xx, xy, yy (see geometry.catalog).
+INC_REGION = 4
+#: Of these, where friction is rigid: what holds along x and y, see laws.friction.stiction.
+INC_HELD = INC_MEMORY + 3
+
+
+#: Entry of `World.scale` that holds the tolerance of a run.
+TOLERANCE = 3
+
+#: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
+CONE_ROWS = 12
+SLOT_COLUMNS = 28
+#: What `crowd.put_aside` keeps of a slot, and twice the memory: frames, mode, point, `Work.slot`.
+SPARE = 24 + SLOT_COLUMNS
+CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area

@@ -1,0 +1,309 @@
+"""What a run is given: constants, but for the fields that say otherwise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mbsim.core import tags
+from mbsim.core.arrays import F1, F2, F3, I1, I2
+
+
+@tags.constant
+class Bodies(NamedTuple):
+    """Moving bodies."""
+
+    mass: F1  # (nb,) scaled so that F = m a
+    inertia: F3  # (nb, 3, 3) about the cg, in cg axes
+    inverse: F3  # (nb, 3, 3) its inverse
+
+
+@tags.constant
+class Graphics(NamedTuple):
+    """Shapes that take part in contacts."""
+
+    body: I1  # (ng,)
+    p: F2  # (ng, 3) centre, in the body's cg axes
+    R: F3  # (ng, 3, 3) shape axes to cg axes
+    size: F2  # (ng, 3) see geometry.catalog
+    reach: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
+    half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
+    turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
+    thin: F1  # (ng,) half of the thinnest side; inf for a plane
+    shape: I1  # (ng,) class of shape, see `Crowds.kind`
+    marker_p: F2  # (ng, 3) reference marker, in cg axes
+    marker_R: F3  # (ng, 3, 3)
+
+
+@tags.constant
+class Kinds(NamedTuple):
+    """How two shapes of a contact are tested against each other."""
+
+    contact: I1  # (nk,)
+    kernel: I1  # (nk,) address, 0 where FCL does it
+    slots: I1  # (nk,) points it gives at most
+    swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
+    regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
+    whole: F1  # (nk,) shares of a flat face, where a pair is one incident with its area; else 0
+    noise: F1  # (nk,) scatter of the normals that its detector gives
+
+
+@tags.constant
+class Contacts(NamedTuple):
+    """Force_Contact elements."""
+
+    id: I1  # (nc,)
+    normal_law: I1  # (nc,) address
+    normal_par: F2  # (nc, widest)
+    friction_law: I1  # (nc,) address, 0 for none
+    friction_par: F2  # (nc, widest)
+    sliding_law: (
+        I1  # (nc,) address of the user's function that gives a law's sliding friction, or 0
+    )
+    sliding_par: F2  # (nc, widest)
+    interpreted: I1  # (nc,) 1 where the friction law enters Python
+    framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
+    memory: I1  # (nc,) numbers that the friction law keeps
+    carried: I1  # (nc,) how many of these are part of y
+    ignore_deeper: F1  # (nc,) inf if not given
+    dmax: F1  # (nc,) 0 if not given
+    reads_x: I1  # (nc,) 1 where an error of X counts
+    user_normal: I1  # (nc,) where `laws.user_normal` has its place, 0 for a built-in normal law
+    rigid: I1  # (nc,) 1 where friction holds by equations: stiction.rigid_contact
+
+
+@tags.constant
+class Slots(NamedTuple):
+    """Places for incidents."""
+
+    pair: I1  # (ns,)
+    x: I1  # (ns,) where X starts in y, -1 where it is not carried
+    z: I1  # (ns,) where the law's memory starts in y, -1 where it is not integrated
+
+
+@tags.constant
+class Markers(NamedTuple):
+    """Markers that joints, forces and expressions look at; row 0 is the global frame."""
+
+    body: I1  # (nm,)
+    p: F2  # (nm, 3) in the body's cg axes
+    R: F3  # (nm, 3, 3)
+
+
+@tags.constant
+class Angles(NamedTuple):
+    """Angles of one marker about the z-axis of another that are followed over whole turns."""
+
+    i: I1  # (na,) markers
+    j: I1  # (na,)
+
+
+@tags.constant
+class Programs(NamedTuple):
+    """Expressions as instructions of a stack machine."""
+
+    start: I1  # (programs + 1,) first instruction of each
+    code: I2  # (instructions, 6) operation and up to five numbers, see compile_model.programs
+    number: F1  # constants
+    stack: tags.Scratch[F2]  # (deepest, 3) value, first and second derivative
+    quick_start: I1  # (programs + 1,) the same for values alone
+    quick: I2  # (instructions, 6) with operations by a number in one, see compile_model.programs
+    operand: F1  # (instructions,) the number that each of `quick` takes, if it takes one
+    values: tags.Scratch[F1]  # (deepest + 1,) values alone
+    level: F1  # (curves,) z of a curve of a spline
+    curve: I1  # (curves + 1,) first piece of each
+    piece: F2  # (pieces, 5) where it begins, and the factors of 1, s, s^2, s^3
+
+
+@tags.constant
+class States(NamedTuple):
+    """States of the user's own."""
+
+    program: I1  # (nz,) their slopes
+    place: I1  # (nz,) in y
+    scale: F1  # (nz,) size below which an error counts as one at this size
+
+
+@tags.constant
+class Sensors(NamedTuple):
+    """What is watched, and acted on in Python when it becomes true."""
+
+    id: I1  # (n,)
+    program: I1  # (n,)
+    evaluate: I1  # (n,) program whose value SENVAL shows, -1 for none
+    compare: I1  # (n,) NOT_LESS, ...
+    value: F1  # (n,)
+    width: F1  # (n,) how far from the value counts as there
+    located: I1  # (n,) 1 where a step ends at the crossing
+
+
+@tags.constant
+class Kinks(NamedTuple):
+    """What may change its branch within a step, which then ends there: compile_model.switching."""
+
+    program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
+    limit: I1  # (n,) row of `Applied`, -1 for an expression; the last may have neither: it is
+    # for what all incidents do whose friction has modes
+
+
+@tags.constant
+class Users(NamedTuple):
+    """User subroutines of forces and variables, see expressions.subroutines."""
+
+    address: I1  # (nu,) of their guarded C functions, 0 for a residual
+    element: I1  # (nu,) row of `Residuals`, -1 for a subroutine
+    result: tags.Scratch[F2]  # (nu, most) what each returned last
+    failed: tags.Scratch[I1]  # (1,) code of the first that failed in this evaluation, or 0
+    seen: tags.Scratch[F1]  # (ny,) y when a friction that looks at it is called; else (0,)
+
+
+@tags.constant
+class Residuals(NamedTuple):
+    """Force_Element: forces whose unknowns a user's residual makes 0, see forces.force_element.
+
+    Rows have na directions and nu unknowns each, at most `axes` and `unknowns`; what they give as
+    `Users.result`: less f along every direction, f' of states, f of every unknown, the mode.
+    """
+
+    id: I1  # (n,)
+    i: I1  # (n,) markers
+    j: I1  # (n,)
+    first: I1  # (n + 1,) first direction of each
+    begin: I1  # (n + 1,) first unknown of each
+    axis: I1  # (directions,) marker whose z it is
+    angle: I1  # (directions,) row of `Angles` of a turn, -1 for a slide
+    kind: I1  # (unknowns,) of laws.residual
+    state: I1  # (unknowns,) row of `States`, -1 for none
+    place: I1  # (unknowns,) in y, -1 for none
+    initial: F1  # (unknowns,)
+    scale: F1  # (unknowns,) a usual size
+    address: I1  # (n,) of the residual
+    twin: I1  # (n,) of the interpreted one, which says why it fails
+    interpreted: I1  # (n,) 1 where `address` enters Python
+    user: I1  # (n,) row of `Users`
+    par: F2  # (n, widest)
+    given: tags.Scratch[F1]  # (inputs,)
+    out: tags.Scratch[F1]  # (unknowns,) of one element, as all below
+    base: tags.Scratch[F1]
+    start: tags.Scratch[F1]
+    z: tags.Scratch[F1]
+    step: tags.Scratch[F1]
+    size: tags.Scratch[F1]
+    rows: tags.Scratch[F1]
+    by: tags.Scratch[F3]  # (2, unknowns, unknowns) residual by f and by f'
+    moves: tags.Scratch[F3]  # (2, unknowns, directions) residual by x and by x'
+    A: tags.Scratch[F2]  # (unknowns, unknowns)
+    swap: tags.Scratch[I1]
+    rise: tags.Scratch[F1]
+    slopes: tags.Scratch[F3]  # (3, unknowns, wide) unknowns by x, x' and states
+    trouble: tags.Scratch[I1]  # (1,) row of the element that was not solved, -1 for none
+
+
+@tags.constant
+class Applied(NamedTuple):
+    """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
+
+    kind: I1  # (nf,) see forces.applied
+    i: I1  # (nf,) markers
+    j: I1  # (nf,)
+    par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
+    # of bushings six stiffnesses, six dampings, six preloads; of dry friction its stiffness (0:
+    # rigid) and the force at which it slides on and at which it begins to
+    program: I1  # (nf,) -1 for none
+    components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
+    axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
+    angle: I1  # (nf,) row of `Angles`, -1 for none
+    alone: I1  # (nf,) 1 where nothing acts on J
+    bounds: F2  # (nf, 2) of limits
+    law: I1  # (nf,) address of a normal or friction law, 0 for none
+    law_par: F2  # (nf, widest)
+    id: I1  # (nf,) of the element
+    connection: I1  # (nf,) whose reaction presses, -1 for none
+    equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
+    late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
+
+
+@tags.constant
+class Tree(NamedTuple):
+    """Bodies that constraints hold, each hung on its parent by one joint, parents first.
+
+    A body without such a joint is a root that moves freely. The bodies of one root follow each
+    other.
+    """
+
+    body: I1  # (nt,)
+    parent: I1  # (nt,) place in the tree, -1 for ground
+    of_body: I1  # (nb + 1,) place in the tree, -1 for none
+    root: I1  # (nt,) place of the first body of its tree
+    end: I1  # (nt,) one behind the last place of its tree
+    turn: I1  # (nt,) what of the rotation is free: TURN_...
+    slide: I2  # (nt, 3) 1 where the child may move along that axis of the parent's marker
+    axis: I2  # (nt, 2) of UNIVERSAL: axis of the child's and of the parent's marker
+    child_p: F2  # (nt, 3) joint marker on the child, in its cg axes
+    child_R: F3  # (nt, 3, 3) turned so that it is along the parent's where the joint holds it
+    parent_p: F2  # (nt, 3)
+    parent_R: F3  # (nt, 3, 3)
+    free: I1  # (nt,) number of free directions
+
+
+@tags.constant
+class Equations(NamedTuple):
+    """Constraint equations that the tree does not hold by itself: loops, motions, couplers.
+
+    An equation is a sum of terms, less a function of TIME, = 0; see constraints.equations.
+    """
+
+    first: I1  # (ne + 1,) first term of each
+    program: I1  # (ne,) function of TIME, or the whole of a general constraint; -1 for none
+    level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
+    general: I1  # (ne,) 1 where the program is the whole equation
+    constant: F1  # (ne,)
+    start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
+    unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
+    connection: I1  # (ne,) the element that it belongs to
+    dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for any other
+    slot: I1  # (ne,) slot that it holds along x or y while that sticks, -1 for any other
+    kind: I1  # (terms,)
+    i: I1  # (terms,) markers
+    j: I1  # (terms,)
+    axis: I2  # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot
+    factor: F1  # (terms,)
+    angle: I1  # (terms,) row of `Angles`, -1 for none
+    active: tags.State[I1]  # (ne + 1,) equations in use, ascending, their number last
+
+
+@tags.constant
+class Connections(NamedTuple):
+    """Elements with reactions: joints, primitives, couplers, motions, general constraints."""
+
+    i: I1  # (nj,) markers
+    j: I1  # (nj,)
+    tree: I1  # (nj,) place in the tree, -1 where equations hold it
+    flip: I1  # (nj,) 1 where I is on the parent
+
+
+@tags.constant
+class World(NamedTuple):
+    """What belongs to no element."""
+
+    gravity: F1  # (3,) what of it is constant
+    weight: I2  # (1 + .., 3) programs of components that are expressions, -1 for none: those in
+    # force, then those of every gravity of the model
+    scale: F1  # (4,) length L, speed V and energy of the whole model, for difference quotients and
+    # what is rounding, and the tolerance; errors are judged by `Scales`
+    doors: I1  # (DOORS,) addresses of what only some scenes need
+    fixed_step: I1  # (1,) 1 for a method without error estimate
+    # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
+    past: tags.Scratch[I1]
+    ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
+
+
+@tags.constant
+class Scales(NamedTuple):
+    """What errors of n groups of connected bodies are judged by: `compile_model.groups`."""
+
+    group: I1  # (nb,) of a body
+    length: F1  # (n,) L
+    speed: F1  # (n,) the least V, weight left out
+    mass: F1  # (n,) of the heaviest body
+    of_contact: I1  # (nc,) group by which a contact's energy is judged
+    gyration: F1  # (nb,) radius

@@ -1,0 +1,105 @@
+"""What goes on from step to step beside y, and so is in a checkpoint; fields say what is not."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mbsim.core import tags
+from mbsim.core.arrays import F1, F2, F3, I1, I2
+
+
+@tags.state
+class Pairs(NamedTuple):
+    """Graphics that may touch, in the order that their kernel wants."""
+
+    kind: I1  # (np,)
+    graphic_i: I1  # (np,) the kernel's I
+    graphic_j: I1  # (np,)
+    slot: tags.Constant[I1]  # (np,) first slot
+    last: tags.Constant[I1]  # (np,) one behind the last slot
+    touches: I1  # (np,) slots that touched at the committed state
+    gap: F1  # (np,) distance that the pair kept when last measured
+    left: F1  # (np,) what the motion since has left of it for certain
+    live: I1  # (np,) places in use, ascending; those of crowds behind all others
+    free: I1  # (np,) places not in use, the next one last
+    count: I1  # (4,) live, free, live for good, places that a listing lacked
+
+
+@tags.state
+class Crowds(NamedTuple):
+    """Contacts of many graphics, whose near pairs are found as they move."""
+
+    contact: tags.Constant[I1]  # (crowds,)
+    same: tags.Constant[I1]  # (crowds,) 1 where I and J are one set: each pair once, no body's own
+    first: tags.Constant[I2]  # (crowds, 4) begin and end of I in `member`, begin and end of J
+    member: tags.Constant[I1]  # graphics
+    kind: tags.Constant[I2]  # (crowds, shapes^2) kind by shape class of I and of J, -1 for none
+    swap: tags.Constant[I2]  # (crowds, shapes^2) 1 where the kernel wants the other order
+    size: F1  # (2,) a pair is near if its boxes are nearer than the first; a usual reach
+    reference: F2  # (ng, 7) centre and quaternion of the body when pairs were last listed
+    room: F1  # (ng,) how far any point may still move before that; inf for who is in no crowd
+    box: tags.Scratch[F2]  # (ng, 6) lower and upper corner when pairs are listed
+    cell: tags.Scratch[I1]  # (ng,) of the grid
+    order: tags.Scratch[I1]  # (ng,) members cell by cell
+    start: tags.Scratch[I1]  # (cells + 1,) where a cell begins in `order`
+    head: tags.Scratch[I1]  # (ng,) first place of a pair whose I is this graphic, -1 for none
+    next: tags.Scratch[I1]  # (np,) next place of the same I
+    moved: tags.Scratch[I2]  # (np, 5) new place of a pair, and its kind, graphics and touches
+    spare: tags.Scratch[F2]  # (ns, SPARE) what is moved with the slots that touch
+
+
+@tags.state
+class State(NamedTuple):
+    """The physical state beside y: the incident table, and where everything was."""
+
+    q: F2  # (nb + 1, 4) quaternions at the committed state
+    w: F2  # (nb + 1, 3) angular velocities at the committed state, global frame
+    since: F1  # (1,) time of the committed state
+    centre: F2  # (ng, 3) centres of the graphics at the committed state
+    angle: F1  # (na,) at the committed state, whole turns included
+    touching: I1  # (ns,)
+    p: F2  # (ns, 3) contact point
+    n: F2  # (ns, 3) normal from J into I
+    t: F2  # (ns, 3) x-axis of the incident marker
+    depth: F1  # (ns,)
+    rate: F1  # (ns,) of depth
+    normal: F1  # (ns,) normal force
+    memory: F2  # (ns, most) of friction laws
+    before: F2  # (ns, most) the same at the begin of the last step
+    mode: F1  # (ns,) branch of a friction law with memory: see laws.catalog
+    hit: I1  # (ns + 1,) slots that touched, their number last
+    sensed: F2  # (sensors, 5) see codes
+    sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
+    frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
+    dry: F2  # (nf, 4) of dry friction, see codes
+    residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
+    # and at the begin of the last step
+    fastest: F1  # (n,) what the largest speed so far of a group counts: pipeline.scales
+    heat: F1  # (2,) of contacts whose friction is rigid: heat as of sides, 1 where one asked for
+    # another mode since the committed state: see events.switching
+
+
+@tags.state
+class Log(NamedTuple):
+    """What is counted and watched over all steps."""
+
+    contacts: F2  # (nc, LOG_COLUMNS)
+    counters: I1  # (COUNTERS,)
+    rejections: I2  # (nc + 1, 4)
+
+
+@tags.state
+class Audit(NamedTuple):
+    """What a run judges itself by, see pipeline.audit."""
+
+    tied: tags.Constant[I1]  # (groups,) of `Scales`: 1 where not only contacts tie it to ground
+    cone: tags.Constant[F1]  # (nc,) largest friction over normal force, inf where the law has none
+    plan: tags.Constant[F1]  # (3,) see codes, as for all here
+    tally: F1  # (TALLIES,)
+    momentum: F2  # (groups, 7) linear 3, angular 3, 1 where ground touched it; of the last sample
+    sums: tags.Scratch[F2]  # (groups, 13) see pipeline.audit
+    first: tags.Constant[I1]  # (groups,) first body of each
+    contact: F2  # (nc + 1, 4) change of balance while this contact pressed hardest (last row: none
+    # touched), the largest of one sample, and when; largest mu N
+    energy: F1  # (4,) as of `Rows.energy`
+    found: F2  # (AUDITS, 4)
