@@ -46,10 +46,9 @@ if TYPE_CHECKING:
     from mbsim.compile_model.subroutines import StateReader
     from mbsim.plugins import UserFriction
     from mbsim.plugins.contact_post import ContactPost
-    from mbsim.plugins.loader import Script
-    from mbsim.plugins.normal import UserNormal
-    from mbsim.plugins.residual import UserResidual
+    from mbsim.plugins.source.script import Script
     from mbsim.plugins.subroutine import UserSubroutine
+    from mbsim.plugins.types import UserNormal, UserResidual
 
 #: XML statements of connections.
 _STATEMENTS = {

@@ -26,7 +26,7 @@ from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Model
 from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
-from mbsim.plugins.loader import Scripts
+from mbsim.plugins.source.script import Scripts
 from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
 
 #: Angles that subroutines may follow over whole turns, beyond those that the deck names.

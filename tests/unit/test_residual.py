@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from mbsim.laws.residual import ALGEBRAIC, DIFFERENTIAL, KINDS, SWITCHING
-from mbsim.plugins.dual import Dual, slope
-from mbsim.plugins.residual import Unknown, _sorted
+from mbsim.plugins.compile.dual import Dual, slope
+from mbsim.plugins.compile.residual_trials import sort_unknowns
+from mbsim.plugins.types import Unknown
 
 
 def kinds(residual, count=1, sizes=(), axes=1):
@@ -22,7 +23,7 @@ def kinds(residual, count=1, sizes=(), axes=1):
         return residual(given[1 : 1 + axes], given[1 + axes : first], f, fdot, given[0])
 
     unknowns = tuple(Unknown(f"u{k}") for k in range(count))
-    return [u.kind for u in _sorted(unknowns, asked, list(sizes), axes, "it")]
+    return [u.kind for u in sort_unknowns(unknowns, asked, list(sizes), axes, "it")]
 
 
 def friction(x, v, f, g, t):

@@ -1,6 +1,6 @@
 """CNFSUB in compiled Python, C and Fortran behind the internal signature of normal laws.
 
-Apart from `normal`, as `adapter` and `library_adapter` are, for the cache's sake. The parameters
+A file of its own, as `friction` and `library` are, for the cache's sake. The parameters
 of such a law begin with an address: of its place (`laws.user_normal`), or of a `NormalCall`.
 """
 

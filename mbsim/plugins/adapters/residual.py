@@ -1,6 +1,6 @@
 """The arguments of a residual on the inside of its compiled function.
 
-Apart from `compiled`, as `adapter` is, for the cache's sake.
+A file of its own, as `friction` is, for the cache's sake.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
