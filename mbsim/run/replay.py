@@ -157,7 +157,7 @@ class Again:
         self._table = pack(scene)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )(jit.address(again_hook, HOOK))
 
     def rows(self) -> Iterator[Row]:
@@ -196,8 +196,8 @@ class Again:
         size, wide = a.CONTACT_COLUMNS * len(ids), sum(groups)
         room = np.zeros(n + size + count * wide)
         code = self._hook(self._table.ctypes.data, time, 0.0, y.ctypes.data, room.ctypes.data)
-        if code != 0.0:
-            fail(self.system, None, int(code), time)
+        if code != 0:
+            fail(self.system, None, code, time)
         nets = room[n : n + size].reshape(len(ids), a.CONTACT_COLUMNS)
         found = Row(time, {id: _net(net) for id, net in zip(ids, nets, strict=True)})
         found.incidents = {id: [] for id in ids}

@@ -96,7 +96,7 @@ class Runner:
         self._advance = jit.function(driver.advance)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
         self.changes = changes or []  # parameters of every Simulate, where some differ
         self.stage = 0  # which Simulate
@@ -118,9 +118,9 @@ class Runner:
         self.system.scene.world.doors[FCL_DOOR] = detector.address
         return detector
 
-    def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> float:
-        """Call one of the problem's hooks from Python."""
-        return float(self._hook(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+    def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> int:
+        """Call one of the problem's hooks that act or answer from Python."""
+        return int(self._hook(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
 
     def assemble(self) -> None:
         """Put the bodies where all constraints hold, and report what had to move."""
@@ -285,15 +285,15 @@ class Runner:
         self.system.scene.world.scale[TOLERANCE] = self.settings.stages[0].tol
         y, f = self.method.y, self.method.k[0]
         code = self.call(self.problem.rhs, t, 0.0, y, f)
-        if code != 0.0:
-            fail(self.system, self.detector, int(code), t)
+        if code != 0:
+            fail(self.system, self.detector, code, t)
         scene, model = self.system.scene, self.system.model
         if self.system.plans.crowds:
             # nothing is listed yet: list what is near, then look again
             self.call(self.problem.commit, t, 0.0, y, f)
             code = self.call(self.problem.rhs, t, 0.0, y, f)
-            if code != 0.0:
-                fail(self.system, self.detector, int(code), t)
+            if code != 0:
+                fail(self.system, self.detector, code, t)
         faults = []
         pairs = scene.pairs
         live = pairs.live[: pairs.count[LIVE]]
@@ -400,8 +400,8 @@ class Runner:
         # the first row of a Simulate is there anyway
         if row and not start:
             code = self.call(self.problem.output, t, 0.0, y, error)
-            if code < 0.0:
-                fail(self.system, self.detector, int(-code), t)
+            if code < 0:
+                fail(self.system, self.detector, -code, t)
             self.recorder.take()
         return follows == GO_ON
 
@@ -435,8 +435,8 @@ class Runner:
             goes_on = self._sense(simulation.end_time, start=True)
         if len(self.sensing.times):
             code = self.call(self.problem.output, t, 0.0, method.y, method.error)
-            if code < 0.0:
-                fail(self.system, self.detector, int(-code), t)
+            if code < 0:
+                fail(self.system, self.detector, -code, t)
         self.recorder.take()
         return goes_on
 

@@ -59,7 +59,7 @@ class Linearised:
     def call(self, name, t, a, b):
         pointer = ctypes.c_void_p
         form = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
         hook = form(getattr(self.problem, name))
         code = hook(self.problem.context, t, 0.0, a.ctypes.data, b.ctypes.data)

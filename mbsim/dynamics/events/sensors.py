@@ -76,18 +76,18 @@ def happens(scene, t, y):
         if sensors.located[k] == 1:
             excess = value(scene, t, y, sensors.program[k]) - sensors.value[k]
             if becomes_true(scene, k, excess):
-                return 1.0
+                return 1
             if scene.state.sensed[k, EXCESS] == 0.0 and excess != 0.0:
                 # it left the value to this side: without that a return within the step is not seen
                 scene.state.sensed[k, EXCESS] = LEAST if excess > 0.0 else -LEAST
-    return 0.0
+    return 0
 
 
 @jitable
 def arrive(scene, t, y):
     """Note what every sensor sees at the committed state; return 1 if one has become true."""
     place_bodies(scene, y)
-    sensors, sensed, rows, any_fired = scene.sensors, scene.state.sensed, scene.rows, 0.0
+    sensors, sensed, rows, any_fired = scene.sensors, scene.state.sensed, scene.rows, 0
     for k in range(len(sensors.id)):
         excess = value(scene, t, y, sensors.program[k]) - sensors.value[k]
         fires = becomes_true(scene, k, excess)
@@ -95,7 +95,7 @@ def arrive(scene, t, y):
         sensed[k, EXCESS] = excess
         if not fires:
             continue
-        any_fired = 1.0
+        any_fired = 1
         sensed[k, FIRED] = 1.0
         if sensors.evaluate[k] >= 0:
             sensed[k, NEXT] = value(scene, t, y, sensors.evaluate[k])

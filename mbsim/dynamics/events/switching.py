@@ -22,7 +22,7 @@ from mbsim.arrays.scene import (
     SLIDES,
     Scene,
 )
-from mbsim.core.address import call_float, call_int, vector_at, view
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -122,13 +122,13 @@ def decide(scene, context, t, y):
     for i in range(len(y)):
         work.ahead[0, i] = y[i] + h * work.idle[i]
     there, then = work.ahead[0], work.ahead[1]
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t + h, 0.0, there, then))
+    call_int(scene.world.doors[EVALUATE_DOOR], (context, t + h, 0.0, there, then))
     for s in range(len(work.slot)):
         row = work.slot[s]
         if row[FOUND_AT] == t:
             row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
             row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    call_int(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
 
 
 @jitable
@@ -150,13 +150,13 @@ def watch_held(scene, t, y, what):
     A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
     leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
     """
-    heat, differs = scene.state.heat, 0.0
+    heat, differs = scene.state.heat, 0
     if what == PASS:
         heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
         heat[1] = 0.0
     elif heat[0] <= HOT:
         if call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y)) == 1:
-            heat[1], differs = 1.0, 2.0
+            heat[1], differs = 1.0, 2
     return differs
 
 
@@ -172,7 +172,7 @@ def load(scene, context, t, y):
             most = 0.0
     if most < 0.0 or scene.state.frozen[0] == 0:
         return -1.0
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+    call_int(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0:
             force = holding_force(scene, f)
@@ -190,10 +190,10 @@ def watch(scene, context, t, y, what):
 
     Unless it is only asked, the sides are kept.
     """
-    sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
+    sides, differs, last = scene.state.sides, 0, len(scene.kinks.program) - 1
     if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
         # what friction does follows from all the rest
-        call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+        call_int(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
         if what == ASK and len(scene.work.ahead) > 0:
             decide(scene, context, t, y)
     else:
@@ -207,7 +207,7 @@ def watch(scene, context, t, y, what):
         exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
         leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
         if leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
-            differs = max(differs, 2.0 if exact else 1.0)
+            differs = max(differs, 2 if exact else 1)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
@@ -291,7 +291,7 @@ def follow_half(scene, context, t, y):
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
         kept[0], kept[1], kept[2] = row[ALONG_X], row[ALONG_Y], counts_as(scene, s)
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    call_int(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         for j in range(state.memory.shape[1]):
@@ -307,7 +307,7 @@ def follow_half(scene, context, t, y):
 def follow_halves(scene, context, t, y):
     """Return how far friction at a step's end is from that of its second half, as an error."""
     state, work, hit, worst = scene.state, scene.work, scene.state.hit, 0.0
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    call_int(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
@@ -325,16 +325,19 @@ def kinks_hook(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == LOAD:
-        return load(scene, context, t, vector_at(a, n))
+        largest = load(scene, context, t, vector_at(a, n))
+        b[0] = largest
+        return 1 if largest >= 0.0 else 0
     if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
-        return 0.0
+        return 0
     if h == HIDES:
-        return 1.0 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0.0
+        return 1 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0
     if h == BENDS:
-        return 1.0 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0.0
+        return 1 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0
     if h == HALF:
         follow_half(scene, context, t, vector_at(a, n))
-        return 0.0
+        return 0
     if h == HALVES:
-        return follow_halves(scene, context, t, vector_at(a, n))
+        b[0] = follow_halves(scene, context, t, vector_at(a, n))
+        return 0
     return watch(scene, context, t, vector_at(a, n), h)

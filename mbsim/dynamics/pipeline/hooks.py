@@ -30,12 +30,13 @@ from mbsim.core import jit
 from mbsim.core.address import call_int, pack, vector_at, view
 from mbsim.core.problem import (
     ALONG,
-    BEGIN_ANEW,
     BY_CHECK,
     FRICTION_ALONE,
-    HOOK,
+    FULL,
     IMPACTS_ALONE,
     Problem,
+    Taken,
+    addresses,
 )
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import commit, first_depth, reversal, watch_peaks
@@ -53,16 +54,12 @@ from mbsim.dynamics.pipeline.output import (
 )
 from mbsim.dynamics.pipeline.scales import take_speeds
 
-PAUSE_FOR_EVENTS = 2.0
-STEP_IS_STALE = 4.0
-
 
 def _rhs(context, t, h, a, b):
     """f(t, y)."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    code = evaluate(scene, t, h, vector_at(a, n), vector_at(b, n))
-    return float(code)
+    return evaluate(scene, t, h, vector_at(a, n), vector_at(b, n))
 
 
 def _project(context, t, h, a, b):
@@ -76,8 +73,8 @@ def _project(context, t, h, a, b):
             y[at + k] /= length
     if scene.world.doors[JOINTS_DOOR] != 0:
         what = ALONG_JOINTS if h == ALONG else PROJECT
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, what, t, y, y))
-    return 0.0
+        return call_int(scene.world.doors[JOINTS_DOOR], (scene, what, t, y, y))
+    return 0
 
 
 def _norm(context, t, h, a, b):
@@ -101,10 +98,7 @@ def _check(context, t, h, a, b):
 
 
 def _commit(context, t, h, a, b):
-    """The incident table, events and peaks.
-
-    Bit 1: y changed, bit 2: empty the events first, bit 3: a stable step is to be found anew.
-    """
+    """The incident table, events and peaks."""
     scene = view(context, Scene)
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
     if scene.world.doors[RIGID_DOOR] != 0:
@@ -113,7 +107,7 @@ def _commit(context, t, h, a, b):
     if scene.world.doors[JOINTS_DOOR] != 0:
         code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
         if code > 0:
-            return -float(code)
+            return -code
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
     changed = commit(scene, t, h, y)
@@ -122,11 +116,17 @@ def _commit(context, t, h, a, b):
     left = passed and not passes
     if left:
         examine_fold(scene, t)
-    word = (1.0 if changed > 0 or left else 0.0) + (PAUSE_FOR_EVENTS if no_room(scene) else 0.0)
+    word = 0
+    if changed > 0 or left:
+        word += Taken.Y_CHANGED
+    if no_room(scene):
+        word += Taken.ROWS_FULL
+    if scene.log.counters[LISTINGS] > listings:
+        # pairs that were not near, and so not counted, are now
+        word += Taken.STABLE_IS_STALE
     if changed == HELD_OTHERWISE or passed != passes:
-        word += BEGIN_ANEW
-    # pairs that were not near, and so not counted, are now
-    return word + (STEP_IS_STALE if scene.log.counters[LISTINGS] > listings else 0.0)
+        word += Taken.BEGIN_ANEW
+    return word
 
 
 def _look(context, t, h, a, b):
@@ -138,7 +138,7 @@ def _look(context, t, h, a, b):
         watch_peaks(scene, t)
     if scene.world.doors[DRY_DOOR] != 0:
         call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
-    return float(code)
+    return code
 
 
 def _inner(context, t, h, a, b):
@@ -162,14 +162,14 @@ def _output(context, t, h, a, b):
     f = vector_at(b, n)
     code = evaluate_past(scene, t, h, vector_at(a, n), f)
     if code != 0:
-        return -float(code)
+        return -code
     full = write_row(scene, t, h, vector_at(a, n), f)
     if scene.world.doors[DRY_DOOR] != 0:
         call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
     if scene.users.failed[0] != 0:
         # a subroutine that only a request asks for
-        return -float(scene.users.failed[0])
-    return 1.0 if full else 0.0
+        return -scene.users.failed[0]
+    return FULL if full else 0
 
 
 def _reject(context, t, h, a, b):
@@ -180,7 +180,7 @@ def _reject(context, t, h, a, b):
     row = contact if contact >= 0 else len(scene.contacts.id)
     scene.work.trouble[1] = contact
     scene.log.rejections[row, reason] += 1
-    return 0.0
+    return 0
 
 
 def _stable(context, t, h, a, b):
@@ -198,7 +198,18 @@ def _follow(context, y):
 
 
 _FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
-_HOOKS = (_rhs, _project, _norm, _check, _commit, _look, _inner, _limit, _output, _reject)
+_HOOKS = {
+    "rhs": _rhs,
+    "project": _project,
+    "norm": _norm,
+    "check": _check,
+    "commit": _commit,
+    "look": _look,
+    "inner": _inner,
+    "limit": _limit,
+    "output": _output,
+    "reject": _reject,
+}
 
 
 def needs_expressions(scene: Scene) -> bool:
@@ -212,12 +223,23 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     Only a method without error estimate, `fixed_step`, needs the last hook.
     """
     table = pack(scene)
-    hooks = (*_HOOKS, _stable) if fixed_step else _HOOKS
+    hooks = _HOOKS | {"stable": _stable} if fixed_step else dict(_HOOKS)
     if len(scene.angles.i) > 0:
         from mbsim.dynamics.pipeline.force_hooks import limit_turn
 
-        hooks = tuple(limit_turn if hook is _limit else hook for hook in hooks)
-    addresses = [jit.address(hook, HOOK) for hook in hooks]
+        hooks["limit"] = limit_turn
+    if len(scene.sensors.id) > 0:
+        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
+
+        hooks["arrive"] = arrive_hook
+        if scene.sensors.located.any():
+            # where none is located, steps need not be looked into
+            hooks["happens"] = happens_hook
+    if len(scene.kinks.program) > 0 and not fixed_step:
+        from mbsim.dynamics.events.switching import kinks_hook
+
+        hooks["kinks"] = kinks_hook
+    problem = Problem(int(table.ctypes.data), **addresses(hooks))
     if needs_expressions(scene):
         # only then: what they are made of need not be imported
         from mbsim.dynamics.pipeline.force_hooks import open_expressions
@@ -233,18 +255,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.pipeline.joint_hooks import open_joints
 
         open_joints(scene)
-    problem = Problem(int(table.ctypes.data), *addresses)
-    if len(scene.sensors.id) > 0:
-        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
-
-        arrive = jit.address(arrive_hook, HOOK)
-        # where none is located, steps need not be looked into
-        happens = jit.address(happens_hook, HOOK) if scene.sensors.located.any() else 0
-        problem = problem._replace(happens=happens, arrive=arrive)
-    if len(scene.kinks.program) > 0 and not fixed_step:
-        from mbsim.dynamics.events.switching import kinks_hook
-
+    if "kinks" in hooks:
         scene.world.doors[EVALUATE_DOOR] = problem.rhs
         scene.state.frozen[0] = int(len(scene.work.idle) > 0)
-        problem = problem._replace(kinks=jit.address(kinks_hook, HOOK))
     return problem, table

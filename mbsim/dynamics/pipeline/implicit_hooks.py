@@ -24,7 +24,7 @@ from mbsim.compile_model.program_dependence import find_depends
 from mbsim.compile_model.tangent import Tangent, make_tangent
 from mbsim.core import jit
 from mbsim.core.address import pack, vector_at, view
-from mbsim.core.problem import HOOK, Problem
+from mbsim.core.problem import Problem, addresses
 from mbsim.dynamics.linearization.connection_slopes import add_connection_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
@@ -40,7 +40,7 @@ def _linearise(context, t, h, a, b):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    return float(linearise(scene, T, t, h, vector_at(a, n), vector_at(b, n)))
+    return linearise(scene, T, t, h, vector_at(a, n), vector_at(b, n))
 
 
 def _factor(context, t, h, a, b):
@@ -49,7 +49,7 @@ def _factor(context, t, h, a, b):
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     for k in range(4):
         T.real.c[0, k] = a[k]
-    return float(factor(scene, T, T.real, h))
+    return factor(scene, T, T.real, h)
 
 
 def _solve(context, t, h, a, b):
@@ -57,7 +57,7 @@ def _solve(context, t, h, a, b):
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     n = scene.rows.y.shape[1]
-    return float(solve(scene, T, T.real, vector_at(a, n), vector_at(b, n)))
+    return solve(scene, T, T.real, vector_at(a, n), vector_at(b, n))
 
 
 def _factor_pair(context, t, h, a, b):
@@ -67,7 +67,7 @@ def _factor_pair(context, t, h, a, b):
     for k in range(3):
         T.pair.c[0, k] = complex(a[2 * k], a[2 * k + 1])
     T.pair.c[0, 3] = a[6]
-    return float(factor(scene, T, T.pair, h))
+    return factor(scene, T, T.pair, h)
 
 
 def _solve_pair(context, t, h, a, b):
@@ -82,7 +82,7 @@ def _solve_pair(context, t, h, a, b):
     for k in range(n):
         b[k] = found[k].real
         b[n + k] = found[k].imag
-    return float(code)
+    return code
 
 
 def _slopes(context, t, y):
@@ -157,7 +157,4 @@ def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem,
     hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
     if pair:
         hooks |= {"factor_pair": _factor_pair, "solve_pair": _solve_pair}
-    return (
-        problem._replace(**{name: jit.address(hook, HOOK) for name, hook in hooks.items()}),
-        (tangent, table),
-    )
+    return problem._replace(**addresses(hooks)), (tangent, table)

@@ -100,4 +100,4 @@ def again_hook(context, t, h, a, b):
     count = scene.rows.used[1]
     room = vector_at(b, n + size + count * wide)
     table = room[n + size :].reshape(count, wide)
-    return float(evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table))
+    return evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table)

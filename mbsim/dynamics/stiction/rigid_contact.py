@@ -32,7 +32,7 @@ from mbsim.arrays.scene import (
 )
 from mbsim.arrays.scene import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import STICK as STICK_EVENT
-from mbsim.core.address import call_float, call_int
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
@@ -541,7 +541,7 @@ def fill_sliding(scene, t, y, count):
         s = scene.equations.slot[int(cone[WHICH, k])]
         x, z = scene.work.held[s, 0], scene.work.held[s, 1]
         let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
-    call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    call_int(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
         point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
@@ -591,7 +591,7 @@ def release_held(scene, t, y):
             released += 1
     if released == 0:
         # sliding would rub more than sticking holds: it goes on to stick
-        call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+        call_int(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
         share_held(scene, t, y)
     return released
 

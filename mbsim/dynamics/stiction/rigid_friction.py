@@ -31,7 +31,7 @@ from mbsim.arrays.scene import (
     SLIP,
     STICK,
 )
-from mbsim.core.address import call_float, call_int
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.forces.dry_friction import (
     AT_REST,
@@ -77,7 +77,7 @@ def hold_sticking(scene, t, y):
     """Take the equations of what sticks into use, bring y onto them and evaluate; return a code."""
     call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
     call_int(scene.world.doors[JOINTS_DOOR], (scene, PROJECT, t, y, y))
-    return call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    return call_int(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
 
 
 @jitable
@@ -108,7 +108,7 @@ def commit_rigid(scene, t, y):
         ask_contacts(scene, RECORD_HELD, t, y)
         return 0
     # one more slides each time, so this ends
-    while hold_sticking(scene, t, y) == 0.0:
+    while hold_sticking(scene, t, y) == 0:
         # contacts are asked for all of theirs at once, under what the rest does
         if release(scene) == 0 and ask_contacts(scene, RELEASE_HELD, t, y) == 0:
             break
