@@ -137,14 +137,6 @@ FRICTION_ALONE, IMPACTS_ALONE = -1.0, -2.0
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0
 
-# codes of an rhs; a problem may have others of its own
-NOT_FINITE = 3
-#: Of an implicit method: its equations of a step are not solved; a shorter one is tried.
-NOT_CONVERGED = 50
-#: Of `factor`: there is no solution, or too many.
-SINGULAR = 51
-#: Codes from here on end the run without another try.
-AT_ONCE = 100
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_DUE = range(8)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     ASK,
-    AT_ONCE,
     BENDS,
     BY_CHECK,
     BY_ERROR,
@@ -26,8 +26,6 @@ from mbsim.core.problem import (
     HAPPENED,
     HIDES,
     LOAD,
-    NOT_CONVERGED,
-    NOT_FINITE,
     PASS,
     PAUSED,
     ROWS_FULL,
@@ -236,11 +234,11 @@ def gives_up(m, code, t, h, floor):
 
     Else it is tried again nearer: a trial far ahead may be where no law was meant for.
     """
-    if code == NOT_CONVERGED:
+    if code == Code.NOT_CONVERGED:
         return False
     m.memory[FAILURES] += 1.0
     m.memory[FAILED_AT] = t + h
-    most = MOST_NOT_FINITE if code == NOT_FINITE else MOST_FAILURES
+    most = MOST_NOT_FINITE if code == Code.NOT_FINITE else MOST_FAILURES
     spent = m.memory[FAILURES] > most or h <= floor
     return code >= AT_ONCE or spent
 
@@ -678,10 +676,10 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         error = m.memory[LAST_ERROR]
         if code != 0:
             ends = gives_up(m, code, t, h, floor)
-            if ends and code != NOT_FINITE:
+            if ends and code != Code.NOT_FINITE:
                 m.counts[CODE] = code
                 return FAILED
-            unsolved = code == NOT_CONVERGED
+            unsolved = code == Code.NOT_CONVERGED
             shrink, reason = (m.memory[RETRY], BY_NEWTON) if unsolved else (0.1, BY_NOT_FINITE)
             reject(p, m, t, max(shrink * h, floor), reason, 0.0)
             m.memory[AFTER_REJECTION] = 1.0

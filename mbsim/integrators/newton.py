@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_int
+from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import ALONG, AT_ONCE, NOT_CONVERGED, SINGULAR
+from mbsim.core.problem import ALONG
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
@@ -175,10 +176,10 @@ def may_help(code):
 @jitable
 def unless_singular(code):
     """Return the code of `factor`, -1 for a singular system: another step has another."""
-    return -1 if code == SINGULAR else code
+    return -1 if code == Code.SINGULAR else code
 
 
 @jitable
 def as_failure(code):
     """Return the code of a step whose equations were not solved for the reason `code`."""
-    return code if code > 0 else NOT_CONVERGED
+    return code if code > 0 else Code.NOT_CONVERGED

@@ -13,6 +13,7 @@ from numba import carray
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, I1
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     BY_NEWTON,
@@ -21,7 +22,6 @@ from mbsim.core.problem import (
     FRICTION_ALONE,
     IMPACTS_ALONE,
     PAUSED,
-    SINGULAR,
     STEP_TOO_SMALL,
     Problem,
     addresses,
@@ -231,7 +231,7 @@ def _factor(context, t, h, a, b):
         box.real[:] = 0.0
         across = keep_to_rod(box, small)
         if not invert(small, box.small) or box.numbers[3] == 1:
-            return SINGULAR
+            return Code.SINGULAR
         box.small[:] = box.small @ across
         for i in range(len(box.at)):
             for j in range(len(small)):
@@ -242,7 +242,7 @@ def _factor(context, t, h, a, b):
     for i in range(len(work)):
         work[i, i] += c[0]
     good = invert(work, box.real) and box.numbers[3] == 0
-    return 0 if good and c[3] == 0.0 and c[1] == c[0] * c[0] and c[2] == c[0] else SINGULAR
+    return 0 if good and c[3] == 0.0 and c[1] == c[0] * c[0] and c[2] == c[0] else Code.SINGULAR
 
 
 def _solve(context, t, h, a, b):
@@ -263,7 +263,7 @@ def _factor_pair(context, t, h, a, b):
     for i in range(len(work)):
         work[i, i] += number
     good = invert(work, box.pair) and abs(number * number - c[2] - 1j * c[3]) < 1e-9 * abs(c[2])
-    return 0 if good and c[4] == c[0] and c[5] == c[1] and c[6] == 0.0 else SINGULAR
+    return 0 if good and c[4] == c[0] and c[5] == c[1] and c[6] == 0.0 else Code.SINGULAR
 
 
 def _solve_pair(context, t, h, a, b):

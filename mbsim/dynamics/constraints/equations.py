@@ -58,8 +58,6 @@ from mbsim.dynamics.expressions.jets import gradient, jet
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 
-#: Code of constraints that contradict each other in the course of the motion.
-CONTRADICTION = 9
 
 #: Below this part of the usual pivots a state is near a position in which a loop can fold: how far
 #: that is goes as the square root of the least pivot.

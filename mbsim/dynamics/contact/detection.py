@@ -9,14 +9,10 @@ from __future__ import annotations
 
 from mbsim.arrays.scene import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.geometry.catalog import COUPLE
-
-#: Code of a trial point too far away for the list of near pairs; the step has to be shorter.
-TOO_FAR = 6
-#: Code of more near pairs than there are places for.
-CROWDED = 7
 
 
 @jitable
@@ -70,9 +66,9 @@ def find_contacts(scene, y):
         work.touching[hit[k]] = 0
     hit[last] = 0
     if not place_graphics(scene, y):
-        return TOO_FAR
+        return Code.TOO_FAR
     if pairs.count[WANTED] > 0:
-        return CROWDED
+        return Code.CROWDED
 
     waiting, measured = 0, 0
     for k in range(pairs.count[LIVE]):

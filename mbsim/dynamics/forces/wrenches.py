@@ -28,8 +28,8 @@ from numba.extending import overload
 
 from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY, WRENCH_DOOR
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
@@ -206,4 +206,4 @@ def add_wrench(scene, t, y, f):
         row[3 + k] = torque[k]
     row[STORED_ENERGY] = stored
     row[LOST_POWER] = lost
-    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else NOT_FINITE
+    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else Code.NOT_FINITE

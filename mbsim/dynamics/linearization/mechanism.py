@@ -25,6 +25,7 @@ from mbsim.arrays.scene import (
     TURN_ROOT,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
@@ -45,8 +46,6 @@ from mbsim.dynamics.linearization.stiffness import (
     pushed,
 )
 
-#: Code of a mechanism with more coupled bodies than there is room for.
-NO_ROOM = 11
 #: Differences for the gradients of equations.
 _PUSH = 1e-7
 
@@ -321,7 +320,7 @@ def add_bends(scene, T, t, y):
 def linearise(scene, T, t, h, y, dy):
     """Keep the mechanism linearised at (t, y), where dy = f(t, y); return a code."""
     if not find_couplings(scene, T):
-        return NO_ROOM
+        return Code.NO_ROOM
     clear(scene, T)
     keep_bodies(scene, T.linear, y, dy)
     fill_joint_forces(scene, T.linear)

@@ -26,8 +26,8 @@ from __future__ import annotations
 
 from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import SINGULAR
 from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.constraints.equations import active_count
 from mbsim.dynamics.linearization.blocks import (
@@ -176,7 +176,7 @@ def factor(scene, T, M, h):
     fill_matrix(scene, T, M)
     ask_memory(scene, M, FACTOR, M.r[0], M.r[1])
     if not eliminate(P, M, L, free):
-        return SINGULAR
+        return Code.SINGULAR
     return factor_rest(scene, T, M)
 
 

@@ -25,8 +25,8 @@ from mbsim.arrays.scene import (
     SPEED_UP,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import add, cross, dot, vector
 from mbsim.dynamics.constraints.equations import (
     MISMATCH,
@@ -67,7 +67,7 @@ def constrain(scene, t, y, dy):
         passing = passes_fold(scene, t)
         power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
         dy[ledger] = power
-    return 0 if math.isfinite(total) else NOT_FINITE
+    return 0 if math.isfinite(total) else Code.NOT_FINITE
 
 
 @jitable

@@ -19,8 +19,8 @@ from mbsim.arrays.scene import (
     WITHIN,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.detection import find_contacts
@@ -80,7 +80,7 @@ def evaluate(scene, t, h, y, dy):
 
     # what follows
     if not math.isfinite(accelerate(scene, y, dy)):
-        return NOT_FINITE
+        return Code.NOT_FINITE
     if scene.world.doors[JOINTS_DOOR] != 0:
         return call_int(scene.world.doors[JOINTS_DOOR], (scene, ACCELERATE, t, y, dy))
     return 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import ACCELERATE, ALONG_JOINTS, MATRIX, PROJECT, REACT
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
@@ -20,7 +20,7 @@ def serve_limbs(scene, what, t, y, dy):
         prepare(scene, y)
         load(scene)
         respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
-        return 0 if math.isfinite(write_accelerations(scene, dy)) else NOT_FINITE
+        return 0 if math.isfinite(write_accelerations(scene, dy)) else Code.NOT_FINITE
     if what == REACT:
         reaction = scene.work.reaction
         for i in range(len(reaction)):
