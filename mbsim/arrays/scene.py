@@ -45,30 +45,6 @@ LIVE, FREE, FIXED, WANTED = range(4)
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 
-# entries of `World.doors`
-(
-    FCL_DOOR,
-    NEAR_DOOR,
-    APPLIED_DOOR,
-    JOINTS_DOOR,
-    EXPRESSION_DOOR,
-    VALUES_DOOR,
-    ANGLES_DOOR,
-    FRICTION_DOOR,
-    WRENCH_DOOR,
-    VALUE_DOOR,
-    TANGENT_DOOR,  # the packed arrays of `compile_model.tangent`, where a method is implicit
-    SLOPES_DOOR,
-    BEND_DOOR,
-    EVALUATE_DOOR,  # the whole rhs
-    MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
-    MEMORY_PAIR_DOOR,  # the same in complex ones
-    DRY_DOOR,  # what Force_DryFriction and Force_Element keep of an accepted step
-    RESIDUAL_DOOR,  # a Force_Element by its residual
-    RIGID_DOOR,  # contacts whose friction holds without give: stiction.rigid_contact
-) = range(19)
-DOORS = 19
-
 # entries of `Applied.kind`
 (
     LINE_FORCE,
@@ -90,24 +66,6 @@ LATE = 16  # is added to the kind of forces that need reactions, see forces.reac
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
 SCALAR, RUBBING = 6, 7
-
-# what is asked for at JOINTS_DOOR
-ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
-
-# what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
-KEEP_DRY, HOLD_AGAIN = range(2)
-
-# what is asked for at RIGID_DOOR, see stiction.rigid_contact
-(
-    PLACE_HELD,
-    SHARE_HELD,
-    ASK_HELD,
-    BEGIN_HELD,
-    RELEASE_HELD,
-    RECORD_HELD,
-    CHANGED_HELD,
-    LOAD_HELD,
-) = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -417,7 +375,7 @@ class Users(NamedTuple):
     address: I1  # (nu,) of their guarded C functions, 0 for a residual
     element: I1  # (nu,) row of `Residuals`, -1 for a subroutine
     result: F2  # (nu, most) what each returned last
-    failed: I1  # (1,) code of the first that failed in this evaluation, or 0
+    failed: I1  # (1,) code of the first hook whose failure was noted, or 0: `arrays.hooks`
     seen: F1  # (ny,) y when a friction subroutine that looks at it is called; else (0,)
 
 
@@ -549,7 +507,7 @@ class World(NamedTuple):
     # force, then those of every gravity of the model
     scale: F1  # (4,) length L, speed V and energy of the whole model, for difference quotients and
     # what is rounding, and the tolerance; errors are judged by `Scales`
-    doors: I1  # (DOORS,) addresses of what only some scenes need
+    hooks: I1  # (hooks,) addresses of what only some scenes need: `arrays.hooks`
     fixed_step: I1  # (1,) 1 for a method without error estimate
     past: I1  # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere

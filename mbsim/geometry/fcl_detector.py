@@ -1,4 +1,4 @@
-"""The door to FCL, and the only file that imports it.
+"""The way to FCL, and the only file that imports it.
 
 Compiled code calls one C function with the number of pairs waiting; this fills their rows of
 `Work.points` and returns 0, or `DETECTOR_FAILED` with the exception kept for the host.

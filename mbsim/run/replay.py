@@ -141,17 +141,16 @@ class Again:
 
     def _open(self) -> None:
         """Compile, or load, what evaluates a row."""
+        from mbsim.arrays.hooks import Hook
         from mbsim.core import jit
         from mbsim.core.address import pack
         from mbsim.core.problem import HOOK
-        from mbsim.dynamics.pipeline.hooks import needs_expressions
+        from mbsim.dynamics.pipeline.hook_table import fill
         from mbsim.dynamics.pipeline.replay import again_hook
 
         scene = self.system.scene
-        if needs_expressions(scene):
-            from mbsim.dynamics.pipeline.force_hooks import open_expressions
-
-            open_expressions(scene)
+        # a user's law may ask for expressions
+        fill(scene, only=(Hook.VALUE, Hook.ELEMENT))
         if self.system.reader is not None:
             self.system.reader.open(scene)
         self._table = pack(scene)

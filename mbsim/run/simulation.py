@@ -86,7 +86,7 @@ class Runner:
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
-        self.detector = self._open_fcl_door()
+        self.detector = self._make_detector()
         system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
         self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
@@ -106,21 +106,33 @@ class Runner:
         self.interrupted = False
         self.dump: ContactProblems | None = None
 
-    def _open_fcl_door(self) -> Any:
-        """Put FCL behind the scene's door where a pair may need it."""
+    def _make_detector(self) -> Any:
+        """Put FCL behind its hook where a pair may need it."""
         if not self.system.needs_fcl:
             return None
-        from mbsim.arrays.scene import FCL_DOOR
+        from mbsim.arrays.hooks import Hook
         from mbsim.geometry.fcl_detector import FclDetector
 
         graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
         detector = FclDetector(self.system.scene, graphics)
-        self.system.scene.world.doors[FCL_DOOR] = detector.address
+        self.system.scene.world.hooks[Hook.FCL] = detector.address
         return detector
 
     def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> int:
         """Call one of the problem's hooks that act or answer from Python."""
         return int(self._hook(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+
+    def must(self, hook: int, t: float, a: Any, b: Any) -> int:
+        """Call one of the problem's hooks from Python; raise what it says where it fails."""
+        answer = self.call(hook, t, 0.0, a, b)
+        acts = hook not in (self.problem.commit, self.problem.output, self.problem.arrive)
+        self._look_at(answer if acts else min(answer, 0), t)
+        return answer
+
+    def _look_at(self, code: int, t: float) -> None:
+        """Raise what a hook's code says, or its answer that is less a code."""
+        if code != 0:
+            fail(self.system, self.detector, abs(code), t)
 
     def assemble(self) -> None:
         """Put the bodies where all constraints hold, and report what had to move."""
@@ -135,7 +147,7 @@ class Runner:
         )
 
         t = self.settings.stages[0].simulation.start_time
-        serve = self._door(t)
+        serve = self._joints(t)
 
         try:
             self.assembly = assemble(scene, self.method.y, serve, self.system.given_velocities())
@@ -177,8 +189,8 @@ class Runner:
         rested = any(one.is_static for one in before)
         return rested or any(c.table in ("motions", "variables") for c in fresh)
 
-    def _door(self, t: float) -> Any:
-        """Return what asks the joints' door at time t, None where there are no joints."""
+    def _joints(self, t: float) -> Any:
+        """Return what asks joints at time t, None where there are no joints."""
         scene = self.system.scene
         if len(scene.tree.body) == 0:
             return None
@@ -189,18 +201,19 @@ class Runner:
         return serve
 
     def _ask_joints(self, what: int, t: float, y: Any, dy: Any) -> None:
-        """Ask something at the joints' door."""
-        from mbsim.arrays.scene import JOINTS_DOOR
+        """Ask joints for something."""
+        from mbsim.arrays.hooks import Hook
 
         pointer = ctypes.c_void_p
-        door = ctypes.CFUNCTYPE(
+        hook = ctypes.CFUNCTYPE(
             ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, pointer, pointer
-        )(int(self.system.scene.world.doors[JOINTS_DOOR]))
-        door(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
+        )(int(self.system.scene.world.hooks[Hook.JOINTS]))
+        code = hook(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
+        self._look_at(code, t)
 
     def dump_every(self, every: int, resumed: bool) -> None:
         """Write the contact problem of every so many steps from here on."""
-        from mbsim.arrays.scene import ACCELERATE
+        from mbsim.arrays.hooks import Joints
         from mbsim.integrators import scheme
         from mbsim.run.dumping import ContactProblems
 
@@ -213,7 +226,7 @@ class Runner:
             return self.call(self.problem.rhs, t, 0.0, y, idle)
 
         def accelerate(t: float, y: Any, dy: Any) -> None:
-            self._ask_joints(ACCELERATE, t, y, dy)
+            self._ask_joints(Joints.ACCELERATE, t, y, dy)
 
         self.dump = ContactProblems(
             self.system, every, folder / "fclib", evaluate, accelerate, resumed
@@ -237,9 +250,9 @@ class Runner:
         t, problem, scene = stage.simulation.start_time, self.problem, self.system.scene
         hooks = Hooks(
             lambda y, f: self.call(problem.rhs, t, 0.0, y, f),
-            lambda y: self.call(problem.project, t, 0.0, y, y),
-            lambda y, f: self.call(problem.commit, t, 0.0, y, f),
-            self._door(t),
+            lambda y: self.must(problem.project, t, y, y),
+            lambda y, f: self.must(problem.commit, t, y, f),
+            self._joints(t),
         )
         groups = (scene.state, scene.pairs, scene.crowds, scene.log, scene.rows)
         before = [[np.array(array) for array in group] for group in groups]
@@ -261,12 +274,12 @@ class Runner:
         self.method.y[...] = y
         for _ in range(2):
             # near pairs of crowds are listed first, then looked at
-            self.call(problem.rhs, t, 0.0, self.method.y, self.method.k[0])
-            self.call(problem.commit, t, 0.0, self.method.y, self.method.k[0])
+            self.must(problem.rhs, t, self.method.y, self.method.k[0])
+            self.must(problem.commit, t, self.method.y, self.method.k[0])
 
     def assemble_again(self, t: float) -> None:
         """Give the bodies the velocities that motions ask for, after a stage that had none."""
-        serve = self._door(t)
+        serve = self._joints(t)
         if serve is None:
             return
         from mbsim.dynamics.initial.assembly import ContradictionError, assemble, contradiction
@@ -284,16 +297,12 @@ class Runner:
         # what begins to stick or slip is told by it
         self.system.scene.world.scale[TOLERANCE] = self.settings.stages[0].tol
         y, f = self.method.y, self.method.k[0]
-        code = self.call(self.problem.rhs, t, 0.0, y, f)
-        if code != 0:
-            fail(self.system, self.detector, code, t)
+        self.must(self.problem.rhs, t, y, f)
         scene, model = self.system.scene, self.system.model
         if self.system.plans.crowds:
             # nothing is listed yet: list what is near, then look again
-            self.call(self.problem.commit, t, 0.0, y, f)
-            code = self.call(self.problem.rhs, t, 0.0, y, f)
-            if code != 0:
-                fail(self.system, self.detector, code, t)
+            self.must(self.problem.commit, t, y, f)
+            self.must(self.problem.rhs, t, y, f)
         faults = []
         pairs = scene.pairs
         live = pairs.live[: pairs.count[LIVE]]
@@ -326,7 +335,7 @@ class Runner:
                 )
         if faults and not allow_overlap:
             raise ModelError("\n".join(dict.fromkeys(faults)))
-        self.call(self.problem.commit, t, 0.0, y, f)
+        self.must(self.problem.commit, t, y, f)
 
     def _saved(self) -> dict[str, Any]:
         """Return all groups of arrays in which a run goes on."""
@@ -399,9 +408,7 @@ class Runner:
         follows, row = self.sensing.act(t, end, last)
         # the first row of a Simulate is there anyway
         if row and not start:
-            code = self.call(self.problem.output, t, 0.0, y, error)
-            if code < 0:
-                fail(self.system, self.detector, -code, t)
+            self.must(self.problem.output, t, y, error)
             self.recorder.take()
         return follows == GO_ON
 
@@ -430,13 +437,11 @@ class Runner:
         if (
             goes_on
             and self.problem.arrive
-            and self.call(self.problem.arrive, t, 0.0, method.y, method.error)
+            and self.must(self.problem.arrive, t, method.y, method.error)
         ):
             goes_on = self._sense(simulation.end_time, start=True)
         if len(self.sensing.times):
-            code = self.call(self.problem.output, t, 0.0, method.y, method.error)
-            if code < 0:
-                fail(self.system, self.detector, -code, t)
+            self.must(self.problem.output, t, method.y, method.error)
         self.recorder.take()
         return goes_on
 

@@ -22,7 +22,7 @@ from mechanism_decks import Joint, Scene, marker
 from scipy.spatial.transform import Rotation
 
 import mbsim
-from mbsim.arrays.scene import CHOOSE
+from mbsim.arrays.hooks import Joints
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
@@ -607,7 +607,7 @@ def test_contacts_without_give(name, slip, tmp_path):
     hit = it.scene.work.hit[: it.scene.work.hit[-1]]
     it.scene.state.memory[hit, 0] = SLIP if slip else STICK
     it.scene.state.memory[hit, 1] = 1e-13
-    it.runner._door(0.0)(CHOOSE, y)
+    it.runner._joints(0.0)(Joints.CHOOSE, y)
     held = int(it.scene.equations.active[-1])
     assert held == (0 if slip else 2 if len(hit) == 1 else 3)
     worst = it.misses(it.on_manifold(y, 0.0), coefficients=(1e3, 1e4, 1e5))

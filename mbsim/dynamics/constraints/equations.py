@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from mbsim.arrays.hooks import Held, Hook, note_failure
 from mbsim.arrays.scene import (
     ANGLE,
     ASKED,
@@ -33,8 +34,6 @@ from mbsim.arrays.scene import (
     PIVOT,
     PIVOT_THEN,
     PIVOT_TIME,
-    PLACE_HELD,
-    RIGID_DOOR,
     TOUCHING,
     TWIST,
     USUAL,
@@ -327,8 +326,8 @@ def lasting(scene: Scene) -> np.ndarray:
 @jitable
 def fill_equations(scene, t, y):
     """Fill gradient, residual and rates of the equations in use."""
-    if scene.world.doors[RIGID_DOOR] != 0:
-        call_int(scene.world.doors[RIGID_DOOR], (scene, PLACE_HELD, t, y))
+    if scene.world.hooks[Hook.HELD] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 

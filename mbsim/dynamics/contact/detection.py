@@ -1,4 +1,4 @@
-"""Who touches whom: the motion bound, the closed-form kernels, the door to FCL.
+"""Who touches whom: the motion bound, the closed-form kernels, the hook to FCL.
 
 A pair that has `left` between it at the committed state cannot touch while its shapes have
 moved by less since. That is a pure function of the trial point and the committed state, so
@@ -7,7 +7,8 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import FCL_CALLS, LIVE, NARROWPHASE, SKIPPED, WANTED
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
@@ -88,7 +89,7 @@ def find_contacts(scene, y):
     # one visit to Python for all pairs that need it
     if waiting > 0:
         log.counters[FCL_CALLS] += waiting
-        code = call_int(scene.world.doors[FCL_DOOR], (waiting,))
+        code = call_int(scene.world.hooks[Hook.FCL], (waiting,))
         if code != 0:
             return code
         for k in range(waiting):

@@ -15,6 +15,7 @@ and it acts where it is on and was not. A located EQUAL acts wherever e comes to
 
 from __future__ import annotations
 
+from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     EQUAL,
     EXCESS,
@@ -109,10 +110,14 @@ def arrive(scene, t, y):
 def happens_hook(context, t, h, a, b):
     """Whether a located sensor has become true."""
     scene = view(context, Scene)
-    return happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    answer = happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    code = failure_or(scene, 0)
+    return answer if code == 0 else -code
 
 
 def arrive_hook(context, t, h, a, b):
     """What sensors see at a committed state."""
     scene = view(context, Scene)
-    return arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    answer = arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    code = failure_or(scene, 0)
+    return answer if code == 0 else -code

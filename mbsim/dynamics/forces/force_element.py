@@ -23,7 +23,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import KEEP_DRY, PYTHON_CALLS
+from mbsim.arrays.hooks import Dry
+from mbsim.arrays.scene import PYTHON_CALLS
 from mbsim.core.address import call_int
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
@@ -560,7 +561,7 @@ def serve_residual(scene, t, y, e, component):
 @jitable
 def keep_residuals(scene, what, t, y):
     """Keep what all elements make of the point evaluated last; return 0."""
-    if what != KEEP_DRY:
+    if what != Dry.KEEP:
         return 0
     R = scene.residuals
     for e in range(len(R.id)):

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -33,7 +34,6 @@ from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velo
 from mbsim.dynamics.constraints.equations import active_count, hold_again
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.expressions.subroutines import failure_or
 from mbsim.dynamics.forces.applied import along_axis, along_line, push
 from mbsim.dynamics.forces.joint_friction import (
     GOOD_ENOUGH,

@@ -26,7 +26,8 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY, WRENCH_DOOR
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
@@ -46,10 +47,10 @@ def wrench(scene, t, y, f):
 
 @overload(wrench)
 def _wrench(scene: Any, t: Any, y: Any, f: Any) -> Any:
-    """Give compiled code its form of `wrench`: a call through the door."""
+    """Give compiled code its form of `wrench`: a call of the hook."""
 
     def compiled(scene: Any, t: Any, y: Any, f: Any) -> Any:
-        return call_int(scene.world.doors[WRENCH_DOOR], (scene, t, y, f))
+        return call_int(scene.world.hooks[Hook.WRENCH], (scene, t, y, f))
 
     return compiled
 

@@ -15,15 +15,8 @@ point on the child, f = (n, F),
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import (
-    BEND_DOOR,
-    BODY_SIZE,
-    SLOPES_DOOR,
-    TURN_AXIS,
-    TURN_CROSS,
-    TURN_FREE,
-    TURN_ROOT,
-)
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import BODY_SIZE, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
@@ -328,8 +321,10 @@ def linearise(scene, T, t, h, y, dy):
         fill_joint(scene, T.linear, y, k)
     fill_rows(scene, T.linear, t)
     if active_count(scene) > 0:
-        call_int(scene.world.doors[BEND_DOOR], (scene, t, y))
+        code = call_int(scene.world.hooks[Hook.BEND], (scene, t, y))
+        if code != 0:
+            return code
     code = add_contacts_slopes(scene, T, t, h, y)
-    if code == 0 and scene.world.doors[SLOPES_DOOR] != 0:
-        code = call_int(scene.world.doors[SLOPES_DOOR], (scene, t, y))
+    if code == 0 and scene.world.hooks[Hook.SLOPES] != 0:
+        code = call_int(scene.world.hooks[Hook.SLOPES], (scene, t, y))
     return code

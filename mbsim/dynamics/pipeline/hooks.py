@@ -5,28 +5,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import types
 
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, failure_or, note_failure
 from mbsim.arrays.scene import (
-    ALONG_JOINTS,
     BODY_SIZE,
-    DRY_DOOR,
     ERROR_NOW,
-    EVALUATE_DOOR,
     FOLD_HALT,
     FOLDS,
     HELD_OTHERWISE,
-    HOLD_AGAIN,
-    JOINTS_DOOR,
-    KEEP,
     LISTINGS,
-    NEAR_DOOR,
-    PROJECT,
-    RIGID_DOOR,
-    SHARE_HELD,
     Scene,
 )
-from mbsim.core import jit
 from mbsim.core.address import call_int, pack, vector_at, view
 from mbsim.core.problem import (
     ALONG,
@@ -44,6 +33,7 @@ from mbsim.dynamics.events.stability import stable_step
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
+from mbsim.dynamics.pipeline.hook_table import fill
 from mbsim.dynamics.pipeline.output import (
     blame,
     friction_left,
@@ -55,11 +45,11 @@ from mbsim.dynamics.pipeline.output import (
 from mbsim.dynamics.pipeline.scales import take_speeds
 
 
-def _rhs(context, t, h, a, b):
+def rhs(context, t, h, a, b):
     """f(t, y)."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return evaluate(scene, t, h, vector_at(a, n), vector_at(b, n))
+    return failure_or(scene, evaluate(scene, t, h, vector_at(a, n), vector_at(b, n)))
 
 
 def _project(context, t, h, a, b):
@@ -71,9 +61,10 @@ def _project(context, t, h, a, b):
         length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
         for k in range(4):
             y[at + k] /= length
-    if scene.world.doors[JOINTS_DOOR] != 0:
-        what = ALONG_JOINTS if h == ALONG else PROJECT
-        return call_int(scene.world.doors[JOINTS_DOOR], (scene, what, t, y, y))
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        what = Joints.ALONG if h == ALONG else Joints.PROJECT
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, what, t, y, y))
+        return failure_or(scene, code)
     return 0
 
 
@@ -94,20 +85,22 @@ def _norm(context, t, h, a, b):
 def _check(context, t, h, a, b):
     """The guard of first penetration."""
     scene = view(context, Scene)
-    return first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
+    part = first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
+    failure_or(scene, 0)  # laws are explored, not asked
+    return part
 
 
 def _commit(context, t, h, a, b):
     """The incident table, events and peaks."""
     scene = view(context, Scene)
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
-    if scene.world.doors[RIGID_DOOR] != 0:
+    if scene.world.hooks[Hook.HELD] != 0:
         # before equations may be chosen anew
-        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, a))
-    if scene.world.doors[JOINTS_DOOR] != 0:
-        code = call_int(scene.world.doors[JOINTS_DOOR], (scene, KEEP, t, a, a))
-        if code > 0:
-            return -code
+        note_failure(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, a)))
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
+        if code != 0:
+            return -failure_or(scene, code)
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
     changed = commit(scene, t, h, y)
@@ -126,7 +119,8 @@ def _commit(context, t, h, a, b):
         word += Taken.STABLE_IS_STALE
     if changed == HELD_OTHERWISE or passed != passes:
         word += Taken.BEGIN_ANEW
-    return word
+    code = failure_or(scene, 0)
+    return word if code == 0 else -code
 
 
 def _look(context, t, h, a, b):
@@ -136,9 +130,9 @@ def _look(context, t, h, a, b):
     code = evaluate_past(scene, t, h, vector_at(a, n), vector_at(b, n))
     if code == 0:
         watch_peaks(scene, t)
-    if scene.world.doors[DRY_DOOR] != 0:
-        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
-    return code
+    if scene.world.hooks[Hook.DRY] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+    return failure_or(scene, code)
 
 
 def _inner(context, t, h, a, b):
@@ -151,6 +145,7 @@ def _limit(context, t, h, a, b):
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    failure_or(scene, 0)  # laws are explored, not asked
     halt = scene.sweep.quality[FOLD_HALT]
     return min(longest, halt - t) if halt > t else longest
 
@@ -162,13 +157,13 @@ def _output(context, t, h, a, b):
     f = vector_at(b, n)
     code = evaluate_past(scene, t, h, vector_at(a, n), f)
     if code != 0:
-        return -code
+        return -failure_or(scene, code)
     full = write_row(scene, t, h, vector_at(a, n), f)
-    if scene.world.doors[DRY_DOOR] != 0:
-        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, a))
-    if scene.users.failed[0] != 0:
-        # a subroutine that only a request asks for
-        return -scene.users.failed[0]
+    if scene.world.hooks[Hook.DRY] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+    code = failure_or(scene, 0)
+    if code != 0:
+        return -code
     return FULL if full else 0
 
 
@@ -187,19 +182,20 @@ def _stable(context, t, h, a, b):
     """The step for a method without error estimate, h being the tolerance."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return stable_step(scene, h, vector_at(a, n), vector_at(b, n))
+    longest = stable_step(scene, h, vector_at(a, n), vector_at(b, n))
+    failure_or(scene, 0)  # laws are explored, not asked
+    return longest
 
 
-def _follow(context, y):
+def list_near(context, y):
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
     follow(scene, vector_at(y, scene.rows.y.shape[1]))
     return 0
 
 
-_FOLLOW = types.int64(types.int64, types.CPointer(types.float64))
 _HOOKS = {
-    "rhs": _rhs,
+    "rhs": rhs,
     "project": _project,
     "norm": _norm,
     "check": _check,
@@ -210,11 +206,6 @@ _HOOKS = {
     "output": _output,
     "reject": _reject,
 }
-
-
-def needs_expressions(scene: Scene) -> bool:
-    """Return whether there are applied forces, expressions or followed angles."""
-    return bool(len(scene.applied.kind) or len(scene.programs.start) > 1 or len(scene.angles.i))
 
 
 def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
@@ -240,22 +231,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
 
         hooks["kinks"] = kinks_hook
     problem = Problem(int(table.ctypes.data), **addresses(hooks))
-    if needs_expressions(scene):
-        # only then: what they are made of need not be imported
-        from mbsim.dynamics.pipeline.force_hooks import open_expressions
-
-        open_expressions(scene)
-    if scene.contacts.rigid.any():
-        from mbsim.dynamics.pipeline.force_hooks import open_held
-
-        open_held(scene)
-    if len(scene.crowds.contact) > 0:
-        scene.world.doors[NEAR_DOOR] = jit.address(_follow, _FOLLOW)
-    if len(scene.tree.body) > 0:
-        from mbsim.dynamics.pipeline.joint_hooks import open_joints
-
-        open_joints(scene)
+    fill(scene)
     if "kinks" in hooks:
-        scene.world.doors[EVALUATE_DOOR] = problem.rhs
         scene.state.frozen[0] = int(len(scene.work.idle) > 0)
     return problem, table
