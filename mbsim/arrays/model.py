@@ -152,7 +152,7 @@ class Users(NamedTuple):
     address: I1  # (nu,) of their guarded C functions, 0 for a residual
     element: I1  # (nu,) row of `Residuals`, -1 for a subroutine
     result: tags.Scratch[F2]  # (nu, most) what each returned last
-    failed: tags.Scratch[I1]  # (1,) code of the first that failed in this evaluation, or 0
+    failed: tags.Scratch[I1]  # (1,) code of the first hook that failed, or 0
     seen: tags.Scratch[F1]  # (ny,) y when a friction that looks at it is called; else (0,)
 
 
@@ -290,7 +290,7 @@ class World(NamedTuple):
     # force, then those of every gravity of the model
     scale: F1  # (4,) length L, speed V and energy of the whole model, for difference quotients and
     # what is rounding, and the tolerance; errors are judged by `Scales`
-    doors: I1  # (DOORS,) addresses of what only some scenes need
+    hooks: I1  # (hooks,) addresses of what only some scenes need: `arrays.hooks`
     fixed_step: I1  # (1,) 1 for a method without error estimate
     # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     past: tags.Scratch[I1]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.acting import acting
 from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import (
@@ -424,7 +425,7 @@ def build(
             pulled[0].constant.copy(),
             np.array([pulled[0].program, *(pull.program for pull in pulled)]),
             _scales(groups, length, speed),
-            np.zeros(a.DOORS, dtype=np.int64),
+            np.zeros(len(Hook), dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             ledger,

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import (
     BEGUN,
@@ -48,6 +48,7 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     TIME,
     WAS_CUT,
+    failure_or,
 )
 
 #: From here on a step is at the stability bound, or in reach of it.
@@ -123,11 +124,11 @@ def is_calm(p, m, steps, t_end):
     h = min(m.memory[STEP], t_end - t)
     if not h > 0.0:
         return False
-    code = call_float(steps.probe, (steps.context, t, h, m.y, m.trial))
+    code = failure_or(m, call_int(steps.probe, (steps.context, t, h, m.y, m.trial)))
     error = m.memory[LAST_ERROR]
     m.memory[LAST_ERROR] = kept
     part = 0.0
-    if code == 0.0 and error < math.inf:
+    if code == 0 and error < math.inf:
         part = 0.9 * max(error, 1e-4) ** -0.2
         if m.memory[STIFFNESS] > 0.0:
             part = min(part, WITHIN / m.memory[STIFFNESS])

@@ -153,13 +153,8 @@ def callback(
 
     With `states` it keeps so many numbers of its own.
     """
-    from mbsim.laws.abi import (
-        DFLAG,
-        FRICTION_INPUTS,
-        MEMORY_OUT,
-        RAISED_INTERPRETED,
-        STOPPED_BY_USER,
-    )
+    from mbsim.core.codes import Code
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, MEMORY_OUT
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
     inputs_at, par_at = Views(FRICTION_INPUTS + states), Views(par_count)
@@ -193,10 +188,10 @@ def callback(
                 _put_force(out_at[out], result)
             return 0
         except PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, f"Force_Contact[{element}]", time, name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 
@@ -233,7 +228,7 @@ def state_callback(
     object
         What must live as long as the address is used.
     """
-    from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.core.codes import Code
 
     results_at = Views(count)
     title, id = element
@@ -260,10 +255,10 @@ def state_callback(
                     room[k] = number
             return 0
         except PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, title, time, name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 

@@ -137,7 +137,7 @@ def _compiled(made: UserNormal, script: Script) -> tuple[int, str]:
 
 def _callback(made: UserNormal) -> tuple[int, object]:
     """Return the address of the interpreted function as a normal law, and what keeps it alive."""
-    from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.core.codes import Code
 
     out_at, place = guard.Views(3), made.place.data
 
@@ -152,11 +152,11 @@ def _callback(made: UserNormal) -> tuple[int, object]:
                 at.keep(results, k, depth, made.call(*at.question(k, depth, rate)))
             return 0
         except guard.PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             title, source = f"Force_Contact[{made.element}]", str(made.source)
             guard.failure.store(error, title, place[at.TIME], made.name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 

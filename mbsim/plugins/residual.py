@@ -214,9 +214,9 @@ def _callback(
             return 0
         except BaseException as error:
             guard.failure.store(error, f"Force_Element[{element}]", time, name, source)
-            from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+            from mbsim.core.codes import Code
 
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 

@@ -44,7 +44,7 @@ def costs(folder, count):
     pair[0::2], pair[1:6:2] = (1e3, 0.0, 1e3, 0.0), (1e3, 2e6, 1e3)
     pointer = ctypes.c_void_p
     form = ctypes.CFUNCTYPE(
-        ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+        ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
     )
 
     def least(name, a, b):

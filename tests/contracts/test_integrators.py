@@ -16,9 +16,9 @@ from helpers.decks import run_model
 from helpers.equations import far, none, observed, one, oscillation, zero
 from helpers.folders import MODELS
 from mbsim.core import jit
-from mbsim.core.address import call_float, pack, view
+from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
-from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem
+from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
 from mbsim.integrators import catalog, dop853, driver, scheme
 
 
@@ -37,7 +37,7 @@ def _oscillator(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[1]
     f[1] = -y[0] + math.sin(2.0 * t)
-    return 0.0
+    return 0
 
 
 def _kepler(context, t, h, a, b):
@@ -46,34 +46,34 @@ def _kepler(context, t, h, a, b):
     cube = math.sqrt(y[0] * y[0] + y[1] * y[1]) ** 3
     f[0], f[1] = y[2], y[3]
     f[2], f[3] = -y[0] / cube, -y[1] / cube
-    return 0.0
+    return 0
 
 
 def _blows_up(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[0] * y[0]
     f[1] = 0.0
-    return 0.0
+    return 0
 
 
 def _rough(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[1]
     f[1] = -y[0] + (1.0 if math.sin(7.0 * t) > 0.0 else -1.0)
-    return 0.0
+    return 0
 
 
 def _refuses(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = 0.6 - y[0]
     f[1] = 0.0
-    return 7.0 if y[0] < 0.5 else 0.0
+    return 7 if y[0] < 0.5 else 0
 
 
 def _turns(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0], f[1] = -3.0 * y[1], 3.0 * y[0]
-    return 0.0
+    return 0
 
 
 def _to_the_circle(context, t, h, a, b):
@@ -81,7 +81,7 @@ def _to_the_circle(context, t, h, a, b):
     length = math.sqrt(y[0] * y[0] + y[1] * y[1])
     y[0] /= length
     y[1] /= length
-    return 0.0
+    return 0
 
 
 def _norm2(context, t, h, a, b):
@@ -107,7 +107,7 @@ def _keep(context, t, h, a, b):
     row = table.rows[table.used[0]]
     row[0], row[1], row[2] = t, y[0], y[1]
     table.used[0] += 1
-    return 0.0
+    return 0
 
 
 def _comes_to_rest(context, t, h, a, b):
@@ -115,7 +115,7 @@ def _comes_to_rest(context, t, h, a, b):
     numbers = view(context, Table).numbers
     f[0] = y[1]
     f[1] = -numbers[0] * y[0] - numbers[1] * y[1]
-    return 0.0
+    return 0
 
 
 def _speed(context, t, h, a, b):
@@ -138,8 +138,11 @@ def planet(t):
 
 
 def make_problem(rhs, context=0, norm=_norm2, output=zero, project=zero):
-    hooks = (rhs, project, norm, one, zero, zero, none, far, output, zero)
-    return Problem(context, *[jit.address(hook, HOOK) for hook in hooks])
+    hooks = dict(
+        rhs=rhs, project=project, norm=norm, check=one, commit=zero, look=zero, inner=none,
+        limit=far, output=output, reject=zero,
+    )  # fmt: skip
+    return Problem(context, **addresses(hooks))
 
 
 @pytest.fixture(scope="module")
@@ -389,7 +392,7 @@ def _verlet(context, t, h, a, b):
     m.counts[scheme.EVALUATIONS] += 1
     m.trial[0] = m.y[0] + h * (m.y[1] + 0.5 * h * m.k[0, 1])
     m.trial[1] = m.y[1]
-    code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[1]))
+    code = call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[1]))
     m.trial[1] = m.y[1] + 0.5 * h * (m.k[0, 1] + m.k[1, 1])
     m.k[1, 0] = m.trial[1]
     return code
@@ -402,7 +405,7 @@ def _cubic(context, t, h, a, b):
         m.dense[0, i], m.dense[1, i] = m.y[i], rise
         m.dense[2, i] = h * m.k[0, i] - rise
         m.dense[3, i] = 2.0 * rise - h * (m.k[0, i] + m.k[1, i])
-    return 0.0
+    return 0
 
 
 def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):

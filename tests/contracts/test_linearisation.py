@@ -19,7 +19,7 @@ from helpers.folders import MODELS
 from helpers.free_bodies import Silent
 from helpers.mechanics import Body
 from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
-from mbsim.arrays.scene import CHOOSE
+from mbsim.arrays.hooks import Joints
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
@@ -51,7 +51,7 @@ class Linearised:
     def call(self, name, t, a, b):
         pointer = ctypes.c_void_p
         form = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
         hook = form(getattr(self.problem, name))
         code = hook(self.problem.context, t, 0.0, a.ctypes.data, b.ctypes.data)
@@ -591,7 +591,7 @@ def test_contacts_without_give(name, slip, tmp_path):
     hit = it.scene.work.hit[: it.scene.work.hit[-1]]
     it.scene.state.memory[hit, 0] = SLIP if slip else STICK
     it.scene.state.memory[hit, 1] = 1e-13
-    it.runner.hooks.joints_at(0.0)(CHOOSE, y)
+    it.runner.hooks.joints_at(0.0)(Joints.CHOOSE, y)
     held = int(it.scene.equations.active[-1])
     assert held == (0 if slip else 2 if len(hit) == 1 else 3)
     worst = it.misses(it.on_manifold(y, 0.0), coefficients=(1e3, 1e4, 1e5))

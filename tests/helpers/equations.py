@@ -8,7 +8,7 @@ import numpy as np
 
 
 def zero(context, t, h, a, b):
-    return 0.0
+    return 0
 
 
 def one(context, t, h, a, b):

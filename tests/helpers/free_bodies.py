@@ -81,7 +81,7 @@ def run(model, tol=1e-9, integrator=None):
     kept = Kept(system.scene.rows)
     runner = Runner(system, settings, kept, None, print)
     y, f = runner.method.y, runner.method.k[0]
-    settle_contacts(system, runner.hooks, settings, None, y, f, False, print, print)
+    settle_contacts(system, runner.hooks, settings, y, f, False, print, print)
     runner.run(None, False)
     kept.take()
     joined = [np.concatenate(parts) for parts in zip(*kept.blocks, strict=True)]

@@ -145,8 +145,8 @@ def test_several_unknowns_and_roots_that_newton_misses():
     ],
 )
 def test_what_has_no_root_is_said(residual):
-    from mbsim.dynamics.forces.force_element import UNSOLVED_ELEMENT
+    from mbsim.core.codes import Code
 
     scene = Scene(residual, [ALGEBRAIC])
-    assert scene.solve(1.0, 0.0)[0] == UNSOLVED_ELEMENT
+    assert scene.solve(1.0, 0.0)[0] == Code.UNSOLVED_ELEMENT
     assert scene.residuals.trouble[0] == 0

@@ -26,10 +26,11 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY, WRENCH_DOOR
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
@@ -46,10 +47,10 @@ def wrench(scene, t, y, f):
 
 @overload(wrench)
 def _wrench(scene: Any, t: Any, y: Any, f: Any) -> Any:
-    """Give compiled code its form of `wrench`: a call through the door."""
+    """Give compiled code its form of `wrench`: a call of the hook."""
 
     def compiled(scene: Any, t: Any, y: Any, f: Any) -> Any:
-        return call_int(scene.world.doors[WRENCH_DOOR], (scene, t, y, f))
+        return call_int(scene.world.hooks[Hook.WRENCH], (scene, t, y, f))
 
     return compiled
 
@@ -206,4 +207,4 @@ def add_wrench(scene, t, y, f):
         row[3 + k] = torque[k]
     row[STORED_ENERGY] = stored
     row[LOST_POWER] = lost
-    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else NOT_FINITE
+    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else Code.NOT_FINITE
