@@ -75,7 +75,7 @@ DOORS = 19
     AXIS_FORCE,
     AXIS_TORQUE,
     VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of forces.wrenches
-    BUSHING,
+    MARKER_FORCE,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
     SLIDE_LIMIT,
     TURN_LIMIT,
@@ -87,6 +87,9 @@ DOORS = 19
     BALL_FRICTION,
 ) = range(14)
 LATE = 16  # is added to the kind of forces that need reactions, see forces.reaction_forces
+
+# entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
+BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
 SCALAR, RUBBING = 6, 7
@@ -469,16 +472,17 @@ class Applied(NamedTuple):
     i: I1  # (nf,) markers
     j: I1  # (nf,)
     par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
-    # of bushings six stiffnesses, six dampings, six preloads; of dry friction its stiffness (0:
-    # rigid) and the force at which it slides on and at which it begins to
+    # of marker forces what a step must follow; of dry friction its stiffness (0: rigid) and the
+    # force at which it slides on and at which it begins to
     program: I1  # (nf,) -1 for none
     components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
     axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
     bounds: F2  # (nf, 2) of limits
-    law: I1  # (nf,) address of a normal or friction law, 0 for none
+    law: I1  # (nf,) address of a normal or friction law or a marker force, 0 for none
     law_par: F2  # (nf, widest)
+    slopes: I1  # (nf,) address of the slopes of a marker force, 0 for none or where not asked for
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
     equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
@@ -651,6 +655,9 @@ class Work(NamedTuple):
     law_in: F1  # (FRICTION_INPUTS + most,)
     law_out: F1  # (MEMORY_OUT + 2 most,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
+    motion: F1  # (12,) of a marker force: see forces.abi, as the next two
+    wrench: F1  # (8,)
+    slopes: F2  # (12, 6)
     rub: F2  # (nf, 9) of friction: see forces.joint_friction
     late: F2  # (nu, 5) of what is settled with the reactions, see forces.reaction_forces
     secant: F2  # (nu, nu) how that follows from what it misses

@@ -250,10 +250,10 @@ def test_bushings_and_vector_forces(tmp_path: Path) -> None:
         )
     )
     model = read(tmp_path, added(text))
-    bushing = model.bushings[1]
-    assert bushing.stiffness == (1.0, 2.0, 3.0, 7.0, 8.0, 9.0)
-    assert bushing.damping == (4.0, 5.0, 6.0, 0.0, 0.0, 0.0)
-    assert bushing.preload == (0.0,) * 5 + (-1.0,)
+    values = list(model.table("BUSHING")[1].values.values())
+    assert values[:6] == [1.0, 2.0, 3.0, 7.0, 8.0, 9.0]
+    assert values[6:12] == [4.0, 5.0, 6.0, 0.0, 0.0, 0.0]
+    assert values[12:] == [0.0] * 5 + [-1.0]
     assert [force.type for force in model.vector_forces.values()] == [
         "FORCEONLY",
         "TORQUEONLY",

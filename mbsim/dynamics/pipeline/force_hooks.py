@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import types
 
@@ -14,8 +16,9 @@ from mbsim.arrays.scene import (
     EXPRESSION_DOOR,
     FOLD_HALT,
     FRICTION_DOOR,
+    MARKER_FORCE,
+    RESIDUAL,
     RIGID_DOOR,
-    SLIDE_LIMIT,
     VALUE_DOOR,
     VALUES_DOOR,
     VECTOR_FORCE,
@@ -37,7 +40,7 @@ from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_late
-from mbsim.dynamics.forces.wrenches import add_wrench
+from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
 from mbsim.dynamics.stiction.rigid_contact import serve_held
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
@@ -76,8 +79,20 @@ def _act(context, t, y, dy):
     return code if code != 0 else drive(scene, t, a, b)
 
 
+def _marker_force(context, t, y, f):
+    """A marker force."""
+    scene = view(context, Scene)
+    return add_marker_force(scene, vector_at(y, scene.rows.y.shape[1]), f)
+
+
+def _vector_force(context, t, y, f):
+    """A vector force."""
+    scene = view(context, Scene)
+    return add_vector_force(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
+
+
 def _wrench(context, t, y, f):
-    """A bushing or a vector force."""
+    """One or the other, where a scene has both."""
     scene = view(context, Scene)
     return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
@@ -161,6 +176,14 @@ def open_jets(scene: Scene) -> None:
     scene.world.doors[EXPRESSION_DOOR] = jit.address(_express, _EXPRESS)
 
 
+def _wrenches(kind: np.ndarray[Any, Any]) -> Any:
+    """Return what adds the wrenches that there are, so that no other is compiled."""
+    vectors = np.isin(kind, (VECTOR_FORCE, RESIDUAL)).any()
+    if (kind == MARKER_FORCE).any():
+        return _wrench if vectors else _marker_force
+    return _vector_force
+
+
 def open_expressions(scene: Scene) -> None:
     """Open the doors that the scene needs."""
     doors = scene.world.doors
@@ -173,8 +196,8 @@ def open_expressions(scene: Scene) -> None:
     elif len(scene.states.program) > 0 or (scene.world.weight >= 0).any():
         doors[APPLIED_DOOR] = jit.address(_drive, _APPLY)
     kind = scene.applied.kind
-    if ((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any():
-        doors[WRENCH_DOOR] = jit.address(_wrench, _WRENCH)
+    if np.isin(kind, (VECTOR_FORCE, MARKER_FORCE, RESIDUAL)).any():
+        doors[WRENCH_DOOR] = jit.address(_wrenches(kind), _WRENCH)
     if np.isin(kind, (DRY_SLIDE, DRY_TURN)).any():
         rigid = bool((scene.applied.equation >= 0).any())
         doors[DRY_DOOR] = jit.address(_serve_rigid if rigid else _serve_dry, _KEEP)

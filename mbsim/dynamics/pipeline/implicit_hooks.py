@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import types
 
 from mbsim.arrays.scene import (
     BALL_FRICTION,
     BEND_DOOR,
-    BUSHING,
+    MARKER_FORCE,
     RESIDUAL,
     SLIDE_FRICTION,
     SLOPES_DOOR,
@@ -25,7 +26,8 @@ from mbsim.compile_model.tangent import Tangent, make_tangent
 from mbsim.core import jit
 from mbsim.core.address import pack, vector_at, view
 from mbsim.core.problem import HOOK, Problem
-from mbsim.dynamics.linearization.connection_slopes import add_connection_slopes
+from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
@@ -95,13 +97,36 @@ def _slopes(context, t, y):
     return code
 
 
-def _all_slopes(context, t, y):
-    """The same, of bushings and friction in joints too."""
+def _slopes_with_marker_forces(context, t, y):
+    """The same, of marker forces too."""
     scene = view(context, Scene)
     T = view(scene.world.doors[TANGENT_DOOR], Tangent)
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
-    add_connection_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def _slopes_with_rubs(context, t, y):
+    """The same, of friction in joints instead."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    a = vector_at(y, scene.rows.y.shape[1])
+    code = add_applied_slopes(scene, T, t, a)
+    add_rubs_slopes(scene, T, t, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def _slopes_with_both(context, t, y):
+    """The same, of both."""
+    scene = view(context, Scene)
+    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    a = vector_at(y, scene.rows.y.shape[1])
+    code = add_applied_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    add_rubs_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
@@ -124,6 +149,15 @@ def _bend_and_drive(context, t, y):
     return 0
 
 
+def _open_marker_forces(scene: Scene) -> None:
+    """Let marker forces have their slopes."""
+    from mbsim.forces.abi import slopes_address
+
+    applied = scene.applied
+    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
+        applied.slopes[f] = slopes_address(int(applied.law[f]))
+
+
 def open_slopes(scene: Scene) -> None:
     """Open the doors of derivatives of forces and equations where there are some."""
     if len(scene.equations.program) > 0:
@@ -132,8 +166,11 @@ def open_slopes(scene: Scene) -> None:
     if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
         return
     kinds = set(scene.applied.kind.tolist())
-    more = kinds & {BUSHING, *range(SLIDE_FRICTION, BALL_FRICTION + 1)}
-    hook = _all_slopes if more else _slopes
+    rubs = bool(kinds & set(range(SLIDE_FRICTION, BALL_FRICTION + 1)))
+    hook = _slopes_with_rubs if rubs else _slopes
+    if MARKER_FORCE in kinds:
+        hook = _slopes_with_both if rubs else _slopes_with_marker_forces
+        _open_marker_forces(scene)
     if RESIDUAL in kinds:
         from mbsim.dynamics.pipeline.element_hooks import residual_slopes as hook
     scene.world.doors[SLOPES_DOOR] = jit.address(hook, _VALUES)
