@@ -32,7 +32,7 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     AXIS_FORCE,
     AXIS_TORQUE,
     VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of forces.wrenches
-    BUSHING,
+    MARKER_FORCE,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
     SLIDE_LIMIT,
     TURN_LIMIT,
@@ -44,6 +44,9 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     BALL_FRICTION,
 ) = range(14)
 LATE = 16  # is added to the kind of forces that need reactions, see forces.reaction_forces
+
+# entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
+BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
 SCALAR, RUBBING = 6, 7

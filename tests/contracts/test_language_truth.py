@@ -391,7 +391,7 @@ FORCES = {
         el.ScalarForce(3, "TRANSLATIONAL", parse("5"), "", 21, 11, action_only=True),
     ],
     "spring_dampers": [el.SpringDamper(2, "ROTATIONAL", "", 31, 21)],
-    "bushings": [el.Bushing(4, "", 21, 31)],
+    "marker_forces": [free.bushing(4, 21, 31)],
     "vector_forces": [
         el.VectorForce(5, exprs=(parse("1"),) * 6, i_marker_id=21, j_floating_marker_id=32)
     ],

@@ -16,7 +16,7 @@ with the sign turned, for nothing says what part of it could come back. Where th
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
 later (`forces.joint_friction`), and so do forces by expressions of reactions
-(`forces.reaction_forces`); bushings and vector forces are in `forces.wrenches`, dry friction in
+(`forces.reaction_forces`); marker and vector forces are in `forces.wrenches`, dry friction in
 `forces.dry_friction`.
 """
 

@@ -20,10 +20,10 @@ from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
     BODY_SIZE,
-    BUSHING,
     DRY_TURN,
     LATE,
     LINE_FORCE,
+    MARKER_FORCE,
     RESIDUAL,
     SLIDE_FRICTION,
     SLIDE_LIMIT,
@@ -785,14 +785,14 @@ def add_dry_slopes(scene, T, y, f):
 
 @jitable
 def add_applied_slopes(scene, T, t, y):
-    """Add what forces between markers do, but for those of `connection_slopes`."""
+    """Add what forces between markers do, but for marker forces and friction in joints."""
     for f in range(len(scene.applied.kind)):
         kind = base_kind(scene, f)
         if kind == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
         elif is_dry(kind):
             add_dry_slopes(scene, T, y, f)
-        elif kind != BUSHING and kind != RESIDUAL and kind < SLIDE_FRICTION:
+        elif kind != MARKER_FORCE and kind != RESIDUAL and kind < SLIDE_FRICTION:
             add_scalar_slopes(scene, T, t, y, f)
     return 0
 

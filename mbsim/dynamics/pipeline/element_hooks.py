@@ -8,8 +8,9 @@ from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
-from mbsim.dynamics.linearization.connection_slopes import add_connection_slopes
+from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
 from mbsim.dynamics.linearization.element_slopes import add_all_residual_slopes
+from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.stiffness import add_applied_slopes, fill_state_slopes
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
@@ -48,7 +49,8 @@ def residual_slopes(context, t, y):
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
-    add_connection_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    add_rubs_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     add_all_residual_slopes(scene, T, t, a)
     return code

@@ -17,7 +17,7 @@ from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_late
-from mbsim.dynamics.forces.wrenches import add_wrench
+from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
 from mbsim.dynamics.stiction.rigid_contact import serve_held
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
@@ -45,8 +45,20 @@ def act(context, t, y, dy):
     return code if code != 0 else drive(scene, t, a, b)
 
 
+def act_by_marker_force(context, t, y, f):
+    """A marker force."""
+    scene = view(context, Scene)
+    return add_marker_force(scene, vector_at(y, scene.rows.y.shape[1]), f)
+
+
+def act_by_vector_force(context, t, y, f):
+    """A vector force."""
+    scene = view(context, Scene)
+    return add_vector_force(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
+
+
 def act_by_wrench(context, t, y, f):
-    """A bushing or a vector force."""
+    """One or the other, where a scene has both."""
     scene = view(context, Scene)
     return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 

@@ -25,12 +25,11 @@ from numba import types
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import (
     BALL_FRICTION,
-    BUSHING,
     DRY_SLIDE,
     DRY_TURN,
+    MARKER_FORCE,
     RESIDUAL,
     SLIDE_FRICTION,
-    SLIDE_LIMIT,
     VECTOR_FORCE,
     Scene,
 )
@@ -107,14 +106,18 @@ def _applied(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_wrenches(scene: Scene, method: Method) -> bool:
-    kind = scene.applied.kind
-    return bool(((kind >= VECTOR_FORCE) & (kind < SLIDE_LIMIT)).any())
+    return bool(np.isin(scene.applied.kind, (VECTOR_FORCE, MARKER_FORCE, RESIDUAL)).any())
 
 
 def _wrench(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import act_by_wrench
+    """Return what adds the wrenches that there are, so that no other is compiled."""
+    from mbsim.dynamics.pipeline import force_hooks as of
 
-    return act_by_wrench
+    kind = scene.applied.kind
+    vectors = np.isin(kind, (VECTOR_FORCE, RESIDUAL)).any()
+    if (kind == MARKER_FORCE).any():
+        return of.act_by_wrench if vectors else of.act_by_marker_force
+    return of.act_by_vector_force
 
 
 def _has_elements(scene: Scene, method: Method) -> bool:
@@ -201,10 +204,12 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
         from mbsim.dynamics.pipeline.element_hooks import residual_slopes
 
         return residual_slopes
-    from mbsim.dynamics.pipeline.implicit_hooks import all_slopes, slopes
+    from mbsim.dynamics.pipeline import implicit_hooks as of
 
-    more = kinds & {BUSHING, *range(SLIDE_FRICTION, BALL_FRICTION + 1)}
-    return all_slopes if more else slopes
+    rubs = bool(kinds & set(range(SLIDE_FRICTION, BALL_FRICTION + 1)))
+    if MARKER_FORCE in kinds:
+        return of.slopes_with_both if rubs else of.slopes_with_marker_forces
+    return of.slopes_with_rubs if rubs else of.slopes
 
 
 def _memory_pair(scene: Scene) -> Callable[..., Any]:
@@ -299,7 +304,7 @@ TABLE = (
         _INT(_INT, _T, _PTR, _INT),  # context, t, y, row of `Applied`
         _has_wrenches,
         _wrench,
-        "adds a bushing or a vector force",
+        "adds a marker force or a vector force",
     ),
     Row(
         Hook.ELEMENT,

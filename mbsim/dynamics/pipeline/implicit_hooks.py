@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from mbsim.arrays.hooks import Hook, failure_or
-from mbsim.arrays.scene import Scene
+from mbsim.arrays.scene import MARKER_FORCE, Scene
 from mbsim.compile_model.program_dependence import find_depends
 from mbsim.compile_model.tangent import Tangent, make_tangent
 from mbsim.core.address import pack, vector_at, view
 from mbsim.core.problem import Problem, addresses
-from mbsim.dynamics.linearization.connection_slopes import add_connection_slopes
+from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
@@ -82,13 +85,36 @@ def slopes(context, t, y):
     return code
 
 
-def all_slopes(context, t, y):
-    """The same, of bushings and friction in joints too."""
+def slopes_with_marker_forces(context, t, y):
+    """The same, of marker forces too."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
-    add_connection_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def slopes_with_rubs(context, t, y):
+    """The same, of friction in joints instead."""
+    scene = view(context, Scene)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
+    a = vector_at(y, scene.rows.y.shape[1])
+    code = add_applied_slopes(scene, T, t, a)
+    add_rubs_slopes(scene, T, t, a)
+    fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def slopes_with_both(context, t, y):
+    """The same, of both."""
+    scene = view(context, Scene)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
+    a = vector_at(y, scene.rows.y.shape[1])
+    code = add_applied_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    add_rubs_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
@@ -111,6 +137,15 @@ def bend_and_drive(context, t, y):
     return 0
 
 
+def _find_slopes(scene: Scene) -> None:
+    """Let marker forces have their slopes."""
+    from mbsim.forces.abi import slopes_address
+
+    applied = scene.applied
+    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
+        applied.slopes[f] = slopes_address(int(applied.law[f]))
+
+
 def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
     """Return the problem with the hooks of an implicit method, and what must live with it.
 
@@ -119,6 +154,7 @@ def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem,
     tangent = make_tangent(scene, find_depends(scene), pair)
     table = pack(tangent)
     scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
+    _find_slopes(scene)
     fill(scene, Method(tangent, pair))
     hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
     if pair:
