@@ -163,10 +163,10 @@ def address(py_func: Callable[..., Any], signature: Any) -> int:
     try:
         made.compile()
     except _NotKeptError:
-        return _NOT_YET
+        return NOT_YET
     _kept[key] = made
     return int(made.address)
 
 
 #: Stands for the address of what is only counted; 0 would say that nothing is wanted.
-_NOT_YET = -1
+NOT_YET = -1

@@ -416,5 +416,6 @@ def fill(scene: Scene, method: Method | None = None, only: Iterable[Hook] | None
 def put(scene: Scene, *hooks: Hook) -> None:
     """Put hooks into `World.hooks` that are not there yet."""
     for row in TABLE:
-        if row.hook in hooks and scene.world.hooks[row.hook] == 0:
+        # what was only counted, to say how much is to be compiled, is not there either
+        if row.hook in hooks and scene.world.hooks[row.hook] in (0, jit.NOT_YET):
             scene.world.hooks[row.hook] = jit.address(row.entry(scene), row.signature)
