@@ -150,7 +150,10 @@ _kept: dict[Any, Any] = {}
 
 
 def address(py_func: Callable[..., Any], signature: Any) -> int:
-    """Return the address of `py_func` compiled as a C function; it lives as long as the process."""
+    """Return the address of `py_func` compiled as a C function; it lives as long as the process.
+
+    As with `function`, what stands elsewhere is not cached.
+    """
     key = py_func, signature
     if key in _kept:
         return int(_kept[key].address)
@@ -158,8 +161,6 @@ def address(py_func: Callable[..., Any], signature: Any) -> int:
     made = CFunc(py_func, sigutils.normalize_signature(signature), {}, {"error_model": "numpy"})
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
-    else:
-        made.enable_caching()
     try:
         made.compile()
     except _NotKeptError:
