@@ -63,7 +63,7 @@ def _pin():
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     rubs = (
         '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY" '
-        'mu_dynamic="0.2" friction_trans_vel="0.001" friction_arm="0.1" pin_radius="0.1"/>'
+        'mu_dynamic="0.2" friction_trans_vel="0.001" pin_radius="0.1"/>'
     )
     joint = mechanism_decks.Joint("REVOLUTE", 1, 0, (0, 0, 0), axes)
     return mechanism_decks.Scene([body], [joint], extra=rubs).xml()
