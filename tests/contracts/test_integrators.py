@@ -18,7 +18,7 @@ from helpers.folders import MODELS
 from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
-from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
+from mbsim.core.problem import DONE, FAILED, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
 from mbsim.integrators import catalog, dop853, driver, scheme
 
 
@@ -143,6 +143,18 @@ def make_problem(rhs, context=0, norm=_norm2, output=zero, project=zero):
         limit=far, output=output, reject=zero,
     )  # fmt: skip
     return Problem(context, **addresses(hooks))
+
+
+def _fails(context, t, h, a, b):
+    return 77
+
+
+def _answers_less_a_code(context, t, h, a, b):
+    return -77
+
+
+def _half(context, t, h, a, b):
+    return 0.5
 
 
 @pytest.fixture(scope="module")
@@ -426,3 +438,29 @@ def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
         assert run.state.memory[scheme.H_LARGEST] == pytest.approx(5.0 / n)
         errors.append((5.0 / n, abs(run.state.y[0] - oscillation(5.0))))
     assert observed(errors) == pytest.approx(2.0, abs=0.1)
+
+
+#: Hooks that act, and those that answer: their codes are negative.
+ACT, ANSWER = (
+    ("rhs", "project", "look", "reject"),
+    (
+        "kinks",
+        "happens",
+        "commit",
+        "arrive",
+        "output",
+    ),
+)
+
+
+@BOTH
+@pytest.mark.parametrize("hook", [*ACT, *ANSWER])
+def test_a_hook_that_fails_ends_the_run_with_its_code(name, hook):
+    made = {hook: _fails if hook in ACT else _answers_less_a_code}
+    if hook == "look":
+        made["inner"] = _half
+    # the other problems of this file have no events and no branches
+    problem = make_problem(_rough if hook == "reject" else _oscillator)
+    run = Run(name, problem._replace(**addresses(made)), step=0.1)
+    assert run(5.0, 1e-8, times=[1.0, 2.0]) == FAILED
+    assert run.state.counts[scheme.CODE] == 77

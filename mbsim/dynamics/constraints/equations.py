@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from mbsim.arrays.hooks import Held, Hook, note_failure
+from mbsim.arrays.hooks import Held, Hook, answer_of
 from mbsim.arrays.scene import (
     ANGLE,
     ASKED,
@@ -327,7 +327,7 @@ def lasting(scene: Scene) -> np.ndarray:
 def fill_equations(scene, t, y):
     """Fill gradient, residual and rates of the equations in use."""
     if scene.world.hooks[Hook.HELD] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, note_failure
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
 from mbsim.arrays.scene import BODY_SIZE, NEAR_FOLD, NOW, WITHIN
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
@@ -81,9 +81,9 @@ def evaluate_past(scene, t, h, y, dy):
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = WITHIN
     if scene.world.hooks[Hook.DRY] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
     code = evaluate(scene, t, h, y, dy)
     if code == 0 and scene.world.hooks[Hook.HELD] != 0:
-        code = call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, y))
+        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, y)))
     scene.world.past[0] = NOW
-    return code
+    return failure_or(scene, code)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, failure_or, note_failure
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
 from mbsim.arrays.scene import (
     BODY_SIZE,
     ERROR_NOW,
@@ -96,7 +96,7 @@ def _commit(context, t, h, a, b):
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
     if scene.world.hooks[Hook.HELD] != 0:
         # before equations may be chosen anew
-        note_failure(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, a)))
     if scene.world.hooks[Hook.JOINTS] != 0:
         code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
         if code != 0:
@@ -131,7 +131,7 @@ def _look(context, t, h, a, b):
     if code == 0:
         watch_peaks(scene, t)
     if scene.world.hooks[Hook.DRY] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
     return failure_or(scene, code)
 
 
@@ -160,7 +160,7 @@ def _output(context, t, h, a, b):
         return -failure_or(scene, code)
     full = write_row(scene, t, h, vector_at(a, n), f)
     if scene.world.hooks[Hook.DRY] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
     code = failure_or(scene, 0)
     if code != 0:
         return -code
