@@ -104,6 +104,9 @@ LOCATED = 1e-11
 #: A step is looked into for events at so many points, and at one more for each row within it,
 #: up to so many.
 LOOKS, MOST_LOOKS = 4, 64
+#: At so many parts of a step for a side that is left and come back to: near the end of a touch what
+#: holds slips for a moment, a small part of a step of a high order.
+LOOKS_FOR_HIDDEN = 16
 #: So often at most a step is taken again to end at its first event.
 MOST_RETAKES = 40
 
@@ -451,9 +454,9 @@ def hidden_side(p, m, t, h):
     The problem is left evaluated at the trial point.
     """
     part = 0.0
-    for k in range(1, LOOKS):
-        if part == 0.0 and side_at(p, m, t, h, k / LOOKS, ASK):
-            part = k / LOOKS
+    for k in range(1, LOOKS_FOR_HIDDEN):
+        if part == 0.0 and side_at(p, m, t, h, k / LOOKS_FOR_HIDDEN, ASK):
+            part = k / LOOKS_FOR_HIDDEN
     ask_kinks(p, m, t + h, ASK, m.trial, m.error)
     return part
 

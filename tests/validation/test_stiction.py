@@ -407,7 +407,13 @@ def test_what_friction_remembers_turns_with_a_body_that_tumbles(tmp_path, law):
         assert np.abs(end(method, 1e-9) - right).max() < most
 
 
-@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-7), ("DOP853", 1e-7), ("DOP853", 1e-10)])
+@pytest.mark.parametrize(
+    ("method", "tol"),
+    [
+        ("DOPRI5", 1e-7), ("DOP853", 1e-6), ("DOP853", 1e-7), ("DOP853", 8e-8), ("DOP853", 6e-8),
+        ("DOP853", 1e-10),
+    ],
+)  # fmt: skip
 def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
     # a ball hops on a spring without a damper and slips for a moment before it leaves and behind
     # each touch, in less than a step of a high order
@@ -426,7 +432,8 @@ def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
         results = run_deck(tmp_path, model, 0.3, 0.1, integrator=method, tol=tol)
         return results["bodies/2/velocity"][-1]
 
-    # 4e-8, 6e-8, 6e-10; 6e-5, 5e-5, 2e-5 where a step was looked at in its end alone
+    # at most 1.3 tol from 1e-5 to 1e-8; 10 to 125 tol at five of 15 where a step was looked at in
+    # its quarters, 500 tol where it was in its end alone
     right = end("DOPRI5", 1e-12)
     assert np.abs(end(method, tol) - right).max() < max(5.0 * tol, 5e-9)
 
