@@ -18,6 +18,7 @@ from mbsim.fclib.factor import Factors, factorise, room_for_factors, solve, tran
 from mbsim.fclib.ordering import Analysis, analyse, elimination_flops
 
 if TYPE_CHECKING:
+    from mbsim.fclib.blocks import DelassusSystem
     from mbsim.fclib.problem import Flags, Indices, Vector
 
 #: rho = RHO / (mean diagonal of the contact's block); 10 to 30 is good, and 100 or 1 is not: too
@@ -63,7 +64,7 @@ class Jacobian(NamedTuple):
 
 
 @jitable
-def no_jacobian(d, nc):
+def no_jacobian(d: int, nc: int) -> Jacobian:
     """Return the matrix over no contacts, with the exchanges' room for all."""
     ptr, col = np.zeros(1, np.int32), np.zeros(0, np.int32)
     analysis = analyse(0, ptr, col, d)
@@ -75,7 +76,7 @@ def no_jacobian(d, nc):
 
 
 @jitable
-def evaluate(system, rho, point, function):
+def evaluate(system: DelassusSystem, rho: Vector, point: Point, function: Vector) -> float:
     """Write the states of the contacts and F; return |F|."""
     mu, r, u, slip = system.mu, point.r, point.u, point.slip
     nt = len(system.tangent)
@@ -111,7 +112,9 @@ def evaluate(system, rho, point, function):
 
 
 @jitable
-def _pattern(ptr, col, held, number, nodes):
+def _pattern(
+    ptr: Indices, col: Indices, held: Flags, number: Indices, nodes: Indices
+) -> tuple[Indices, Indices]:
     """Return the pattern among contacts `held`; `number` and `nodes` say who they are."""
     size = 0
     for a in range(len(held)):
@@ -141,7 +144,9 @@ def _pattern(ptr, col, held, number, nodes):
 
 
 @jitable
-def selected(system, slip, jacobian, same):
+def selected(
+    system: DelassusSystem, slip: Vector, jacobian: Jacobian, same: bool
+) -> tuple[Jacobian, float]:
     """Return the matrix, analysed for the contacts that are closed now, and the work for it.
 
     It stays as it is if `same`, no other contact is closed, and few have opened (SPARE).
@@ -183,7 +188,15 @@ def selected(system, slip, jacobian, same):
 
 
 @jitable
-def _right_side(system, rho, point, number, a, e, out):
+def _right_side(
+    system: DelassusSystem,
+    rho: Vector,
+    point: Point,
+    number: Indices,
+    a: int,
+    e: Vector,
+    out: Vector,
+) -> float:
     """Write the right side of contact a (`_linear_system`) and, for one that slips, e; return c."""
     ptr, col, val = system.ptr, system.col, system.val
     r, u, g = point.r, point.u, point.slip[a]
@@ -213,7 +226,7 @@ def _right_side(system, rho, point, number, a, e, out):
         e[s] = r[first + 1 + s] - rho[a] * u[first + 1 + s]
         length += e[s] ** 2
     length = math.sqrt(length)
-    c = 1.0 / (rho[a] * max(g, 1.0 / RHO))
+    c: float = 1.0 / (rho[a] * max(g, 1.0 / RHO))
     weight = c * g * rho[a]
     along = 0.0
     for s in range(nt):
@@ -227,7 +240,9 @@ def _right_side(system, rho, point, number, a, e, out):
 
 
 @jitable
-def _linear_system(system, rho, shift, point, jacobian, x):
+def _linear_system(
+    system: DelassusSystem, rho: Vector, shift: float, point: Point, jacobian: Jacobian, x: Vector
+) -> None:
     """Write Newton's matrix and right side of the contacts of `jacobian`.
 
     Rows are divided by rho (and g, where a contact slips), so that they have the size of W's.
@@ -281,8 +296,21 @@ def _linear_system(system, rho, shift, point, jacobian, x):
 
 
 @jitable
-def direction(system, rho, shift, point, jacobian, x, step, until):
-    """Write Newton's step; return whether the matrix was regular. `x` is room (m,)."""
+def direction(
+    system: DelassusSystem,
+    rho: Vector,
+    shift: float,
+    point: Point,
+    jacobian: Jacobian,
+    x: Vector,
+    step: Vector,
+    rate: Vector,
+    until: Vector,
+) -> bool:
+    """Write Newton's step and its velocity change; return whether the matrix was regular.
+
+    `x` is room (m,).
+    """
     d = 1 + len(system.tangent)
     size = len(jacobian.ptr) - 1
     if size > 0:
@@ -298,19 +326,24 @@ def direction(system, rho, shift, point, jacobian, x, step, until):
     for k in range(size):
         for s in range(d):
             step[d * jacobian.nodes[k] + s] = x[d * k + s]
+    # in place of q, for the change of the velocity
+    for k in range(len(step)):
+        x[k] = shift * step[k]
+    product(system, x, step, rate)
     return True
 
 
 @jitable
-def velocity_change(system, shift, step, room, rate):
-    """Write the velocity change (W + shift I) step. `room` (m,)."""
-    for k in range(len(step)):
-        room[k] = shift * step[k]
-    product(system, room, step, rate)
-
-
-@jitable
-def _advance(system, rho, point, t, step, rate, trial, function):
+def _advance(
+    system: DelassusSystem,
+    rho: Vector,
+    point: Point,
+    t: float,
+    step: Vector,
+    rate: Vector,
+    trial: Point,
+    function: Vector,
+) -> float:
     """Write the point a share t of the step ahead; return |F| there."""
     for k in range(len(step)):
         trial.r[k] = point.r[k] + t * step[k]
@@ -319,7 +352,16 @@ def _advance(system, rho, point, t, step, rate, trial, function):
 
 
 @jitable
-def line_search(system, rho, point, step, rate, highest, trial, function):
+def line_search(
+    system: DelassusSystem,
+    rho: Vector,
+    point: Point,
+    step: Vector,
+    rate: Vector,
+    highest: float,
+    trial: Point,
+    function: Vector,
+) -> float:
     """Write the point that |F| <= (1 - 1e-4 t) `highest` accepts, or the best; return |F| there.
 
     Without any in which F is a number it is infinite.
