@@ -97,10 +97,11 @@ def factorise(
     `back` is what `transposed_places` returns. It is given up, as not sound, when it is late
     (`clock.until`).
     """
-    front_ptr, pivots, stack = analysis.front_ptr, analysis.pivots, factors.stack
+    front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
+    rank, stack = analysis.rank, factors.stack
     fronts = len(pivots)
-    local = np.empty(len(analysis.rank), np.int32)
-    runs = np.empty((len(analysis.rank) + 1, 3), np.int64)
+    local = np.empty(len(rank), np.int32)
+    runs = np.empty((len(rank) + 1, 3), np.int64)
     # what waits on the stack
     waiting = np.empty(fronts + 1, np.int32)
     depth = 0
@@ -118,13 +119,28 @@ def factorise(
                 return False
             products = 0
         matrix = factors.front[: n * n].reshape(n, n)
+        matrix[:] = 0.0
         for k in range(lo, hi):
-            local[analysis.nodes[k]] = k - lo
-        _assemble(d, ptr, col, back, val, analysis, f, local, matrix)
+            local[nodes[k]] = k - lo
+        for k in range(lo, lo + pivots[f]):
+            a = nodes[k]
+            row = d * (k - lo)
+            for j in range(ptr[a], ptr[a + 1]):
+                b = col[j]
+                if rank[b] < f:
+                    continue
+                column = d * local[b]
+                for s in range(d):
+                    for t in range(d):
+                        matrix[row + s, column + t] = val[j, s, t]
+                if rank[b] > f:
+                    for s in range(d):
+                        for t in range(d):
+                            matrix[column + s, row + t] = val[back[j], s, t]
         for _ in range(analysis.children[f]):
             depth -= 1
             child = waiting[depth]
-            members = analysis.nodes[front_ptr[child] + pivots[child] : front_ptr[child + 1]]
+            members = nodes[front_ptr[child] + pivots[child] : front_ptr[child + 1]]
             size = d * len(members)
             top -= size * size
             update = stack[top : top + size * size].reshape(size, size)
@@ -140,39 +156,6 @@ def factorise(
         depth += 1
         piv += own
     return sound
-
-
-@jitable
-def _assemble(
-    d: int,
-    ptr: Indices,
-    col: Indices,
-    back: Indices,
-    val: Vector,
-    analysis: Analysis,
-    f: int,
-    local: Indices,
-    matrix: Vector,
-) -> None:
-    """Write rows and columns of front f's own nodes; `local` says where in it a node is."""
-    rank = analysis.rank
-    lo = analysis.front_ptr[f]
-    matrix[:] = 0.0
-    for k in range(lo, lo + analysis.pivots[f]):
-        a = analysis.nodes[k]
-        row = d * (k - lo)
-        for j in range(ptr[a], ptr[a + 1]):
-            b = col[j]
-            if rank[b] < f:
-                continue
-            column = d * local[b]
-            for s in range(d):
-                for t in range(d):
-                    matrix[row + s, column + t] = val[j, s, t]
-            if rank[b] > f:
-                for s in range(d):
-                    for t in range(d):
-                        matrix[column + s, row + t] = val[back[j], s, t]
 
 
 @jitable

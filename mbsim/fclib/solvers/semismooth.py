@@ -188,55 +188,54 @@ def selected(
 
 
 @jitable
-def _right_side(
-    system: DelassusSystem,
-    rho: Vector,
-    point: Point,
-    number: Indices,
-    a: int,
-    e: Vector,
-    out: Vector,
-) -> float:
-    """Write the right side of contact a (`_linear_system`) and, for one that slips, e; return c."""
-    ptr, col, val = system.ptr, system.col, system.val
-    r, u, g = point.r, point.u, point.slip[a]
+def _right_sides(
+    system: DelassusSystem, rho: Vector, point: Point, jacobian: Jacobian, x: Vector
+) -> tuple[Vector, Vector]:
+    """Write the right sides of `_linear_system`; return c and, of contacts that slip, e."""
+    ptr, col, val, mu = system.ptr, system.col, system.val, system.mu
+    number, nodes = jacobian.number, jacobian.nodes
+    r, u, slip = point.r, point.u, point.slip
     nt = len(system.tangent)
     d = 1 + nt
-    first = d * a
-    if g == 0.0:
-        for s in range(d):
-            out[s] = -r[first + s]
-        return 1.0
-    for s in range(d):
-        out[s] = 0.0
-    # velocity change by the contacts that open
-    for j in range(ptr[a], ptr[a + 1]):
-        b = col[j]
-        if number[b] < 0:
+    size = len(jacobian.ptr) - 1
+    c, e = np.ones(size), np.empty((size, nt))
+    for k in range(size):
+        a = nodes[k]
+        first, g = d * a, slip[a]
+        if g == 0.0:
             for s in range(d):
-                for t in range(d):
-                    out[s] -= val[j, s, t] * r[d * b + t]
-    out[0] = -u[first] - out[0]
-    if g < 0.0:
+                x[d * k + s] = -r[first + s]
+            continue
+        for s in range(d):
+            x[d * k + s] = 0.0
+        # velocity change by the contacts that open
+        for j in range(ptr[a], ptr[a + 1]):
+            b = col[j]
+            if number[b] < 0:
+                for s in range(d):
+                    for t in range(d):
+                        x[d * k + s] -= val[j, s, t] * r[d * b + t]
+        x[d * k] = -u[first] - x[d * k]
+        if g < 0.0:
+            for s in range(nt):
+                x[d * k + 1 + s] = -u[first + 1 + s] - x[d * k + 1 + s]
+            continue
+        length = 0.0
         for s in range(nt):
-            out[1 + s] = -u[first + 1 + s] - out[1 + s]
-        return 1.0
-    length = 0.0
-    for s in range(nt):
-        e[s] = r[first + 1 + s] - rho[a] * u[first + 1 + s]
-        length += e[s] ** 2
-    length = math.sqrt(length)
-    c: float = 1.0 / (rho[a] * max(g, 1.0 / RHO))
-    weight = c * g * rho[a]
-    along = 0.0
-    for s in range(nt):
-        e[s] /= length
-        along += e[s] * out[1 + s]
-    for s in range(nt):
-        opened = out[1 + s] - e[s] * along
-        out[1 + s] = -c * (r[first + 1 + s] - system.mu[a] * r[first] * e[s])
-        out[1 + s] -= weight * opened
-    return c
+            e[k, s] = r[first + 1 + s] - rho[a] * u[first + 1 + s]
+            length += e[k, s] ** 2
+        length = math.sqrt(length)
+        c[k] = 1.0 / (rho[a] * max(g, 1.0 / RHO))
+        weight = c[k] * g * rho[a]
+        along = 0.0
+        for s in range(nt):
+            e[k, s] /= length
+            along += e[k, s] * x[d * k + 1 + s]
+        for s in range(nt):
+            opened = x[d * k + 1 + s] - e[k, s] * along
+            x[d * k + 1 + s] = -c[k] * (r[first + 1 + s] - mu[a] * r[first] * e[k, s])
+            x[d * k + 1 + s] -= weight * opened
+    return c, e
 
 
 @jitable
@@ -258,13 +257,12 @@ def _linear_system(
     nt = len(system.tangent)
     d = 1 + nt
     at = 0
-    e = np.empty(nt)
     block = np.empty((d, d))
+    c, e = _right_sides(system, rho, point, jacobian, x)
     for k in range(len(jacobian.ptr) - 1):
         a = nodes[k]
         g = point.slip[a]
-        c = _right_side(system, rho, point, number, a, e, x[d * k : d * k + d])
-        weight = c * g * rho[a]
+        weight = c[k] * g * rho[a]
         diagonal = 1.0 if g == 0.0 else shift
         for j in range(ptr[a], ptr[a + 1]):
             b = number[col[j]]
@@ -280,15 +278,15 @@ def _linear_system(
                 for t in range(d):
                     along = 0.0
                     for s in range(nt):
-                        along += e[s] * block[1 + s, t]
+                        along += e[k, s] * block[1 + s, t]
                     for s in range(nt):
-                        block[1 + s, t] = weight * (block[1 + s, t] - e[s] * along)
+                        block[1 + s, t] = weight * (block[1 + s, t] - e[k, s] * along)
                 if b == k:
                     for s in range(nt):
-                        block[1 + s, 0] -= c * system.mu[a] * e[s]
-                        block[1 + s, 1 + s] += c * (1.0 - g)
+                        block[1 + s, 0] -= c[k] * system.mu[a] * e[k, s]
+                        block[1 + s, 1 + s] += c[k] * (1.0 - g)
                         for t in range(nt):
-                            block[1 + s, 1 + t] += c * g * e[s] * e[t]
+                            block[1 + s, 1 + t] += c[k] * g * e[k, s] * e[k, t]
             for s in range(d):
                 for t in range(d):
                     jac[at, s, t] = block[s, t]
