@@ -54,7 +54,9 @@ class Rows(NamedTuple):
 
 
 @jitable
-def compressed_rows(rows, columns, nz, p, i, x):
+def compressed_rows(
+    rows: int, columns: int, nz: int, p: Indices, i: Indices, x: Vector
+) -> tuple[Indices, Indices, Vector]:
     """Return a matrix of any FCLIB storage as compressed rows (pointers, columns, values)."""
     if nz == -2:
         return p, i, x
@@ -84,7 +86,7 @@ def compressed_rows(rows, columns, nz, p, i, x):
 
 
 @jitable
-def dense(rows, columns, p, i, x):
+def dense(rows: int, columns: int, p: Indices, i: Indices, x: Vector) -> Vector:
     """Return compressed rows as a dense matrix."""
     made = np.zeros((rows, columns))
     for a in range(rows):
@@ -94,7 +96,16 @@ def dense(rows, columns, p, i, x):
 
 
 @jitable
-def beside(rows, shift, p, i, x, other_p, other_i, other_x):
+def beside(
+    rows: int,
+    shift: int,
+    p: Indices,
+    i: Indices,
+    x: Vector,
+    other_p: Indices,
+    other_i: Indices,
+    other_x: Vector,
+) -> tuple[Indices, Indices, Vector]:
     """Return two matrices of compressed rows side by side, the second's columns after `shift`."""
     ptr = np.zeros(rows + 1, np.int32)
     col = np.empty(p[rows] + other_p[rows], np.int32)
@@ -114,7 +125,9 @@ def beside(rows, shift, p, i, x, other_p, other_i, other_x):
 
 
 @jitable
-def block_rows(d, contacts, p, i, x):
+def block_rows(
+    d: int, contacts: int, p: Indices, i: Indices, x: Vector
+) -> tuple[Indices, Indices, Vector]:
     """Return compressed rows as blocks: pointers, columns (rising), values (blocks, d, d).
 
     The pattern is made symmetric and every diagonal block is there, zeros included.
@@ -165,7 +178,7 @@ def block_rows(d, contacts, p, i, x):
 
 
 @jitable
-def diagonal_places(ptr, col):
+def diagonal_places(ptr: Indices, col: Indices) -> Indices:
     """Return where each row's diagonal block is."""
     places = np.empty(len(ptr) - 1, np.int32)
     for a in range(len(ptr) - 1):
@@ -176,7 +189,7 @@ def diagonal_places(ptr, col):
 
 
 @jitable
-def mean_diagonals(system):
+def mean_diagonals(system: DelassusSystem) -> tuple[Vector, float]:
     """Return the mean diagonal of each contact's block (nc,), and that of W."""
     val = system.val
     d, nc = 1 + len(system.tangent) + len(system.rolling), len(system.diagonal)
@@ -190,7 +203,7 @@ def mean_diagonals(system):
 
 
 @jitable
-def _largest_of_three(a, b, c, e, f, g):
+def _largest_of_three(a: float, b: float, c: float, e: float, f: float, g: float) -> float:
     """Return the largest eigenvalue of [[a, e, f], [e, b, g], [f, g, c]], by the roots' cosines."""
     mean = (a + b + c) / 3.0
     a, b, c = a - mean, b - mean, c - mean
@@ -202,7 +215,7 @@ def _largest_of_three(a, b, c, e, f, g):
 
 
 @jitable
-def own_units(val, diagonal):
+def own_units(val: Vector, diagonal: Indices) -> Vector:
     """Return rho (contacts,), 1 / lambda_max of the symmetric part of each diagonal block.
 
     Of blocks larger than 3 x 3 five squarings bring out the largest eigenvalue, and a Rayleigh
@@ -264,7 +277,7 @@ def own_units(val, diagonal):
 
 
 @jitable
-def transposed_pattern(size, ptr, col):
+def transposed_pattern(size: int, ptr: Indices, col: Indices) -> tuple[Indices, Indices]:
     """Return the transpose of a pattern, its columns rising."""
     tptr = np.zeros(size + 1, np.int32)
     for k in range(ptr[size]):
@@ -282,7 +295,7 @@ def transposed_pattern(size, ptr, col):
 
 
 @jitable
-def symmetric_pattern(size, ptr, col):
+def symmetric_pattern(size: int, ptr: Indices, col: Indices) -> tuple[Indices, Indices]:
     """Return the union of a pattern and its transpose, columns rising."""
     tptr, tcol = transposed_pattern(size, ptr, col)
     seen = np.full(size, -1, np.int32)
@@ -326,7 +339,17 @@ def symmetric_pattern(size, ptr, col):
 
 
 @jitable
-def add_row(tangent, rolling, col, val, r, begin, end, out, first):
+def add_row(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    col: Indices,
+    val: Vector,
+    r: Vector,
+    begin: int,
+    end: int,
+    out: Vector,
+    first: int,
+) -> None:
     """Add blocks begin:end of a row times r to `out` from place `first` on."""
     d = 1 + len(tangent) + len(rolling)
     if d == 3:
@@ -350,7 +373,7 @@ def add_row(tangent, rolling, col, val, r, begin, end, out, first):
 
 
 @jitable
-def product(system, q, r, u):
+def product(system: DelassusSystem, q: Vector, r: Vector, u: Vector) -> None:
     """Write u = W r + q, q that of the system or another one."""
     tangent, rolling = system.tangent, system.rolling
     ptr, col, val = system.ptr, system.col, system.val
@@ -362,7 +385,9 @@ def product(system, q, r, u):
 
 
 @jitable
-def product_of_stored(rows, nz, p, i, x, r, u):
+def product_of_stored(
+    rows: int, nz: int, p: Indices, i: Indices, x: Vector, r: Vector, u: Vector
+) -> None:
     """Add A r to u, A of any FCLIB storage."""
     if nz == -2:
         for a in range(rows):
@@ -381,7 +406,9 @@ def product_of_stored(rows, nz, p, i, x, r, u):
 
 
 @jitable
-def transposed_product_of_stored(rows, nz, p, i, x, r, u):
+def transposed_product_of_stored(
+    rows: int, nz: int, p: Indices, i: Indices, x: Vector, r: Vector, u: Vector
+) -> None:
     """Add A' r to u, A of any FCLIB storage."""
     if nz == -2:
         for a in range(rows):

@@ -11,7 +11,7 @@ import ctypes
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba.core import event
@@ -20,6 +20,9 @@ from mbsim.core import jit
 from mbsim.core.address import call_float
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
 
 
 class _Preparing(event.Listener):
@@ -70,17 +73,19 @@ def until(deadline: float) -> Any:
 
 
 @jitable
-def unlimited():
+def unlimited() -> Vector:
     """Return an `until` that never comes."""
     return np.array([0.0, 0.0, np.inf])
 
 
 @jitable
-def late(until):
+def late(until: Vector) -> bool:
     """Return whether the time is over; a question takes 0.2 us."""
     if until[2] == np.inf:
         return False
-    return call_float(np.int64(until[0]), ()) - floats_at(until[1], 1)[0] > until[2]
+    now: float = call_float(np.int64(until[0]), ())  # type: ignore[call-arg]  # an intrinsic
+    over: bool = now - floats_at(until[1], 1)[0] > until[2]
+    return over
 
 
 @contextmanager

@@ -7,7 +7,7 @@ complement on these is solved with.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -52,7 +52,9 @@ class MassFactors(NamedTuple):
 
 
 @jitable
-def condense(d, nodes, mass, columns, f):
+def condense(
+    d: int, nodes: int, mass: tuple[Any, ...], columns: tuple[Any, ...], f: Vector
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Return K' M^-1 K in blocks and K' M^-1 f.
 
     `mass` and `columns` are M (n, n) and K (n, d * nodes), what `Rows` has. Returns ((sound, ptr,
@@ -106,7 +108,7 @@ def condense(d, nodes, mass, columns, f):
 
 
 @jitable
-def mass_solve(factors, forces, v):
+def mass_solve(factors: tuple[Any, ...], forces: Vector, v: Vector) -> None:
     """Write M^-1 times a vector; `factors` are what `condense` returned."""
     row_ptr, rows, sizes, dense, exchange, sparse, analyses, values = factors
     for c in range(len(row_ptr) - 1):
@@ -131,7 +133,7 @@ def mass_solve(factors, forces, v):
 
 
 @jitable
-def components(n, p, i):
+def components(n: int, p: Indices, i: Indices) -> tuple[int, Indices]:
     """Return how many components without common entries a matrix has, and every row's."""
     root = np.arange(n).astype(np.int32)
     for a in range(n):
@@ -163,7 +165,7 @@ def components(n, p, i):
 
 
 @jitable
-def _members(count, component):
+def _members(count: int, component: Indices) -> tuple[Indices, Indices, Indices]:
     """Return the rows of each component, and where in its component each row is."""
     n = len(component)
     row_ptr = np.zeros(count + 1, np.int32)
@@ -183,7 +185,9 @@ def _members(count, component):
 
 
 @jitable
-def _touched_nodes(d, nodes, row_ptr, rows, k):
+def _touched_nodes(
+    d: int, nodes: int, row_ptr: Indices, rows: Indices, k: Rows
+) -> tuple[Indices, Indices]:
     """Return the nodes that K couples with each component, by compressed rows."""
     count = len(row_ptr) - 1
     seen = np.full(nodes, -1, np.int32)
@@ -204,7 +208,7 @@ def _touched_nodes(d, nodes, row_ptr, rows, k):
 
 
 @jitable
-def _coupling(nodes, node_ptr, touched):
+def _coupling(nodes: int, node_ptr: Indices, touched: Indices) -> tuple[Indices, Indices]:
     """Return the pattern in which nodes that one component touches are neighbours."""
     count = len(node_ptr) - 1
     of_ptr, of_node = _components_of_nodes(nodes, count, node_ptr, touched)
@@ -240,7 +244,9 @@ def _coupling(nodes, node_ptr, touched):
 
 
 @jitable
-def _components_of_nodes(nodes, count, node_ptr, touched):
+def _components_of_nodes(
+    nodes: int, count: int, node_ptr: Indices, touched: Indices
+) -> tuple[Indices, Indices]:
     """Return the components that touch each node, by compressed rows."""
     of_ptr = np.zeros(nodes + 1, np.int32)
     for k in range(node_ptr[count]):
@@ -258,7 +264,9 @@ def _components_of_nodes(nodes, count, node_ptr, touched):
 
 
 @jitable
-def _right_sides(d, mine, wide, local, k, f):
+def _right_sides(
+    d: int, mine: Indices, wide: int, local: Indices, k: Rows, f: Vector
+) -> tuple[Vector, Vector]:
     """Return K and f of one component, K with the columns of the nodes that it touches."""
     size = len(mine)
     x = np.zeros((size, d * wide))
@@ -273,7 +281,9 @@ def _right_sides(d, mine, wide, local, k, f):
 
 
 @jitable
-def _solve_dense(mine, inside, m, lu, swaps, x, y):
+def _solve_dense(
+    mine: Indices, inside: Indices, m: Rows, lu: Vector, swaps: Indices, x: Vector, y: Vector
+) -> bool:
     """Factorise one small component into `lu` and solve; return whether it is regular."""
     for j in range(len(mine)):
         a = mine[j]
@@ -287,7 +297,9 @@ def _solve_dense(mine, inside, m, lu, swaps, x, y):
 
 
 @jitable
-def _solve_sparse(mine, inside, m, k, swaps, x, y):
+def _solve_sparse(
+    mine: Indices, inside: Indices, m: Rows, k: Rows, swaps: Indices, x: Vector, y: Vector
+) -> tuple[int, Analysis, Vector, bool]:
     """Factorise one large component and solve; by blocks of 3 where it has them.
 
     Rows that K touches come last. Returns (unknowns of a node, analysis, factors, whether it is
@@ -333,7 +345,7 @@ def _solve_sparse(mine, inside, m, k, swaps, x, y):
 
 
 @jitable
-def _dense_solve(lu, swaps, x):
+def _dense_solve(lu: Vector, swaps: Indices, x: Vector) -> None:
     """Overwrite the columns of x by solutions with the factors of a dense matrix."""
     n = lu.shape[0]
     for k in range(n):
@@ -364,7 +376,17 @@ def _dense_solve(lu, swaps, x):
 
 
 @jitable
-def _add_product(d, mine, near, local, k, x, ptr, col, val):
+def _add_product(
+    d: int,
+    mine: Indices,
+    near: Indices,
+    local: Indices,
+    k: Rows,
+    x: Vector,
+    ptr: Indices,
+    col: Indices,
+    val: Vector,
+) -> None:
     """Add K_c' X to the blocks, X = M_c^-1 K_c of one component that touches the nodes `near`."""
     wide = len(near)
     product = np.zeros((d * wide, d * wide))
@@ -392,7 +414,7 @@ def _add_product(d, mine, near, local, k, x, ptr, col, val):
 
 
 @jitable
-def _packed(analysis):
+def _packed(analysis: Analysis) -> Indices:
     """Return what `solve` needs of an analysis as one array, sizes first."""
     front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
     sizes = np.array([len(pivots), len(nodes), analysis.widest])
@@ -400,7 +422,7 @@ def _packed(analysis):
 
 
 @jitable
-def _unpacked(packed):
+def _unpacked(packed: Indices) -> Analysis:
     """Return an analysis that is enough for `solve`."""
     fronts, entries, widest = packed[0], packed[1], packed[2]
     at = 3

@@ -7,8 +7,14 @@ numbers of tangential and rolling directions, so that compiled loops over them a
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from mbsim.core.jitable import jitable
+from mbsim.fclib.blocks import product
+
+if TYPE_CHECKING:
+    from mbsim.fclib.blocks import DelassusSystem
+    from mbsim.fclib.problem import Indices, Vector
 
 #: Rounding errors of u over the sum of its terms: at most, of which there are a few, and between
 #: two orders of summation. Shares that matter to no tolerance.
@@ -29,7 +35,7 @@ GROWTH = 2.0
 
 
 @jitable
-def cone_height(normal, slide, roll, mu, mu_r):
+def cone_height(normal: float, slide: float, roll: float, mu: float, mu_r: float) -> float:
     """Return the normal part of the projection of a point on the cone.
 
     `slide` and `roll` are the lengths of its tangential and rolling parts. The projection is
@@ -51,7 +57,17 @@ def cone_height(normal, slide, roll, mu, mu_r):
 
 
 @jitable
-def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
+def natural_map(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    mu: float,
+    mu_r: float,
+    u: Vector,
+    r: Vector,
+    first: int,
+    rho: float,
+    out: Vector,
+) -> float:
     """Write F = r - P_K(r - rho (u + (mu |u_T| + mu_r |u_R|) e_N)) of one contact, return |F|^2.
 
     The contact's numbers begin at `first` in u, r and `out`.
@@ -72,10 +88,10 @@ def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
         speed += u[first + 1 + k] ** 2
     for k in range(nr):
         spin += u[first + 1 + nt + k] ** 2
-    lift = mu * math.sqrt(speed)
+    shift = mu * math.sqrt(speed)
     if nr > 0:
-        lift += mu_r * math.sqrt(spin)
-    normal = r[first] - rho * (u[first] + lift)
+        shift += mu_r * math.sqrt(spin)
+    normal = r[first] - rho * (u[first] + shift)
     slide = 0.0
     roll = 0.0
     for k in range(nt):
@@ -87,7 +103,7 @@ def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
     height = cone_height(normal, slide, roll, mu, mu_r)
     turn = min(1.0, mu * height / slide) if slide > 0.0 else 1.0
     out[first] = r[first] - height
-    squares = out[first] ** 2
+    squares: float = out[first] ** 2
     for k in range(nt):
         at = first + 1 + k
         out[at] = r[at] - turn * (r[at] - rho * u[at])
@@ -102,7 +118,7 @@ def natural_map(tangent, rolling, mu, mu_r, u, r, first, rho, out):
 
 
 @jitable
-def bring_into_cones(tangent, mu, r, out):
+def bring_into_cones(tangent: tuple[int, ...], mu: Vector, r: Vector, out: Vector) -> None:
     """Write r with pulls made 0 and friction cut to mu r_N.
 
     A method that keeps neither to the last bit leaves weak contacts outside by more than their own
@@ -124,7 +140,15 @@ def bring_into_cones(tangent, mu, r, out):
 
 
 @jitable
-def residual(tangent, rolling, mu, mu_r, u, r, out):
+def residual(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    mu: Vector,
+    mu_r: Vector,
+    u: Vector,
+    r: Vector,
+    out: Vector,
+) -> float:
     """Write the natural map (rho = 1) of every contact and return its Euclidean norm."""
     d = 1 + len(tangent) + len(rolling)
     total = 0.0
@@ -134,7 +158,7 @@ def residual(tangent, rolling, mu, mu_r, u, r, out):
 
 
 @jitable
-def norm(vector):
+def norm(vector: Vector) -> float:
     """Return the Euclidean norm."""
     total = 0.0
     for k in range(len(vector)):
@@ -143,7 +167,9 @@ def norm(vector):
 
 
 @jitable
-def own_share(system, u, r, a, square, most, reach):
+def own_share(
+    system: DelassusSystem, u: Vector, r: Vector, a: int, square: float, most: float, reach: float
+) -> tuple[float, float]:
     """Return two shares of a contact, whose natural map F_a with its own `rho` has this square.
 
     The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, with what rounding may hide
@@ -178,7 +204,7 @@ def own_share(system, u, r, a, square, most, reach):
 
 
 @jitable
-def rounding(system, r):
+def rounding(system: DelassusSystem, r: Vector) -> tuple[float, float]:
     """Return the velocity that rounding is at most taken for, and `reach`.
 
     The first is EXCUSED of the largest |q_a|. W being positive, the sum of |W_aj| |r_j| is at most
@@ -198,7 +224,9 @@ def rounding(system, r):
 
 
 @jitable
-def own_errors(system, u, r, shares, work):
+def own_errors(
+    system: DelassusSystem, u: Vector, r: Vector, shares: int, work: Vector
+) -> tuple[float, float, float, float]:
     """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
@@ -252,7 +280,9 @@ def own_errors(system, u, r, shares, work):
 
 
 @jitable
-def relative_errors(system, u, r, shares, work):
+def relative_errors(
+    system: DelassusSystem, u: Vector, r: Vector, shares: int, work: Vector
+) -> tuple[float, float]:
     """Return how far an iterate is from the first goal and from the second one.
 
     The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
@@ -273,7 +303,16 @@ def relative_errors(system, u, r, shares, work):
 
 
 @jitable
-def improves(second, size, before, size_before):
+def errors_at(
+    system: DelassusSystem, r: Vector, u: Vector, shares: int, work: Vector
+) -> tuple[float, float]:
+    """Write u = W r + q and return `relative_errors`."""
+    product(system, system.q, r, u)
+    return relative_errors(system, u, r, shares, work)
+
+
+@jitable
+def improves(second: float, size: float, before: float, size_before: float) -> bool:
     """Return whether an iterate within the first goal is better than the one before.
 
     Its second figure decides. Impulses that grow beyond GROWTH must bring as much as they grow: in
@@ -283,7 +322,15 @@ def improves(second, size, before, size_before):
 
 
 @jitable
-def is_better(tol, error, error_q, candidate, best, best_q, r):
+def is_better(
+    tol: float,
+    error: float,
+    error_q: float,
+    candidate: Vector,
+    best: float,
+    best_q: float,
+    r: Vector,
+) -> bool:
     """Return whether an iterate is better than the best one, r; within `tol` `improves` decides."""
     if error <= tol and best <= tol:
         return improves(error_q, norm(candidate), best_q, norm(r))
@@ -291,7 +338,7 @@ def is_better(tol, error, error_q, candidate, best, best_q, r):
 
 
 @jitable
-def count_changes(tangent, mu, r, states):
+def count_changes(tangent: tuple[int, ...], mu: Vector, r: Vector, states: Indices) -> int:
     """Write whether contacts are open (0), stick (1) or slip (2); return how many were not before.
 
     Solvers that project on the cone leave impulses of slipping contacts on its edge.

@@ -17,7 +17,7 @@ from mbsim.fclib.clock import compiled, unlimited
 from mbsim.fclib.factor import partial_lu
 
 if TYPE_CHECKING:
-    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.problem import Indices, Vector
 
 #: Equality constraints hold in the range of R to this much, relatively.
 RANGE = 1e-9
@@ -59,7 +59,7 @@ def eliminate(
 
 
 @jitable
-def without_multipliers(v, r, s):
+def without_multipliers(v: Vector, r: Vector, s: Vector) -> tuple[Vector, Vector, bool]:
     """Eliminate l from [R V' s; V 0 0], v: (k, p).
 
     Returns the rows of R after elimination (`Equality`), -V R^-1 [V' s] (k, k + 1), and whether R
@@ -101,7 +101,7 @@ def without_multipliers(v, r, s):
 
 
 @jitable
-def upper_solution(factors, p, weights):
+def upper_solution(factors: Vector, p: int, weights: Vector) -> Vector:
     """Return U^-1 Y w, U the upper triangle of the first p columns and Y those after them."""
     found = np.empty(p)
     for i in range(p - 1, -1, -1):
@@ -116,7 +116,9 @@ def upper_solution(factors, p, weights):
 
 
 @jitable
-def split(d, contacts, extra, ptr, col, val):
+def split(
+    d: int, contacts: int, extra: int, ptr: Indices, col: Indices, val: Vector
+) -> tuple[Indices, Indices, Vector, Vector, Vector]:
     """Split blocks into those among contacts, and full V and R (padded to whole blocks)."""
     v = np.zeros((d * contacts, d * extra))
     r = np.zeros((d * extra, d * extra))
@@ -140,7 +142,9 @@ def split(d, contacts, extra, ptr, col, val):
 
 
 @jitable
-def add_clique(d, ptr, col, val, touched, addition):
+def add_clique(
+    d: int, ptr: Indices, col: Indices, val: Vector, touched: Indices, addition: Vector
+) -> tuple[Indices, Indices, Vector]:
     """Return blocks to which a full matrix among the `touched` contacts (rising) is added."""
     size = len(ptr) - 1
     place = np.full(size, -1, np.int32)

@@ -17,6 +17,7 @@ from mbsim.core.jitable import jitable
 from mbsim.fclib.clock import late
 
 if TYPE_CHECKING:
+    from mbsim.fclib.ordering import Analysis
     from mbsim.fclib.problem import Indices, Vector
 
 #: Columns eliminated before the rest of a front is touched.
@@ -47,7 +48,7 @@ class Factors(NamedTuple):
 
 
 @jitable
-def room_for_factors(analysis, unknowns):
+def room_for_factors(analysis: Analysis, unknowns: int) -> Factors:
     """Return room for the factors of a matrix with so many unknowns."""
     return Factors(
         np.empty(analysis.factor_ptr[-1]),
@@ -59,7 +60,7 @@ def room_for_factors(analysis, unknowns):
 
 
 @jitable
-def factor_work(flops, blocks):
+def factor_work(flops: float, blocks: int) -> float:
     """Return the estimated seconds of a factorisation: a measure that does not depend on a clock.
 
     `flops` is what `ordering.elimination_flops` says, `blocks` the number of blocks.
@@ -68,7 +69,7 @@ def factor_work(flops, blocks):
 
 
 @jitable
-def transposed_places(size, ptr, col):
+def transposed_places(size: int, ptr: Indices, col: Indices) -> Indices:
     """Return for every block (a, b) of a symmetric pattern, columns rising, where (b, a) is."""
     place = ptr[:size].copy()
     back = np.empty(ptr[size], np.int32)
@@ -81,16 +82,26 @@ def transposed_places(size, ptr, col):
 
 
 @jitable
-def factorise(d, ptr, col, back, val, analysis, factors, until):
+def factorise(
+    d: int,
+    ptr: Indices,
+    col: Indices,
+    back: Indices,
+    val: Vector,
+    analysis: Analysis,
+    factors: Factors,
+    until: Vector,
+) -> bool:
     """Write the factors of the matrix (val: blocks, d, d); return whether every pivot was sound.
 
     `back` is what `transposed_places` returns. It is given up, as not sound, when it is late
     (`clock.until`).
     """
-    front_ptr, pivots, stack = analysis.front_ptr, analysis.pivots, factors.stack
+    front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
+    rank, stack = analysis.rank, factors.stack
     fronts = len(pivots)
-    local = np.empty(len(analysis.rank), np.int32)
-    runs = np.empty((len(analysis.rank) + 1, 3), np.int64)
+    local = np.empty(len(rank), np.int32)
+    runs = np.empty((len(rank) + 1, 3), np.int64)
     # what waits on the stack
     waiting = np.empty(fronts + 1, np.int32)
     depth = 0
@@ -108,13 +119,28 @@ def factorise(d, ptr, col, back, val, analysis, factors, until):
                 return False
             products = 0
         matrix = factors.front[: n * n].reshape(n, n)
+        matrix[:] = 0.0
         for k in range(lo, hi):
-            local[analysis.nodes[k]] = k - lo
-        _assemble(d, ptr, col, back, val, analysis, f, local, matrix)
+            local[nodes[k]] = k - lo
+        for k in range(lo, lo + pivots[f]):
+            a = nodes[k]
+            row = d * (k - lo)
+            for j in range(ptr[a], ptr[a + 1]):
+                b = col[j]
+                if rank[b] < f:
+                    continue
+                column = d * local[b]
+                for s in range(d):
+                    for t in range(d):
+                        matrix[row + s, column + t] = val[j, s, t]
+                if rank[b] > f:
+                    for s in range(d):
+                        for t in range(d):
+                            matrix[column + s, row + t] = val[back[j], s, t]
         for _ in range(analysis.children[f]):
             depth -= 1
             child = waiting[depth]
-            members = analysis.nodes[front_ptr[child] + pivots[child] : front_ptr[child + 1]]
+            members = nodes[front_ptr[child] + pivots[child] : front_ptr[child + 1]]
             size = d * len(members)
             top -= size * size
             update = stack[top : top + size * size].reshape(size, size)
@@ -133,30 +159,9 @@ def factorise(d, ptr, col, back, val, analysis, factors, until):
 
 
 @jitable
-def _assemble(d, ptr, col, back, val, analysis, f, local, matrix):
-    """Write rows and columns of front f's own nodes; `local` says where in it a node is."""
-    rank = analysis.rank
-    lo = analysis.front_ptr[f]
-    matrix[:] = 0.0
-    for k in range(lo, lo + analysis.pivots[f]):
-        a = analysis.nodes[k]
-        row = d * (k - lo)
-        for j in range(ptr[a], ptr[a + 1]):
-            b = col[j]
-            if rank[b] < f:
-                continue
-            column = d * local[b]
-            for s in range(d):
-                for t in range(d):
-                    matrix[row + s, column + t] = val[j, s, t]
-            if rank[b] > f:
-                for s in range(d):
-                    for t in range(d):
-                        matrix[column + s, row + t] = val[back[j], s, t]
-
-
-@jitable
-def _add_update(d, update, members, local, runs, matrix):
+def _add_update(
+    d: int, update: Vector, members: Indices, local: Indices, runs: Indices, matrix: Vector
+) -> None:
     """Add to a front what is left of a child's, among the child's `members`.
 
     `runs` gets those of the child's unknowns that are neighbours here, too: from, to, length.
@@ -183,7 +188,7 @@ def _add_update(d, update, members, local, runs, matrix):
 
 
 @jitable
-def _keep(matrix, own, kept):
+def _keep(matrix: Vector, own: int, kept: Vector) -> None:
     """Store a front's factors: its own rows, then the multipliers of the others, transposed."""
     n = matrix.shape[0]
     at = 0
@@ -198,7 +203,7 @@ def _keep(matrix, own, kept):
 
 
 @jitable
-def partial_lu(matrix, own, exchange, until):
+def partial_lu(matrix: Vector, own: int, exchange: Indices, until: Vector) -> bool:
     """Eliminate the first `own` unknowns of a dense matrix in place; rows change among these.
 
     Return whether every pivot was sound, and there was time for all (`clock.until`).
@@ -242,7 +247,7 @@ def partial_lu(matrix, own, exchange, until):
 
 
 @jitable
-def _subtract(matrix, begin, end):
+def _subtract(matrix: Vector, begin: int, end: int) -> None:
     """Subtract the product of the panel's columns and rows from all that follows."""
     n = matrix.shape[0]
     if end - begin == 8:
@@ -290,7 +295,7 @@ def _subtract(matrix, begin, end):
 
 
 @jitable
-def solve(d, analysis, factors, x):
+def solve(d: int, analysis: Analysis, factors: Factors, x: Vector) -> None:
     """Overwrite the right side x by the solution."""
     front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
     factor_ptr, values = analysis.factor_ptr, factors.values
@@ -342,7 +347,7 @@ def solve(d, analysis, factors, x):
 
 
 @jitable
-def solve_many(d, begin, analysis, factors, x):
+def solve_many(d: int, begin: int, analysis: Analysis, factors: Factors, x: Vector) -> None:
     """Overwrite the right sides, columns of x (d * nodes, k), from front `begin` on.
 
     Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
@@ -405,7 +410,7 @@ def solve_many(d, begin, analysis, factors, x):
 
 
 @jitable
-def _dot(a, b):
+def _dot(a: Vector, b: Vector) -> float:
     """Return the product of two vectors, summed in four parts."""
     n = len(a)
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0

@@ -274,20 +274,20 @@ def _figures(problem: Local | Global, u: Vector, r: Vector, q: Vector) -> tuple[
     tangent, _ = directions(problem)
     nt = len(tangent)
     us, rs, qs = (vector.reshape(nc, d) for vector in (u, r, q))
-    speed, grip = _lengths(us[:, 1 : 1 + nt]), _lengths(rs[:, 1 : 1 + nt])
-    spin, twist = _lengths(us[:, 1 + nt :]), _lengths(rs[:, 1 + nt :])
+    speed, friction = _lengths(us[:, 1 : 1 + nt]), _lengths(rs[:, 1 : 1 + nt])
+    spin, moment = _lengths(us[:, 1 + nt :]), _lengths(rs[:, 1 + nt :])
     mu = problem.mu
     mu_r = np.zeros(nc) if problem.mu_r is None else problem.mu_r
-    lifted = us[:, 0] + mu * speed + mu_r * spin
-    power = np.abs(lifted * rs[:, 0] + np.einsum("ij,ij->i", us[:, 1:], rs[:, 1:]))
+    shifted = us[:, 0] + mu * speed + mu_r * spin
+    power = np.abs(shifted * rs[:, 0] + np.einsum("ij,ij->i", us[:, 1:], rs[:, 1:]))
     largest_r, largest_u = float(_lengths(rs).max()), float(_lengths(us).max())
     held = rs[:, 0].clip(min=0.0)
-    outside = np.maximum(np.maximum(grip - mu * held, twist - mu_r * held), -rs[:, 0])
+    outside = np.maximum(np.maximum(friction - mu * held, moment - mu_r * held), -rs[:, 0])
     penetration = max(0.0, float(-us[:, 0].min()))
     # each on its own scale, so that units do not matter
     scale = max(largest_u, float(_lengths(qs).max()))
     normal_r, normal_u = _each(rs[:, 0], largest_r), _each(us[:, 0], scale)
-    room, moving = _each(mu * held - grip, largest_r), _each(speed, scale)
+    room, moving = _each(mu * held - friction, largest_r), _each(speed, scale)
     slips = (room <= moving) & (moving > AT_REST)
     states = np.where(normal_r <= normal_u, OPEN, np.where(slips, SLIP, STICK))
     return (

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.cone import cone_height
 
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Vector
+
 
 @jitable
-def contact_2d(a, k, bn, bt, mu, rn, rt):
+def contact_2d(
+    a: Vector, k: int, bn: float, bt: float, mu: float, rn: float, rt: float
+) -> tuple[float, float]:
     """Return (r_N, r_T) in the plane; A is a[k], open, stick and slip are tried in this order.
 
     The impulse given is kept where A has no normal part to solve with.
@@ -36,7 +42,9 @@ def contact_2d(a, k, bn, bt, mu, rn, rt):
 
 
 @jitable
-def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
+def contact_3d(
+    a: Vector, k: int, bn: float, b1: float, b2: float, mu: float, rn: float, r1: float, r2: float
+) -> tuple[float, float, float]:
     """Return (r_N, r_T1, r_T2); A is a[k].
 
     Slip is one scalar unknown s > 0: with S = A_TT - A_TN A_NT / A_NN, c = b_T - A_TN b_N / A_NN,
@@ -112,7 +120,18 @@ def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
 
 
 @jitable
-def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, work):
+def contact_rolling(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    a: Vector,
+    k: int,
+    b: Vector,
+    mu: float,
+    mu_r: float,
+    r: Vector,
+    first: int,
+    work: Vector,
+) -> None:
     """Improve r of one contact with rolling friction in place (no closed form is known).
 
     Fixed point r = P_K(r - rho (u + (mu |u_T| + mu_r |u_R|) e_N)) with the step rho adapted so that
@@ -129,7 +148,7 @@ def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, work):
     u, trial = work[:d], work[d : 3 * d]
     rho = d / trace
     for _ in range(200):
-        _lifted(tangent, rolling, a, k, b, mu, mu_r, r, first, u)
+        _shifted_velocity(tangent, rolling, a, k, b, mu, mu_r, r, first, u)
         size = 0.0
         change = 0.0
         for _ in range(30):
@@ -150,7 +169,7 @@ def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, work):
             for c in range(nr):
                 at = 1 + nt + c
                 trial[at] = twist * (r[first + at] - rho * u[at])
-            _lifted(tangent, rolling, a, k, b, mu, mu_r, trial, 0, trial[d:])
+            _shifted_velocity(tangent, rolling, a, k, b, mu, mu_r, trial, 0, trial[d:])
             change = 0.0
             moved = 0.0
             size = 0.0
@@ -171,8 +190,19 @@ def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, work):
 
 
 @jitable
-def _lifted(tangent, rolling, a, k, b, mu, mu_r, r, first, u):
-    """Write u = A r + b + (mu |u_T| + mu_r |u_R|) e_N."""
+def _shifted_velocity(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    a: Vector,
+    k: int,
+    b: Vector,
+    mu: float,
+    mu_r: float,
+    r: Vector,
+    first: int,
+    u: Vector,
+) -> None:
+    """Write De Saxce's velocity u = A r + b + (mu |u_T| + mu_r |u_R|) e_N."""
     nt, nr = len(tangent), len(rolling)
     d = 1 + nt + nr
     for row in range(d):

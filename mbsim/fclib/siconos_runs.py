@@ -9,12 +9,16 @@ info, iterations, seconds (best of the repeats: the call of the solver and, wher
 the problem itself, what SciPy takes to get W and q).
 """
 
+from __future__ import annotations
+
 import json
 import os
 import signal
 import sys
 import time
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import siconos.numerics as sn
@@ -31,7 +35,7 @@ MANY = 4000
 ENOUGH = 2.0
 
 
-def parts_in(folder):
+def parts_in(folder: str) -> dict[str, Any]:
     """Return matrices and vectors of the problem, none if local.dat is all."""
     path = os.path.join(folder, "parts.npz")
     if not os.path.isfile(path):
@@ -45,7 +49,7 @@ def parts_in(folder):
     return parts
 
 
-def condensation_time(parts, repeats):
+def condensation_time(parts: dict[str, Any], repeats: int) -> float:
     """Return the seconds in which SciPy gets W and q: the best of the repeats, full or sparse."""
     best, spent = float("inf"), 0.0
     for _ in range(repeats):
@@ -62,7 +66,7 @@ def condensation_time(parts, repeats):
     return best
 
 
-def condense(parts, full):
+def condense(parts: dict[str, Any], full: bool) -> tuple[Any, Any]:
     """Return W and q of a problem with masses or equality constraints, by full matrices or not."""
     if "M" in parts:
         wide = sparse.hstack([parts["H"], parts["G"]]) if "G" in parts else parts["H"]
@@ -95,7 +99,7 @@ def condense(parts, full):
     return w - v @ solved[:, :-1], q - v @ solved[:, -1]
 
 
-def driven(name, folder):
+def driven(name: str, folder: str) -> tuple[int, Callable[[Any], tuple[Any, Any]]]:
     """Return the number of Siconos' solver, and a function that makes a call of it ready.
 
     A global problem is built for each call: NSGS_WR dies when it gets one for the second time.
@@ -109,7 +113,7 @@ def driven(name, folder):
             parts[key].indptr = parts[key].indptr.astype(np.int64)
         number = getattr(sn, "SICONOS_GLOBAL_FRICTION_3D_" + name[len("GLOBAL_") :])
 
-        def prepare(options):
+        def prepare(options: Any) -> tuple[Any, Any]:
             problem = sn.GlobalFrictionContactProblem(3)
             problem.numberOfContacts = len(parts["mu"])
             problem.M, problem.H = parts["M"], parts["H"]
@@ -123,7 +127,7 @@ def driven(name, folder):
         d = problem.dimension
         number = getattr(sn, f"SICONOS_FRICTION_{d}D_{name}")
 
-        def prepare(options):
+        def prepare(options: Any) -> tuple[Any, Any]:
             driver = sn.fc2d_driver if d == 2 else sn.fc3d_driver
             r, u = np.zeros(d * problem.numberOfContacts), np.zeros(d * problem.numberOfContacts)
             return r, lambda: driver(problem, r, u, options)
@@ -131,7 +135,7 @@ def driven(name, folder):
     return number, prepare
 
 
-def run(name, tol, repeats, folder):
+def run(name: str, tol: float, repeats: int, folder: str) -> dict[str, Any]:
     """Solve with one solver and leave r in a file."""
     number, prepare = driven(name, folder)
     best = float("inf")
@@ -153,7 +157,9 @@ def run(name, tol, repeats, folder):
     return {"solver": name, "info": int(info), "iterations": iterations, "seconds": best}
 
 
-def in_a_process(name, tol, seconds, repeats, folder):
+def in_a_process(
+    name: str, tol: float, seconds: float, repeats: int, folder: str
+) -> dict[str, Any]:
     """Run a solver in a process that an alarm ends; return what `run` does."""
     reading, writing = os.pipe()
     child = os.fork()
@@ -173,7 +179,7 @@ def in_a_process(name, tol, seconds, repeats, folder):
     return json.loads(text) if text else fallen
 
 
-def main():
+def main() -> None:
     """Run every solver named on the command line."""
     folder, tol, seconds, repeats, *names = sys.argv[1:]
     warnings.simplefilter("ignore")

@@ -19,7 +19,7 @@ import numpy as np
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.cone import count_changes
 from mbsim.fclib.factor import factor_work
-from mbsim.fclib.ordering import analyse, elimination_flops
+from mbsim.fclib.ordering import elimination_cost
 from mbsim.fclib.solvers import newton, proximal, splitting, states, sweeps
 from mbsim.fclib.solvers.task import Task
 
@@ -51,7 +51,7 @@ NEAR = 1.5e-4
 RUNS = ((10.0, 1.6), (10.0, 1.0), (30.0, 1.0))
 #: Newton iterations in which a run must halve its error, and how often its centre is looked at.
 WINDOW, SAMPLE = 240, 8
-#: Runs from a best point without gain after which the sweeps' way is better.
+#: Runs from a best point without gain after which going on with the sweeps is better.
 IDLE = 3
 #: Error of a mean of centres that is a good start.
 MIDDLE = 1e-3
@@ -161,10 +161,8 @@ def _costs(task: Task) -> Costs:
     """Estimate what the methods cost."""
     b = task.blocks
     d = 1 + len(b.tangent) + len(b.rolling)
-    analysis = compiled(analyse)(b.contacts, b.ptr, b.col, d)
-    flops = compiled(elimination_flops)(analysis, d)
-    entries = float(analysis.factor_ptr[-1])
-    factor = compiled(factor_work)(flops, len(b.col))
+    flops, entries = compiled(elimination_cost)(b.contacts, b.ptr, b.col, d)
+    factor = factor_work(flops, len(b.col))
     once = 1e-9 * entries + 1.2e-7 * b.contacts
     step = math.inf if b.rolling else factor + once
     return Costs(step, once + 5e-9 * len(b.col), factor)
@@ -254,7 +252,7 @@ def _finish(task: Task) -> None:
     The problem is not convex, so a run may go round in a circle about a solution: the middle of
     the circle, which is nearer to it, is where the next run starts. Else that starts from the best
     point of one that was near, with other numbers, and at last from where the sweeps have got to
-    meanwhile, on their own way.
+    meanwhile.
     """
     start = chain = task.r
     vain = idle = 0

@@ -20,6 +20,7 @@ from mbsim.fclib.cone import (
     NO_SHARES,
     PUBLISHED,
     bring_into_cones,
+    errors_at,
     is_better,
     norm,
     own_errors,
@@ -27,17 +28,18 @@ from mbsim.fclib.cone import (
 )
 from mbsim.fclib.factor import factor_work
 from mbsim.fclib.solvers.semismooth import (
+    Jacobian,
     Point,
     direction,
     evaluate,
     line_search,
     no_jacobian,
     selected,
-    velocity_change,
 )
-from mbsim.fclib.solvers.task import POLISHED, record
+from mbsim.fclib.solvers.task import POLISHED, Goal, record
 
 if TYPE_CHECKING:
+    from mbsim.fclib.blocks import DelassusSystem
     from mbsim.fclib.problem import Vector
 
 #: Newton iterations of one proximal step, and when a hopeless one is given up.
@@ -76,18 +78,17 @@ class Workspace(NamedTuple):
 
 
 @jitable
-def _workspace(m, nc):
-    """Return room for a problem's Newton iterations."""
-    point = Point(np.empty(m), np.empty(m), np.empty(nc))
-    trial = Point(np.empty(m), np.empty(m), np.empty(nc))
-    return Workspace(
-        point, trial, np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(nc),
-        np.empty(MEMORY),
-    )  # fmt: skip
-
-
-@jitable
-def _newton_iterations(system, work, jacobian, shift, aim, most, state, goal, fresh):
+def _newton_iterations(
+    system: DelassusSystem,
+    work: Workspace,
+    jacobian: Jacobian,
+    shift: float,
+    aim: float,
+    most: int,
+    state: Vector,
+    goal: Goal,
+    fresh: bool,
+) -> tuple[int, bool, Jacobian]:
     """Iterate at most `most` times from work.point until the error is at most `aim`.
 
     That error is of the proximal problem. `fresh`: there is no matrix yet. Returns the iterations,
@@ -102,7 +103,7 @@ def _newton_iterations(system, work, jacobian, shift, aim, most, state, goal, fr
     while newtons < most and not late(goal.until):
         jacobian, effort = selected(system, point.slip, jacobian, newtons > 0 or not fresh)
         state[WORK] += effort
-        sound = direction(system, rho, shift, point, jacobian, right, step, goal.until)
+        sound = direction(system, rho, shift, point, jacobian, right, step, rate, goal.until)
         newtons += 1
         state[WORK] += (
             factor_work(jacobian.flops, len(system.col))
@@ -111,7 +112,6 @@ def _newton_iterations(system, work, jacobian, shift, aim, most, state, goal, fr
         )
         if not sound:
             break
-        velocity_change(system, shift, step, trial.r, rate)
         if not math.isfinite(norm(rate)):
             break
         # |F| may rise above the last one but not above the last five
@@ -141,7 +141,9 @@ def _newton_iterations(system, work, jacobian, shift, aim, most, state, goal, fr
 
 
 @jitable
-def _keep_best(state, goal, error, error_q, trial, r):
+def _keep_best(
+    state: Vector, goal: Goal, error: float, error_q: float, trial: Vector, r: Vector
+) -> None:
     """Take the trial impulses as the best iterate if they are, and count steps without gain."""
     if is_better(goal.tol, error, error_q, trial, state[BEST], state[BEST_Q], r):
         state[STALLED] = 0.0 if error < 0.9 * state[BEST] else state[STALLED] + 1.0
@@ -153,7 +155,9 @@ def _keep_best(state, goal, error, error_q, trial, r):
 
 
 @jitable
-def _move_centre(state, centre, x, good, newtons, error):
+def _move_centre(
+    state: Vector, centre: Vector, x: Vector, good: bool, newtons: int, error: float
+) -> bool:
     """Move the centre to or beyond x, and change alpha; return whether to go on.
 
     `good`: the proximal problem was solved.
@@ -182,7 +186,15 @@ def _move_centre(state, centre, x, good, newtons, error):
 
 
 @jitable
-def proximal_newton(system, r, centre, state, goal, limit, history):
+def proximal_newton(
+    system: DelassusSystem,
+    r: Vector,
+    centre: Vector,
+    state: Vector,
+    goal: Goal,
+    limit: int,
+    history: Vector,
+) -> int:
     """Take proximal steps until the error is small enough or `limit` Newton iterations are spent.
 
     It ends with the iteration in which it gets late (`clock.until`).
@@ -200,7 +212,11 @@ def proximal_newton(system, r, centre, state, goal, limit, history):
     rows = 0
     if not mean > 0.0:
         return rows
-    work = _workspace(m, nc)
+    work = Workspace(
+        Point(np.empty(m), np.empty(m), np.empty(nc)),
+        Point(np.empty(m), np.empty(m), np.empty(nc)),
+        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(nc), np.empty(MEMORY),
+    )  # fmt: skip
     x, trial, rho = work.point.r, work.trial.r, work.rho
     plain = np.empty(m)
     jacobian = no_jacobian(1 + len(system.tangent), nc)
@@ -231,8 +247,7 @@ def proximal_newton(system, r, centre, state, goal, limit, history):
         state[STEPS] += 1
         # the error of the problem itself
         bring_into_cones(system.tangent, system.mu, x, trial)
-        product(system, system.q, trial, plain)
-        error, error_q = relative_errors(system, plain, trial, DECIDING, work.room)
+        error, error_q = errors_at(system, trial, plain, DECIDING, work.room)
         rows = record(history, rows, state[NEWTONS], error, error_q)
         _keep_best(state, goal, error, error_q, trial, r)
         if finishing or state[PHASE] > 0.0:

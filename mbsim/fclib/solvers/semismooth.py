@@ -18,6 +18,7 @@ from mbsim.fclib.factor import Factors, factorise, room_for_factors, solve, tran
 from mbsim.fclib.ordering import Analysis, analyse, elimination_flops
 
 if TYPE_CHECKING:
+    from mbsim.fclib.blocks import DelassusSystem
     from mbsim.fclib.problem import Flags, Indices, Vector
 
 #: rho = RHO / (mean diagonal of the contact's block); 10 to 30 is good, and 100 or 1 is not: too
@@ -63,7 +64,7 @@ class Jacobian(NamedTuple):
 
 
 @jitable
-def no_jacobian(d, nc):
+def no_jacobian(d: int, nc: int) -> Jacobian:
     """Return the matrix over no contacts, with the exchanges' room for all."""
     ptr, col = np.zeros(1, np.int32), np.zeros(0, np.int32)
     analysis = analyse(0, ptr, col, d)
@@ -75,7 +76,7 @@ def no_jacobian(d, nc):
 
 
 @jitable
-def evaluate(system, rho, point, function):
+def evaluate(system: DelassusSystem, rho: Vector, point: Point, function: Vector) -> float:
     """Write the states of the contacts and F; return |F|."""
     mu, r, u, slip = system.mu, point.r, point.u, point.slip
     nt = len(system.tangent)
@@ -111,7 +112,9 @@ def evaluate(system, rho, point, function):
 
 
 @jitable
-def _pattern(ptr, col, held, number, nodes):
+def _pattern(
+    ptr: Indices, col: Indices, held: Flags, number: Indices, nodes: Indices
+) -> tuple[Indices, Indices]:
     """Return the pattern among contacts `held`; `number` and `nodes` say who they are."""
     size = 0
     for a in range(len(held)):
@@ -141,7 +144,9 @@ def _pattern(ptr, col, held, number, nodes):
 
 
 @jitable
-def selected(system, slip, jacobian, same):
+def selected(
+    system: DelassusSystem, slip: Vector, jacobian: Jacobian, same: bool
+) -> tuple[Jacobian, float]:
     """Return the matrix, analysed for the contacts that are closed now, and the work for it.
 
     It stays as it is if `same`, no other contact is closed, and few have opened (SPARE).
@@ -183,51 +188,60 @@ def selected(system, slip, jacobian, same):
 
 
 @jitable
-def _right_side(system, rho, point, number, a, e, out):
-    """Write the right side of contact a (`_linear_system`) and, for one that slips, e; return c."""
-    ptr, col, val = system.ptr, system.col, system.val
-    r, u, g = point.r, point.u, point.slip[a]
+def _right_sides(
+    system: DelassusSystem, rho: Vector, point: Point, jacobian: Jacobian, x: Vector
+) -> tuple[Vector, Vector]:
+    """Write the right sides of `_linear_system`; return c and, of contacts that slip, e."""
+    ptr, col, val, mu = system.ptr, system.col, system.val, system.mu
+    number, nodes = jacobian.number, jacobian.nodes
+    r, u, slip = point.r, point.u, point.slip
     nt = len(system.tangent)
     d = 1 + nt
-    first = d * a
-    if g == 0.0:
-        for s in range(d):
-            out[s] = -r[first + s]
-        return 1.0
-    for s in range(d):
-        out[s] = 0.0
-    # velocity change by the contacts that open
-    for j in range(ptr[a], ptr[a + 1]):
-        b = col[j]
-        if number[b] < 0:
+    size = len(jacobian.ptr) - 1
+    c, e = np.ones(size), np.empty((size, nt))
+    for k in range(size):
+        a = nodes[k]
+        first, g = d * a, slip[a]
+        if g == 0.0:
             for s in range(d):
-                for t in range(d):
-                    out[s] -= val[j, s, t] * r[d * b + t]
-    out[0] = -u[first] - out[0]
-    if g < 0.0:
+                x[d * k + s] = -r[first + s]
+            continue
+        for s in range(d):
+            x[d * k + s] = 0.0
+        # velocity change by the contacts that open
+        for j in range(ptr[a], ptr[a + 1]):
+            b = col[j]
+            if number[b] < 0:
+                for s in range(d):
+                    for t in range(d):
+                        x[d * k + s] -= val[j, s, t] * r[d * b + t]
+        x[d * k] = -u[first] - x[d * k]
+        if g < 0.0:
+            for s in range(nt):
+                x[d * k + 1 + s] = -u[first + 1 + s] - x[d * k + 1 + s]
+            continue
+        length = 0.0
         for s in range(nt):
-            out[1 + s] = -u[first + 1 + s] - out[1 + s]
-        return 1.0
-    length = 0.0
-    for s in range(nt):
-        e[s] = r[first + 1 + s] - rho[a] * u[first + 1 + s]
-        length += e[s] ** 2
-    length = math.sqrt(length)
-    c = 1.0 / (rho[a] * max(g, 1.0 / RHO))
-    weight = c * g * rho[a]
-    along = 0.0
-    for s in range(nt):
-        e[s] /= length
-        along += e[s] * out[1 + s]
-    for s in range(nt):
-        opened = out[1 + s] - e[s] * along
-        out[1 + s] = -c * (r[first + 1 + s] - system.mu[a] * r[first] * e[s])
-        out[1 + s] -= weight * opened
-    return c
+            e[k, s] = r[first + 1 + s] - rho[a] * u[first + 1 + s]
+            length += e[k, s] ** 2
+        length = math.sqrt(length)
+        c[k] = 1.0 / (rho[a] * max(g, 1.0 / RHO))
+        weight = c[k] * g * rho[a]
+        along = 0.0
+        for s in range(nt):
+            e[k, s] /= length
+            along += e[k, s] * x[d * k + 1 + s]
+        for s in range(nt):
+            opened = x[d * k + 1 + s] - e[k, s] * along
+            x[d * k + 1 + s] = -c[k] * (r[first + 1 + s] - mu[a] * r[first] * e[k, s])
+            x[d * k + 1 + s] -= weight * opened
+    return c, e
 
 
 @jitable
-def _linear_system(system, rho, shift, point, jacobian, x):
+def _linear_system(
+    system: DelassusSystem, rho: Vector, shift: float, point: Point, jacobian: Jacobian, x: Vector
+) -> None:
     """Write Newton's matrix and right side of the contacts of `jacobian`.
 
     Rows are divided by rho (and g, where a contact slips), so that they have the size of W's.
@@ -243,13 +257,12 @@ def _linear_system(system, rho, shift, point, jacobian, x):
     nt = len(system.tangent)
     d = 1 + nt
     at = 0
-    e = np.empty(nt)
     block = np.empty((d, d))
+    c, e = _right_sides(system, rho, point, jacobian, x)
     for k in range(len(jacobian.ptr) - 1):
         a = nodes[k]
         g = point.slip[a]
-        c = _right_side(system, rho, point, number, a, e, x[d * k : d * k + d])
-        weight = c * g * rho[a]
+        weight = c[k] * g * rho[a]
         diagonal = 1.0 if g == 0.0 else shift
         for j in range(ptr[a], ptr[a + 1]):
             b = number[col[j]]
@@ -265,15 +278,15 @@ def _linear_system(system, rho, shift, point, jacobian, x):
                 for t in range(d):
                     along = 0.0
                     for s in range(nt):
-                        along += e[s] * block[1 + s, t]
+                        along += e[k, s] * block[1 + s, t]
                     for s in range(nt):
-                        block[1 + s, t] = weight * (block[1 + s, t] - e[s] * along)
+                        block[1 + s, t] = weight * (block[1 + s, t] - e[k, s] * along)
                 if b == k:
                     for s in range(nt):
-                        block[1 + s, 0] -= c * system.mu[a] * e[s]
-                        block[1 + s, 1 + s] += c * (1.0 - g)
+                        block[1 + s, 0] -= c[k] * system.mu[a] * e[k, s]
+                        block[1 + s, 1 + s] += c[k] * (1.0 - g)
                         for t in range(nt):
-                            block[1 + s, 1 + t] += c * g * e[s] * e[t]
+                            block[1 + s, 1 + t] += c[k] * g * e[k, s] * e[k, t]
             for s in range(d):
                 for t in range(d):
                     jac[at, s, t] = block[s, t]
@@ -281,8 +294,21 @@ def _linear_system(system, rho, shift, point, jacobian, x):
 
 
 @jitable
-def direction(system, rho, shift, point, jacobian, x, step, until):
-    """Write Newton's step; return whether the matrix was regular. `x` is room (m,)."""
+def direction(
+    system: DelassusSystem,
+    rho: Vector,
+    shift: float,
+    point: Point,
+    jacobian: Jacobian,
+    x: Vector,
+    step: Vector,
+    rate: Vector,
+    until: Vector,
+) -> bool:
+    """Write Newton's step and its velocity change; return whether the matrix was regular.
+
+    `x` is room (m,).
+    """
     d = 1 + len(system.tangent)
     size = len(jacobian.ptr) - 1
     if size > 0:
@@ -298,19 +324,24 @@ def direction(system, rho, shift, point, jacobian, x, step, until):
     for k in range(size):
         for s in range(d):
             step[d * jacobian.nodes[k] + s] = x[d * k + s]
+    # in place of q, for the change of the velocity
+    for k in range(len(step)):
+        x[k] = shift * step[k]
+    product(system, x, step, rate)
     return True
 
 
 @jitable
-def velocity_change(system, shift, step, room, rate):
-    """Write the velocity change (W + shift I) step. `room` (m,)."""
-    for k in range(len(step)):
-        room[k] = shift * step[k]
-    product(system, room, step, rate)
-
-
-@jitable
-def _advance(system, rho, point, t, step, rate, trial, function):
+def _advance(
+    system: DelassusSystem,
+    rho: Vector,
+    point: Point,
+    t: float,
+    step: Vector,
+    rate: Vector,
+    trial: Point,
+    function: Vector,
+) -> float:
     """Write the point a share t of the step ahead; return |F| there."""
     for k in range(len(step)):
         trial.r[k] = point.r[k] + t * step[k]
@@ -319,7 +350,16 @@ def _advance(system, rho, point, t, step, rate, trial, function):
 
 
 @jitable
-def line_search(system, rho, point, step, rate, highest, trial, function):
+def line_search(
+    system: DelassusSystem,
+    rho: Vector,
+    point: Point,
+    step: Vector,
+    rate: Vector,
+    highest: float,
+    trial: Point,
+    function: Vector,
+) -> float:
     """Write the point that |F| <= (1 - 1e-4 t) `highest` accepts, or the best; return |F| there.
 
     Without any in which F is a number it is infinite.

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.blocks import mean_diagonals, product
+from mbsim.fclib.blocks import mean_diagonals
 from mbsim.fclib.clock import compiled, late
-from mbsim.fclib.cone import DECIDING, cone_height, is_better, relative_errors
+from mbsim.fclib.cone import DECIDING, cone_height, errors_at, is_better
 from mbsim.fclib.factor import (
     Factors,
     factor_work,
@@ -30,9 +30,10 @@ from mbsim.fclib.factor import (
     transposed_places,
 )
 from mbsim.fclib.ordering import Analysis, analyse, elimination_flops
-from mbsim.fclib.solvers.task import POLISHED, ROWS, Task, record
+from mbsim.fclib.solvers.task import POLISHED, ROWS, Goal, Task, record
 
 if TYPE_CHECKING:
+    from mbsim.fclib.blocks import DelassusSystem
     from mbsim.fclib.problem import Indices, Vector
 
 # places in `state`, what a later call needs to go on
@@ -66,7 +67,7 @@ class Regularised(NamedTuple):
 
 
 @jitable
-def _project(system, x, y, z):
+def _project(system: DelassusSystem, x: Vector, y: Vector, z: Vector) -> None:
     """Write z = P_K(x + y)."""
     tangent, rolling, mu, mu_r = system.tangent, system.rolling, system.mu, system.mu_r
     nt, nr = len(tangent), len(rolling)
@@ -94,7 +95,7 @@ def _project(system, x, y, z):
 
 
 @jitable
-def regularised(d, ptr, col, val):
+def regularised(d: int, ptr: Indices, col: Indices, val: Vector) -> Regularised:
     """Return room for W + rho D and its factors."""
     nc = len(ptr) - 1
     analysis = analyse(nc, ptr, col, d)
@@ -103,7 +104,9 @@ def regularised(d, ptr, col, val):
 
 
 @jitable
-def _factorised(system, weight, penalty, matrix, until):
+def _factorised(
+    system: DelassusSystem, weight: Vector, penalty: float, matrix: Regularised, until: Vector
+) -> bool:
     """Write the factors of W + penalty D; return whether there were any, and time for them."""
     d = 1 + len(system.tangent) + len(system.rolling)
     for a in range(len(weight)):
@@ -116,7 +119,14 @@ def _factorised(system, weight, penalty, matrix, until):
 
 
 @jitable
-def _solve_for_x(system, run, weight, penalty, matrix, x):
+def _solve_for_x(
+    system: DelassusSystem,
+    run: Iterates,
+    weight: Vector,
+    penalty: float,
+    matrix: Regularised,
+    x: Vector,
+) -> None:
     """Write x, and s of the velocity that goes with it."""
     z, y, shift, q = run.z, run.y, run.shift, system.q
     nt = len(system.tangent)
@@ -142,7 +152,9 @@ def _solve_for_x(system, run, weight, penalty, matrix, x):
 
 
 @jitable
-def _update_dual(system, run, weight, x, old_z):
+def _update_dual(
+    system: DelassusSystem, run: Iterates, weight: Vector, x: Vector, old_z: Vector
+) -> tuple[float, float, float, float, float]:
     """Write y; return squares of |x - z|, the change of z, z or x, y, and q, weighed by D."""
     z, y, q = run.z, run.y, system.q
     d = 1 + len(system.tangent) + len(system.rolling)
@@ -160,7 +172,7 @@ def _update_dual(system, run, weight, x, old_z):
 
 
 @jitable
-def _accelerate(run, state, residual):
+def _accelerate(run: Iterates, state: Vector, residual: float) -> None:
     """Extrapolate z and y (Nesterov), or restart where the residual has risen."""
     z, y, last_z, last_y = run.z, run.y, run.last_z, run.last_y
     if residual < 0.999 * state[RESIDUAL] and state[RESIDUAL] > 0.0:
@@ -180,7 +192,9 @@ def _accelerate(run, state, residual):
 
 
 @jitable
-def _balance(run, state, apart, moved, size, dual):
+def _balance(
+    run: Iterates, state: Vector, apart: float, moved: float, size: float, dual: float
+) -> None:
     """Change the penalty where primal and dual residuals, relative ones, are far apart."""
     if not (size > 0.0 and dual > 0.0 and moved > 0.0 and apart > 0.0):
         return
@@ -198,7 +212,18 @@ def _balance(run, state, apart, moved, size, dual):
 
 
 @jitable
-def admm(system, r, run, matrix, state, accelerate, goal, limit, every, history):
+def admm(
+    system: DelassusSystem,
+    r: Vector,
+    run: Iterates,
+    matrix: Regularised,
+    state: Vector,
+    accelerate: bool,
+    goal: Goal,
+    limit: int,
+    every: float,
+    history: Vector,
+) -> int:
     """Iterate until the error is small enough, `limit` iterations are done or it is late.
 
     With the goal reached, a tenth of the iterations more may bring a tenth of it (POLISHED).
@@ -238,8 +263,7 @@ def admm(system, r, run, matrix, state, accelerate, goal, limit, every, history)
             1e-9 * len(matrix.factors.values) + 1e-7 * nc + 1e-8 / every * len(system.col)
         )
         if state[ITERATIONS] % every == 0.0:
-            product(system, system.q, z, u)
-            error, error_q = relative_errors(system, u, z, DECIDING, work)
+            error, error_q = errors_at(system, z, u, DECIDING, work)
             rows = record(history, rows, state[ITERATIONS], error, error_q)
             if is_better(tol, error, error_q, z, state[BEST], state[BEST_Q], r):
                 state[BEST] = error

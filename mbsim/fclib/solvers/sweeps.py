@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from mbsim.fclib.cone import (
     EVERY_SHARE,
     FREE,
     PUBLISHED,
+    errors_at,
     improves,
     natural_map,
     norm,
@@ -36,7 +37,7 @@ from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
 from mbsim.fclib.solvers.task import POLISHED, ROWS, Goal, Task, record
 
 if TYPE_CHECKING:
-    from mbsim.fclib.problem import Vector
+    from mbsim.fclib.problem import Indices, Vector
     from mbsim.fclib.reduction import Blocks
 
 
@@ -53,7 +54,7 @@ LONG = 200
 
 
 @jitable
-def sweep(system, r, some, work):
+def sweep(system: DelassusSystem, r: Vector, some: Indices, work: Vector) -> float:
     """Solve contacts `some` once, with the newest impulses of the others; return |change|^2."""
     tangent, rolling, diagonal = system.tangent, system.rolling, system.diagonal
     ptr, col, val, q = system.ptr, system.col, system.val, system.q
@@ -88,7 +89,18 @@ def sweep(system, r, some, work):
 
 
 @jitable
-def local_sweeps(tangent, stored, q, mu, r, goal, sweeps, every, history, check):
+def local_sweeps(
+    tangent: tuple[int, ...],
+    stored: tuple[Any, ...],
+    q: Vector,
+    mu: Vector,
+    r: Vector,
+    goal: tuple[Any, ...],
+    sweeps: int,
+    every: int,
+    history: Vector,
+    check: Vector,
+) -> tuple[Any, ...]:
     """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
 
     `stored` is W: (rows, nz, p, i, x); `goal` what `Goal` has. Both are plain tuples, and so is
@@ -117,7 +129,7 @@ def local_sweeps(tangent, stored, q, mu, r, goal, sweeps, every, history, check)
 
 
 @jitable
-def _extrapolate(r, old, older, trial):
+def _extrapolate(r: Vector, old: Vector, older: Vector, trial: Vector) -> bool:
     """Write where three iterates lead if one slow direction is left; return whether they do.
 
     The change shrinks by a factor c each sweep, so that c / (1 - c) of the last one is to come
@@ -139,17 +151,20 @@ def _extrapolate(r, old, older, trial):
 
 
 @jitable
-def _errors(system, r, u, shares, tol, work):
+def _errors(
+    system: DelassusSystem, r: Vector, u: Vector, shares: int, tol: float, work: Vector
+) -> tuple[float, float]:
     """Return the errors of an iterate (`relative_errors`); PUBLISHED says all only above `tol`."""
-    product(system, system.q, r, u)
-    error, error_q = relative_errors(system, u, r, shares, work)
+    error, error_q = errors_at(system, r, u, shares, work)
     if shares == PUBLISHED and error <= tol:
         error, error_q = relative_errors(system, u, r, DECIDING, work)
     return error, error_q
 
 
 @jitable
-def gauss_seidel(system, r, goal, sweeps, every, history):
+def gauss_seidel(
+    system: DelassusSystem, r: Vector, goal: Goal, sweeps: int, every: int, history: Vector
+) -> tuple[int, float, float, int]:
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q` (`Goal`).
 
     With the first reached, the second gets as many sweeps again, and GRACE more, at most; with
@@ -223,7 +238,7 @@ def gauss_seidel(system, r, goal, sweeps, every, history):
 
 
 @jitable
-def mend_weak(system, r, tol, most):
+def mend_weak(system: DelassusSystem, r: Vector, tol: float, most: int) -> bool:
     """Sweep over weak contacts, whose share (`own_share`) is above a third of the `tol` for it.
 
     That is done as long as they are not more than `most` and one of them is above; returns whether

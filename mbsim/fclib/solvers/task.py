@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.blocks import product
 from mbsim.fclib.clock import clock, compiled, until
-from mbsim.fclib.cone import DECIDING, improves, relative_errors
+from mbsim.fclib.cone import DECIDING, errors_at, improves
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -40,7 +39,7 @@ class Goal(NamedTuple):
 
 
 @jitable
-def record(history, rows, iterations, error, error_q):
+def record(history: Vector, rows: int, iterations: float, error: float, error_q: float) -> int:
     """Add a row to the history, as long as it has room; return the number of rows."""
     if rows >= len(history):
         return rows
@@ -135,11 +134,8 @@ class Task:
 
     def look(self, r: Vector) -> tuple[float, float]:
         """Return the errors of an iterate."""
-        system = self.blocks.system
-        u = np.empty_like(r)
-        compiled(product)(system, system.q, r, u)
-        errors: tuple[float, float] = compiled(relative_errors)(
-            system, u, r, DECIDING, np.empty_like(r)
+        errors: tuple[float, float] = compiled(errors_at)(
+            self.blocks.system, r, np.empty_like(r), DECIDING, np.empty_like(r)
         )
         return errors
 
