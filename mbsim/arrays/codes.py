@@ -26,37 +26,13 @@ LIVE, FREE, FIXED, WANTED = range(4)
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 
-# entries of `World.doors`
-(
-    FCL_DOOR,
-    NEAR_DOOR,
-    APPLIED_DOOR,
-    JOINTS_DOOR,
-    EXPRESSION_DOOR,
-    VALUES_DOOR,
-    ANGLES_DOOR,
-    FRICTION_DOOR,
-    WRENCH_DOOR,
-    VALUE_DOOR,
-    TANGENT_DOOR,  # the packed arrays of `compile_model.tangent`, where a method is implicit
-    SLOPES_DOOR,
-    BEND_DOOR,
-    EVALUATE_DOOR,  # the whole rhs
-    MEMORY_DOOR,  # friction that carries numbers in y, in linear systems
-    MEMORY_PAIR_DOOR,  # the same in complex ones
-    DRY_DOOR,  # what Force_DryFriction and Force_Element keep of an accepted step
-    RESIDUAL_DOOR,  # a Force_Element by its residual
-    RIGID_DOOR,  # contacts whose friction holds without give: stiction.rigid_contact
-) = range(19)
-DOORS = 19
-
 # entries of `Applied.kind`
 (
     LINE_FORCE,
     AXIS_FORCE,
     AXIS_TORQUE,
     VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of forces.wrenches
-    BUSHING,
+    MARKER_FORCE,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
     SLIDE_LIMIT,
     TURN_LIMIT,
@@ -69,26 +45,11 @@ DOORS = 19
 ) = range(14)
 LATE = 16  # is added to the kind of forces that need reactions, see forces.reaction_forces
 
+# entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
+BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
+
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
 SCALAR, RUBBING = 6, 7
-
-# what is asked for at JOINTS_DOOR
-ACCELERATE, PROJECT, REACT, KEEP, SEAT, MATRIX, DISPLACE, SPEED_UP, CHOOSE, ALONG_JOINTS = range(10)
-
-# what is asked for at DRY_DOOR: to keep a step; that what sticks is held, and nothing else
-KEEP_DRY, HOLD_AGAIN = range(2)
-
-# what is asked for at RIGID_DOOR, see stiction.rigid_contact
-(
-    PLACE_HELD,
-    SHARE_HELD,
-    ASK_HELD,
-    BEGIN_HELD,
-    RELEASE_HELD,
-    RECORD_HELD,
-    CHANGED_HELD,
-    LOAD_HELD,
-) = range(8)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)

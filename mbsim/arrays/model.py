@@ -152,7 +152,7 @@ class Users(NamedTuple):
     address: I1  # (nu,) of their guarded C functions, 0 for a residual
     element: I1  # (nu,) row of `Residuals`, -1 for a subroutine
     result: tags.Scratch[F2]  # (nu, most) what each returned last
-    failed: tags.Scratch[I1]  # (1,) code of the first that failed in this evaluation, or 0
+    failed: tags.Scratch[I1]  # (1,) code of the first hook that failed, or 0
     seen: tags.Scratch[F1]  # (ny,) y when a friction that looks at it is called; else (0,)
 
 
@@ -206,16 +206,17 @@ class Applied(NamedTuple):
     i: I1  # (nf,) markers
     j: I1  # (nf,)
     par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
-    # of bushings six stiffnesses, six dampings, six preloads; of dry friction its stiffness (0:
-    # rigid) and the force at which it slides on and at which it begins to
+    # of marker forces what a step must follow; of dry friction its stiffness (0: rigid) and the
+    # force at which it slides on and at which it begins to
     program: I1  # (nf,) -1 for none
     components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
     axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
     bounds: F2  # (nf, 2) of limits
-    law: I1  # (nf,) address of a normal or friction law, 0 for none
+    law: I1  # (nf,) address of a normal or friction law or a marker force, 0 for none
     law_par: F2  # (nf, widest)
+    slopes: I1  # (nf,) address of the slopes of a marker force, 0 for none or where not asked for
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
     equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
@@ -290,7 +291,7 @@ class World(NamedTuple):
     # force, then those of every gravity of the model
     scale: F1  # (4,) length L, speed V and energy of the whole model, for difference quotients and
     # what is rounding, and the tolerance; errors are judged by `Scales`
-    doors: I1  # (DOORS,) addresses of what only some scenes need
+    hooks: I1  # (hooks,) addresses of what only some scenes need: `arrays.hooks`
     fixed_step: I1  # (1,) 1 for a method without error estimate
     # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     past: tags.Scratch[I1]

@@ -40,6 +40,9 @@ class Work(NamedTuple):
     law_in: F1  # (FRICTION_INPUTS + most,)
     law_out: F1  # (MEMORY_OUT + 2 most,)
     applied: F2  # (nf, 8) force, torque on I at the I marker, stored energy, dissipated power
+    motion: F1  # (12,) of a marker force: see forces.abi, as the next two
+    wrench: F1  # (8,)
+    slopes: F2  # (12, 6)
     rub: F2  # (nf, 9) of friction: see forces.joint_friction
     late: F2  # (nu, 5) of what is settled with the reactions, see forces.reaction_forces
     secant: F2  # (nu, nu) how that follows from what it misses

@@ -13,9 +13,9 @@ import numpy as np
 
 from mbsim.bench.outcome import Outcome
 
-#: In an installed package the decks lie beside this file, in a checkout where all decks are.
+#: In an installed package the decks lie within it, in a checkout where all decks are.
 FOLDERS = (
-    Path(__file__).parent / "models" / "stiff",
+    Path(__file__).parents[1] / "examples" / "models" / "stiff",
     Path(__file__).parents[2] / "models" / "stiff",
 )
 

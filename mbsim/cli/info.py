@@ -120,8 +120,9 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     from mbsim.model.names import element_name, is_adams
     from mbsim.plugins.about import about
     from mbsim.plugins.contact_post import CONTACTPOST
-    from mbsim.plugins.loader import CFFSUB, Scripts, friction_arguments
+    from mbsim.plugins.friction import friction_arguments
     from mbsim.plugins.normal import CNFSUB, normal_arguments
+    from mbsim.plugins.source.script import CFFSUB, Scripts
     from mbsim.plugins.subroutine import ARGUMENTS
 
     scripts: Scripts = {}

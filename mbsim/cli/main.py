@@ -22,6 +22,7 @@ COMMANDS = {
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",
     "fclib": "mbsim.cli.fclib",
+    "warm": "mbsim.cli.warm",
 }
 
 

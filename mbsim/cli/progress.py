@@ -1,4 +1,4 @@
-"""The progress line of `mbsim run`: simulated time, step, time left."""
+"""The progress line of `mbsim run`: what is compiled, then simulated time, step, time left."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Display:
-    """A line on standard error that begins with the first `update` and leaves no trace.
+    """A line on standard error that begins with what is first shown and leaves no trace.
 
     A run that ends before that never imports rich.
     """
@@ -20,6 +20,7 @@ class Display:
     def __init__(self) -> None:
         self._bar: Progress | None = None
         self._task: TaskID | None = None
+        self._compiling = False
 
     def __enter__(self) -> Display:
         return self
@@ -34,12 +35,31 @@ class Display:
 
     def update(self, t: float, h: float, end_time: float) -> None:
         """Show where the run is."""
+        bar, task = self._shown()
+        if self._compiling:
+            self._compiling = False
+            bar.reset(task)
+        bar.update(task, total=end_time, completed=t, now=f"t = {t:.6g}", step=f"h = {h:.3g}")
+
+    def compiling(self, name: str) -> None:
+        """Show the function that is compiled next, and how many there are as far as is known."""
+        from mbsim.core import jit
+
+        bar, task = self._shown()
+        self._compiling = True
+        known = jit.expected > jit.compiled
+        now = f"compiling {jit.compiled}" + (f" of {jit.expected}" if known else "")
+        total = jit.expected if known else None
+        bar.update(task, total=total, completed=jit.compiled - 1, now=now, step=name)
+
+    def _shown(self) -> tuple[Progress, TaskID]:
+        """Return the line, begun if it was not."""
         if self._bar is None:
             self._bar = _make()
-            self._task = self._bar.add_task("", total=end_time, step="", now="")
+            self._task = self._bar.add_task("", total=None, step="", now="")
             self._bar.start()
         assert self._task is not None
-        self._bar.update(self._task, completed=t, now=f"t = {t:.6g}", step=f"h = {h:.3g}")
+        return self._bar, self._task
 
     def say(self, text: str) -> None:
         """Print a message above the line."""

@@ -101,10 +101,12 @@ def command(
     result_file = directory / f"{deck.name}.h5"
 
     from mbsim.cli.progress import Display
+    from mbsim.core import jit
     from mbsim.run.simulation import simulate
 
     shown = progress == "auto" and sys.stderr.isatty()
     display = Display() if shown else None
+    jit.on_compile = display.compiling if display else None
     with display or nullcontext():
         try:
             results = simulate(

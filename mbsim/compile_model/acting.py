@@ -20,8 +20,8 @@ from mbsim.model.placement import place
 
 if TYPE_CHECKING:
     from mbsim.compile_model.subroutines import StateReader
-    from mbsim.plugins.residual import UserResidual
     from mbsim.plugins.subroutine import UserSubroutine
+    from mbsim.plugins.types import UserResidual
 
 
 def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:

@@ -1,9 +1,9 @@
-"""Springs, dampers, bushings, scalar and vector forces, and what acts in joints, as rows."""
+"""Springs, dampers, scalar and vector forces, kinds of `forces.catalog`, what acts in joints."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,14 @@ import numpy as np
 from mbsim.arrays import scene as a
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
+from mbsim.forces.catalog import FORCES
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.elements import (
-    Bushing,
     DryFriction,
     ForceElement,
     JointFriction,
     JointLimit,
+    MarkerForce,
     Model,
     ScalarForce,
     SpringDamper,
@@ -50,7 +51,7 @@ def applied_forces(
         kind=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
         j=np.zeros(n, dtype=np.int64),
-        par=np.zeros((n, 18 if model.bushings else 4)),
+        par=np.zeros((n, 8 if model.marker_forces else 4)),
         program=np.full(n, -1, dtype=np.int64),
         components=np.full((n, 6), -1, dtype=np.int64),
         axes=np.zeros(n, dtype=np.int64),
@@ -58,6 +59,7 @@ def applied_forces(
         alone=np.zeros(n, dtype=np.int64),
         bounds=np.zeros((n, 2)),
         law=np.zeros(n, dtype=np.int64),
+        slopes=np.zeros(n, dtype=np.int64),
         law_par=np.zeros((n, max([1, *(len(values) for _, values in found)]))),
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
@@ -71,12 +73,12 @@ def applied_forces(
     return made, [(statement, element.id) for statement, element in given]
 
 
-def _tables(model: Model) -> dict[str, dict[int, Any]]:
+def _tables(model: Model) -> dict[str, Mapping[int, Any]]:
     """Return the elements that push, by statement."""
     return {
         "SPRINGDAMPER": model.spring_dampers,
         "SFORCE": model.scalar_forces,
-        "BUSHING": model.bushings,
+        **{name: model.table(name) for name in FORCES},
         "VECTORFORCE": model.vector_forces,
         "BODYFORCE": model.body_forces,
         "JOINTFRICTION": model.joint_frictions,
@@ -119,18 +121,20 @@ def _add_scalar(
     made.kind[k] = a.AXIS_TORQUE if force.type == "ROTATIONAL" else along
 
 
-def _add_bushing(
+def _add_marker_force(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
     made: a.Applied,
     k: int,
-    bushing: Bushing,
+    force: MarkerForce,
 ) -> None:
-    """Fill row k with a bushing."""
-    made.i[k], made.j[k] = markers.row(bushing.i_marker_id), markers.row(bushing.j_marker_id)
-    made.kind[k] = a.BUSHING
-    made.par[k] = *bushing.stiffness, *bushing.damping, *bushing.preload
+    """Fill row k with a force of a kind of `forces.catalog`."""
+    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
+    made.kind[k] = a.MARKER_FORCE
+    kind = FORCES[force.kind]
+    bounds = kind.bounds(kind.constants(force.values))
+    made.par[k] = (*bounds[: a.REST], *bounds.rest)
 
 
 def _add_vector(
@@ -158,6 +162,12 @@ def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:
         from mbsim.laws import abi  # what only a run needs
 
         return abi.normal_address(normal), abi.normal_constants(normal, element)
+    if isinstance(element, MarkerForce):
+        kind = FORCES[element.kind]
+        constants = np.array(kind.constants(element.values), dtype=np.float64)
+        from mbsim.forces.abi import wrench_address  # what only a run needs
+
+        return wrench_address(kind.name, len(constants)), constants
     if not isinstance(element, JointFriction) or element.cff_type == "COULOMB_OFF":
         return 0, np.zeros(0)
     friction = FRICTION_LAWS[element.cff_type]
@@ -251,7 +261,7 @@ def _add_element(
 _FILL: dict[str, Callable[..., None]] = {
     "SPRINGDAMPER": _add_spring,
     "SFORCE": _add_scalar,
-    "BUSHING": _add_bushing,
+    **{name: _add_marker_force for name in FORCES},
     "VECTORFORCE": _add_vector,
     "BODYFORCE": _add_vector,
     "JOINTFRICTION": _add_friction,

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.acting import acting
 from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import (
@@ -47,10 +48,9 @@ if TYPE_CHECKING:
     from mbsim.compile_model.subroutines import StateReader
     from mbsim.plugins import UserFriction
     from mbsim.plugins.contact_post import ContactPost
-    from mbsim.plugins.loader import Script
-    from mbsim.plugins.normal import UserNormal
-    from mbsim.plugins.residual import UserResidual
+    from mbsim.plugins.source.script import Script
     from mbsim.plugins.subroutine import UserSubroutine
+    from mbsim.plugins.types import UserNormal, UserResidual
 
 #: XML statements of connections.
 _STATEMENTS = {
@@ -426,7 +426,7 @@ def build(
             pulled[0].constant.copy(),
             np.array([pulled[0].program, *(pull.program for pull in pulled)]),
             _scales(groups, length, speed),
-            np.zeros(a.DOORS, dtype=np.int64),
+            np.zeros(len(Hook), dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             ledger,

@@ -29,7 +29,7 @@ from mbsim.model.placement import Placement
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
-    from mbsim.plugins.normal import UserNormal
+    from mbsim.plugins.types import UserNormal
 
 #: Places for near pairs of a crowd, for each of its graphics.
 NEAR_EACH = 24

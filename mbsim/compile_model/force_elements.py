@@ -14,7 +14,7 @@ from mbsim.laws.residual import DIFFERENTIAL, inputs
 from mbsim.model.elements import ForceElement, Model
 
 if TYPE_CHECKING:
-    from mbsim.plugins.residual import UserResidual
+    from mbsim.plugins.types import UserResidual
 
 STATEMENT = "FORCEELEMENT"
 

@@ -17,13 +17,14 @@ import numpy as np
 
 from mbsim.expressions import Expression
 from mbsim.expressions.tree import references
+from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Model, Units
 from mbsim.model.placement import Placement, graphic_box
 
 #: Tables of a model whose elements act.
 _ACTING = (
     *("joints", "primitives", "couplers", "motions", "general_constraints", "spring_dampers"),
-    *("scalar_forces", "bushings", "vector_forces", "body_forces", "joint_frictions"),
+    *("scalar_forces", *FORCES, "vector_forces", "body_forces", "joint_frictions"),
     *("joint_limits", "dry_frictions", "force_elements"),
 )
 #: Where an expression's references lead, by their statement.
@@ -33,7 +34,7 @@ _TABLES = {
     "MOTION": "motions",
     "SFORCE": "scalar_forces",
     "SPRINGDAMPER": "spring_dampers",
-    "BUSHING": "bushings",
+    **{name: name for name in FORCES},
     "VECTORFORCE": "vector_forces",
     "VARIABLE": "variables",
     "DIFF": "differentials",
@@ -119,7 +120,7 @@ class _Look:
             elif reference.statement == "CONTACT":
                 met.bodies.update(*_touching(self.model, reference.id))
             elif reference.statement in _TABLES:
-                table = getattr(self.model, _TABLES[reference.statement])
+                table = self.model.table(_TABLES[reference.statement])
                 met.named += [table[reference.id]] if reference.id in table else []
 
 
@@ -135,7 +136,7 @@ def _elements(model: Model) -> Iterator[_Met]:
     """Yield what every element that acts has to do with."""
     look = _Look(model)
     for table in _ACTING:
-        for element in getattr(model, table).values():
+        for element in model.table(table).values():
             yield look.all_of(element)
 
 

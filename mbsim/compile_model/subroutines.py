@@ -1,7 +1,7 @@
 """User subroutines of a model as rows of `Users`, and what they may ask of the trial state.
 
 `py_sysfnc("DX", [i, j])` becomes an instruction of the stack machine, kept by name and ids. It
-is put in the place of one spare program and run through the door of expressions, so that it
+is put in the place of one spare program and run by the hook of expressions, so that it
 measures at the state at which the subroutine is called, and by the same code as an expression.
 """
 
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.acting import wanted
 from mbsim.compile_model.programs import ANGLE, Instruction, ProgramTable
 from mbsim.core.address import pack
@@ -26,7 +27,7 @@ from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Model
 from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
-from mbsim.plugins.loader import Scripts
+from mbsim.plugins.source.script import Scripts
 from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
 
 #: Angles that subroutines may follow over whole turns, beyond those that the deck names.
@@ -89,12 +90,12 @@ class StateReader:
             self.table = pack(scene)
             host.seen = (self.table.ctypes.data, scene.users.seen.ctypes.data)
 
-    def door(self) -> Callable[..., float]:
-        """Return the door of expressions, which opens after the scene is made."""
+    def hook(self) -> Callable[..., float]:
+        """Return the hook of expressions, which is filled after the scene is made."""
         if self.run is None:
             number, real = ctypes.c_int64, ctypes.c_double
             kind = ctypes.CFUNCTYPE(real, number, real, number, number)
-            self.run = kind(int(self.scene.world.doors[a.VALUE_DOOR]))
+            self.run = kind(int(self.scene.world.hooks[Hook.VALUE]))
         return self.run
 
     def sysfnc(self, name: str, ids: Sequence[float]) -> list[Any]:
@@ -128,7 +129,7 @@ class StateReader:
             self.shown = found
         scene, time, y = host.state
         # one measure leaves the stack alone: its value is what is returned
-        return self.door()(scene, time, y, self.spare)
+        return self.hook()(scene, time, y, self.spare)
 
     def variable(self, program: int) -> float:
         """Return the value of the program of a variable."""
@@ -137,13 +138,13 @@ class StateReader:
             raise RecursionError("variables that need each other by py_sysfnc")
         scene, time, y = host.state
         if host.seen is not None and y == host.seen[1]:
-            # contacts come first in an evaluation, before what forgets failures
+            # what was noted before, as where a law is explored, is not of this call
             self.scene.users.failed[0] = 0
         # an expression that is half done may stand on the stack
         kept = self.values.tobytes()
         self.open_programs.append(program)
         try:
-            value = self.door()(scene, time, y, program)
+            value = self.hook()(scene, time, y, program)
         finally:
             self.open_programs.pop()
         self.values.cast("B")[:] = kept

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbsim.arrays.scene import MEMORY_DOOR, MEMORY_PAIR_DOOR, TURN_ROOT, Scene
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import TURN_ROOT, Scene
 from mbsim.core import tags
 from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
 
@@ -88,7 +89,7 @@ class Real(NamedTuple):
     c: F2  # (1, 4) coefficients c1, c2, c3, form
     r: tags.Scratch[F2]  # (2, n) residual and answer in the layout of y
     keep: F3  # (slots + 1, carried, carried) Z of `linearization.memory_slopes`, scratch last
-    door: tags.Constant[I1]  # (1,) entry of `World.doors` at which that is asked for
+    hook: tags.Constant[I1]  # (1,) entry of `World.hooks` by which that is asked for
 
 
 @tags.state
@@ -109,7 +110,7 @@ class Pair(NamedTuple):
     c: C2
     r: tags.Scratch[C2]
     keep: C3
-    door: tags.Constant[I1]
+    hook: tags.Constant[I1]
 
 
 @tags.state
@@ -212,9 +213,9 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((2, 5 + wide)),
     )
     sizes = nb, m, n, blocks, slots + 1, wide
-    real = Real(*_factor_arrays(*sizes, np.float64), np.array([MEMORY_DOOR]))
+    real = Real(*_factor_arrays(*sizes, np.float64), np.array([Hook.MEMORY]))
     sizes = sizes if pair else (0, 0, 0, 0, 0, 0)
-    both = Pair(*_factor_arrays(*sizes, np.complex128), np.array([MEMORY_PAIR_DOOR]))
+    both = Pair(*_factor_arrays(*sizes, np.complex128), np.array([Hook.MEMORY_PAIR]))
     return Tangent(pattern, linear, keeps, depends, real, both)
 
 

@@ -534,7 +534,7 @@ def follows_time(scene: a.Scene) -> bool:
 
 def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
-    from mbsim.plugins.diagnose import reads_parameter
+    from mbsim.plugins.source.diagnose import reads_parameter
 
     if any(name[0] != "FORCEELEMENT" for name in system.subroutines):
         return True

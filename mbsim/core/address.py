@@ -16,13 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import intrinsic, lower_builtin, register_model, type_callable
-from numba.np import arrayobj
 
+from mbsim.core.array_items import DATA, describe
 from mbsim.core.memory import floats_at
 
 _WORD = ir.IntType(64)
@@ -87,21 +86,9 @@ def _lower_field(context: Any, builder: Any, group: Any, value: Any, name: str) 
         return builder.add(value, ir.Constant(_WORD, 8 * word))
     table = builder.inttoptr(value, _WORD.as_pointer())
     read = [_constant_word(builder, table, word + k) for k in range(1 + target.ndim)]
-    itemsize = context.get_abi_sizeof(context.get_data_type(target.dtype))
-    array = arrayobj.make_array(target)(context, builder)
-    shape = read[1:]
-    strides = [ir.Constant(_WORD, itemsize)]
-    for length in reversed(shape[1:]):
-        strides.insert(0, builder.mul(strides[0], length))
-    arrayobj.populate_array(
-        array,
-        data=builder.inttoptr(read[0], array.data.type),
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
-        itemsize=ir.Constant(_WORD, itemsize),
-        meminfo=None,
-    )
-    return impl_ret_borrowed(context, builder, target, array._getvalue())
+    data = builder.inttoptr(read[0], context.get_data_type(target.dtype).as_pointer())
+    array = describe(context, builder, target, data, read[1:])
+    return impl_ret_borrowed(context, builder, target, array)
 
 
 def _leaves(group: NamedTuple) -> list[np.ndarray[Any, Any]]:
@@ -143,7 +130,7 @@ def _call(result: Any, result_ir: Any, arguments: Any) -> Any:
         for position, kind in enumerate(arguments.types):
             value = builder.extract_value(packed, position)
             if isinstance(kind, types.Array):
-                value = arrayobj.make_array(kind)(context, builder, value=value).data
+                value = builder.extract_value(value, DATA)
             values.append(value)
             kinds.append(value.type)
         pointer = builder.inttoptr(address, ir.FunctionType(result_ir, kinds).as_pointer())
@@ -169,20 +156,8 @@ _FLOATS = types.Array(types.float64, 1, "C")
 
 def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
     """Return what lies at a pointer as an array of a kind and `shape` that shares it."""
-    array = arrayobj.make_array(kind)(context, builder)
-    size = ir.Constant(_WORD, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    strides = [size]
-    for length in reversed(shape[1:]):
-        strides.insert(0, builder.mul(strides[0], length))
-    arrayobj.populate_array(
-        array,
-        data=builder.bitcast(data, array.data.type),
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
-        itemsize=size,
-        meminfo=None,
-    )
-    return array._getvalue()
+    target = context.get_data_type(kind.dtype).as_pointer()
+    return describe(context, builder, kind, builder.bitcast(data, target), list(shape))
 
 
 def _at(kind: Any) -> Any:

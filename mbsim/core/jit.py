@@ -1,4 +1,4 @@
-"""The one compile policy: what is compiled, where it is kept, when it is stale.
+"""The one compile policy: what is compiled, and when.
 
 Two ways into compiled code, and only these:
 
@@ -6,128 +6,43 @@ Two ways into compiled code, and only these:
 * `address(f, signature)`: a C function behind an address, for everything that a
   scene chooses (laws, pairs) and for what an integrator calls without knowing it.
 
-Everything these call is a plain function marked `jitable`. The result is cached
-on disk under a digest of *all* project files that the function can reach through
-imports: Numba's own check sees only the file of the function itself, and would go
-on using an edited helper's old code.
+Everything these call is a plain function marked `jitable`. `core.code_cache` keeps the result.
 """
 
 from __future__ import annotations
 
 import functools
 import gc
-import hashlib
-import os
-import re
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
-from numba.core import event
-from numba.core.caching import CacheImpl, _CacheLocator
+from numba.core import event, sigutils
+from numba.core.ccallback import CFunc
 from numba.extending import register_jitable
 
 import mbsim.core.address  # noqa: F401  (compiled forms of core.memory)
 from mbsim.core import linking
+from mbsim.core.code_cache import CodeCache, cache_root, is_known, source_digest
 from mbsim.core.jitable import take_marked
 
-PACKAGE = Path(__file__).resolve().parent.parent
-_IMPORT = re.compile(
-    r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
-)
+__all__ = ["address", "cache_root", "function", "planned", "source_digest"]
+
+Made = TypeVar("Made")
 
 #: Seconds spent compiling in this process, and the hook that is told before the first compilation.
 compile_seconds = 0.0
 on_first_compile: Callable[[], None] | None = None
+#: Roots that were compiled in this process, and of the run at hand, the one that is about to be
+#: among them; how many the run will have as far as is known (`planned`). One hook is told the name
+#: before each, the other that more are known.
+total = compiled = expected = 0
+on_compile: Callable[[str], None] | None = None
+on_plan: Callable[[], None] | None = None
 
-
-def cache_root() -> Path:
-    """Return the folder of compiled code: $MBSIM_CACHE_DIR, or the user's cache folder."""
-    named = os.environ.get("MBSIM_CACHE_DIR")
-    if named:
-        return Path(named)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library/Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "mbsim"
-
-
-@functools.cache
-def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
-    """Return the digest of a file and the project files that it imports."""
-    text = path.read_bytes()
-    found = []
-    for module, names, plain in _IMPORT.findall(text.decode("utf-8")):
-        parts = (module or plain).split(".")[1:]
-        candidates = [parts] + [[*parts, name] for name in re.findall(r"\w+", names)]
-        for candidate in candidates:
-            file = PACKAGE.joinpath(*candidate).with_suffix(".py") if candidate else None
-            if file is not None and file.is_file():
-                found.append(file)
-    return hashlib.sha256(text).digest(), tuple(found)
-
-
-def source_digest(files: list[Path]) -> str:
-    """Return a digest of `files` and of every project file they reach through imports."""
-    reached: dict[Path, bytes] = {}
-    waiting = [file.resolve() for file in files]
-    while waiting:
-        file = waiting.pop()
-        if file not in reached:
-            reached[file], imported = _imports(file)
-            waiting.extend(imported)
-    # names too: a file that moves changes what its callers mean
-    lines = sorted(file.name.encode() + digest for file, digest in reached.items())
-    return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
-
-
-def _is_known(file: Path) -> bool:
-    """Return whether all that a file can reach is seen by the digest of the cache."""
-    return PACKAGE in file.parents or cache_root().resolve() in file.parents
-
-
-class _ContentLocator(_CacheLocator):
-    """Numba's cache for functions of this project, in a folder named by content."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def get_cache_path(self) -> str:
-        return str(self._path)
-
-    def get_source_stamp(self) -> str:
-        return "content"  # the folder's name already says it
-
-    def get_disambiguator(self) -> str:
-        return ""
-
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ContentLocator | None:
-        root = cache_root()
-        file = Path(py_file).resolve()
-        if not _is_known(file):
-            return None
-        # an adapter closes over the law it adapts: that law's file counts as well
-        cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
-        files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
-        locator = cls(
-            root / f"{numba.__version__}-{linking.POLICY}" / source_digest([file, *files])
-        )
-        try:
-            locator.ensure_cache_path()
-        except OSError:
-            return None
-        return locator
-
-
-if _ContentLocator not in CacheImpl._locator_classes:
-    CacheImpl._locator_classes.insert(0, _ContentLocator)
+_missing: list[str] | None = None  # names, while roots are counted
+_planning = False
 
 
 def _register() -> None:
@@ -168,6 +83,46 @@ class _Watch(event.Listener):
 event.register("numba:run_pass", _Watch())
 
 
+class _NotKeptError(Exception):
+    """What is only counted is in no cache."""
+
+
+def _about_to_compile(name: str) -> None:
+    """Count a root that no cache holds, and tell of it."""
+    global total, compiled, expected
+    if _missing is not None:
+        _missing.append(name)
+        raise _NotKeptError
+    total += 1
+    compiled += 1
+    expected = max(expected, compiled)
+    if on_compile is not None:
+        on_compile(name)
+
+
+def planned(make: Callable[[], Made]) -> Made:
+    """Return what `make` makes, having counted first what it asks for that no cache holds.
+
+    To be counted `make` is called once more, with addresses that nobody may call; it leaves no more
+    behind than a second call would set again.
+    """
+    global _missing, _planning, expected
+    if _planning:
+        return make()
+    _missing, _planning = [], True
+    try:
+        made = make()
+        missing, _missing = len(_missing), None
+        if missing == 0:
+            return made
+        expected = compiled + missing
+        if on_plan is not None:
+            on_plan()
+        return make()
+    finally:
+        _missing, _planning = None, False
+
+
 @functools.cache
 def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     """Return `py_func` compiled at its first call (or loaded from the cache), once a process.
@@ -176,17 +131,43 @@ def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     change.
     """
     _register()
-    known = _is_known(Path(py_func.__code__.co_filename).resolve())
-    return numba.njit(cache=known, error_model="numpy")(py_func)
+    made = numba.njit(error_model="numpy")(py_func)
+    if is_known(py_func):
+        made._cache = CodeCache(py_func, _about_to_compile)
+    return made
 
 
-_kept: list[Any] = []
+def awaited(py_func: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `function(py_func)`, counted (`planned`) as what is called soon."""
+    made = function(py_func)
+    if _missing is not None and isinstance(made._cache, CodeCache):  # type: ignore[attr-defined]
+        if not made.overloads and made._cache.is_empty():  # type: ignore[attr-defined]
+            _missing.append(py_func.__qualname__)
+    return made
 
 
-@functools.cache
+_kept: dict[Any, Any] = {}
+
+
 def address(py_func: Callable[..., Any], signature: Any) -> int:
-    """Return the address of `py_func` compiled as a C function; it lives as long as the process."""
+    """Return the address of `py_func` compiled as a C function; it lives as long as the process.
+
+    As with `function`, what stands elsewhere is not cached.
+    """
+    key = py_func, signature
+    if key in _kept:
+        return int(_kept[key].address)
     _register()
-    compiled = numba.cfunc(signature, cache=True, error_model="numpy")(py_func)
-    _kept.append(compiled)
-    return int(compiled.address)
+    made = CFunc(py_func, sigutils.normalize_signature(signature), {}, {"error_model": "numpy"})
+    if is_known(py_func):
+        made._cache = CodeCache(py_func, _about_to_compile)
+    try:
+        made.compile()
+    except _NotKeptError:
+        return NOT_YET
+    _kept[key] = made
+    return int(made.address)
+
+
+#: Stands for the address of what is only counted; 0 would say that nothing is wanted.
+NOT_YET = -1

@@ -9,9 +9,31 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from numba.core import ir, targetconfig, types
+from numba import stencil
+from numba.core import (
+    compiler_machinery,
+    errors,
+    event,
+    inline_closurecall,
+    ir,
+    lowering,
+    postproc,
+    targetconfig,
+    transforms,
+    typed_passes,
+    typeinfer,
+    types,
+)
+from numba.core.base import BaseContext
 from numba.core.registry import cpu_target
+from numba.core.rewrites import rewrite_registry
+from numba.core.runtime.context import NRTContext
+from numba.core.types.functions import BaseFunction
 from numba.core.typing import npydecl
+from numba.np.ufunc import array_exprs
+from numba.stencils.stencil import StencilFunc
+
+from mbsim.core import array_items
 
 _equal_options = targetconfig.TargetConfig.__eq__
 
@@ -87,11 +109,206 @@ def _import_declarations_once() -> None:
         context.refresh()
     for context in contexts:
         context.load_additional_registries = functools.partial(_look_through, context)
+        context.refresh = functools.partial(_refresh, context)
 
 
 def _look_through(context: Any) -> None:
     for registry in list(context._registries):
         context.install_registry(registry)
+
+
+_known: dict[Any, int] = {}
+
+
+def _refresh(context: Any) -> None:
+    """Refresh a context where anything was registered since: the lists are only appended to."""
+    target = cpu_target.target_context
+    registries = [*target._registries, *cpu_target.typing_context._registries]
+    now = sum(len(entries) for each in registries for entries in _lists(each))
+    if _known.get(context) != now:
+        type(context).refresh(context)
+        _known[context] = now
+
+
+@functools.cache
+def _lists(registry: Any) -> list[Any]:
+    """Return the lists of what is registered."""
+    return [entries for entries in vars(registry).values() if isinstance(entries, list)]
+
+
+_post_process = postproc.PostProcessor.run
+
+
+def _with_lifetimes_on_demand(
+    self: Any, emit_dels: bool = False, extend_lifetimes: bool = False
+) -> None:
+    """Find which variables live where only for who asks: the pass that deletes them.
+
+    It is done again after every change of the control flow.
+    """
+    ir_of_function = self.func_ir
+    if emit_dels or ir_of_function.is_generator:
+        _post_process(self, emit_dels, extend_lifetimes)
+        return
+    ir_of_function.blocks = transforms.canonicalize_cfg(ir_of_function.blocks)
+    ir_of_function.variable_lifetime = postproc.VariableLifetime(ir_of_function.blocks)
+    ir_of_function.generator_info = None
+
+
+_count_references = NRTContext._call_incref_decref
+
+
+def _counted(context: Any, kind: Any) -> Any:
+    """Return how a type is laid out if there may be reference counts in it, else None."""
+    model = context.data_model_manager[kind]
+    try:
+        counted = model.is_counted
+    except AttributeError:
+        counted = model.is_counted = model.contains_nrt_meminfo()
+    return model if counted else None
+
+
+def _count_where_counted(self: Any, builder: Any, typ: Any, value: Any, name: str) -> None:
+    """Count references only to what may have some."""
+    if _counted(self._context, typ) is not None:
+        _count_references(self, builder, typ, value, name)
+
+
+def _references(self: Any, builder: Any, ty: Any, val: Any) -> list[Any]:
+    """Return (type, reference count) of all in a value, taking out of it no more than these."""
+    model = _counted(self._context, ty)
+    if model is None:
+        return []
+    found = [(ty, model.get_nrt_meminfo(builder, val))] if model.has_nrt_meminfo() else []
+    for kind, taken in model.traverse(builder):
+        if _counted(self._context, kind) is not None:
+            found.extend(_references(self, builder, kind, taken(val)))
+    return found
+
+
+_call_type = BaseFunction.get_call_type
+
+
+def _call_type_once(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Return the signature that was found before for these arguments.
+
+    Numba asks a dozen templates in turn, for each operation twice. A function type that gets
+    another template is another function type.
+    """
+    flags = targetconfig.ConfigStack.top_or_none()
+    key = context, tuple(args), tuple(kws.items()), flags
+    try:
+        return self._found[key]
+    except AttributeError:
+        self._found = {}
+    except KeyError:
+        pass
+    found = self._found[key] = _call_type(self, context, args, kws)
+    return found
+
+
+class _ErrorContext:
+    """What an error within is said to have happened in: a plain object for a generator."""
+
+    __slots__ = ("_args", "_format", "_named")
+
+    def __init__(self, fmt_: str, *args: Any, **kwargs: Any) -> None:
+        self._format, self._args, self._named = fmt_, args, kwargs
+
+    def __enter__(self) -> None:
+        loc = self._named.get("loc")
+        if loc is not None and not loc.filename.startswith(errors._numba_path):
+            errors.loc_info.update(self._named)
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        if isinstance(error, errors.NumbaError):
+            error.add_context(errors._format_msg(self._format, self._args, self._named))
+
+
+_size_of, _alignment_of = BaseContext.get_abi_sizeof, BaseContext.get_abi_alignment
+_sizes: dict[tuple[Any, str], int] = {}
+
+
+def _measured(self: Any, measure: Any, ty: Any) -> int:
+    """Return what LLVM says of a type without having it parse a module for each question."""
+    text = str(ty)
+    if "%" in text:  # what a name means is its module's own
+        return int(measure(self, ty))
+    key = measure, text
+    if key not in _sizes:
+        _sizes[key] = measure(self, ty)
+    return _sizes[key]
+
+
+_close_over = inline_closurecall.InlineClosureCallPass.run
+_INLINED_CALLS = (functools.reduce, stencil)
+
+
+def _inline_where_there_is_something(self: Any) -> None:
+    """Look for closures, comprehensions and stencils where a function has what they are made of."""
+    for block in self.func_ir.blocks.values():
+        for assign in block.find_insts(ir.Assign):
+            value = assign.value
+            if isinstance(value, ir.Expr):
+                found = value.op in ("make_function", "build_list")
+            elif isinstance(value, ir.Global | ir.FreeVar):
+                named = value.value
+                found = named in _INLINED_CALLS if callable(named) else False
+                found = found or isinstance(named, StencilFunc)
+            else:
+                continue
+            if found:
+                _close_over(self)
+                return
+
+
+_rewrite = typed_passes.NopythonRewrites.run_pass
+
+
+def _rewrite_with_deletions_where_asked(self: Any, state: Any) -> bool:
+    """Find where variables are deleted only for expressions of whole arrays, which ask for it."""
+    types_of = state.typemap
+    for block in state.func_ir.blocks.values():
+        for assign in block.find_insts(ir.Assign):
+            value = assign.value
+            if not isinstance(value, ir.Expr):
+                continue
+            whole = isinstance(types_of.get(assign.target.name), types.Array)
+            if value.op == "build_list" or (whole and _is_of_arrays(value, types_of)):
+                return bool(_rewrite(self, state))
+    rewrite_registry.apply("after-inference", state)
+    return True
+
+
+def _is_of_arrays(value: Any, types_of: Any) -> bool:
+    """Return whether an expression may be one that Numba runs in a loop over whole arrays."""
+    if value.op != "call":
+        return value.op in ("unary", "binop", "inplace_binop")
+    return array_exprs._is_ufunc(getattr(types_of.get(value.func.name), "typing_key", None))
+
+
+_run_pass = compiler_machinery.PassManager._runPass
+
+
+def _run_pass_unmeasured(self: Any, index: int, pss: Any, state: Any) -> None:
+    """Run a pass without taking times and texts of types for those who would look at them."""
+    kind = "numba:run_pass"
+    watched = len(event._registered[kind]) > 1 or self._print_after or self._print_before
+    if watched or self._ENFORCING:
+        _run_pass(self, index, pss, state)
+        return
+    pss.analysis = self._analysis
+    event.start_event(kind)
+    try:
+        with _ErrorContext("Pass {name}", name=pss.name()):
+            for step in (pss.run_initialization, pss.run_pass, pss.run_finalizer):
+                step(state)
+    finally:
+        event.end_event(kind)
+    if isinstance(pss, compiler_machinery.FunctionPass):
+        compiler_machinery.enforce_no_dels(state.func_ir)
+    none = compiler_machinery.pass_timings(0.0, 0.0, 0.0)
+    self.exec_times[f"{index}_{pss.name()}"] = none
 
 
 def install() -> None:
@@ -100,4 +317,16 @@ def install() -> None:
     targetconfig.TargetConfig.__hash__ = _hash_of_options  # type: ignore[method-assign]
     ir.Inst._rec_list_vars = _variables
     npydecl.NumpyRulesArrayOperator.generic = _operator_on_arrays
+    postproc.PostProcessor.run = _with_lifetimes_on_demand
+    NRTContext._call_incref_decref = _count_where_counted
+    NRTContext.get_meminfos = _references
+    typed_passes.NopythonRewrites.run_pass = _rewrite_with_deletions_where_asked
+    BaseFunction.get_call_type = _call_type_once
+    for module in (errors, lowering, typeinfer):
+        module.new_error_context = _ErrorContext
+    BaseContext.get_abi_sizeof = functools.partialmethod(_measured, _size_of)
+    BaseContext.get_abi_alignment = functools.partialmethod(_measured, _alignment_of)
+    inline_closurecall.InlineClosureCallPass.run = _inline_where_there_is_something
+    compiler_machinery.PassManager._runPass = _run_pass_unmeasured
+    array_items.install()
     _import_declarations_once()

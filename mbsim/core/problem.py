@@ -1,45 +1,46 @@
-"""What an integrator sees: hooks behind addresses, all with one signature.
+"""What an integrator sees: hooks behind addresses, called in the order of this table.
 
-    double hook(int64 context, double t, double h, double *a, double *b)
+    int64  hook(int64 context, double t, double h, double *a, double *b)
+    double hook(the same), of those that measure: norm, check, inner, limit, stable
 
 A mechanism (`pipeline.hooks`) and a scalar test equation (the tests) look the same, and a
-method is compiled once for all. Codes are 0 for success. A trial point whose rhs fails is tried
-again nearer to the committed one before the run ends, but for codes from AT_ONCE on.
+method is compiled once for all. A hook that acts returns 0, or the code of its failure; one that
+answers returns its answer, or less the code. A trial point whose rhs fails is tried again nearer
+to the committed one before the run ends, but for codes from AT_ONCE on.
 
-| hook   | a, b                        | returns                                              |
-|--------|-----------------------------|------------------------------------------------------|
-| rhs    | y, f (out)                  | code; f = f(t, y), h after the last committed point   |
-| project| y (in and out), -           | code; y back onto its manifold; h = ALONG: velocities |
-|        |                             | in y are displacements a time, and all that counts is |
-|        |                             | what holds positions                                  |
-| norm   | local error, y              | largest error over its scale, dimensionless; h = 0:   |
-|        |                             | of a difference of two states that is no step's error,|
-|        |                             | with what it changes of friction over normal forces;  |
-|        |                             | h = FRICTION_ALONE: only that; h = IMPACTS_ALONE: what |
-|        |                             | it changes of speeds in impacts, over what these        |
-|        |                             | changed by in the step, t being its length             |
-| check  | y new, -                    | 1, or the part of the step to take instead            |
-| commit | y (in and out), f           | bits: 1 y changed, so f must be evaluated again; 2    |
-|        |                             | rows are full; 4 `stable` must be asked again; 8 the  |
-|        |                             | motion is held otherwise from here on: begin anew     |
-| look   | y at an inner point, -      | code; called where `commit` before asked for it       |
-| inner  | -, -                        | part of the step (0..1) worth a look, or < 0          |
-| limit  | y, f                        | longest step that may be tried                        |
-| happens| y, scratch                  | 1 if an event that is to be located has happened     |
-|        |                             | between the committed point and this one, else 0     |
-| arrive | y committed, scratch        | 1 if something happened by this committed point that  |
-|        |                             | the caller of `advance` must act on, else 0           |
-| kinks  | y, -   (h: ASK, ...)        | 1 if a force is on another branch than at the committed |
-|        |                             | point, 2 if that shall be found exactly, else 0;      |
-|        |                             | LOAD: what friction holds over what it can, or < 0;   |
-|        |                             | BENDS (b: y committed): 1 if HALF, at the step's       |
-|        |                             | middle, then HALVES, at its end, are to be asked: the |
-|        |                             | error of a way followed in one, in the norm of errors; |
-|        |                             | HIDES (b: y committed): 1 if a force may leave its     |
-|        |                             | branch and come back within the step                   |
-| stable | y, f   (h: tolerance)       | step of a method that has no error estimate           |
-| output | y at an output time, -      | 0, or FULL: take the rows away before going on        |
-| reject | -, -   (h: reason)          | 0; told of every rejected step                        |
+| hook    | a, b                   | returns                                                    |
+|---------|------------------------|------------------------------------------------------------|
+| arrive  | y committed, -         | 1 if something happened by this committed point that the   |
+|         |                        | caller of `advance` must act on, else 0                    |
+| rhs     | y, f (out)             | code; f = f(t, y), h after the last committed point        |
+| stable  | y, f   (h: tolerance)  | step of a method that has no error estimate                |
+| limit   | y, f                   | longest step that may be tried                             |
+| project | y (in and out), -      | code; y back onto its manifold; h = ALONG: velocities in y |
+|         |                        | are displacements a time, and all that counts is what      |
+|         |                        | holds positions                                            |
+| norm    | local error, y         | largest error over its scale, dimensionless; h = 0: of a   |
+|         |                        | difference of two states that is no step's error, with     |
+|         |                        | what it changes of friction over normal forces; h =        |
+|         |                        | FRICTION_ALONE: only that; h = IMPACTS_ALONE: what it      |
+|         |                        | changes of speeds in impacts, over what these changed by   |
+|         |                        | in the step, t being its length                            |
+| check   | y new, -               | 1, or the part of the step to take instead                 |
+| inner   | -, -                   | part of the step (0..1) worth a look, or < 0               |
+| kinks   | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
+|         |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
+|         |                        | a step that was taken: 1 if one changed in it; LOAD: 1     |
+|         |                        | if friction holds something, the largest force by which it |
+|         |                        | does over what it can in out[0]; BENDS (b: y committed): 1 |
+|         |                        | if HALF, at the step's middle, then HALVES, at its end,    |
+|         |                        | are to be asked: the error of a way followed in one, in    |
+|         |                        | the norm of errors, in out[0]; HIDES (b: y committed): 1   |
+|         |                        | if a force may leave its branch and come back within it    |
+| happens | y, -                   | 1 if an event that is to be located has happened between   |
+|         |                        | the committed point and this one, else 0                   |
+| reject  | -, -   (h: reason)     | code; told of every rejected step                          |
+| commit  | y (in and out), f      | what follows from the step that is taken: a sum of `Taken` |
+| look    | y at an inner point, - | code; called where `inner` before asked for it             |
+| output  | y at an output time, - | 0, or FULL: take the rows away before going on             |
 
 Implicit methods need the linearisation of f as well, in y's layout and with the bodies' part in
 second-order form. With d = (dx, dq, dv, dw, dz) for bodies at x with quaternion q, velocity v
@@ -68,12 +69,17 @@ da being the linearised acceleration under joints and equations. `form` says wha
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 from numba import types
 
 _PTR = types.CPointer(types.float64)
-HOOK = types.float64(types.int64, types.float64, types.float64, _PTR, _PTR)
+HOOK = types.int64(types.int64, types.float64, types.float64, _PTR, _PTR)
+MEASURE = types.float64(types.int64, types.float64, types.float64, _PTR, _PTR)
+#: The hooks that measure.
+MEASURES = frozenset({"norm", "check", "inner", "limit", "stable"})
 
 
 class Problem(NamedTuple):
@@ -101,6 +107,28 @@ class Problem(NamedTuple):
     solve_pair: int = 0
 
 
+def addresses(hooks: Mapping[str, Callable[..., Any]]) -> dict[str, int]:
+    """Return the addresses of compiled hooks, by their names in `Problem`."""
+    from mbsim.core import jit
+
+    return {
+        name: jit.address(hook, MEASURE if name in MEASURES else HOOK)
+        for name, hook in hooks.items()
+    }
+
+
+class Taken(IntEnum):
+    """What follows from a step that is taken: `commit` returns the sum of what does."""
+
+    Y_CHANGED = 1  # f is to be evaluated again
+    ROWS_FULL = 2  # the caller is to take them away before anything else
+    STABLE_IS_STALE = 4  # `stable` is to be asked again
+    BEGIN_ANEW = 8  # the motion is held otherwise from here on: nothing is known of a step before
+
+
+#: What `output` answers where another row may find no place.
+FULL = 1
+
 #: Steps for which what `stable` says is believed, unless `commit` says that it is stale.
 STABLE_EVERY = 16
 
@@ -110,14 +138,6 @@ FRICTION_ALONE, IMPACTS_ALONE = -1.0, -2.0
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0
 
-# codes of an rhs; a problem may have others of its own
-NOT_FINITE = 3
-#: Of an implicit method: its equations of a step are not solved; a shorter one is tried.
-NOT_CONVERGED = 50
-#: Of `factor`: there is no solution, or too many.
-SINGULAR = 51
-#: Codes from here on end the run without another try.
-AT_ONCE = 100
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_DUE = range(8)
@@ -125,9 +145,6 @@ DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_D
 TABLE_OVER = 8
 #: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.
 WATCH_EVERY = 5000
-
-#: What `commit` adds where the motion is held otherwise from here on.
-BEGIN_ANEW = 8.0
 
 # what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads; and
 # of friction that follows a way in closed form: whether that bends, then two halves of the step;

@@ -34,6 +34,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from mbsim.forces.catalog import FORCES
+
 
 class Kind(Enum):
     """What a function looks at, which says where it may be used."""
@@ -121,7 +123,9 @@ _put(Kind.FORCE, "JPRIM", "JPRIM jflag comp marker", 3)
 _put(Kind.FORCE, "MOTION", "MOTION jflag comp marker", 3)
 _put(Kind.FORCE, "SFORCE", "SFORCE jflag comp marker", 3)
 _put(Kind.FORCE, "SPDP", "SPRINGDAMPER jflag comp marker", 3)
-_put(Kind.FORCE, "BUSH", "BUSHING jflag comp marker", 3)
+for _name in FORCES:
+    if FORCES[_name].function:
+        _put(Kind.FORCE, FORCES[_name].function, f"{_name} jflag comp marker", 3)
 _put(Kind.FORCE, "VFORCE VTORQ GFORCE", "VECTORFORCE jflag comp marker", 3)
 _put(Kind.VARIABLE, "VARVAL", "VARIABLE")
 _put(Kind.VARIABLE, "DIF1", "DIFF")

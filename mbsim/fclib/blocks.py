@@ -3,10 +3,54 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mbsim.core.jitable import jitable
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Indices, Vector
+
+
+class DelassusSystem(NamedTuple):
+    """u = W r + q in blocks, with the friction of its contacts, as compiled code takes it.
+
+    To hand it over from Python takes 1 us longer than its arrays one by one.
+
+    Parameters
+    ----------
+    tangent, rolling
+        Tuples whose *lengths* are the numbers of tangential and rolling directions, so that
+        compiled loops over them are unrolled; a contact has d = 1 + their sum of unknowns.
+    ptr, col, val, diagonal
+        W (`block_rows`): val is (blocks, d, d); diagonal (nc,) says where the diagonal blocks are.
+    q
+        (m,), m = d nc.
+    mu, mu_r
+        (nc,) coefficients of friction and rolling friction.
+    rho
+        (nc,) what turns a contact's velocity into the impulse that it is worth (`own_units`).
+    """
+
+    tangent: tuple[int, ...]
+    rolling: tuple[int, ...]
+    ptr: Indices
+    col: Indices
+    val: Vector
+    diagonal: Indices
+    q: Vector
+    mu: Vector
+    mu_r: Vector
+    rho: Vector
+
+
+class Rows(NamedTuple):
+    """A matrix by compressed rows."""
+
+    ptr: Indices
+    col: Indices
+    val: Vector
 
 
 @jitable
@@ -36,6 +80,36 @@ def compressed_rows(rows, columns, nz, p, i, x):
                 place[i[k]] += 1
                 col[at] = c
                 val[at] = x[k]
+    return ptr, col, val
+
+
+@jitable
+def dense(rows, columns, p, i, x):
+    """Return compressed rows as a dense matrix."""
+    made = np.zeros((rows, columns))
+    for a in range(rows):
+        for k in range(p[a], p[a + 1]):
+            made[a, i[k]] += x[k]
+    return made
+
+
+@jitable
+def beside(rows, shift, p, i, x, other_p, other_i, other_x):
+    """Return two matrices of compressed rows side by side, the second's columns after `shift`."""
+    ptr = np.zeros(rows + 1, np.int32)
+    col = np.empty(p[rows] + other_p[rows], np.int32)
+    val = np.empty(len(col))
+    at = 0
+    for a in range(rows):
+        for k in range(p[a], p[a + 1]):
+            col[at] = i[k]
+            val[at] = x[k]
+            at += 1
+        for k in range(other_p[a], other_p[a + 1]):
+            col[at] = shift + other_i[k]
+            val[at] = other_x[k]
+            at += 1
+        ptr[a + 1] = at
     return ptr, col, val
 
 
@@ -99,6 +173,20 @@ def diagonal_places(ptr, col):
             if col[k] == a:
                 places[a] = k
     return places
+
+
+@jitable
+def mean_diagonals(system):
+    """Return the mean diagonal of each contact's block (nc,), and that of W."""
+    val = system.val
+    d, nc = 1 + len(system.tangent) + len(system.rolling), len(system.diagonal)
+    means = np.zeros(nc)
+    mean = 0.0
+    for a in range(nc):
+        for s in range(d):
+            means[a] += val[system.diagonal[a], s, s] / d
+        mean += means[a] / nc
+    return means, mean
 
 
 @jitable
@@ -262,8 +350,10 @@ def add_row(tangent, rolling, col, val, r, begin, end, out, first):
 
 
 @jitable
-def product(tangent, rolling, ptr, col, val, q, r, u):
-    """Write u = W r + q."""
+def product(system, q, r, u):
+    """Write u = W r + q, q that of the system or another one."""
+    tangent, rolling = system.tangent, system.rolling
+    ptr, col, val = system.ptr, system.col, system.val
     d = 1 + len(tangent) + len(rolling)
     for a in range(len(ptr) - 1):
         for row in range(d):

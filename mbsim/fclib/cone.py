@@ -143,7 +143,7 @@ def norm(vector):
 
 
 @jitable
-def own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach):
+def own_share(system, u, r, a, square, most, reach):
     """Return two shares of a contact, whose natural map F_a with its own `rho` has this square.
 
     The first is |F_a| / max(|r_a|, rho_a |q_a|), at most LARGEST, with what rounding may hide
@@ -151,11 +151,13 @@ def own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach):
     rho_a |q_a| all are below NOISE of that sum (and `most` as a velocity). The second is what can
     be made smaller, 0 where |F_a| alone is below NOISE. `most`, `reach`: see `rounding`.
     """
-    own = rho[a]
+    ptr, col, val = system.ptr, system.col, system.val
+    d = 1 + len(system.tangent) + len(system.rolling)
+    own = system.rho[a]
     size, push = 0.0, 0.0
     for k in range(d * a, d * a + d):
         size += r[k] ** 2
-        push += q[k] ** 2
+        push += system.q[k] ** 2
     held, missing = math.sqrt(size), math.sqrt(square)
     size = max(held, own * math.sqrt(push))
     if size > 0.0 and ROUNDED * math.sqrt(own) * reach <= NEGLIGIBLE * size:
@@ -176,12 +178,14 @@ def own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach):
 
 
 @jitable
-def rounding(d, rho, q, r):
+def rounding(system, r):
     """Return the velocity that rounding is at most taken for, and `reach`.
 
     The first is EXCUSED of the largest |q_a|. W being positive, the sum of |W_aj| |r_j| is at most
     `reach` / sqrt(rho_a).
     """
+    rho, q = system.rho, system.q
+    d = 1 + len(system.tangent) + len(system.rolling)
     fastest, reach = 0.0, 0.0
     for a in range(len(rho)):
         push, size = 0.0, 0.0
@@ -194,7 +198,7 @@ def rounding(d, rho, q, r):
 
 
 @jitable
-def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work):
+def own_errors(system, u, r, shares, work):
     """Return four figures of the natural maps F_i with each contact's own `rho`, free of units.
 
     rho_i = 1 / lambda_max(W_ii) turns a contact's velocity into the impulse that it is worth.
@@ -208,9 +212,11 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, 
     which rounding is a part, are made only of contacts that the fourth depends on; NO_SHARES, and
     both are 0.
     """
+    tangent, rolling, mu, mu_r = system.tangent, system.rolling, system.mu, system.mu_r
+    rho, q = system.rho, system.q
     d = 1 + len(tangent) + len(rolling)
     missing, speeds, given, bound, moved, impulse = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    most, reach = rounding(d, rho, q, r) if shares == EVERY_SHARE else (-1.0, 0.0)
+    most, reach = rounding(system, r) if shares == EVERY_SHARE else (-1.0, 0.0)
     free, attainable = 0.0, 0.0
     for a in range(len(mu)):
         own = rho[a]
@@ -229,8 +235,8 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, 
             shares == DECIDING and square > attainable**2 * max(held, own**2 * push)
         ):
             if most < 0.0:
-                most, reach = rounding(d, rho, q, r)
-            share, second = own_share(d, ptr, col, val, rho, q, u, r, a, square, most, reach)
+                most, reach = rounding(system, r)
+            share, second = own_share(system, u, r, a, square, most, reach)
             attainable = max(attainable, second)
             if shares == EVERY_SHARE:
                 free = max(free, share)
@@ -246,7 +252,7 @@ def own_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, 
 
 
 @jitable
-def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work):
+def relative_errors(system, u, r, shares, work):
     """Return how far an iterate is from the first goal and from the second one.
 
     The first is the larger of |F| / max(|q|, |r|, |u|), with rho = 1, and of the same with every
@@ -255,16 +261,14 @@ def relative_errors(tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, sha
     scale-free residual (`own_errors`). A scale of 0 does not divide. `shares`: DECIDING; or
     PUBLISHED, for what is lower than both and does for an iterate not within the first goal.
     """
-    missing = residual(tangent, rolling, mu, mu_r, u, r, work)
-    bound = norm(q)
+    missing = residual(system.tangent, system.rolling, system.mu, system.mu_r, u, r, work)
+    bound = norm(system.q)
     scale = max(bound, norm(r), norm(u))
     error = missing / scale if scale > 0.0 else missing
     second = max(missing / bound if bound > 0.0 else missing, missing / (1.0 + math.sqrt(bound)))
     if shares == PUBLISHED:
         return error, second
-    own, _, speeds, free = own_errors(
-        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, work
-    )
+    own, _, speeds, free = own_errors(system, u, r, shares, work)
     return max(error, own), max(second, free / FREE, speeds / FREE)
 
 
@@ -276,6 +280,14 @@ def improves(second, size, before, size_before):
     a wedge the figures fall a little as they run away.
     """
     return second * max(1.0, size / (GROWTH * size_before) if size_before > 0.0 else 1.0) < before
+
+
+@jitable
+def is_better(tol, error, error_q, candidate, best, best_q, r):
+    """Return whether an iterate is better than the best one, r; within `tol` `improves` decides."""
+    if error <= tol and best <= tol:
+        return improves(error_q, norm(candidate), best_q, norm(r))
+    return error < best
 
 
 @jitable

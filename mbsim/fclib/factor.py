@@ -9,16 +9,53 @@ every matrix of the same pattern.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.clock import late
+
+if TYPE_CHECKING:
+    from mbsim.fclib.problem import Indices, Vector
 
 #: Columns eliminated before the rest of a front is touched.
 PANEL = 8
 #: Size of a matrix whose panels take long enough to ask the clock before each, and the number of
 #: products in smaller ones after which it is asked.
 LARGE, MANY = 64, 200_000
+
+
+class Factors(NamedTuple):
+    """LU factors of a matrix (`ordering.Analysis`), and room to get and to use them.
+
+    Parameters
+    ----------
+    values
+        (factor_ptr[-1],) the factors, front by front.
+    exchange
+        (d * nodes,) the row of its front that each pivot's row was exchanged with.
+    front, stack, part
+        (widest^2,), (stacked,) and (widest,): a front, what waits for its parent, a right side.
+    """
+
+    values: Vector
+    exchange: Indices
+    front: Vector
+    stack: Vector
+    part: Vector
+
+
+@jitable
+def room_for_factors(analysis, unknowns):
+    """Return room for the factors of a matrix with so many unknowns."""
+    return Factors(
+        np.empty(analysis.factor_ptr[-1]),
+        np.empty(unknowns, np.int32),
+        np.empty(analysis.widest**2),
+        np.empty(analysis.stacked),
+        np.empty(analysis.widest),
+    )
 
 
 @jitable
@@ -44,20 +81,17 @@ def transposed_places(size, ptr, col):
 
 
 @jitable
-def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack, until):
+def factorise(d, ptr, col, back, val, analysis, factors, until):
     """Write the factors of the matrix (val: blocks, d, d); return whether every pivot was sound.
 
-    `symbolic` is what `ordering.analyse` returned; `factors` has room for factor_ptr[-1] numbers,
-    `exchange` for d * nodes, `front` for room[0]^2 and `stack` for room[1]. It is given up, as not
-    sound, when it is late (`clock.until`).
+    `back` is what `transposed_places` returns. It is given up, as not sound, when it is late
+    (`clock.until`).
     """
-    front_ptr, nodes, pivots, children, rank, factor_ptr, _ = symbolic
+    front_ptr, pivots, stack = analysis.front_ptr, analysis.pivots, factors.stack
     fronts = len(pivots)
-    local = np.empty(len(rank), np.int32)
-    run_from = np.empty(len(rank) + 1, np.int64)
-    run_to = np.empty(len(rank) + 1, np.int64)
-    run_length = np.empty(len(rank) + 1, np.int64)
-    # sizes and places of what waits on the stack
+    local = np.empty(len(analysis.rank), np.int32)
+    runs = np.empty((len(analysis.rank) + 1, 3), np.int64)
+    # what waits on the stack
     waiting = np.empty(fronts + 1, np.int32)
     depth = 0
     top = 0
@@ -73,55 +107,20 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack,
             if late(until):
                 return False
             products = 0
-        matrix = front[: n * n].reshape(n, n)
-        matrix[:] = 0.0
+        matrix = factors.front[: n * n].reshape(n, n)
         for k in range(lo, hi):
-            local[nodes[k]] = k - lo
-        for k in range(lo, lo + pivots[f]):
-            a = nodes[k]
-            row = d * (k - lo)
-            for j in range(ptr[a], ptr[a + 1]):
-                b = col[j]
-                if rank[b] < f:
-                    continue
-                column = d * local[b]
-                for s in range(d):
-                    for t in range(d):
-                        matrix[row + s, column + t] = val[j, s, t]
-                if rank[b] > f:
-                    for s in range(d):
-                        for t in range(d):
-                            matrix[column + s, row + t] = val[back[j], s, t]
-        for _ in range(children[f]):
+            local[analysis.nodes[k]] = k - lo
+        _assemble(d, ptr, col, back, val, analysis, f, local, matrix)
+        for _ in range(analysis.children[f]):
             depth -= 1
             child = waiting[depth]
-            clo = front_ptr[child] + pivots[child]
-            many = front_ptr[child + 1] - clo
-            size = d * many
+            members = analysis.nodes[front_ptr[child] + pivots[child] : front_ptr[child + 1]]
+            size = d * len(members)
             top -= size * size
             update = stack[top : top + size * size].reshape(size, size)
-            # runs of the child's unknowns that are neighbours here, too
-            runs = 0
-            for j in range(many):
-                place = d * local[nodes[clo + j]]
-                if j > 0 and place == run_to[runs - 1] + d * j - run_from[runs - 1]:
-                    run_length[runs - 1] += d
-                else:
-                    run_from[runs] = d * j
-                    run_to[runs] = place
-                    run_length[runs] = d
-                    runs += 1
-            for i in range(many):
-                row = d * local[nodes[clo + i]]
-                for s in range(d):
-                    for k in range(runs):
-                        length = run_length[k]
-                        source = update[d * i + s, run_from[k] : run_from[k] + length]
-                        target = matrix[row + s, run_to[k] : run_to[k] + length]
-                        for t in range(length):
-                            target[t] += source[t]
-        sound = partial_lu(matrix, own, exchange[piv : piv + own], until) and sound
-        _keep(matrix, own, factors[factor_ptr[f] : factor_ptr[f + 1]])
+            _add_update(d, update, members, local, runs, matrix)
+        sound = partial_lu(matrix, own, factors.exchange[piv : piv + own], until) and sound
+        _keep(matrix, own, factors.values[analysis.factor_ptr[f] : analysis.factor_ptr[f + 1]])
         size = n - own
         for i in range(size):
             target = stack[top + i * size : top + (i + 1) * size]
@@ -131,6 +130,56 @@ def factorise(d, ptr, col, back, val, symbolic, factors, exchange, front, stack,
         depth += 1
         piv += own
     return sound
+
+
+@jitable
+def _assemble(d, ptr, col, back, val, analysis, f, local, matrix):
+    """Write rows and columns of front f's own nodes; `local` says where in it a node is."""
+    rank = analysis.rank
+    lo = analysis.front_ptr[f]
+    matrix[:] = 0.0
+    for k in range(lo, lo + analysis.pivots[f]):
+        a = analysis.nodes[k]
+        row = d * (k - lo)
+        for j in range(ptr[a], ptr[a + 1]):
+            b = col[j]
+            if rank[b] < f:
+                continue
+            column = d * local[b]
+            for s in range(d):
+                for t in range(d):
+                    matrix[row + s, column + t] = val[j, s, t]
+            if rank[b] > f:
+                for s in range(d):
+                    for t in range(d):
+                        matrix[column + s, row + t] = val[back[j], s, t]
+
+
+@jitable
+def _add_update(d, update, members, local, runs, matrix):
+    """Add to a front what is left of a child's, among the child's `members`.
+
+    `runs` gets those of the child's unknowns that are neighbours here, too: from, to, length.
+    """
+    count = 0
+    for j in range(len(members)):
+        place = d * local[members[j]]
+        if j > 0 and place == runs[count - 1, 1] + d * j - runs[count - 1, 0]:
+            runs[count - 1, 2] += d
+        else:
+            runs[count, 0] = d * j
+            runs[count, 1] = place
+            runs[count, 2] = d
+            count += 1
+    for i in range(len(members)):
+        row = d * local[members[i]]
+        for s in range(d):
+            for k in range(count):
+                begin, to, length = runs[k, 0], runs[k, 1], runs[k, 2]
+                source = update[d * i + s, begin : begin + length]
+                target = matrix[row + s, to : to + length]
+                for t in range(length):
+                    target[t] += source[t]
 
 
 @jitable
@@ -241,9 +290,11 @@ def _subtract(matrix, begin, end):
 
 
 @jitable
-def solve(d, symbolic, factors, exchange, x, part):
-    """Overwrite the right side x by the solution; `part` has room for room[0] numbers."""
-    front_ptr, nodes, pivots, _, _, factor_ptr, _ = symbolic
+def solve(d, analysis, factors, x):
+    """Overwrite the right side x by the solution."""
+    front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
+    factor_ptr, values = analysis.factor_ptr, factors.values
+    exchange, part = factors.exchange, factors.part
     fronts = len(pivots)
     piv = 0
     for f in range(fronts):
@@ -253,7 +304,7 @@ def solve(d, symbolic, factors, exchange, x, part):
         for k in range(hi - lo):
             for s in range(d):
                 part[d * k + s] = x[d * nodes[lo + k] + s]
-        kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
+        kept = values[factor_ptr[f] : factor_ptr[f + 1]]
         upper = kept[: own * n].reshape(own, n)
         below = kept[own * n :].reshape(own, n - own)
         for k in range(own):
@@ -282,7 +333,7 @@ def solve(d, symbolic, factors, exchange, x, part):
         for k in range(hi - lo):
             for s in range(d):
                 part[d * k + s] = x[d * nodes[lo + k] + s]
-        upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
+        upper = values[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
         for k in range(own - 1, -1, -1):
             part[k] = (part[k] - _dot(upper[k, k + 1 :], part[k + 1 : n])) / upper[k, k]
         for k in range(pivots[f]):
@@ -291,13 +342,14 @@ def solve(d, symbolic, factors, exchange, x, part):
 
 
 @jitable
-def solve_many(d, begin, symbolic, factors, exchange, x, part):
+def solve_many(d, begin, analysis, factors, x):
     """Overwrite the right sides, columns of x (d * nodes, k), from front `begin` on.
 
     Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
-    `part` has room for room[0] rows of x.
     """
-    front_ptr, nodes, pivots, _, _, factor_ptr, _ = symbolic
+    front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
+    factor_ptr, values, exchange = analysis.factor_ptr, factors.values, factors.exchange
+    part = np.empty((analysis.widest, x.shape[1]))
     fronts = len(pivots)
     piv = 0
     for f in range(begin):
@@ -309,7 +361,7 @@ def solve_many(d, begin, symbolic, factors, exchange, x, part):
         for k in range(hi - lo):
             for s in range(d):
                 part[d * k + s] = x[d * nodes[lo + k] + s]
-        kept = factors[factor_ptr[f] : factor_ptr[f + 1]]
+        kept = values[factor_ptr[f] : factor_ptr[f + 1]]
         upper = kept[: own * n].reshape(own, n)
         below = kept[own * n :].reshape(own, n - own)
         for k in range(own):
@@ -336,7 +388,7 @@ def solve_many(d, begin, symbolic, factors, exchange, x, part):
         for k in range(hi - lo):
             for s in range(d):
                 part[d * k + s] = x[d * nodes[lo + k] + s]
-        upper = factors[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
+        upper = values[factor_ptr[f] : factor_ptr[f] + own * n].reshape(own, n)
         for k in range(own - 1, -1, -1):
             target = part[k]
             for i in range(k + 1, n):

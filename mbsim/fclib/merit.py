@@ -170,11 +170,9 @@ def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> Error
 
 def _own(blocks: Blocks, u: Vector, r: Vector) -> tuple[float, float, float, float]:
     """Return own_error, scale_free, velocity_error and attainable."""
-    b = blocks
     found: tuple[float, float, float, float] = compiled(own_errors)(
-        b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r, EVERY_SHARE,
-        np.empty_like(r),
-    )  # fmt: skip
+        blocks.system, u, r, EVERY_SHARE, np.empty_like(r)
+    )
     return found
 
 

@@ -112,11 +112,12 @@ def contact_3d(a, k, bn, b1, b2, mu, rn, r1, r2):
 
 
 @jitable
-def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, u, trial):
+def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, work):
     """Improve r of one contact with rolling friction in place (no closed form is known).
 
     Fixed point r = P_K(r - rho (u + (mu |u_T| + mu_r |u_R|) e_N)) with the step rho adapted so that
     rho |change of u| <= 0.7 |change of r| (the rule of self-adaptive projection methods).
+    `work` has room for 3 d numbers.
     """
     nt, nr = len(tangent), len(rolling)
     d = 1 + nt + nr
@@ -125,6 +126,7 @@ def contact_rolling(tangent, rolling, a, k, b, mu, mu_r, r, first, u, trial):
         trace += a[k, c, c]
     if trace <= 0.0:
         return
+    u, trial = work[:d], work[d : 3 * d]
     rho = d / trace
     for _ in range(200):
         _lifted(tangent, rolling, a, k, b, mu, mu_r, r, first, u)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     Vector = NDArray[np.float64]
-    Indices = NDArray[np.int32]
+    Indices = NDArray[np.integer[Any]]
+    Flags = NDArray[np.bool_]
 
 #: Values of `Matrix.nz` that are no count of entries.
 CSC, CSR = -1, -2

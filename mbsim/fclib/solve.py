@@ -21,7 +21,7 @@ from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
 from mbsim.fclib.solvers.catalog import solver as named
-from mbsim.fclib.solvers.sweeps import GRACE, local_sweeps, mended, sweep_work
+from mbsim.fclib.solvers.sweeps import local_sweeps, mended, sweep_work
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -149,8 +149,8 @@ def _solve_plain(
     check = np.empty(6)
     end = _end(began, max_seconds, nc, len(w.x) / problem.spacedim**2)
     ptr, col, val, diagonal, rho, u, done, error, error_q, rows = compiled(local_sweeps)(
-        tangent, w.m, w.nz, w.p, w.i, w.x, problem.q, mu, r, tol, tol, sweeps, every, GRACE,
-        until(end), history, check,
+        tangent, (w.m, w.nz, w.p, w.i, w.x), problem.q, mu, r, (tol, tol, until(end)), sweeps,
+        every, history, check,
     )  # fmt: skip
     if error <= tol and error_q <= tol:
         found = Errors(*check.tolist())

@@ -1,4 +1,4 @@
-"""The door to FCL, and the only file that imports it.
+"""The way to FCL, and the only file that imports it.
 
 Compiled code calls one C function with the number of pairs waiting; this fills their rows of
 `Work.points` and returns 0, or `DETECTOR_FAILED` with the exception kept for the host.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core.codes import Code
 from mbsim.geometry.hull_overlap import Hull, Solid, hull_of, least_overlap, touching_point
 from mbsim.geometry.mesh_contact import (
     Surface,
@@ -29,7 +30,6 @@ from mbsim.model.elements import Graphic
 if TYPE_CHECKING:
     from mbsim.arrays.scene import Scene
 
-DETECTOR_FAILED = 4
 #: Directions that FCL's iterative solver returns scatter by this much (the project's measurement
 #: on ellipsoid pairs, given in its interface conventions).
 NORMAL_NOISE = 2e-6
@@ -79,7 +79,7 @@ class FclDetector:
                 self._detect(pair)
         except BaseException as error:  # nothing may cross a C callback
             self.failure = error
-            return DETECTOR_FAILED
+            return Code.DETECTOR_FAILED
         return 0
 
     def _geometry(self, g: int, flat_partner: float) -> Any:

@@ -2,12 +2,16 @@
 
 The explicit method estimates the largest rate of f from its last two stages, which are at the same
 time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
-some 3.3, stability and not the error bounds the steps: the model is stiff. The implicit method
-tries an explicit step now and then; where that is good enough, and stable, at half the length
-twice running, it costs less.
+some 3.3, stability and not the error bounds the steps: the model is stiff. Of a step that is cut at
+an event the whole one is meant, as it was tried before.
+
+The implicit method tries an explicit step now and then. What its own last steps took, less what
+explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
+wrong, the explicit method goes on. `Methods.change_over` learns from what came of a change.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
+Steps are counted by their evaluations: those that are rejected or shortened count more.
 Friction that turns sign from step to step within the tolerance hides its rate. That is mostly seen
 all the same (`dopri5.stiffness`), and counts twice: such steps are far beyond the bound, and what
 else they shake leaves the state that the implicit method would begin from. What trembles so leaves
@@ -22,24 +26,29 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import (
     BEGUN,
+    BEGUN_WORK,
     CALM_STEPS,
     COSTLY,
+    EVALUATIONS,
     EXPLICIT_STEPS,
     IMPLICIT_STEPS,
+    JACOBIANS,
     LAST_ERROR,
-    LAST_STEP,
     PACE,
     PATIENCE,
+    RELUCTANCE,
     STEP,
     STEPS,
     STIFF_STEP,
     STIFF_STEPS,
     STIFFNESS,
     TIME,
+    WAS_CUT,
+    failure_or,
 )
 
 #: From here on a step is at the stability bound, or in reach of it.
@@ -48,38 +57,48 @@ BOUND, WITHIN = 3.0, 2.5
 FIRST_PATIENCE, FORGET = 15, 6
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
+#: Of the explicit method, where nothing is taken again: what work is counted in.
+EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
 WORTH, WORTH_AGAIN = 2000, 200
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
-#: Implicit steps between trials of an explicit one, and how many good ones change back: more of
-#: them, over WINDOW steps, where it would be shorter than what the explicit method took before.
-TRY_EVERY, TRIALS, TRIALS_OF_SHORT = 20, 2, 10
+#: For fewer steps that stability does not bound it was not worth it to leave the implicit method.
+SHORT_STAY = 60
+#: Implicit steps between trials of an explicit one.
+TRY_EVERY = 20
+#: An evaluation of the implicit method, with its share of linear algebra, takes as long as so many.
+IMPLICIT_WORK = 2.5
+#: What the implicit method takes, in evaluations, until it runs well again; what is lost with the
+#: explicit steps until then if it was wrong to leave it. A short trial tells so much of others.
+IMPLICIT_START = 250.0
+WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
 @jitable
-def is_stiff(m, t_end):
+def is_stiff(m, h, t_end):
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
         m.memory[CALM_STEPS] = 0.0
-        m.memory[STIFF_STEP] = m.memory[LAST_STEP]
+        m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
         # what trembles leaves and touches: the short steps behind that are not what bounds it
-        m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
+        m.memory[CALM_STEPS] += min(1.0, h / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     m.memory[EXPLICIT_STEPS] += 1.0
     t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
     # the run so far: after a change back only whole windows count, for that may be in an impact
     if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
-        m.memory[PACE] = min(steps, WINDOW) / (t - m.memory[BEGUN])
+        work = m.counts[EVALUATIONS] - m.memory[BEGUN_WORK]
+        m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
     if steps % WINDOW == 0.0:
-        m.memory[BEGUN] = t
+        m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
     # steps that grow, as from a start, are not yet those to come
-    most = (t_end - t) / m.memory[STEP]
+    most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
     if m.memory[COSTLY] == math.inf:
         enough = ahead > WORTH
@@ -105,27 +124,35 @@ def is_calm(p, m, steps, t_end):
     h = min(m.memory[STEP], t_end - t)
     if not h > 0.0:
         return False
-    code = call_float(steps.probe, (steps.context, t, h, m.y, m.trial))
+    code = failure_or(m, call_int(steps.probe, (steps.context, t, h, m.y, m.trial)))
     error = m.memory[LAST_ERROR]
     m.memory[LAST_ERROR] = kept
     part = 0.0
-    if code == 0.0 and error < math.inf:
+    if code == 0 and error < math.inf:
         part = 0.9 * max(error, 1e-4) ** -0.2
         if m.memory[STIFFNESS] > 0.0:
             part = min(part, WITHIN / m.memory[STIFFNESS])
-    m.memory[CALM_STEPS] = m.memory[CALM_STEPS] + 1.0 if part >= 0.5 else 0.0
+    work = m.counts[EVALUATIONS] - EVALUATIONS_A_STEP + m.counts[JACOBIANS] - m.memory[BEGUN_WORK]
+    gain = -math.inf
+    if part > 0.0:
+        # of steps of this length, and no more time than they took: short ones are behind an event
+        each = IMPLICIT_WORK * work / TRY_EVERY
+        gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, TRY_EVERY)
+    m.memory[BEGUN] = t
+    m.memory[BEGUN_WORK] = m.counts[EVALUATIONS] + m.counts[JACOBIANS]
     # a short step, as after a change or a kink, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
-    if m.memory[CALM_STEPS] < (TRIALS_OF_SHORT if short else TRIALS):
+    m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain * (SHORT_TELLS if short else 1.0))
+    if m.memory[CALM_STEPS] < WRONG * m.memory[RELUCTANCE]:
         return False
     m.memory[STEP] = min(1.0, part) * h
     return True
 
 
 @jitable
-def changes_over(p, m, steps, t_end):
+def changes_over(p, m, steps, h, t_end):
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return is_calm(p, m, steps, t_end)
-    return is_stiff(m, t_end)
+    return is_stiff(m, h, t_end)

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -26,6 +26,7 @@ from mbsim.integrators.scheme import (
     combine,
     interpolate,
     on_bench,
+    project,
 )
 
 
@@ -157,7 +158,7 @@ def stage(p, m, t, h, s, out):
     combine(m.k, A[s], s, out)
     for i in range(len(out)):
         out[i] = m.y[i] + h * out[i]
-    return call_float(p.rhs, (p.context, t + C[s] * h, C[s] * h, out, m.k[s]))
+    return call_int(p.rhs, (p.context, t + C[s] * h, C[s] * h, out, m.k[s]))
 
 
 @jitable
@@ -175,19 +176,19 @@ def attempt(p, m, t, h):
     for s in range(1, 12):
         m.counts[EVALUATIONS] += 1
         code = stage(p, m, t, h, s, m.trial)
-        if code != 0.0:
+        if code != 0:
             return code
     combine(m.k, A[12], 12, m.trial)
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + h * m.trial[i]
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    project(p, m, t + h, h, m.trial)
     third = estimate(p, m, t, h, E3[0])
     fifth = estimate(p, m, t, h, E5[0])
     m.memory[LAST_ERROR] = combined_error(fifth, third) / m.memory[TOL]
     if not m.memory[LAST_ERROR] <= 1.0:
-        return 0.0
+        return 0
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[12]))
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[12]))
 
 
 @jitable
@@ -211,8 +212,8 @@ def weigh_dense(p, m, t, h):
             part = INSIDE[row] * h
             interpolate(m, INSIDE[row], m.error)
             m.counts[EVALUATIONS] += 1
-            code = call_float(p.rhs, (p.context, t + part, part, m.error, k[16]))
-            if code != 0.0:
+            code = call_int(p.rhs, (p.context, t + part, part, m.error, k[16]))
+            if code != 0:
                 return code
             combine(k, SLOPES[row], 16, m.error)
             for i in range(n):
@@ -221,7 +222,7 @@ def weigh_dense(p, m, t, h):
             m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], defect / DEFECT)
     # the norm is asked last for the step's own error, which the problem may keep
     estimate(p, m, t, h, E5[0])
-    return 0.0
+    return 0
 
 
 @jitable
@@ -231,7 +232,7 @@ def fit_dense(p, m, t, h):
     for s in range(13, 16):
         m.counts[EVALUATIONS] += 1
         code = stage(p, m, t, h, s, m.error)
-        if code != 0.0:
+        if code != 0:
             return code
     for i in range(len(m.y)):
         rise = m.trial[i] - m.y[i]
@@ -245,10 +246,10 @@ def fit_dense(p, m, t, h):
             d[4 + j, i] *= h
     if m.memory[SHOWN] == 1.0:
         code = weigh_dense(p, m, t, h)
-        if code != 0.0:
+        if code != 0:
             return code
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, k[12]))
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, k[12]))
 
 
 def _attempt(context, t, h, a, b):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.scheme import (
@@ -21,6 +21,7 @@ from mbsim.integrators.scheme import (
     WATCH,
     Scheme,
     on_bench,
+    project,
 )
 
 C2, C3, C4, C5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
@@ -58,36 +59,36 @@ def attempt(p, m, t, h):
     m.counts[EVALUATIONS] += 6
     for i in range(n):
         w[i] = y[i] + h * (A21 * k[0, i])
-    code = call_float(p.rhs, (p.context, t + C2 * h, C2 * h, w, k[1]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + C2 * h, C2 * h, w, k[1]))
+    if code != 0:
         return code
     for i in range(n):
         w[i] = y[i] + h * (A31 * k[0, i] + A32 * k[1, i])
-    code = call_float(p.rhs, (p.context, t + C3 * h, C3 * h, w, k[2]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + C3 * h, C3 * h, w, k[2]))
+    if code != 0:
         return code
     for i in range(n):
         w[i] = y[i] + h * (A41 * k[0, i] + A42 * k[1, i] + A43 * k[2, i])
-    code = call_float(p.rhs, (p.context, t + C4 * h, C4 * h, w, k[3]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + C4 * h, C4 * h, w, k[3]))
+    if code != 0:
         return code
     for i in range(n):
         w[i] = y[i] + h * (A51 * k[0, i] + A52 * k[1, i] + A53 * k[2, i] + A54 * k[3, i])
-    code = call_float(p.rhs, (p.context, t + C5 * h, C5 * h, w, k[4]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + C5 * h, C5 * h, w, k[4]))
+    if code != 0:
         return code
     for i in range(n):
         w[i] = y[i] + h * (
             A61 * k[0, i] + A62 * k[1, i] + A63 * k[2, i] + A64 * k[3, i] + A65 * k[4, i]
         )
-    code = call_float(p.rhs, (p.context, t + h, h, w, k[5]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + h, h, w, k[5]))
+    if code != 0:
         return code
     for i in range(n):
         w[i] = y[i] + h * (B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i])
-    call_float(p.project, (p.context, t + h, h, w, w))
-    code = call_float(p.rhs, (p.context, t + h, h, w, k[6]))
-    if code != 0.0:
+    project(p, m, t + h, h, w)
+    code = call_int(p.rhs, (p.context, t + h, h, w, k[6]))
+    if code != 0:
         return code
     for i in range(n):
         m.error[i] = h * (
@@ -96,7 +97,7 @@ def attempt(p, m, t, h):
     m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / m.memory[TOL]
     if m.memory[WATCH] == 1.0:
         m.memory[STIFFNESS] = stiffness(m, h)
-    return 0.0
+    return 0
 
 
 @jitable
@@ -152,7 +153,7 @@ def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
     _, method = on_bench(context)
     fit_dense(method, h)
-    return 0.0
+    return 0
 
 
 SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=6, dense=5, order=5.0, memory=0.4)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_float, call_int
+from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     ASK,
-    AT_ONCE,
-    BEGIN_ANEW,
     BENDS,
     BY_CHECK,
     BY_ERROR,
@@ -27,8 +26,6 @@ from mbsim.core.problem import (
     HAPPENED,
     HIDES,
     LOAD,
-    NOT_CONVERGED,
-    NOT_FINITE,
     PASS,
     PAUSED,
     ROWS_FULL,
@@ -38,6 +35,7 @@ from mbsim.core.problem import (
     TABLE_OVER,
     WATCH_DUE,
     WATCH_EVERY,
+    Taken,
 )
 from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
@@ -66,6 +64,7 @@ from mbsim.integrators.scheme import (
     H_SMALLEST,
     HAVE_F,
     HAVE_JACOBIAN,
+    KINK_CUT,
     LAST_ERROR,
     LAST_REASON,
     LAST_STEP,
@@ -86,13 +85,18 @@ from mbsim.integrators.scheme import (
     STALE,
     STEP,
     STEPS,
+    STIFFNESS,
     TIME,
     TOL,
     VAIN,
     WAS_CUT,
     WATCH,
+    answer_of,
+    failure_or,
     interpolate,
+    note_failure,
     on_bench,
+    project,
 )
 
 #: An event is located to so much of the problem's own time, or of the time where that is larger.
@@ -116,6 +120,8 @@ FARTHER = 10.0
 NEAR_FLOORS = 100.0
 #: So often at most a step is taken again to end at a kink.
 MOST_CUTS = 3
+#: Where steps are cut one after another, whole ones grow so much at most.
+CUT_GROW = 2.0
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol),
 #: and how often a step is shortened for that.
 BENT, MOST_SHORT = 2.0, 20
@@ -138,9 +144,9 @@ def first_step(p, m, t, span, order):
     for i in range(n):
         m.trial[i] = m.y[i] + probe * m.k[0, i]
     m.counts[EVALUATIONS] += 1
-    code = call_float(p.rhs, (p.context, t + probe, probe, m.trial, m.k[1]))
+    code = call_int(p.rhs, (p.context, t + probe, probe, m.trial, m.k[1]))
     curvature = 0.0
-    if code == 0.0:
+    if code == 0:
         for i in range(n):
             m.error[i] = (m.k[1, i] - m.k[0, i]) / probe
         curvature = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
@@ -162,16 +168,28 @@ def bound_is_due(m):
 
 
 @jitable
+def ask_kinks(p, m, t, what, y, b):
+    """Return what the hook `kinks` answers; 0 where it failed, which is noted."""
+    return answer_of(m, call_int(p.kinks, (p.context, t, what, y, b)))
+
+
+@jitable
+def load_of(p, m, t, y):
+    """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
+    return m.error[0] if ask_kinks(p, m, t, LOAD, y, m.error) == 1 else -1.0
+
+
+@jitable
 def begin(p, m, steps, t, t_end, h_max):
     """Evaluate f at the committed point and choose a first step where there is none."""
     if m.memory[HAVE_F] == 0.0:
         m.counts[EVALUATIONS] += 1
-        code = call_float(p.rhs, (p.context, t, 0.0, m.y, m.k[0]))
-        if code != 0.0:
+        code = call_int(p.rhs, (p.context, t, 0.0, m.y, m.k[0]))
+        if code != 0:
             return code
         m.memory[HAVE_F] = 1.0
         if p.kinks != 0:
-            call_float(p.kinks, (p.context, t, SETTLE, m.y, m.error))
+            ask_kinks(p, m, t, SETTLE, m.y, m.error)
         m.memory[FRESH] = 1.0
         m.memory[HAVE_JACOBIAN] = 0.0
     if m.memory[STEP] == 0.0:
@@ -181,7 +199,7 @@ def begin(p, m, steps, t, t_end, h_max):
             m.memory[STEP] = first_step(p, m, t, t_end - t, steps.order)
         if m.memory[FIRST_MAX] > 0.0:
             m.memory[STEP] = min(m.memory[STEP], m.memory[FIRST_MAX])
-    return 0.0
+    return failure_or(m, 0)
 
 
 @jitable
@@ -207,7 +225,9 @@ def reject(p, m, t, h, reason, cut_from):
     """
     m.counts[REJECTED] += 1
     m.counts[LAST_REASON] = reason
-    call_float(p.reject, (p.context, t, float(reason), m.y, m.error))
+    code = call_int(p.reject, (p.context, t, float(reason), m.y, m.error))
+    if code != 0:
+        note_failure(m, code)
     m.memory[STEP] = h
     m.memory[CUT_FROM] = cut_from
 
@@ -218,11 +238,11 @@ def gives_up(m, code, t, h, floor):
 
     Else it is tried again nearer: a trial far ahead may be where no law was meant for.
     """
-    if code == NOT_CONVERGED:
+    if code == Code.NOT_CONVERGED:
         return False
     m.memory[FAILURES] += 1.0
     m.memory[FAILED_AT] = t + h
-    most = MOST_NOT_FINITE if code == NOT_FINITE else MOST_FAILURES
+    most = MOST_NOT_FINITE if code == Code.NOT_FINITE else MOST_FAILURES
     spent = m.memory[FAILURES] > most or h <= floor
     return code >= AT_ONCE or spent
 
@@ -280,9 +300,9 @@ def looks_within(m, times, t):
 def happens_at(p, m, t, h, s):
     """Return whether an event has happened by the part s of the step, its end being m.trial."""
     if s == 1.0:
-        return call_float(p.happens, (p.context, t + h, 0.0, m.trial, m.error)) > 0.0
+        return answer_of(m, call_int(p.happens, (p.context, t + h, 0.0, m.trial, m.error))) == 1
     interpolate(m, s, m.error)
-    return call_float(p.happens, (p.context, t + s * h, 0.0, m.error, m.error)) > 0.0
+    return answer_of(m, call_int(p.happens, (p.context, t + s * h, 0.0, m.error, m.error))) == 1
 
 
 @jitable
@@ -319,8 +339,8 @@ def side_at(p, m, t, h, s, what):
     Sides are those just behind the step's begin: before that only what is found exactly counts.
     """
     interpolate(m, s, m.error)
-    differs = call_float(p.kinks, (p.context, t + s * h, what, m.error, m.error))
-    return differs > (0.0 if s >= NEAR_KINK else 1.0)
+    differs = ask_kinks(p, m, t + s * h, what, m.error, m.error)
+    return differs > (0 if s >= NEAR_KINK else 1)
 
 
 @jitable
@@ -337,29 +357,29 @@ def first_kink(p, m, t, h, whole, behind):
     side_at(p, m, t, h, low, SETTLE)
     if behind < 1.0:
         interpolate(m, behind, m.error)
-        differs = call_float(p.kinks, (p.context, t + behind * h, ASK, m.error, m.error))
+        differs = ask_kinks(p, m, t + behind * h, ASK, m.error, m.error)
     else:
-        differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
-    if differs > 1.0:
+        differs = ask_kinks(p, m, t + h, ASK, m.trial, m.error)
+    if differs > 1:
         # it is told from what was committed, however near that is
         # a part of the whole step: where it lies at the very begin, as behind another, a step
         # that is cut again and again would get too short to reach it
         low, near = 0.0, NEAR_CHANGE * whole / h * farther
-    if differs > 0.0:
+    if differs > 0:
         while high - low > 0.1 * near:
             middle = 0.5 * (low + high)
             if side_at(p, m, t, h, middle, ASK):
                 high = middle
             else:
                 low = middle
-    call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    ask_kinks(p, m, t + h, ASK, m.trial, m.error)
     # a little more, so that the step after it begins on the other side
     return h if high > 1.0 - near else (high + 0.5 * near) * h
 
 
 @jitable
 def outputs(p, m, steps, times):
-    """Write a row for every output time within the last step; return 0 or what stopped it."""
+    """Write a row for every output time within the last step; return 0, FULL, or less a code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
     t_new = m.memory[TIME]
     # forces that depend on a fixed step are shown as they acted
@@ -368,22 +388,23 @@ def outputs(p, m, steps, times):
         when = times[m.counts[NEXT_OUTPUT]]
         # a row at the time of an event holds what is after it
         if when > t_new or (when == t_new and m.memory[EVENT_DUE] == 1.0):
-            return 0.0
+            return 0
         interpolate(m, min(1.0, (when - t) / h), m.trial)
-        call_float(p.project, (p.context, when, 0.0, m.trial, m.trial))
+        project(p, m, when, 0.0, m.trial)
         m.counts[OUTPUTS] += 1
         m.counts[NEXT_OUTPUT] += 1
-        code = call_float(p.output, (p.context, when, within, m.trial, m.error))
-        if code != 0.0:
-            return code
-    return 0.0
+        full = call_int(p.output, (p.context, when, within, m.trial, m.error))
+        code = failure_or(m, 0)
+        if code != 0 or full != 0:
+            return -code if code != 0 else full
+    return 0
 
 
 @jitable
 def load_at(p, m, t, h, s):
     """Return the load of what holds at the part s of the fitted step."""
     interpolate(m, s, m.error)
-    return call_float(p.kinks, (p.context, t + s * h, LOAD, m.error, m.error))
+    return load_of(p, m, t + s * h, m.error)
 
 
 @jitable
@@ -395,7 +416,7 @@ def reach_of(p, m, t, h, begin):
     pass the limit and come back unseen. What passes it there is cut off. The problem is left
     evaluated at the trial point.
     """
-    end = call_float(p.kinks, (p.context, t + h, LOAD, m.trial, m.error))
+    end = load_of(p, m, t + h, m.trial)
     bent, passed = 0.0, 1.0
     for k in range(3, 0, -1):
         s = 0.25 * k
@@ -403,7 +424,7 @@ def reach_of(p, m, t, h, begin):
         bent = max(bent, abs(load - (1.0 - s) * begin - s * end))
         if load > 1.0:
             passed = s
-    call_float(p.kinks, (p.context, t + h, LOAD, m.trial, m.error))
+    load_of(p, m, t + h, m.trial)
     allowed = BENT * math.sqrt(m.memory[TOL])
     if passed < 1.0 or bent <= allowed:
         return passed
@@ -418,8 +439,9 @@ def way_error(p, m, t, h):
     stages tells how far that is off: two halves of the step do. What they make of it is kept.
     """
     interpolate(m, 0.5, m.error)
-    call_float(p.kinks, (p.context, t + 0.5 * h, HALF, m.error, m.error))
-    return call_float(p.kinks, (p.context, t + h, HALVES, m.trial, m.error)) / m.memory[TOL]
+    ask_kinks(p, m, t + 0.5 * h, HALF, m.error, m.error)
+    ask_kinks(p, m, t + h, HALVES, m.trial, m.error)
+    return m.error[0] / m.memory[TOL]
 
 
 @jitable
@@ -432,7 +454,7 @@ def hidden_side(p, m, t, h):
     for k in range(1, LOOKS):
         if part == 0.0 and side_at(p, m, t, h, k / LOOKS, ASK):
             part = k / LOOKS
-    call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
+    ask_kinks(p, m, t + h, ASK, m.trial, m.error)
     return part
 
 
@@ -446,8 +468,8 @@ def attempt(p, m, steps, t, h, times):
     before the problem is committed, while its hooks still know the step's begin. Single impacts
     are not guarded, nor their peaks looked for, by a method whose step is the problem's bound.
     """
-    code = call_float(steps.attempt, (steps.context, t, h, m.y, m.trial))
-    if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+    code = failure_or(m, call_int(steps.attempt, (steps.context, t, h, m.y, m.trial)))
+    if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
         return code, 1.0, -1.0, 0.0, 1.0
     asked, kinked, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
     # one that ends before a switch at the end is taken for the end
@@ -455,26 +477,26 @@ def attempt(p, m, steps, t, h, times):
     if steps.order > 0.0:
         part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
         if part < 1.0:
-            return 0.0, part, -1.0, 0.0, 1.0
+            return 0, part, -1.0, 0.0, 1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if p.kinks != 0:
-        differs = call_float(p.kinks, (p.context, t + h, ASK, m.trial, m.error))
-        kinked = 1.0 if differs > 0.0 else 0.0
+        differs = ask_kinks(p, m, t + h, ASK, m.trial, m.error)
+        kinked = 1.0 if differs > 0 else 0.0
         if kinked == 0.0:
-            hides = call_float(p.kinks, (p.context, t + h, HIDES, m.trial, m.y)) > 0.0
-            bends = call_float(p.kinks, (p.context, t + h, BENDS, m.trial, m.y)) > 0.0
-            begin = call_float(p.kinks, (p.context, t, LOAD, m.y, m.error))
+            hides = ask_kinks(p, m, t + h, HIDES, m.trial, m.y) > 0
+            bends = ask_kinks(p, m, t + h, BENDS, m.trial, m.y) > 0
+            begin = load_of(p, m, t, m.y)
     looks = kinked > 0.0 or hides or bends or begin >= 0.0
     # a peak is looked for in every step of what trembles at its bound of stability: not shown
     shown = output_within(m, times, until)
     m.memory[SHOWN] = 1.0 if shown else 0.0
     if asked >= 0.0 or shown or looks or p.happens != 0:
-        code = call_float(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
-    if begin >= 0.0 and code == 0.0:
+        code = call_int(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
+    if begin >= 0.0 and code == 0:
         reach = reach_of(p, m, t, h, begin)
-    if hides and code == 0.0:
+    if hides and code == 0:
         kinked = hidden_side(p, m, t, h)
-    if bends and code == 0.0 and kinked == 0.0:
+    if bends and code == 0 and kinked == 0.0:
         m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
     return code, 1.0, asked, kinked, reach
 
@@ -482,6 +504,8 @@ def attempt(p, m, steps, t, h, times):
 @jitable
 def attempt_to_event(p, m, steps, t, h, times, floor):
     """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
+
+    And the error of the step before it was made shorter.
 
     A step with a kink ends just behind it, so that none has one in its midst.
     A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
@@ -492,10 +516,15 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     nudge = 1e-3 * near
     shortened, retakes, cuts, short = False, 0, 0, 0
     whole = max(h, m.memory[CUT_FROM], NEAR_FLOORS / NEAR_CHANGE * floor)
+    uncut, stiffness = -1.0, 0.0
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
         code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
-        failed = code != 0.0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
+        failed = code != 0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
+        if uncut < 0.0:
+            uncut, stiffness = m.memory[LAST_ERROR], m.memory[STIFFNESS]
+        # whether stability bounds a step is asked of what it would be without the event
+        m.memory[STIFFNESS] = stiffness
         if kinked > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
             cut = first_kink(p, m, t, h, whole, kinked)
@@ -507,10 +536,9 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             if reach * h > floor:
                 h *= reach
                 continue
-        if not failed:
-            m.memory[VAIN] = m.memory[VAIN] + 1.0 if cuts > 0 and kinked == 0.0 else 0.0
+        m.memory[KINK_CUT] = 1.0 if cuts > 0 else 0.0
         if p.happens == 0 or failed:
-            return code, part, asked, h
+            return failure_or(m, code), part, asked, h, uncut
         cut = first_event(p, m, t, h, times)
         before = cut > h
         good = (not shortened or nudge > near) if before else (h - cut <= near or h <= floor)
@@ -525,7 +553,7 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             shortened = True
     # the problem's hooks expect its last evaluation at the trial point
     happens_at(p, m, t, h, 1.0)
-    return code, part, asked, h
+    return failure_or(m, code), part, asked, h, uncut
 
 
 @jitable
@@ -535,20 +563,22 @@ def look_inside(p, m, asked):
     # the force of a damped contact peaks before its depth does
     for part in (asked, 0.8 * asked, 0.5 * asked):
         interpolate(m, part, m.trial)
-        call_float(p.project, (p.context, t + part * h, 0.0, m.trial, m.trial))
+        project(p, m, t + part * h, 0.0, m.trial)
         m.counts[OUTPUTS] += 1
-        code = call_float(p.look, (p.context, t + part * h, part * h, m.trial, m.error))
-        if code != 0.0:
+        code = call_int(p.look, (p.context, t + part * h, part * h, m.trial, m.error))
+        if code != 0:
             return code
-    return 0.0
+    return 0
 
 
 @jitable
 def accept(p, m, steps, t, h, asked):
-    """Take the trial point; return the problem's word on it, or a negative code."""
-    word = call_float(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
+    """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
+    word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
     if p.kinks != 0:
-        call_float(p.kinks, (p.context, t + h, PASS, m.trial, m.error))
+        changed = ask_kinks(p, m, t + h, PASS, m.trial, m.error) > 0
+        in_vain = m.memory[KINK_CUT] == 1.0 and not changed
+        m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
@@ -560,12 +590,10 @@ def accept(p, m, steps, t, h, asked):
             for i in range(len(m.y)):
                 m.kept[j, i] = m.ahead[j, i]
     m.memory[FRESH] = 0.0
-    if word >= BEGIN_ANEW:
-        word -= BEGIN_ANEW
+    if word > 0 and word & Taken.BEGIN_ANEW:
         m.memory[FRESH] = 1.0
         m.memory[HAVE_JACOBIAN] = 0.0
-    if word >= 4.0:
-        word -= 4.0
+    if word > 0 and word & Taken.STABLE_IS_STALE:
         m.memory[STALE] = 1.0
     m.memory[LAST_TIME], m.memory[LAST_STEP] = t, h
     m.memory[TIME] = t + h
@@ -574,9 +602,10 @@ def accept(p, m, steps, t, h, asked):
     m.counts[STEPS] += 1
     if asked >= 0.0:
         code = look_inside(p, m, asked)
-        if code != 0.0:
-            return -code
-    return word
+        if code != 0:
+            note_failure(m, code)
+    code = failure_or(m, 0)
+    return -code if code != 0 else word
 
 
 @jitable
@@ -617,9 +646,9 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
     # rows of the last step that found the table full
     if m.memory[LAST_STEP] > 0.0:
         full = outputs(p, m, steps, times)
-        if full != 0.0:
-            m.counts[CODE] = int(-full)
-            return ROWS_FULL if full > 0.0 else FAILED
+        if full != 0:
+            m.counts[CODE] = max(-full, 0)
+            return ROWS_FULL if full > 0 else FAILED
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0
             return HAPPENED
@@ -644,8 +673,8 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         t = m.memory[TIME]
         if m.memory[HAVE_F] == 0.0 or m.memory[STEP] == 0.0:
             code = begin(p, m, steps, t, t_end, h_max)
-            if code != 0.0:
-                m.counts[CODE] = int(code)
+            if code != 0:
+                m.counts[CODE] = code
                 return FAILED
         floor = smallest_step(t, m.memory[OWN_TIME], h_min)
         if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
@@ -655,14 +684,14 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         most = min(whole, max(m.memory[REACH] - t, floor))
 
         # try
-        code, part, asked, h = attempt_to_event(p, m, steps, t, most, times, floor)
+        code, part, asked, h, uncut = attempt_to_event(p, m, steps, t, most, times, floor)
         error = m.memory[LAST_ERROR]
-        if code != 0.0:
+        if code != 0:
             ends = gives_up(m, code, t, h, floor)
-            if ends and code != NOT_FINITE:
-                m.counts[CODE] = int(code)
+            if ends and code != Code.NOT_FINITE:
+                m.counts[CODE] = code
                 return FAILED
-            unsolved = code == NOT_CONVERGED
+            unsolved = code == Code.NOT_CONVERGED
             shrink, reason = (m.memory[RETRY], BY_NEWTON) if unsolved else (0.1, BY_NOT_FINITE)
             reject(p, m, t, max(shrink * h, floor), reason, 0.0)
             m.memory[AFTER_REJECTION] = 1.0
@@ -688,37 +717,44 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             continue
 
         # take
+        may_grow = m.memory[WAS_CUT] == 1.0 and m.memory[AFTER_REJECTION] == 0.0
         choose_next(m, steps, h, h_max)
         if h < whole:
+            m.memory[STEP] = max(m.memory[STEP], whole)
+        if h < most and may_grow and steps.order > 0.0:
             # it was good enough, and ended for an event; where those follow each other, as when
-            # stick and slip take turns, whole steps have to outgrow what they alternate in
-            grows = 2.0 if m.memory[WAS_CUT] == 1.0 and steps.order > 0.0 else 1.0
-            m.memory[STEP] = max(m.memory[STEP], grows * whole)
+            # stick and slip take turns, whole steps outgrow what they alternate in, as far as the
+            # error that they have themselves lets them
+            factor = next_factor(uncut, 1.0, steps.order, steps.memory, False)
+            m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
         arrive_at(m, t, h, h < whole and h == m.memory[REACH] - t, t_end)
         forgive(m)
-        if word < 0.0:
-            m.counts[CODE] = int(-word)
+        if word < 0:
+            m.counts[CODE] = -word
             return FAILED
         if p.arrive != 0:
-            arrived = call_float(p.arrive, (p.context, m.memory[TIME], 0.0, m.y, m.error))
-            m.memory[EVENT_DUE] = arrived
-        full = outputs(p, m, steps, times)
-        if full < 0.0:
-            m.counts[CODE] = int(-full)
-            return FAILED
-        if word == 1.0 or word == 3.0:
-            m.counts[EVALUATIONS] += 1
-            code = call_float(p.rhs, (p.context, t + h, 0.0, m.y, m.k[0]))
-            if code != 0.0:
-                m.counts[CODE] = int(code)
+            arrived = call_int(p.arrive, (p.context, m.memory[TIME], 0.0, m.y, m.error))
+            m.memory[EVENT_DUE] = float(arrived)
+            if arrived < 0:
+                m.counts[CODE] = -arrived
                 return FAILED
-        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, t_end):
+        full = outputs(p, m, steps, times)
+        if full < 0:
+            m.counts[CODE] = -full
+            return FAILED
+        if word & Taken.Y_CHANGED:
+            m.counts[EVALUATIONS] += 1
+            code = call_int(p.rhs, (p.context, t + h, 0.0, m.y, m.k[0]))
+            if code != 0:
+                m.counts[CODE] = code
+                return FAILED
+        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, most, t_end):
             m.memory[CHANGE_DUE] = 1.0
-        if full > 0.0 or word >= 2.0:
+        if full > 0 or word & Taken.ROWS_FULL:
             return ROWS_FULL
         if m.memory[EVENT_DUE] == 1.0:
             m.memory[EVENT_DUE] = 0.0

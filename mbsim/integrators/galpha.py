@@ -30,7 +30,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE
@@ -50,6 +50,7 @@ from mbsim.integrators.newton import (
     note,
     put_along,
     target,
+    unless_singular,
 )
 from mbsim.integrators.rotation import turn
 from mbsim.integrators.scheme import (
@@ -65,6 +66,7 @@ from mbsim.integrators.scheme import (
     TOL,
     Scheme,
     on_bench,
+    project,
 )
 
 #: What a step leaves of a vibration that is fast against it.
@@ -117,8 +119,8 @@ def factor(p, m, t, h):
     m.counts[FACTORIZATIONS] += 1
     part = (1.0 - AM) / (1.0 - AF)
     c = np.array((GAMMA / (BETA * h), part / (BETA * h * h), part / (GAMMA * h), 1.0))
-    code = call_float(p.factor, (p.context, t, h, c, c))
-    m.memory[FACTORED_STEP] = h if code == 0.0 else 0.0
+    code = call_int(p.factor, (p.context, t, h, c, c))
+    m.memory[FACTORED_STEP] = h if code == 0 else 0.0
     return code
 
 
@@ -143,24 +145,24 @@ def probe_on(p, m, t, h, s, ahead, gain):
     """
     n = len(m.y)
     carry_on(m, s)
-    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    project(p, m, t + ahead, ahead, m.trial)
     m.counts[EVALUATIONS] += 1
-    code = call_float(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
-    if code != 0.0:
+    code = call_int(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
+    if code != 0:
         return code
     for i in range(n):
         m.k[R, i] = m.k[F, i] - (m.trial[i] - m.k[A_BEFORE, i]) / s
     if m.bodies[0] > 0:
         put_along(p, m, t + ahead, m.trial, m.k[R], m.error)
-    code = call_float(p.solve, (p.context, t, h, m.k[R], gain))
-    if code != 0.0:
+    code = call_int(p.solve, (p.context, t, h, m.k[R], gain))
+    if code != 0:
         return code
     for i in range(n):
         m.trial[i] += gain[i]
-    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    project(p, m, t + ahead, ahead, m.trial)
     for i in range(n):
         gain[i] = m.trial[i] - m.k[A_BEFORE, i]
-    return 0.0
+    return 0
 
 
 @jitable
@@ -174,25 +176,26 @@ def probe(p, m, t, h):
     s = PROBE * h
     if m.memory[HAVE_JACOBIAN] == 0.0:
         code = linearise(p, m, t, 0.0, m.y, m.k[F])
-        if code != 0.0:
+        if code != 0:
             return code
     m.memory[FACTORED_STEP] = 0.0
     m.counts[FACTORIZATIONS] += 1
     g = 1.0 / s
     c = np.array((g, g * g, g, 0.0))
-    if call_float(p.factor, (p.context, t, h, c, c)) != 0.0:
-        return -1.0
+    code = call_int(p.factor, (p.context, t, h, c, c))
+    if code != 0:
+        return unless_singular(code)
     for i in range(n):
         m.trial[i] = m.y[i]
     for j in range(2):
         code = probe_on(p, m, t, h, s, (j + 1.0) * s, m.k[D + j])
-        if code != 0.0:
+        if code != 0:
             return code
     for i in range(n):
         m.kept[ALGORITHMIC, i] = m.k[0, i]
         m.kept[DOT, i] = m.k[0, i]
         m.kept[SLOPE, i] = (m.k[D + 1, i] - m.k[D, i]) / (s * s)
-    return 0.0
+    return 0
 
 
 @jitable
@@ -269,14 +272,14 @@ def settle(p, m, t, h):
     end = BODY_SIZE * m.bodies[0]
     for i in range(end):
         m.error[i] = m.trial[i]
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    project(p, m, t + h, h, m.trial)
     twice = swung(m)
     if twice:
         # that turned velocities along joints as well, in body axes: only what is across counts
         for at in range(7, end, BODY_SIZE):
             for i in range(at, at + 6):
                 m.trial[i] = m.error[i]
-        call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+        project(p, m, t + h, h, m.trial)
     for at in range(7, end, BODY_SIZE):
         for i in range(at, at + 6):
             m.k[A1, i] += (m.trial[i] - m.error[i]) / (GAMMA * h)
@@ -290,7 +293,7 @@ def show_drift(p, m, t, h):
     for i in range(n):
         m.k[D, i] = m.trial[i]
     place(m, h)
-    call_float(p.project, (p.context, t + h, h, m.trial, m.trial))
+    project(p, m, t + h, h, m.trial)
     for i in range(n):
         m.trial[i] = m.k[D, i]
 
@@ -302,22 +305,23 @@ def evaluate(p, m, t, h, anew):
     if anew:
         return linearise(p, m, t + h, h, m.trial, m.k[F])
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[F]))
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[F]))
 
 
 @jitable
 def correction(p, m, t, h, d):
     """Write Newton's correction of y for the f evaluated last into d; return code and size."""
-    if m.memory[FACTORED_STEP] != h and factor(p, m, t, h) != 0.0:
-        # a singular system is none of an rhs: another step has another
-        return -1.0, 0.0
+    if m.memory[FACTORED_STEP] != h:
+        code = factor(p, m, t, h)
+        if code != 0:
+            return unless_singular(code), 0.0
     end = BODY_SIZE * m.bodies[0]
     for i in range(len(m.y)):
         m.k[R, i] = m.k[F, i] - true_rate(m, i) if is_rate(i, end) else 0.0
-    code = call_float(p.solve, (p.context, t, h, m.k[R], d))
-    if code != 0.0:
+    code = call_int(p.solve, (p.context, t, h, m.k[R], d))
+    if code != 0:
         return code, 0.0
-    return 0.0, call_float(p.norm, (p.context, t, 0.0, d, m.trial))
+    return 0, call_float(p.norm, (p.context, t, 0.0, d, m.trial))
 
 
 @jitable
@@ -349,16 +353,16 @@ def iterate(p, m, t, h, anew):
     while word == GO_ON:
         iteration += 1
         code = evaluate(p, m, t, h, anew and iteration == 1)
-        if code != 0.0:
+        if code != 0:
             return code
         code, size = correction(p, m, t, h, m.k[D])
-        if code != 0.0:
+        if code != 0:
             return code
         take(m, h, 1.0, m.k[D])
         word, rate = judge(m, iteration, most, size, before, rate, LATE)
         before = size
     m.memory[RATE] = rate
-    return 0.0 if word == SOLVED else -1.0
+    return 0 if word == SOLVED else -1
 
 
 @jitable
@@ -377,12 +381,12 @@ def search(p, m, t, h, size):
         code = evaluate(p, m, t, h, False)
         if not may_help(code):
             return code
-        if code == 0.0:
+        if code == 0:
             code, left = correction(p, m, t, h, m.k[D_NEXT])
-            if code == 0.0 and left <= (1.0 - 0.25 * part) * size:
-                return 0.0
+            if code == 0 and left <= (1.0 - 0.25 * part) * size:
+                return 0
         part *= 0.5
-    return -1.0
+    return -1
 
 
 @jitable
@@ -391,26 +395,26 @@ def iterate_damped(p, m, t, h):
     m.memory[RETRY] = QUARTER
     for _ in range(MOST_DAMPED):
         code = evaluate(p, m, t, h, True)
-        if code != 0.0:
+        if code != 0:
             return code
         code, size = correction(p, m, t, h, m.k[D])
-        if code != 0.0:
+        if code != 0:
             return code
         note(m, size)
         if size <= target(m.memory[TOL]):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
-            return 0.0
+            return 0
         code = search(p, m, t, h, size)
-        if code == -1.0 and size <= LEFT * m.memory[TOL]:
+        if code == -1 and size <= LEFT * m.memory[TOL]:
             # nothing is better: what is left is rounding
             for i in range(len(m.y)):
                 m.k[A1, i] = m.k[A_BEFORE, i]
             m.memory[RATE] = 0.0
-            return 0.0
-        if code != 0.0:
+            return 0
+        if code != 0:
             return code
-    return -1.0
+    return -1
 
 
 @jitable
@@ -419,7 +423,7 @@ def arrive(p, m, t, h):
     if settle(p, m, t, h):
         show_drift(p, m, t, h)
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
 
 
 @jitable
@@ -439,7 +443,7 @@ def is_off(p, m, t, h):
         w[i] = m.trial[i] + e[i]
     for i in range(end, len(m.y)):
         w[i] = m.trial[i]
-    call_float(p.project, (p.context, t + h, h, w, w))
+    project(p, m, t + h, h, w)
     for i in range(end):
         e[i] = w[i] - m.trial[i]
     return not call_float(p.norm, (p.context, t, h, e, m.trial)) <= most
@@ -452,17 +456,17 @@ def solve_step(p, m, t, h):
     Returns a code.
     """
     good = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[RATE] <= KEEP
-    code = -1.0
+    code = -1
     for level in range(0 if good else 1, 3):
         foretell(m, h)
         code = iterate_damped(p, m, t, h) if level == 2 else iterate(p, m, t, h, level == 1)
-        if code == 0.0:
+        if code == 0:
             code = arrive(p, m, t, h)
-        if code == 0.0 and level < 2 and is_off(p, m, t, h):
+        if code == 0 and level < 2 and is_off(p, m, t, h):
             code = iterate_damped(p, m, t, h)
-            if code == 0.0:
+            if code == 0:
                 code = arrive(p, m, t, h)
-        if code == 0.0 or not may_help(code):
+        if code == 0 or not may_help(code):
             return code
     # what fails may still be near a better one
     m.memory[HAVE_JACOBIAN] = 0.0
@@ -529,13 +533,13 @@ def attempt(p, m, t, h):
     if m.memory[FRESH] == 1.0:
         m.memory[RETRY] = QUARTER
         code = probe(p, m, t, h)
-        if code != 0.0:
+        if code != 0:
             return as_failure(code)
     code = solve_step(p, m, t, h)
-    if code != 0.0:
+    if code != 0:
         return code
     m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
-    return 0.0
+    return 0
 
 
 @jitable
@@ -556,14 +560,14 @@ def fit_dense(m, h):
 def _attempt(context, t, h, a, b):
     """One step, tried."""
     p, m = on_bench(context)
-    return float(attempt(p, m, t, h))
+    return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
     _, m = on_bench(context)
     fit_dense(m, h)
-    return 0.0
+    return 0
 
 
 SCHEME = Scheme(

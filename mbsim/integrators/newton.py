@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_int
+from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import ALONG, AT_ONCE, NOT_CONVERGED
+from mbsim.core.problem import ALONG
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
@@ -23,6 +24,7 @@ from mbsim.integrators.scheme import (
     REST,
     RETRY,
     TOL,
+    project,
 )
 
 # what `judge` says
@@ -51,10 +53,10 @@ def linearise(p, m, t, h, y, f):
     m.counts[EVALUATIONS] += 1
     m.counts[JACOBIANS] += 1
     m.memory[FACTORED_STEP] = 0.0
-    code = call_float(p.rhs, (p.context, t, h, y, f))
-    if code == 0.0:
-        code = call_float(p.linearise, (p.context, t, h, y, f))
-    m.memory[HAVE_JACOBIAN] = 1.0 if code == 0.0 else 0.0
+    code = call_int(p.rhs, (p.context, t, h, y, f))
+    if code == 0:
+        code = call_int(p.linearise, (p.context, t, h, y, f))
+    m.memory[HAVE_JACOBIAN] = 1.0 if code == 0 else 0.0
     m.memory[JACOBIAN_TIME] = t
     return code
 
@@ -79,7 +81,7 @@ def put_along(p, m, t, y, r, w):
         w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
         w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
         w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    call_float(p.project, (p.context, t, ALONG, w, w))
+    project(p, m, t, ALONG, w)
     for at in range(0, end, BODY_SIZE):
         a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
         for i in range(3):
@@ -172,6 +174,12 @@ def may_help(code):
 
 
 @jitable
+def unless_singular(code):
+    """Return the code of `factor`, -1 for a singular system: another step has another."""
+    return -1 if code == Code.SINGULAR else code
+
+
+@jitable
 def as_failure(code):
     """Return the code of a step whose equations were not solved for the reason `code`."""
-    return code if code > 0.0 else NOT_CONVERGED
+    return code if code > 0 else Code.NOT_CONVERGED

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.newton import (
@@ -39,6 +39,7 @@ from mbsim.integrators.newton import (
     linearise,
     may_help,
     put_along,
+    unless_singular,
 )
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -56,7 +57,9 @@ from mbsim.integrators.scheme import (
     TOL,
     WHERE,
     Scheme,
+    note_failure,
     on_bench,
+    project,
 )
 
 _ROOT = math.sqrt(6.0)
@@ -125,12 +128,12 @@ def factor(p, m, t, h):
     m.memory[FACTORED_STEP] = 0.0
     g, re, im = G0 / h, G_RE / h, G_IM / h
     c = np.array((g, g * g, g, 0.0))
-    code = call_float(p.factor, (p.context, t, h, c, c))
-    if code != 0.0:
+    code = call_int(p.factor, (p.context, t, h, c, c))
+    if code != 0:
         return code
     pair = np.array((re, im, re * re - im * im, 2.0 * re * im, re, im, 0.0))
-    code = call_float(p.factor_pair, (p.context, t, h, pair, pair))
-    if code == 0.0:
+    code = call_int(p.factor_pair, (p.context, t, h, pair, pair))
+    if code == 0:
         m.memory[FACTORED_STEP] = h
     return code
 
@@ -167,7 +170,7 @@ def project_stage(p, m, t, h, j):
     z = m.k[Z + j]
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + (z[i] + m.error[i])
-    call_float(p.project, (p.context, t + C[j] * h, C[j] * h, m.trial, m.trial))
+    project(p, m, t + C[j] * h, C[j] * h, m.trial)
     for i in range(len(m.y)):
         m.error[i] = (m.trial[i] - m.y[i]) - z[i]
         z[i] += m.error[i]
@@ -189,10 +192,10 @@ def evaluate_stages(p, m, t, h):
         for i in range(len(m.y)):
             m.trial[i] = m.y[i] + m.k[Z + j, i]
         m.counts[EVALUATIONS] += 1
-        code = call_float(p.rhs, (p.context, t + C[j] * h, C[j] * h, m.trial, m.k[F + j]))
-        if code != 0.0:
+        code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, m.trial, m.k[F + j]))
+        if code != 0:
             return code
-    return 0.0
+    return 0
 
 
 @jitable
@@ -220,11 +223,11 @@ def correct(p, m, t, h):
     if m.bodies[0] > 0:
         for r in (real, pair[0], pair[1]):
             put_along(p, m, t, m.y, r, m.trial)
-    code = call_float(p.solve, (p.context, t, h, real, d))
-    if code != 0.0:
+    code = call_int(p.solve, (p.context, t, h, real, d))
+    if code != 0:
         return code, 0.0
-    code = call_float(p.solve_pair, (p.context, t, h, pair, dd))
-    if code != 0.0:
+    code = call_int(p.solve_pair, (p.context, t, h, pair, dd))
+    if code != 0:
         return code, 0.0
     size = 0.0
     for j in range(3):
@@ -235,7 +238,7 @@ def correct(p, m, t, h):
         part = call_float(p.norm, (p.context, t, 0.0, m.error, m.y))
         size = max(size, part) if part < math.inf else math.inf
     transform(m)
-    return 0.0, size
+    return 0, size
 
 
 @jitable
@@ -266,10 +269,10 @@ def iterate(p, m, t, h, anew):
     while word == GO_ON:
         iteration += 1
         code = evaluate_stages(p, m, t, h)
-        if code != 0.0:
+        if code != 0:
             return code
         code, size = correct(p, m, t, h)
-        if code != 0.0:
+        if code != 0:
             return code
         word, rate = judge(m, iteration, MOST, size, before, rate, 0.0)
         if iteration == 2:
@@ -282,8 +285,8 @@ def iterate(p, m, t, h, anew):
     m.memory[RATE] = rate
     m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
     if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == place(m, t, h)):
-        return 0.0 if is_good_enough(m, before, rate) else -1.0
-    return 0.0 if word == SOLVED else -1.0
+        return 0 if is_good_enough(m, before, rate) else -1
+    return 0 if word == SOLVED else -1
 
 
 @jitable
@@ -298,7 +301,7 @@ def linearise_within(p, m, t, h):
     s = 1.0 + ahead / m.memory[LAST_STEP]
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + carried_on(m, s, i)
-    call_float(p.project, (p.context, t + ahead, ahead, m.trial, m.trial))
+    project(p, m, t + ahead, ahead, m.trial)
     return linearise(p, m, t + ahead, ahead, m.trial, m.k[F])
 
 
@@ -324,19 +327,18 @@ def solve_stages(p, m, t, h):
     while True:
         if stale:
             code = linearise_within(p, m, t, h)
-            if code != 0.0:
+            if code != 0:
                 return code
         if m.memory[FACTORED_STEP] != h:
             code = factor(p, m, t, h)
             m.memory[RETRY] = HALF
-            # a singular system is none of an rhs: another step has another
-            code = -1.0 if code != 0.0 else 0.0
+            code = unless_singular(code)
         else:
-            code = 0.0
-        if code == 0.0:
+            code = 0
+        if code == 0:
             code = iterate(p, m, t, h, False)
-            if code == 0.0:
-                return 0.0
+            if code == 0:
+                return 0
         if m.memory[JACOBIAN_TIME] == place(m, t, h) or not may_help(code):
             return as_failure(code)
         stale = True
@@ -362,13 +364,16 @@ def estimate_error(p, m, t, h):
     if m.bodies[0] > 0:
         put_along(p, m, t, m.y, r, m.error)
     error = math.inf
-    if call_float(p.solve, (p.context, t, h, r, m.error)) == 0.0:
+    code = call_int(p.solve, (p.context, t, h, r, m.error))
+    if code != 0:
+        note_failure(m, code)
+    else:
         for i in range(len(m.y)):
             w[i] = m.trial[i]
             if i < end and is_rate(i, end):
                 w[i] = m.y[i] + h * led(m, i, F + 2)
         # the last stage, which the trial point is, has been projected
-        call_float(p.project, (p.context, t + h, h, w, w))
+        project(p, m, t + h, h, w)
         error = call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
     m.memory[LAST_ERROR] = error
 
@@ -418,9 +423,9 @@ def arrive(p, m, t, h):
         m.trial[i] = m.y[i] + m.k[Z + 2, i]
     estimate_error(p, m, t, h)
     if not m.memory[LAST_ERROR] <= 1.0:
-        return 0.0
+        return 0
     m.counts[EVALUATIONS] += 1
-    return call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
 
 
 @jitable
@@ -430,13 +435,13 @@ def solve_anew(p, m, t, h):
     Returns a code.
     """
     code = linearise(p, m, t + h, h, m.trial, m.k[LAST])
-    if code == 0.0:
+    if code == 0:
         code = factor(p, m, t, h)
         m.memory[RETRY] = HALF
-        if code == 0.0:
+        if code == 0:
             code = iterate(p, m, t, h, True)
-            if code == 0.0:
-                return 0.0
+            if code == 0:
+                return 0
     return as_failure(code)
 
 
@@ -447,13 +452,13 @@ def attempt(p, m, t, h):
     What f at the trial point does not agree with is solved again with linearisations there.
     """
     code, anew = solve_stages(p, m, t, h), 0
-    while code == 0.0:
+    while code == 0:
         code = arrive(p, m, t, h)
-        if code != 0.0 or not m.memory[LAST_ERROR] <= 1.0:
+        if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
             return code
         if anew == MOST_ANEW or not is_off(p, m, t, h):
             keep_polynomial(m)
-            return 0.0
+            return 0
         anew += 1
         code = solve_anew(p, m, t, h)
     return code
@@ -471,14 +476,14 @@ def fit_dense(m):
 def _attempt(context, t, h, a, b):
     """One step, tried."""
     p, m = on_bench(context)
-    return float(attempt(p, m, t, h))
+    return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
     _, m = on_bench(context)
     fit_dense(m)
-    return 0.0
+    return 0
 
 
 SCHEME = Scheme(

@@ -7,7 +7,7 @@ uses. With p the problem, m the `Method` and k the stages, k[0] = f at the commi
 * `attempt(p, m, t, h)` goes from (t, y) to t + h: fills the stages, `trial`, projected before
   f is taken there into k[last], and memory[LAST_ERROR] = local error over memory[TOL]. A method
   that knows before the last stage that the step fails may leave that stage out. It counts
-  its evaluations and returns 0 or the code of the hook that failed.
+  its evaluations and returns 0 or the code of the hook that failed (a `HOOK` of the problem's).
 * `fit_dense(p, m, t, h)` fills `dense` for a step that is about to be accepted, only where an
   output or a peak lies in it. It may take more stages, if it leaves the problem evaluated at
   the trial point. Where memory[SHOWN] is 1 a method whose polynomial may be worse than its step
@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.core import tags
-from mbsim.core.address import pack, view
+from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import HOOK, Problem
@@ -77,10 +77,16 @@ WAS_CUT = 45
 SHOWN = 46
 # of AUTO: length of the step that was found stiff last
 STIFF_STEP = 47
-# how many steps in a row were cut at a kink and ended before it after all
+# how many steps in a row were cut at a kink and changed no side after all
 VAIN = 48
-MEMORY = 49
-# counts; the last two: at how many steps the caller wants to look at the run, row of the timetable
+# of AUTO: evaluations when its last window of steps began; how many times as much as at first has
+# to speak for leaving the implicit method
+BEGUN_WORK, RELUCTANCE = range(49, 51)
+# 1 where the step that was tried last was cut at a kink
+KINK_CUT = 51
+MEMORY = 52
+# counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
+# caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
 COUNTS = 11
@@ -89,8 +95,8 @@ COUNTS = 11
 class Scheme(NamedTuple):
     """A method: its two functions as hooks, and its numbers."""
 
-    attempt: Callable[..., float]
-    fit_dense: Callable[..., float]
+    attempt: Callable[..., int]
+    fit_dense: Callable[..., int]
     stages: int  # rows of k
     last: int  # row of k with f at the trial point
     dense: int  # coefficients of the dense output
@@ -206,6 +212,38 @@ def on_bench(context):
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
     problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19])
     return problem, bench.method
+
+
+@jitable
+def note_failure(m, code):
+    """Keep the first code of a hook where it cannot be returned: `failure_or` hands it on."""
+    if m.counts[CODE] == 0:
+        m.counts[CODE] = code
+
+
+@jitable
+def failure_or(m, code):
+    """Return the code that `note_failure` kept, which is forgotten, or `code` if there is none."""
+    noted = m.counts[CODE]
+    m.counts[CODE] = 0
+    return noted if noted != 0 else code
+
+
+@jitable
+def answer_of(m, answer):
+    """Return what a hook answers; 0 where it failed, which is noted."""
+    if answer < 0:
+        note_failure(m, -answer)
+        return 0
+    return answer
+
+
+@jitable
+def project(p, m, t, h, y):
+    """Bring y back onto the problem's manifold; a failure is noted."""
+    code = call_int(p.project, (p.context, t, h, y, y))
+    if code != 0:
+        note_failure(m, code)
 
 
 @jitable

@@ -12,11 +12,11 @@ Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 
 
 from __future__ import annotations
 
-from mbsim.core.address import call_float
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.rotation import turn
-from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, on_bench
+from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, on_bench, project
 
 
 @jitable
@@ -37,13 +37,13 @@ def attempt(p, m, t, h):
         wy = y[at + 11] + 0.5 * h * f[at + 11]
         wz = y[at + 12] + 0.5 * h * f[at + 12]
         turn(y, at, h, wx, wy, wz, w)
-    code = call_float(p.rhs, (p.context, t + h, h, w, new))
+    code = call_int(p.rhs, (p.context, t + h, h, w, new))
     for i in range(end, n):
         w[i] = y[i] + 0.5 * h * (f[i] + new[i])
     for at in range(0, end, BODY_SIZE):
         for k in range(at + 7, at + 13):
             w[k] = y[k] + 0.5 * h * (f[k] + new[k])
-    call_float(p.project, (p.context, t + h, h, w, w))
+    project(p, m, t + h, h, w)
     m.memory[LAST_ERROR] = 0.0
     return code
 
@@ -59,13 +59,13 @@ def fit_dense(p, m, t, h):
         d[1, i] = rise
         d[2, i] = bend
         d[3, i] = rise - h * m.k[1, i] - bend
-    return 0.0
+    return 0
 
 
 def _attempt(context, t, h, a, b):
     """One step."""
     p, m = on_bench(context)
-    return float(attempt(p, m, t, h))
+    return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):

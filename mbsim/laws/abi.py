@@ -25,7 +25,6 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from mbsim.core import jit
 from mbsim.core.address import vector_at
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import AT_ONCE
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
 FRICTION_INPUTS = 27
@@ -34,9 +33,6 @@ DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19
 NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
 #: Fields of a law's output before its memory: force, torques, and those named here.
 STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
-RAISED_INTERPRETED = 1
-RAISED_COMPILED = 2
-STOPPED_BY_USER = AT_ONCE
 
 _PTR = types.CPointer(types.float64)
 NORMAL_SIGNATURE = types.int64(types.float64, types.float64, _PTR, _PTR)

@@ -34,8 +34,6 @@ PLACE = 19
 # first
 EVALUATE, SLOPES, EXPLORE = 0.0, 1.0, 2.0
 
-#: Code of a user's normal law that raised when compiled, or made something else than a number.
-USER_NORMAL_FAILED = 14
 
 # Gauss-Legendre on (0, 1), three points: exact for forces up to depth^5
 _AWAY = 0.5 * math.sqrt(0.6)

@@ -8,6 +8,7 @@ Nothing here is converted, placed or checked; see `placement` and `checks`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.expressions import Expression
+from mbsim.forces.catalog import FORCES
 
 Array = npt.NDArray[np.float64]
 
@@ -348,20 +350,24 @@ class ScalarForce:
 
 
 @dataclass(frozen=True)
-class Bushing:
-    """Force_Bushing, Adams' BUSHING: springs and dampers along and about the axes of J.
+class MarkerForce:
+    """A force between two markers of one of the kinds in `forces.catalog`.
 
-    Six numbers each: x, y, z [F/L, F T/L, F], then about x, y, z [F L/rad, F L T/rad, F L].
+    `parameters` are the attributes of its statement by name, defaults among them.
     """
 
     id: int
+    kind: str
     label: str = ""
     i_marker_id: int = 0
     j_marker_id: int = 0
-    stiffness: tuple[float, ...] = (0.0,) * 6
-    damping: tuple[float, ...] = (0.0,) * 6
-    preload: tuple[float, ...] = (0.0,) * 6
+    parameters: tuple[tuple[str, Any], ...] = ()
     source: Source = Source()
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The attributes by name."""
+        return dict(self.parameters)
 
 
 @dataclass(frozen=True)
@@ -606,7 +612,7 @@ class Model:
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
     spring_dampers: dict[int, SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
-    bushings: dict[int, Bushing] = field(default_factory=dict)
+    marker_forces: dict[str, dict[int, MarkerForce]] = field(default_factory=dict)  # by kind
     vector_forces: dict[int, VectorForce] = field(default_factory=dict)
     body_forces: dict[int, BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
@@ -628,6 +634,13 @@ class Model:
     warnings: tuple[str, ...] = field(default=(), metadata=_ASIDE)
     # what was set in the deck before it was read
     overrides: tuple[str, ...] = field(default=(), metadata=_ASIDE)
+
+    def table(self, name: str) -> Mapping[int, Any]:
+        """Return the elements of a field by id, or those of a kind of forces between markers."""
+        if name in FORCES:
+            return self.marker_forces.get(name, {})
+        found: dict[int, Any] = getattr(self, name)
+        return found
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""

@@ -9,6 +9,7 @@ from mbsim.errors import Fault
 from mbsim.expressions import Expression
 from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.tree import Call, Number
+from mbsim.forces.catalog import FORCES
 from mbsim.joints.catalog import JOINTS
 from mbsim.model.elements import Model, Source
 
@@ -20,7 +21,7 @@ STATEMENTS = {
     "MOTION": "Motion_Joint",
     "SFORCE": "Force_Scalar_TwoBody",
     "SPRINGDAMPER": "Force_SpringDamper",
-    "BUSHING": "Force_Bushing",
+    **{name: FORCES[name].statement for name in FORCES},
     "VECTORFORCE": "Force_Vector_TwoBody",
     "BODYFORCE": "Force_Vector_OneBody",
     "JOINTFRICTION": "Force_JointFriction",
@@ -62,7 +63,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Motion_Joint": model.motions,
         "Force_SpringDamper": model.spring_dampers,
         "Force_Scalar_TwoBody": model.scalar_forces,
-        "Force_Bushing": model.bushings,
+        **{FORCES[name].statement: model.table(name) for name in FORCES},
         "Force_Vector_TwoBody": model.vector_forces,
         "Force_Vector_OneBody": model.body_forces,
         "Force_JointFriction": model.joint_frictions,

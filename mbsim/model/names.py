@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mbsim.forces.catalog import FORCES
+
 #: Adams' statements by the XML's.
 ADAMS = {
     "Body_Rigid": "PART",
@@ -13,7 +15,7 @@ ADAMS = {
     "Motion_Marker": "MOTION",
     "Force_SpringDamper": "SPRINGDAMPER",
     "Force_Scalar_TwoBody": "SFORCE",
-    "Force_Bushing": "BUSHING",
+    **{FORCES[name].statement: adams.name for name in FORCES if (adams := FORCES[name].adams)},
     "Force_Vector_TwoBody": "GFORCE",
     "Reference_Variable": "VARIABLE",
     "Reference_Spline": "SPLINE",

@@ -8,9 +8,10 @@ from typing import Any
 
 from mbsim.model.elements import Subroutine
 from mbsim.plugins.dependence import dependence
-from mbsim.plugins.loader import Scripts, find_script, find_source, user_function
-from mbsim.plugins.octave import OctaveFile
-from mbsim.plugins.shared_library import Library, choose
+from mbsim.plugins.source.find import find_script, find_source
+from mbsim.plugins.source.octave import OctaveFile
+from mbsim.plugins.source.script import Scripts, user_function
+from mbsim.plugins.source.shared_library import Library, choose
 
 
 def about(
@@ -36,7 +37,7 @@ def about(
     arguments : sequence
         What the call with iflag 1 is given.
     plugin_files, scripts
-        As `loader.load_friction` takes them.
+        As `friction.load_friction` takes them.
 
     Raises
     ------

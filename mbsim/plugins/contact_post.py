@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
-from mbsim.plugins.helpers import host
-from mbsim.plugins.loader import Scripts, find_script, user_function
+from mbsim.plugins.helpers import Pair, host
+from mbsim.plugins.source.find import find_script
+from mbsim.plugins.source.script import Scripts, user_function
 
 #: Names of the arguments, in order.
 CONTACTPOST = "id, i_gra_id, j_gra_id, time, par, npar, iflag, endflg"
-
-Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +55,6 @@ class ContactPost:
             guard.raise_failure()
         finally:
             host.time = outer
-
-
-@dataclass(frozen=True)
-class Shown:
-    """What the results of one contact at one output time are, for `py_get_contact_post`.
-
-    Attributes
-    ----------
-    net : sequence of float, shape (8,)
-        Force (3), torque about I's cg (3), largest depth and largest slip speed of the element.
-    incidents : mapping
-        By pair of graphics I, J: rows of depth, point (3), normal (3), X (3).
-    """
-
-    net: Sequence[float]
-    incidents: Mapping[Pair, Sequence[Sequence[float]]]
 
 
 def load_post(contact: Contact, plugin_files: Sequence[Path], scripts: Scripts) -> ContactPost:

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mbsim.errors import PluginError
 from mbsim.plugins.helpers import StopRun, host
-from mbsim.plugins.octave import OctaveError
+from mbsim.plugins.source.octave import OctaveError
 
 if TYPE_CHECKING:
-    from mbsim.plugins.loader import UserFriction
+    from mbsim.plugins.types import UserFriction
+from mbsim.plugins.returned import NotAForce, force_and_state, numbers, one_number, three_numbers
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 C_FUNCTION = ctypes.CFUNCTYPE(
@@ -27,10 +28,6 @@ C_FUNCTION = ctypes.CFUNCTYPE(
 STATE_FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64
 )
-
-
-class NotAForce(Exception):
-    """A user function returned something else than three finite numbers."""
 
 
 class PassedOn(BaseException):
@@ -110,62 +107,6 @@ def _report(error: BaseException, element: str, time: float, name: str, source: 
     return "\n".join(lines)
 
 
-def three_numbers(result: Any) -> list[float]:
-    """Return a user function's result as three finite floats, or raise `NotAForce`."""
-    return numbers(result, 3, " [Fx, Fy, Tz]")
-
-
-def force_and_state(result: Any, states: int) -> list[float]:
-    """Return Fx, Fy, Tz and the new state as finite floats, or raise `NotAForce`."""
-    try:
-        force, state = result
-    except (TypeError, ValueError):
-        shown = repr(result)
-        shown = shown if len(shown) <= 80 else shown[:77] + "..."
-        raise NotAForce(
-            f"returned {shown}, not (force, new_state) as CFFSUB_STATES = {states} asks"
-        ) from None
-    return three_numbers(force) + numbers(state, states, " of new state")
-
-
-def numbers(result: Any, count: int, names: str = "") -> list[float]:
-    """Return a user function's result as `count` finite floats, or raise `NotAForce`."""
-    shown = repr(result)
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    # numpy arrays have no common base with list; length and indexing make a sequence
-    sized = hasattr(result, "__len__") and hasattr(result, "__getitem__")
-    if not sized or isinstance(result, (str, bytes, dict)):
-        hint = " (no return statement?)" if result is None else ""
-        raise NotAForce(f"returned {shown}{hint}, not {count} finite numbers{names}")
-    if len(result) != count:
-        raise NotAForce(f"returned {len(result)} values, {shown}, not {count} finite numbers")
-    try:
-        if any(isinstance(value, (str, bytes)) for value in result):
-            raise TypeError
-        values = [float(value) for value in result]
-    except (TypeError, ValueError, OverflowError) as error:
-        raise NotAForce(f"returned {shown}, not {count} finite numbers") from error
-    if any(value - value != 0.0 for value in values):
-        raise NotAForce(f"returned {shown}, not {count} finite numbers")
-    return values
-
-
-def one_number(result: Any) -> list[float]:
-    """Return a user function's result as one finite float in a list, or raise `NotAForce`."""
-    shown = repr(result)
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    hint = " (no return statement?)" if result is None else ""
-    try:
-        if isinstance(result, (str, bytes)):
-            raise TypeError
-        value = float(result)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise NotAForce(f"returned {shown}{hint}, not one finite number") from error
-    if value - value != 0.0:
-        raise NotAForce(f"returned {shown}, not one finite number")
-    return [value]
-
-
 class Views(dict[int, Any]):
     """Memory of a fixed number of doubles by address; the host's buffers seldom move."""
 
@@ -212,13 +153,8 @@ def callback(
 
     With `states` it keeps so many numbers of its own.
     """
-    from mbsim.laws.abi import (
-        DFLAG,
-        FRICTION_INPUTS,
-        MEMORY_OUT,
-        RAISED_INTERPRETED,
-        STOPPED_BY_USER,
-    )
+    from mbsim.core.codes import Code
+    from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, MEMORY_OUT
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
     inputs_at, par_at = Views(FRICTION_INPUTS + states), Views(par_count)
@@ -252,10 +188,10 @@ def callback(
                 _put_force(out_at[out], result)
             return 0
         except PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, f"Force_Contact[{element}]", time, name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 
@@ -292,7 +228,7 @@ def state_callback(
     object
         What must live as long as the address is used.
     """
-    from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.core.codes import Code
 
     results_at = Views(count)
     title, id = element
@@ -319,10 +255,10 @@ def state_callback(
                     room[k] = number
             return 0
         except PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, title, time, name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 

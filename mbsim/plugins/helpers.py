@@ -5,13 +5,11 @@ from __future__ import annotations
 import builtins
 import math
 import sys
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from mbsim.plugins import kernels
-
-if TYPE_CHECKING:
-    from mbsim.plugins.contact_post import Shown
 
 
 class StopRun(BaseException):
@@ -27,6 +25,25 @@ Look = Callable[[str, Sequence[float]], list[Any]]
 
 def _nothing(name: str, ids: Sequence[float]) -> list[Any]:
     return [0.0, 1]
+
+
+Pair = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the results of one contact at one output time are, for `py_get_contact_post`.
+
+    Attributes
+    ----------
+    net : sequence of float, shape (8,)
+        Force (3), torque about I's cg (3), largest depth and largest slip speed of the element.
+    incidents : mapping
+        By pair of graphics I, J: rows of depth, point (3), normal (3), X (3).
+    """
+
+    net: Sequence[float]
+    incidents: Mapping[Pair, Sequence[Sequence[float]]]
 
 
 class Host:

@@ -4,97 +4,30 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from mbsim.errors import PluginError
 from mbsim.laws import user_normal as at
 from mbsim.model.elements import Contact
 from mbsim.plugins import guard
 from mbsim.plugins.dependence import dependence
-from mbsim.plugins.diagnose import reads_parameter
 from mbsim.plugins.helpers import StopRun, host
-from mbsim.plugins.loader import Script, Scripts, find_source, user_function
-from mbsim.plugins.octave import OctaveFile, running
-from mbsim.plugins.shared_library import FORTRAN, Library, address_of, choose
+from mbsim.plugins.source.diagnose import reads_parameter
+from mbsim.plugins.source.find import find_source
+from mbsim.plugins.source.octave import OctaveFile, running
+from mbsim.plugins.source.script import Script, Scripts, user_function
+from mbsim.plugins.source.shared_library import FORTRAN, Library, address_of, choose
+from mbsim.plugins.types import UserNormal
 
 #: Names of the arguments, in order.
 CNFSUB = "id, time, par, npar, loci, ni, locj, nj, gap, gapdot, gapdotdot, dflag, iflag"
 _FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p
 )
-
-
-@dataclass(frozen=True, eq=False)
-class UserNormal:
-    """A user's normal law, ready to be called; keep it alive as long as `address` is in use.
-
-    Attributes
-    ----------
-    address : int
-        Of the C function behind `laws.abi.NORMAL_SIGNATURE`.
-    par : ndarray, shape (n,)
-        The values of cnf_param_string.
-    place : ndarray, shape (user_normal.PLACE,)
-        What the law is given beside depth and rate.
-    hidden : tuple of float
-        What the C function reads of its parameters before `par`.
-    language, compiled, reason, source, name, element, function, looks, asked
-        As of `loader.UserFriction`.
-    """
-
-    address: int
-    par: npt.NDArray[np.float64]
-    place: npt.NDArray[np.float64]
-    hidden: tuple[float, ...]
-    source: Path
-    name: str
-    element: int
-    function: Callable[..., Any] | None = field(default=None, repr=False)
-    compiled: bool = True
-    reason: str = ""
-    language: str = "Python"
-    keep: object = field(default=None, repr=False)
-    looks: bool = False
-    asked: tuple[str, ...] = ()
-
-    @property
-    def how(self) -> str:
-        """How it runs, in a word for the user."""
-        if self.language != "Python":
-            return self.language
-        return "compiled" if self.compiled else "interpreted"
-
-    @property
-    def row(self) -> npt.NDArray[np.float64]:
-        """The parameters as the C function behind `address` reads them."""
-        return np.concatenate([self.hidden, self.par])
-
-    def call(self, depth: float, rate: float) -> float:
-        """Return the force of the interpreted function at its place; exceptions come through."""
-        assert self.function is not None
-        given = self.place.tolist()
-        vectors = [given[k : k + 3] for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
-        dflag, par = int(given[at.MODE] != at.EVALUATE), self.par.tolist()
-        host.time, host.area = given[at.TIME], given[at.AREA]
-        return only_one(
-            self.function(
-                self.element, given[at.TIME], par, len(par), *vectors, -depth, -rate, 0.0, dflag, 0
-            )
-        )
-
-
-def only_one(result: Any) -> float:
-    """Return the force that a function gave as a number or as a sequence of one."""
-    if type(result) is float and result - result == 0.0:
-        return result
-    if hasattr(result, "__len__") and not isinstance(result, (str, bytes, dict)):
-        return guard.numbers(result, 1, " [F]")[0]
-    return guard.one_number(result)[0]
 
 
 def normal_arguments(contact: Contact) -> list[Any]:
@@ -112,7 +45,7 @@ def load_normal(
 ) -> UserNormal:
     """Return the user's normal law of a contact, compiled if it can be.
 
-    The arguments are those of `loader.load_friction`, and so is what is raised.
+    The arguments are those of `friction.load_friction`, and so is what is raised.
     """
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cnf.fnc_name
@@ -158,7 +91,7 @@ def _from_library(
     from mbsim.core import jit
     from mbsim.core.address import pack
     from mbsim.laws.abi import NORMAL_SIGNATURE
-    from mbsim.plugins.normal_adapter import NormalCall, call_c, call_fortran
+    from mbsim.plugins.adapters.normal import NormalCall, call_c, call_fortran
 
     spoken, symbol = choose(library, made.name, "cnf", language)
     call = NormalCall(
@@ -189,8 +122,8 @@ def _compiled(made: UserNormal, script: Script) -> tuple[int, str]:
     """Return the address of compiled code that has passed the probes, or 0 and the reason."""
     if script.text is None:
         return 0, "a .pyc has no source"
-    from mbsim.plugins.compiled import compile_normal
-    from mbsim.plugins.probe import normal_disagreement
+    from mbsim.plugins.compile.compiled import compile_normal
+    from mbsim.plugins.compile.probe import normal_disagreement
 
     address, reason = compile_normal(script.text, script.values, made.name, len(made.par))
     if reason:
@@ -204,7 +137,7 @@ def _compiled(made: UserNormal, script: Script) -> tuple[int, str]:
 
 def _callback(made: UserNormal) -> tuple[int, object]:
     """Return the address of the interpreted function as a normal law, and what keeps it alive."""
-    from mbsim.laws.abi import RAISED_INTERPRETED, STOPPED_BY_USER
+    from mbsim.core.codes import Code
 
     out_at, place = guard.Views(3), made.place.data
 
@@ -219,11 +152,11 @@ def _callback(made: UserNormal) -> tuple[int, object]:
                 at.keep(results, k, depth, made.call(*at.question(k, depth, rate)))
             return 0
         except guard.PassedOn:
-            return RAISED_INTERPRETED
+            return Code.RAISED_INTERPRETED
         except BaseException as error:
             title, source = f"Force_Contact[{made.element}]", str(made.source)
             guard.failure.store(error, title, place[at.TIME], made.name, source)
-            return STOPPED_BY_USER if isinstance(error, StopRun) else RAISED_INTERPRETED
+            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
         finally:
             host.state = outer
 

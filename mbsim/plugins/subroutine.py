@@ -14,8 +14,9 @@ from mbsim.model.elements import Subroutine
 from mbsim.model.names import element_name, is_adams
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
-from mbsim.plugins.loader import Scripts, find_script, user_function
-from mbsim.plugins.octave import end_all
+from mbsim.plugins.source.find import find_script
+from mbsim.plugins.source.octave import end_all
+from mbsim.plugins.source.script import Scripts, user_function
 
 ARGUMENTS = "id, time, par, npar, dflag, iflag"
 

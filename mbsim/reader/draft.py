@@ -32,7 +32,7 @@ class Draft:
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
     spring_dampers: dict[int, el.SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
-    bushings: dict[int, el.Bushing] = field(default_factory=dict)
+    marker_forces: dict[str, dict[int, el.MarkerForce]] = field(default_factory=dict)
     vector_forces: dict[int, el.VectorForce] = field(default_factory=dict)
     body_forces: dict[int, el.BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)

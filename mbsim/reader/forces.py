@@ -1,4 +1,4 @@
-"""Force_SpringDamper, _Scalar_TwoBody, _Bushing, _Vector_..., and Reference_Variable."""
+"""Force_SpringDamper, _Scalar_TwoBody, _Vector_..., and Reference_Variable."""
 
 from __future__ import annotations
 
@@ -53,30 +53,6 @@ def _build_scalar(entry: Entry) -> None:
         source=entry.source,
     )
     entry.register(entry.draft.scalar_forces, force)
-
-
-_AXES = ("x", "y", "z", "tx", "ty", "tz")
-
-
-def _build_bushing(entry: Entry) -> None:
-    """Add a bushing."""
-    stiffness, damping, preload = (
-        tuple(entry.get(f"{prefix}{axis}", 0.0) for axis in _AXES)
-        for prefix in ("k", "c", "preload_")
-    )
-    if not any((*stiffness, *damping, *preload)):
-        entry.warn("all stiffnesses, dampings and preloads are 0: the bushing does nothing")
-    bushing = el.Bushing(
-        id=entry.get("id", 0),
-        label=entry.get("label", ""),
-        i_marker_id=entry.get("i_marker_id", 0),
-        j_marker_id=entry.get("j_marker_id", 0),
-        stiffness=stiffness,
-        damping=damping,
-        preload=preload,
-        source=entry.source,
-    )
-    entry.register(entry.draft.bushings, bushing)
 
 
 #: Which of COMPONENTS a type does not have.
@@ -180,16 +156,6 @@ FORCE_SCALAR_TWOBODY = Statement(
         "action_only": Spec(FLAG),  # ours; Adams' ACTIONONLY
     },
     _build_scalar,
-)
-FORCE_BUSHING = Statement(
-    "Force_Bushing",
-    {
-        **NAMED,
-        **_MARKERS,
-        **{f"{prefix}{axis}": Spec(NOT_NEGATIVE) for prefix in "kc" for axis in _AXES},
-        **{f"preload_{axis}": Spec(REAL) for axis in _AXES},
-    },
-    _build_bushing,
 )
 _VECTOR: dict[str, Spec] = {
     "type": Spec(keyword(VECTOR_TYPES), required=True),

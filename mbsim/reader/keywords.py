@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from mbsim.forces.catalog import FORCES
 from mbsim.laws.catalog import FRICTION_LAWS
 
 
@@ -67,7 +68,7 @@ FORCE_ELEMENTS = spellings(
     MOTION="MOTION_JOINT MOTION_MARKER",
     SPRINGDAMPER="FORCE_SPRINGDAMPER",
     SFORCE="FORCE_SCALAR_TWOBODY",
-    BUSHING="FORCE_BUSHING",
+    **{name: FORCES[name].statement.upper() for name in FORCES},
     VECTORFORCE="FORCE_VECTOR_TWOBODY VFORCE VTORQUE GFORCE",
     BODYFORCE="FORCE_VECTOR_ONEBODY",
     JOINTFRICTION="FORCE_JOINTFRICTION",

@@ -19,7 +19,6 @@ from mbsim.reader.draft import Draft
 from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.force_element import FORCE_ELEMENT
 from mbsim.reader.forces import (
-    FORCE_BUSHING,
     FORCE_SCALAR_TWOBODY,
     FORCE_SPRINGDAMPER,
     FORCE_VECTOR_ONEBODY,
@@ -29,6 +28,7 @@ from mbsim.reader.forces import (
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.marker_forces import marker_forces
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
@@ -61,7 +61,7 @@ STATEMENTS = (
     MOTION_MARKER,
     FORCE_SPRINGDAMPER,
     FORCE_SCALAR_TWOBODY,
-    FORCE_BUSHING,
+    *marker_forces(),
     FORCE_VECTOR_TWOBODY,
     FORCE_VECTOR_ONEBODY,
     FORCE_JOINTFRICTION,
@@ -82,8 +82,9 @@ STATEMENTS = (
 )
 BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
-# documented statements (or members of documented families) that would change the motion
-NOT_BUILT = (
+# documented statements (or members of documented families) that would change the motion; those
+# that have been built are none of them
+_DOCUMENTED = (
     "Activate Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
     "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_FMU Control_PlantInput "
@@ -96,6 +97,7 @@ NOT_BUILT = (
     "Reference_ParamSurface Reference_String "
     "Sensor_Evaluate Sensor_Proximity UserProgramControl"
 ).split()
+NOT_BUILT = [name for name in _DOCUMENTED if fold(name) not in BY_KEY]
 #: Documented statements that mbsim has another way for.
 REFUSED = {
     "Load_Command": "a run's commands are those of its deck; write them into this <Command>",

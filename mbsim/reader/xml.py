@@ -163,7 +163,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         general_constraints=draft.general_constraints,
         spring_dampers=draft.spring_dampers,
         scalar_forces=draft.scalar_forces,
-        bushings=draft.bushings,
+        marker_forces=draft.marker_forces,
         vector_forces=draft.vector_forces,
         body_forces=draft.body_forces,
         joint_frictions=draft.joint_frictions,

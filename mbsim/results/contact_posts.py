@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays.scene import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
-from mbsim.plugins.contact_post import ContactPost, Pair, Shown
-from mbsim.plugins.helpers import host
+from mbsim.plugins.contact_post import ContactPost
+from mbsim.plugins.helpers import Pair, Shown, host
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System

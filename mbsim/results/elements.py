@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Model
 from mbsim.model.names import element_name
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 class Group:
     """Elements of one statement: where a model and a result file have them, and their names."""
 
-    member: str  # of Model
+    member: str  # of Model: see its `table`
     path: str  # in result files
     one: str  # on pictures
     title: str  # in messages, with the id behind it
@@ -34,7 +35,7 @@ GROUPS = {
     ),
     "SPRINGDAMPER": Group("spring_dampers", "springs", "spring", "Force_SpringDamper"),
     "SFORCE": Group("scalar_forces", "scalar_forces", "scalar force", "Force_Scalar_TwoBody"),
-    "BUSHING": Group("bushings", "bushings", "bushing", "Force_Bushing"),
+    **{name: Group(name, k.path, k.title, k.statement) for name in FORCES if (k := FORCES[name])},
     "VECTORFORCE": Group("vector_forces", "vector_forces", "vector force", "Force_Vector_TwoBody"),
     "BODYFORCE": Group("body_forces", "body_forces", "body force", "Force_Vector_OneBody"),
     "JOINTFRICTION": Group(
@@ -48,15 +49,14 @@ GROUPS = {
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
 APPLIED = (
-    *("SPRINGDAMPER", "SFORCE", "BUSHING", "VECTORFORCE", "BODYFORCE"),
+    *("SPRINGDAMPER", "SFORCE", *FORCES, "VECTORFORCE", "BODYFORCE"),
     *("JOINTFRICTION", "JOINTLIMIT", "DRYFRICTION", "FORCEELEMENT"),
 )
 
 
-def elements_of(model: Model, statement: str) -> dict[int, Any]:
+def elements_of(model: Model, statement: str) -> Mapping[int, Any]:
     """Return the elements of a statement by id."""
-    found: dict[int, Any] = getattr(model, GROUPS[statement].member)
-    return found
+    return model.table(GROUPS[statement].member)
 
 
 def title(model: Model, statement: str, id: int) -> str:

@@ -114,7 +114,9 @@ def plain(value: Any) -> Any:
 def of_elements(holder: Any, file: str) -> dict[str, Any]:
     """Return the facts of a model or of settings, by the name of each element in its deck."""
     facts: dict[str, Any] = {}
-    for member, value in plain(holder).items():
+    named = plain(holder)
+    # kinds of forces between markers are tables of their own
+    for member, value in (named | named.pop("marker_forces", {})).items():
         title = _STATEMENTS.get(member, member)
         if isinstance(value, dict) and member in _STATEMENTS and "" not in value:
             facts |= {element_name(file, title, int(id)): item for id, item in value.items()}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from mbsim.core.codes import Code
 from mbsim.errors import PluginError, SolverError
 from mbsim.model.names import element_name
 
@@ -94,47 +95,39 @@ def _not_finite(system: System) -> list[str]:
     return [element_name(file, GROUPS[statement].title, id) for statement, id in elements]
 
 
+_PLAIN: dict[int, str] = {
+    Code.TOO_FAR: "shapes moved further in a step than is known of what is near them",
+    Code.NO_ROOM: "more bodies act on each other than a linearisation has room for",
+    Code.SINGULAR: "the linear equations of an implicit step have no solution",
+}
+
+
 def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
     """Raise what the hooks' code says."""
-    from mbsim.core.problem import NOT_FINITE
-    from mbsim.dynamics.contact.detection import CROWDED
-    from mbsim.dynamics.contact.forces import USER_NOT_FINITE
-    from mbsim.geometry.fcl_detector import DETECTOR_FAILED
-    from mbsim.laws.abi import RAISED_COMPILED, RAISED_INTERPRETED, STOPPED_BY_USER
-    from mbsim.laws.user_normal import USER_NORMAL_FAILED
-
-    if code in (RAISED_INTERPRETED, STOPPED_BY_USER):
+    if code in (Code.RAISED_INTERPRETED, Code.STOPPED_BY_USER):
         from mbsim.plugins import raise_failure
 
         raise_failure()
-    from mbsim.dynamics.constraints.equations import CONTRADICTION
-
     contact = int(system.scene.work.trouble[1])
-    if code == CONTRADICTION:
+    if code == Code.CONTRADICTION:
         from mbsim.dynamics.initial.assembly import equation_name
 
         raise SolverError(
             f"{equation_name(system, contact)} contradicts other constraints from time "
             f"{t:.9g} on; results up to there are kept"
         )
-    from mbsim.dynamics.forces.joint_friction import JAMMED
-
-    if code == JAMMED:
+    if code == Code.JAMMED:
         raise SolverError(_jammed(system, contact, t))
-    from mbsim.dynamics.forces.reaction_forces import UNSETTLED
-
-    if code == UNSETTLED:
+    if code == Code.UNSETTLED:
         raise SolverError(_unsettled(system, contact, t))
-    from mbsim.dynamics.forces.force_element import UNSOLVED_ELEMENT
-
-    if code == UNSOLVED_ELEMENT:
+    if code == Code.UNSOLVED_ELEMENT:
         raise SolverError(_unsolved(system, t))
     element = system.contact_ids[contact] if 0 <= contact < len(system.contact_ids) else 0
-    if code == USER_NORMAL_FAILED:
+    if code == Code.USER_NORMAL_FAILED:
         from mbsim.plugins.normal import reproduce_normal
 
         reproduce_normal(system.user_normal[element])
-    if code in (RAISED_COMPILED, USER_NOT_FINITE) and element in system.user_friction:
+    if code in (Code.RAISED_COMPILED, Code.USER_NOT_FINITE) and element in system.user_friction:
         from mbsim.plugins import reproduce
 
         user = system.user_friction[element]
@@ -147,16 +140,17 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
             )
         reproduce(system.user_friction[element], system.scene.work.law_in, element)
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
-    if code == DETECTOR_FAILED and detector is not None:
+    if code == Code.DETECTOR_FAILED and detector is not None:
         raise SolverError(f"FCL failed at time {t:.9g}: {detector.failure}")
-    if code == CROWDED:
+    if code == Code.CROWDED:
         raise SolverError(
             f"at time {t:.9g} more pairs of graphics are near each other than there is room for"
         )
-    if code in (NOT_FINITE, USER_NOT_FINITE):
+    if code in (Code.NOT_FINITE, Code.USER_NOT_FINITE):
         where = "".join(f" of {name}" for name in _not_finite(system)[:1])
         raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
-    raise SolverError(f"evaluation failed with code {code} at time {t:.9g}")
+    why = _PLAIN.get(code, f"evaluation failed with code {code}")
+    raise SolverError(f"{why} at time {t:.9g}")
 
 
 def _jammed(system: System, row: int, t: float) -> str:

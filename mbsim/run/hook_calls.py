@@ -6,13 +6,15 @@ import ctypes
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from mbsim.run.failures import fail
+
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.core.problem import Problem
 
 _POINTER = ctypes.c_void_p
 _HOOK = ctypes.CFUNCTYPE(
-    ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, _POINTER, _POINTER
+    ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, _POINTER, _POINTER
 )
 _JOINTS = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_double, _POINTER, _POINTER
@@ -20,25 +22,38 @@ _JOINTS = ctypes.CFUNCTYPE(
 
 
 class HookCalls:
-    """The hooks of one system; `problem` may be exchanged for that of another method."""
+    """The hooks of one system that act or answer; `detector` says why FCL failed."""
 
-    def __init__(self, system: System, problem: Problem) -> None:
-        self.scene, self.problem = system.scene, problem
+    def __init__(self, system: System, problem: Problem, detector: Any) -> None:
+        self.system, self.problem, self.detector = system, problem, detector
 
-    def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> float:
-        """Call one of the problem's hooks."""
-        return float(_HOOK(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+    def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> int:
+        """Call one of the problem's hooks; return its code or answer."""
+        return int(_HOOK(hook)(self.problem.context, t, h, a.ctypes.data, b.ctypes.data))
+
+    def must(self, hook: int, t: float, a: Any, b: Any) -> int:
+        """Call one of the problem's hooks; raise what it says where it fails."""
+        answer = self.call(hook, t, 0.0, a, b)
+        acts = hook not in (self.problem.commit, self.problem.output, self.problem.arrive)
+        self._look_at(answer if acts else min(answer, 0), t)
+        return answer
+
+    def _look_at(self, code: int, t: float) -> None:
+        """Raise what a hook's code says, or its answer that is less a code."""
+        if code != 0:
+            fail(self.system, self.detector, abs(code), t)
 
     def ask_joints(self, what: int, t: float, y: Any, dy: Any) -> None:
-        """Ask something of the joints: one of the requests at JOINTS_DOOR."""
-        from mbsim.arrays.scene import JOINTS_DOOR
+        """Ask joints for something, one of `arrays.hooks.Joints`; raise what fails."""
+        from mbsim.arrays.hooks import Hook
 
-        door = _JOINTS(int(self.scene.world.doors[JOINTS_DOOR]))
-        door(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
+        hook = _JOINTS(int(self.system.scene.world.hooks[Hook.JOINTS]))
+        code = hook(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
+        self._look_at(code, t)
 
     def joints_at(self, t: float) -> Callable[[int, Any], None] | None:
         """Return what asks the joints at time t, None where there are none."""
-        if len(self.scene.tree.body) == 0:
+        if len(self.system.scene.tree.body) == 0:
             return None
 
         def serve(what: int, y: Any) -> None:

@@ -67,15 +67,20 @@ class Runner:
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
-        self.detector = self._open_fcl_door()
+        self.detector = self._make_detector()
         system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
-        self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
+        timed = follows_time(system.scene)
+        self._advance, self.methods = jit.planned(
+            lambda: (
+                jit.awaited(driver.advance),
+                Methods(system, settings.integrator, start, timed),
+            )
+        )
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
-        self.hooks = HookCalls(system, self.problem)
+        self.hooks = HookCalls(system, self.problem, self.detector)
         self.method.counts[scheme.NEXT_WATCH] = 0
-        self._advance = jit.function(driver.advance)
         self.changes = changes or []  # parameters of every Simulate, where some differ
         self.stage = 0  # which Simulate
         self.pace = Pace(start, start)  # of that one
@@ -84,16 +89,16 @@ class Runner:
         self.interrupted = False
         self.dump: ContactProblems | None = None
 
-    def _open_fcl_door(self) -> Any:
-        """Put FCL behind the scene's door where a pair may need it."""
+    def _make_detector(self) -> Any:
+        """Put FCL behind its hook where a pair may need it."""
         if not self.system.needs_fcl:
             return None
-        from mbsim.arrays.scene import FCL_DOOR
+        from mbsim.arrays.hooks import Hook
         from mbsim.geometry.fcl_detector import FclDetector
 
         graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
         detector = FclDetector(self.system.scene, graphics)
-        self.system.scene.world.doors[FCL_DOOR] = detector.address
+        self.system.scene.world.hooks[Hook.FCL] = detector.address
         return detector
 
     def start(self, allow_overlap: bool) -> None:
@@ -106,7 +111,6 @@ class Runner:
             self.system,
             self.hooks,
             self.settings,
-            self.detector,
             method.y,
             method.k[0],
             allow_overlap,
@@ -155,7 +159,7 @@ class Runner:
 
     def dump_every(self, every: int, resumed: bool) -> None:
         """Write the contact problem of every so many steps from here on."""
-        from mbsim.arrays.scene import ACCELERATE
+        from mbsim.arrays.hooks import Joints
         from mbsim.integrators import scheme
         from mbsim.run.dumping import ContactProblems
 
@@ -168,7 +172,7 @@ class Runner:
             return self.hooks.call(self.problem.rhs, t, 0.0, y, idle)
 
         def accelerate(t: float, y: Any, dy: Any) -> None:
-            self.hooks.ask_joints(ACCELERATE, t, y, dy)
+            self.hooks.ask_joints(Joints.ACCELERATE, t, y, dy)
 
         self.dump = ContactProblems(
             self.system, every, folder / "fclib", evaluate, accelerate, resumed
@@ -225,9 +229,7 @@ class Runner:
         follows, row = self.sensing.act(t, end, last)
         # the first row of a Simulate is there anyway
         if row and not start:
-            code = self.hooks.call(self.problem.output, t, 0.0, y, error)
-            if code < 0.0:
-                fail(self.system, self.detector, int(-code), t)
+            self.hooks.must(self.problem.output, t, y, error)
             self.recorder.take()
         return follows == GO_ON
 
@@ -258,13 +260,11 @@ class Runner:
         if (
             goes_on
             and self.problem.arrive
-            and self.hooks.call(self.problem.arrive, t, 0.0, method.y, method.error)
+            and self.hooks.must(self.problem.arrive, t, method.y, method.error)
         ):
             goes_on = self._sense(simulation.end_time, start=True)
         if len(self.sensing.times):
-            code = self.hooks.call(self.problem.output, t, 0.0, method.y, method.error)
-            if code < 0.0:
-                fail(self.system, self.detector, int(-code), t)
+            self.hooks.must(self.problem.output, t, method.y, method.error)
         self.recorder.take()
         return goes_on
 

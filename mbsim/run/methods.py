@@ -11,9 +11,16 @@ import numpy as np
 from mbsim.arrays.scene import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
+from mbsim.core import jit
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
-from mbsim.integrators.changing import FIRST_PATIENCE
+from mbsim.integrators.changing import (
+    EVALUATIONS_A_STEP,
+    FIRST_PATIENCE,
+    IMPLICIT_START,
+    IMPLICIT_WORK,
+    SHORT_STAY,
+)
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -64,8 +71,11 @@ class Methods:
         if changing and bodies <= MOST_BODIES:
             self.arrays.memory[scheme.WATCH] = 1.0
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
+            self.arrays.memory[scheme.RELUCTANCE] = 1.0
             self.arrays.memory[scheme.BEGUN] = start
         self.changes = 0
+        #: When AUTO changed over last, and the work by then.
+        self._since = (start, 0.0)
         self.bind()
 
     @property
@@ -75,22 +85,25 @@ class Methods:
 
     def bind(self) -> None:
         """Bind the method that memory names."""
-        running = self.explicit
+        self.problem, self._tangent, (self.steps, self._bench) = jit.planned(self._bound)
+
+    def _bound(self) -> tuple[Problem, Any, tuple[scheme.Steps, Any]]:
+        """Return the problem, what its linearisation lives in, and the method bound to it."""
+        running, problem, linearised = self.explicit, self.problem, self._tangent
         if self.other is not None and self.is_stiff:
             running = self.other
-        if running.implicit and self._tangent is None:
+        if running.implicit and linearised is None:
             from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 
-            made = implicit_hooks(self.system.scene, self.problem, running.pair)
-            self.problem, self._tangent = made
+            problem, linearised = implicit_hooks(self.system.scene, problem, running.pair)
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
-        self.steps, self._bench = scheme.bind(running, self.problem, self.arrays, probe)
+        return problem, linearised, scheme.bind(running, problem, self.arrays, probe)
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""
-        kept: dict[str, Any] = {"changes": np.array(self.changes)}
+        kept: dict[str, Any] = {"changes": np.array(self.changes), "since": np.array(self._since)}
         if self.steps.implicit:
             kept |= tangent.saved(self._tangent[0])
         return kept
@@ -98,6 +111,7 @@ class Methods:
     def restore(self, kept: Mapping[str, Any]) -> None:
         """Bind the method that ran, whose arrays are as they were, to what it kept."""
         self.changes = int(kept["changes"])
+        self._since = (float(kept["since"][0]), float(kept["since"][1]))
         self.bind()
         if self.steps.implicit:
             tangent.restore(self._tangent[0], kept)
@@ -110,9 +124,29 @@ class Methods:
             # no couplings: they are found anew
             self._tangent[0].pattern.count[...] = (0, 0, 1)
 
+    def _learn(self, stiff: bool) -> None:
+        """Let AUTO be slower to change as it did last where that did not pay, else faster.
+
+        The implicit method pays where it takes less work than as many explicit steps a time as when
+        the model was found stiff, the explicit one where stability bounds few of its steps.
+        """
+        memory, counts = self.arrays.memory, self.arrays.counts
+        now = memory[scheme.TIME]
+        work = float(counts[scheme.EVALUATIONS] + counts[scheme.JACOBIANS])
+        if not stiff:
+            took = IMPLICIT_START + IMPLICIT_WORK * (work - self._since[1])
+            pays = took < EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
+            factor = 1.0 / 1.5 if pays else 1.5
+            memory[scheme.PATIENCE] = max(FIRST_PATIENCE, factor * memory[scheme.PATIENCE])
+        elif self.changes > 0:
+            free = memory[scheme.EXPLICIT_STEPS] - memory[scheme.STIFF_STEPS]
+            factor = 2.0 if free < SHORT_STAY else 0.5
+            memory[scheme.RELUCTANCE] = max(1.0, factor * memory[scheme.RELUCTANCE])
+        self._since = (now, work)
+
     def change_over(self) -> str:
         """Let AUTO's other method go on from the committed point; return what is to be said."""
-        memory = self.arrays.memory
+        memory, counts = self.arrays.memory, self.arrays.counts
         stiff = not self.is_stiff
         bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
         memory[scheme.STIFF] = float(stiff)
@@ -120,16 +154,17 @@ class Methods:
         memory[scheme.ERROR_BEFORE] = 1.0
         memory[scheme.GROWTH] = math.inf
         memory[scheme.BEGUN] = memory[scheme.TIME]
-        if stiff:
+        work = counts[scheme.EVALUATIONS] + (counts[scheme.JACOBIANS] if stiff else 0)
+        memory[scheme.BEGUN_WORK] = float(work)
+        self._learn(stiff)
+        if stiff and memory[scheme.PACE] > 0.0:
+            # else there was no window of steps since the last change: it is as costly as before
             memory[scheme.COSTLY] = memory[scheme.PACE]
         # one over the length of the steps that were too short
         often = max(memory[scheme.PACE], 1.0 / memory[scheme.STEP])
         memory[scheme.PACE] = often if stiff else 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
-        if stiff:
-            # one that goes to and fro waits longer each time
-            memory[scheme.PATIENCE] *= 1.5
         self.arrays.dense[...] = 0.0
         self._forget()
         self.changes += 1

@@ -141,23 +141,22 @@ class Again:
 
     def _open(self) -> None:
         """Compile, or load, what evaluates a row."""
+        from mbsim.arrays.hooks import Hook
         from mbsim.core import jit
         from mbsim.core.address import pack
         from mbsim.core.problem import HOOK
-        from mbsim.dynamics.pipeline.hooks import needs_expressions
+        from mbsim.dynamics.pipeline.hook_table import fill
         from mbsim.dynamics.pipeline.replay import again_hook
 
         scene = self.system.scene
-        if needs_expressions(scene):
-            from mbsim.dynamics.pipeline.force_hooks import open_expressions
-
-            open_expressions(scene)
+        # a user's law may ask for expressions
+        fill(scene, only=(Hook.VALUE, Hook.ELEMENT))
         if self.system.reader is not None:
             self.system.reader.open(scene)
         self._table = pack(scene)
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )(jit.address(again_hook, HOOK))
 
     def rows(self) -> Iterator[Row]:
@@ -196,8 +195,8 @@ class Again:
         size, wide = a.CONTACT_COLUMNS * len(ids), sum(groups)
         room = np.zeros(n + size + count * wide)
         code = self._hook(self._table.ctypes.data, time, 0.0, y.ctypes.data, room.ctypes.data)
-        if code != 0.0:
-            fail(self.system, None, int(code), time)
+        if code != 0:
+            fail(self.system, None, code, time)
         nets = room[n : n + size].reshape(len(ids), a.CONTACT_COLUMNS)
         found = Row(time, {id: _net(net) for id, net in zip(ids, nets, strict=True)})
         found.incidents = {id: [] for id in ids}

@@ -116,6 +116,8 @@ def simulate(
     jit.on_first_compile = lambda: tell(
         "compiling what this model needs (a quarter of a minute to one); later runs load it"
     )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
     for file in files:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from mbsim.errors import ModelError
-from mbsim.run.failures import fail
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -71,7 +70,6 @@ def settle_contacts(
     system: System,
     hooks: HookCalls,
     settings: Settings,
-    detector: Any,
     y: Any,
     f: Any,
     allow_overlap: bool,
@@ -85,21 +83,15 @@ def settle_contacts(
     t = settings.stages[0].simulation.start_time
     # what begins to stick or slip is told by it
     scene.world.scale[TOLERANCE] = settings.stages[0].tol
-
-    def look() -> None:
-        code = hooks.call(problem.rhs, t, 0.0, y, f)
-        if code != 0.0:
-            fail(system, detector, int(code), t)
-
-    look()
+    hooks.must(problem.rhs, t, y, f)
     if system.plans.crowds:
         # nothing is listed yet: list what is near, then look again
-        hooks.call(problem.commit, t, 0.0, y, f)
-        look()
+        hooks.must(problem.commit, t, y, f)
+        hooks.must(problem.rhs, t, y, f)
     faults = overlaps(system, log, tell)
     if faults and not allow_overlap:
         raise ModelError("\n".join(dict.fromkeys(faults)))
-    hooks.call(problem.commit, t, 0.0, y, f)
+    hooks.must(problem.commit, t, y, f)
 
 
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:

@@ -142,8 +142,8 @@ def balance_bodies(
     t, problem, scene = simulation.start_time, hooks.problem, system.scene
     asked = Hooks(
         lambda y, f: hooks.call(problem.rhs, t, 0.0, y, f),
-        lambda y: hooks.call(problem.project, t, 0.0, y, y),
-        lambda y, f: hooks.call(problem.commit, t, 0.0, y, f),
+        lambda y: hooks.must(problem.project, t, y, y),
+        lambda y, f: hooks.must(problem.commit, t, y, f),
         hooks.joints_at(t),
     )
     before = tags.copies(scene, tags.STATE)
@@ -159,5 +159,5 @@ def balance_bodies(
     at[...] = y
     for _ in range(2):
         # near pairs of crowds are listed first, then looked at
-        hooks.call(problem.rhs, t, 0.0, at, f)
-        hooks.call(problem.commit, t, 0.0, at, f)
+        hooks.must(problem.rhs, t, at, f)
+        hooks.must(problem.commit, t, at, f)

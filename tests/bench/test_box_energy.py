@@ -11,7 +11,7 @@ import numba
 import numpy as np
 import pytest
 
-from helpers.decks import FLOATING, contact, cube, run_deck
+from helpers.decks import EARTH, contact, cube, run_deck
 from helpers.polyhedra import CUBE, box, box_mesh, mesh, rotation
 from mbsim.compile_model.contacts import pair_address
 from mbsim.core.address import call_int
@@ -42,7 +42,7 @@ def test_energy_of_elastic_hits(tmp_path):
         lost = []
         for a, b in hits(kind, 20, rng):
             p = (*rng.uniform(-0.12, 0.12, 2), 0.36)
-            model = FLOATING + contact(300, 200, **law) + cube(2, (0, 0, 0), b)
+            model = EARTH + contact(300, 200, **law) + cube(2, (0, 0, 0), b)
             model += cube(3, p, a, v=(0.0, 0.0, -3.0), w=rng.uniform(-3, 3, 3))
             results = run_deck(tmp_path, model, end_time=0.15, tol=1e-8)
             if results["contacts/301/peak_force"] > 0.0:

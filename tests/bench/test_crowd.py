@@ -13,7 +13,7 @@ import pytest
 from numba import njit
 
 import mbsim
-from helpers.crowd_decks import block, pile, random_axes, sets, shape_graphic, solid
+from helpers.crowd_decks import LAW, block, pile, random_axes, sets, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, write_deck
 from mbsim.arrays.scene import LIVE, Scene
 from mbsim.compile_model import pairing
@@ -24,7 +24,6 @@ from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact.broadphase import list_pairs
 
 pytestmark = pytest.mark.bench
-LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
 EDGES = [5, 10, 20]
 
 

@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 
 from helpers import free_bodies as free
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import call_float, pack, view
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.pipeline.force_hooks import open_expressions
+from mbsim.dynamics.pipeline.hook_table import put
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, Spline
 
@@ -171,7 +172,7 @@ def test_expressions_against_c(tmp_path):
     )
     system = build(model)
     scene = system.scene
-    open_expressions(scene)
+    put(scene, Hook.VALUE)
     place_bodies(scene, system.y0)
     rows = {"I": system.marker_rows[21], "J": system.marker_rows[11], "G": 0}
     source = MEASURES + spline_in_c(scene)

@@ -13,6 +13,7 @@ import pytest
 
 import mbsim
 from helpers import joint_chain
+from helpers.free_bodies import Silent
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.run.loop import Runner
@@ -25,13 +26,6 @@ pytestmark = pytest.mark.bench
 #: this may grow from a chain of 10.
 MOST, GROWTH = 30.0, 5.0
 ROUNDS = 200
-
-
-class Silent:
-    """A log that keeps nothing."""
-
-    def line(self, text):
-        pass
 
 
 def costs(folder, count):
@@ -50,7 +44,7 @@ def costs(folder, count):
     pair[0::2], pair[1:6:2] = (1e3, 0.0, 1e3, 0.0), (1e3, 2e6, 1e3)
     pointer = ctypes.c_void_p
     form = ctypes.CFUNCTYPE(
-        ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+        ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
     )
 
     def least(name, a, b):

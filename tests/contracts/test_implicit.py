@@ -10,21 +10,22 @@ import numpy.typing as npt
 import pytest
 from numba import carray
 
+from helpers.equations import far, none, observed, one, oscillation, zero
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, I1
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     BY_NEWTON,
     DONE,
     FAILED,
     FRICTION_ALONE,
-    HOOK,
     IMPACTS_ALONE,
     PAUSED,
-    SINGULAR,
     STEP_TOO_SMALL,
     Problem,
+    addresses,
 )
 from mbsim.integrators import catalog, control, driver, galpha, newton, radau5, scheme
 
@@ -72,10 +73,10 @@ def rates(kind, given, t, y, f):
         f[0] = y[0] * y[0]
     elif kind == HALF_LINE:
         f[0] = 0.6 - y[0]
-        return 7.0 if y[0] < 0.5 else 0.0
+        return 7 if y[0] < 0.5 else 0
     elif kind >= BODY:
         body_rates(kind, given, t, y, f)
-    return 0.0
+    return 0
 
 
 @jitable
@@ -231,18 +232,18 @@ def _factor(context, t, h, a, b):
         box.real[:] = 0.0
         across = keep_to_rod(box, small)
         if not invert(small, box.small) or box.numbers[3] == 1:
-            return SINGULAR
+            return Code.SINGULAR
         box.small[:] = box.small @ across
         for i in range(len(box.at)):
             for j in range(len(small)):
                 for k in range(len(small)):
                     box.real[i, first + j] += box.spread[i, k] * box.small[k, j]
-        return 0.0
+        return 0
     work = -box.jacobian
     for i in range(len(work)):
         work[i, i] += c[0]
     good = invert(work, box.real) and box.numbers[3] == 0
-    return 0.0 if good and c[3] == 0.0 and c[1] == c[0] * c[0] and c[2] == c[0] else SINGULAR
+    return 0 if good and c[3] == 0.0 and c[1] == c[0] * c[0] and c[2] == c[0] else Code.SINGULAR
 
 
 def _solve(context, t, h, a, b):
@@ -253,7 +254,7 @@ def _solve(context, t, h, a, b):
         d[i] = 0.0
         for j in range(n):
             d[i] += box.real[i, j] * r[j]
-    return 0.0
+    return 0
 
 
 def _factor_pair(context, t, h, a, b):
@@ -263,7 +264,7 @@ def _factor_pair(context, t, h, a, b):
     for i in range(len(work)):
         work[i, i] += number
     good = invert(work, box.pair) and abs(number * number - c[2] - 1j * c[3]) < 1e-9 * abs(c[2])
-    return 0.0 if good and c[4] == c[0] and c[5] == c[1] and c[6] == 0.0 else SINGULAR
+    return 0 if good and c[4] == c[0] and c[5] == c[1] and c[6] == 0.0 else Code.SINGULAR
 
 
 def _solve_pair(context, t, h, a, b):
@@ -275,7 +276,7 @@ def _solve_pair(context, t, h, a, b):
         for j in range(n):
             total += box.pair[i, j] * (r[0, j] + 1j * r[1, j])
         d[0, i], d[1, i] = total.real, total.imag
-    return 0.0
+    return 0
 
 
 def _unit(context, t, h, a, b):
@@ -289,7 +290,7 @@ def _unit(context, t, h, a, b):
     length = math.sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
     for i in range(3, 7):
         y[i] /= length
-    return 0.0
+    return 0
 
 
 def _keep(context, t, h, a, b):
@@ -300,26 +301,21 @@ def _keep(context, t, h, a, b):
     for i in range(n):
         row[1 + i] = y[i]
     box.numbers[1] += 1
-    return 0.0
+    return 0
 
 
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
-
-
-HOOKS = (_rhs, _zero, _norm, _one, _zero, _zero, _none, _far, _keep, _zero)
+HOOKS = {
+    "rhs": _rhs,
+    "project": zero,
+    "norm": _norm,
+    "check": one,
+    "commit": zero,
+    "look": zero,
+    "inner": none,
+    "limit": far,
+    "output": _keep,
+    "reject": zero,
+}
 BOTH = pytest.mark.parametrize("name", ["RADAU5", "GALPHA"])
 LINEAR = ("linearise", "factor", "solve", "factor_pair", "solve_pair")
 
@@ -353,13 +349,10 @@ class Run:
             np.zeros((rows, n + 1)),
         )
         self._table = pack(self.box)
-        named = list(HOOKS)
-        named[1] = _unit if bodies else _zero
-        plain = [jit.address(hook, HOOK) for hook in named]
-        problem = Problem(int(self._table.ctypes.data), *plain)
-        hooks = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
-        linear = dict(zip(LINEAR, (jit.address(f, HOOK) for f in hooks), strict=True))
-        self.problem = problem._replace(**linear)
+        linear = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
+        hooks = HOOKS | dict(zip(LINEAR, linear, strict=True))
+        hooks["project"] = _unit if bodies else zero
+        self.problem = Problem(int(self._table.ctypes.data), **addresses(hooks))
         method = catalog.load(name)
         self.state = scheme.make(method, np.array(y0), 0.0, bodies)
         self.state.memory[scheme.STEP] = step
@@ -372,17 +365,6 @@ class Run:
 
     def count(self, name):
         return int(self.state.counts[name])
-
-
-def observed(errors):
-    """Return the order between the first and the last of (h, error)."""
-    (h0, e0), (h1, e1) = errors[0], errors[-1]
-    return math.log(e0 / e1) / math.log(h0 / h1)
-
-
-def oscillation(t):
-    # y'' = -y + sin 2t, y(0) = 1, y'(0) = 0
-    return np.cos(t) + 2.0 / 3.0 * np.sin(t) - np.sin(2.0 * t) / 3.0
 
 
 def fixed_steps(kind, y0, n, end=5.0, tol=1e-10, **more):

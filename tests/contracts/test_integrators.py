@@ -13,11 +13,12 @@ from numba import carray, cfunc
 
 import mbsim
 from helpers.decks import run_model
+from helpers.equations import far, none, observed, one, oscillation, zero
 from helpers.folders import MODELS
 from mbsim.core import jit
-from mbsim.core.address import call_float, pack, view
+from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
-from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem
+from mbsim.core.problem import DONE, FAILED, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
 from mbsim.integrators import catalog, dop853, driver, scheme
 
 
@@ -36,7 +37,7 @@ def _oscillator(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[1]
     f[1] = -y[0] + math.sin(2.0 * t)
-    return 0.0
+    return 0
 
 
 def _kepler(context, t, h, a, b):
@@ -45,34 +46,34 @@ def _kepler(context, t, h, a, b):
     cube = math.sqrt(y[0] * y[0] + y[1] * y[1]) ** 3
     f[0], f[1] = y[2], y[3]
     f[2], f[3] = -y[0] / cube, -y[1] / cube
-    return 0.0
+    return 0
 
 
 def _blows_up(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[0] * y[0]
     f[1] = 0.0
-    return 0.0
+    return 0
 
 
 def _rough(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = y[1]
     f[1] = -y[0] + (1.0 if math.sin(7.0 * t) > 0.0 else -1.0)
-    return 0.0
+    return 0
 
 
 def _refuses(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0] = 0.6 - y[0]
     f[1] = 0.0
-    return 7.0 if y[0] < 0.5 else 0.0
+    return 7 if y[0] < 0.5 else 0
 
 
 def _turns(context, t, h, a, b):
     y, f = carray(a, (2,)), carray(b, (2,))
     f[0], f[1] = -3.0 * y[1], 3.0 * y[0]
-    return 0.0
+    return 0
 
 
 def _to_the_circle(context, t, h, a, b):
@@ -80,7 +81,7 @@ def _to_the_circle(context, t, h, a, b):
     length = math.sqrt(y[0] * y[0] + y[1] * y[1])
     y[0] /= length
     y[1] /= length
-    return 0.0
+    return 0
 
 
 def _norm2(context, t, h, a, b):
@@ -91,22 +92,6 @@ def _norm2(context, t, h, a, b):
 def _norm4(context, t, h, a, b):
     e = carray(a, (4,))
     return math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
-
-
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
 
 
 class Table(NamedTuple):
@@ -122,7 +107,7 @@ def _keep(context, t, h, a, b):
     row = table.rows[table.used[0]]
     row[0], row[1], row[2] = t, y[0], y[1]
     table.used[0] += 1
-    return 0.0
+    return 0
 
 
 def _comes_to_rest(context, t, h, a, b):
@@ -130,18 +115,13 @@ def _comes_to_rest(context, t, h, a, b):
     numbers = view(context, Table).numbers
     f[0] = y[1]
     f[1] = -numbers[0] * y[0] - numbers[1] * y[1]
-    return 0.0
+    return 0
 
 
 def _speed(context, t, h, a, b):
     # as of a body on a stiff contact: its position counts next to nothing
     e = carray(a, (2,))
     return max(abs(e[1]), abs(e[0]))
-
-
-def exact(t):
-    # y'' = -y + sin 2t, y(0) = 1, y'(0) = 0
-    return np.cos(t) + 2.0 / 3.0 * np.sin(t) - np.sin(2.0 * t) / 3.0
 
 
 ECCENTRICITY = 0.3
@@ -157,9 +137,24 @@ def planet(t):
     return np.array([math.cos(anomaly) - ECCENTRICITY, across])
 
 
-def make_problem(rhs, context=0, norm=_norm2, output=_zero, project=_zero):
-    hooks = (rhs, project, norm, _one, _zero, _zero, _none, _far, output, _zero)
-    return Problem(context, *[jit.address(hook, HOOK) for hook in hooks])
+def make_problem(rhs, context=0, norm=_norm2, output=zero, project=zero):
+    hooks = dict(
+        rhs=rhs, project=project, norm=norm, check=one, commit=zero, look=zero, inner=none,
+        limit=far, output=output, reject=zero,
+    )  # fmt: skip
+    return Problem(context, **addresses(hooks))
+
+
+def _fails(context, t, h, a, b):
+    return 77
+
+
+def _answers_less_a_code(context, t, h, a, b):
+    return -77
+
+
+def _half(context, t, h, a, b):
+    return 0.5
 
 
 @pytest.fixture(scope="module")
@@ -188,12 +183,6 @@ class Run:
         return advance(self.steps, end, tol, h_max, 0.0, times, budget)
 
 
-def observed(errors):
-    """Return the order between the first and the last of (h, error)."""
-    (h0, e0), (h1, e1) = errors[0], errors[-1]
-    return math.log(e0 / e1) / math.log(h0 / h1)
-
-
 def at_least_the_order(order, name):
     # DOP853 has small coefficients: the next order shows as well
     return order == pytest.approx(5.0, abs=0.3) if name == "DOPRI5" else 7.5 <= order < 10.0
@@ -207,7 +196,7 @@ def test_observed_order_on_an_oscillator(oscillator, name):
         run = Run(name, oscillator, step=5.0 / n)
         run(5.0, 1e9, h_max=5.0 / n)
         count = run.state.counts[scheme.STEPS]
-        errors.append((5.0 / count, abs(run.state.y[0] - exact(5.0))))
+        errors.append((5.0 / count, abs(run.state.y[0] - oscillation(5.0))))
     assert at_least_the_order(observed(errors), name), errors
 
 
@@ -233,7 +222,7 @@ def test_observed_order_of_dense_output(name):
         run.state.memory[scheme.STEP] = 5.0 / n
         run(5.0, 1e9, h_max=5.0 / n, times=times)
         assert table.rows[:, 0].tolist() == times.tolist()
-        worst = np.abs(table.rows[:, 1] - exact(times)).max()
+        worst = np.abs(table.rows[:, 1] - oscillation(times)).max()
         errors.append((5.0 / run.state.counts[scheme.STEPS], worst))
     assert observed(errors) > ORDERS[name][1] - 0.1, errors
 
@@ -272,7 +261,7 @@ def test_error_falls_with_the_tolerance_down_to_rounding(oscillator, name):
     for tol in 10.0 ** -np.arange(3, 15):
         run = Run(name, oscillator)
         assert run(5.0, tol) == DONE
-        errors.append(abs(run.state.y[0] - exact(5.0)))
+        errors.append(abs(run.state.y[0] - oscillation(5.0)))
     assert errors[-1] < 1e-13
     assert errors[0] / errors[-1] > 1e7
     for looser, tighter in zip(errors, errors[2:], strict=False):
@@ -415,7 +404,7 @@ def _verlet(context, t, h, a, b):
     m.counts[scheme.EVALUATIONS] += 1
     m.trial[0] = m.y[0] + h * (m.y[1] + 0.5 * h * m.k[0, 1])
     m.trial[1] = m.y[1]
-    code = call_float(p.rhs, (p.context, t + h, h, m.trial, m.k[1]))
+    code = call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[1]))
     m.trial[1] = m.y[1] + 0.5 * h * (m.k[0, 1] + m.k[1, 1])
     m.k[1, 0] = m.trial[1]
     return code
@@ -428,7 +417,7 @@ def _cubic(context, t, h, a, b):
         m.dense[0, i], m.dense[1, i] = m.y[i], rise
         m.dense[2, i] = h * m.k[0, i] - rise
         m.dense[3, i] = 2.0 * rise - h * (m.k[0, i] + m.k[1, i])
-    return 0.0
+    return 0
 
 
 def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
@@ -447,5 +436,31 @@ def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
         assert run.state.counts[scheme.STEPS] == n
         assert run.state.counts[scheme.EVALUATIONS] == n + 1
         assert run.state.memory[scheme.H_LARGEST] == pytest.approx(5.0 / n)
-        errors.append((5.0 / n, abs(run.state.y[0] - exact(5.0))))
+        errors.append((5.0 / n, abs(run.state.y[0] - oscillation(5.0))))
     assert observed(errors) == pytest.approx(2.0, abs=0.1)
+
+
+#: Hooks that act, and those that answer: their codes are negative.
+ACT, ANSWER = (
+    ("rhs", "project", "look", "reject"),
+    (
+        "kinks",
+        "happens",
+        "commit",
+        "arrive",
+        "output",
+    ),
+)
+
+
+@BOTH
+@pytest.mark.parametrize("hook", [*ACT, *ANSWER])
+def test_a_hook_that_fails_ends_the_run_with_its_code(name, hook):
+    made = {hook: _fails if hook in ACT else _answers_less_a_code}
+    if hook == "look":
+        made["inner"] = _half
+    # the other problems of this file have no events and no branches
+    problem = make_problem(_rough if hook == "reject" else _oscillator)
+    run = Run(name, problem._replace(**addresses(made)), step=0.1)
+    assert run(5.0, 1e-8, times=[1.0, 2.0]) == FAILED
+    assert run.state.counts[scheme.CODE] == 77

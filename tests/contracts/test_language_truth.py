@@ -16,6 +16,7 @@ from helpers import free_bodies as free
 from helpers.language_truth import CASES, MOST_ARGS
 from helpers.measure_truth import Motion, component, fixed, measure, opposite
 from helpers.minimal_deck import deck, read
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import SHOWN, Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit
@@ -24,7 +25,7 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.forces import FORCE
 from mbsim.dynamics.expressions.jets import jet, value
-from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
+from mbsim.dynamics.pipeline.hook_table import put
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.model import elements as el
@@ -44,7 +45,7 @@ def scene_of(texts, *bodies, **elements):
     system = build(
         free.model(*bodies, requests=[el.Request(1, "EXPRESSION", exprs=exprs)], **elements)
     )
-    open_expressions(system.scene)
+    put(system.scene, Hook.VALUE)
     return system, len(system.scene.programs.start) - 1 - len(texts)
 
 
@@ -184,7 +185,7 @@ def jet_scene():
     """Return a system with the cases of what moves: every argument is x + TIME**2/8."""
     args = [f"({place} + TIME**2/8)" for place in COORDINATES]
     system, first = scene_of([case.text.format(*args) for case in CASES], *BODIES)
-    open_jets(system.scene)
+    put(system.scene, Hook.JET)
     return system, first
 
 
@@ -352,7 +353,7 @@ def displaced_scene():
     system, first = scene_of(
         [text_of(*call) for call in calls], *BODIES[:2], markers=MARKER_ELEMENTS
     )
-    open_jets(system.scene)
+    put(system.scene, Hook.JET)
     return system, first, calls
 
 
@@ -390,7 +391,7 @@ FORCES = {
         el.ScalarForce(3, "TRANSLATIONAL", parse("5"), "", 21, 11, action_only=True),
     ],
     "spring_dampers": [el.SpringDamper(2, "ROTATIONAL", "", 31, 21)],
-    "bushings": [el.Bushing(4, "", 21, 31)],
+    "marker_forces": [free.bushing(4, 21, 31)],
     "vector_forces": [
         el.VectorForce(5, exprs=(parse("1"),) * 6, i_marker_id=21, j_floating_marker_id=32)
     ],
@@ -504,7 +505,7 @@ def test_forces_of_contacts(tmp_path):
     model = read(tmp_path, deck(BOX, ("</Model>", "\n".join([*requests, "</Model>"]))))
     system = build(model)
     scene = system.scene
-    open_expressions(scene)
+    put(scene, Hook.VALUE)
     rng = np.random.default_rng(12)
     slots = len(scene.work.hit) - 1
     assert slots > 3
@@ -606,7 +607,7 @@ def test_splines(name):
 def test_derivatives_of_splines(name):
     texts = [f"{name}(DX(20) + TIME**2/8, DY(20), {spline.id})" for spline in SPLINES]
     system, first = scene_of(texts, *BODIES, splines=SPLINES)
-    open_jets(system.scene)
+    put(system.scene, Hook.JET)
     rng = np.random.default_rng(24)
     ys, times = np.tile(system.y0, (POINTS, 1)), rng.uniform(0, 1, POINTS)
     ys[:, 0], ys[:, 1] = rng.uniform(-5, 6, POINTS), rng.uniform(-2, 2, POINTS)

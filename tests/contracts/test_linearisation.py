@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers.decks import write_deck
 from helpers.folders import MODELS
+from helpers.free_bodies import Silent
 from helpers.mechanics import Body
-from helpers.mechanism_decks import Joint, Scene, marker
-from mbsim.arrays.scene import CHOOSE
+from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
+from mbsim.arrays.hooks import Joints
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
@@ -30,13 +30,6 @@ from mbsim.run.start import assemble_model
 COEFFICIENTS = (1.0, 10.0, 1e3)
 #: Half of the step of differences, and how many times f is rounded on its way from a state.
 EPS, ROUNDINGS = 1e-5, 16.0
-
-
-class Silent:
-    """A log that keeps nothing."""
-
-    def line(self, text):
-        pass
 
 
 class Linearised:
@@ -58,7 +51,7 @@ class Linearised:
     def call(self, name, t, a, b):
         pointer = ctypes.c_void_p
         form = ctypes.CFUNCTYPE(
-            ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+            ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
         )
         hook = form(getattr(self.problem, name))
         code = hook(self.problem.context, t, 0.0, a.ctypes.data, b.ctypes.data)
@@ -175,14 +168,6 @@ def test_models(name):
 # --- joints between moving bodies ---
 
 
-def rotation(axis, angle):
-    """Return a rotation about an axis."""
-    axis = np.array(axis, float)
-    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
-
-
-SKEW = rotation((1, 2, -1), 0.7)
-SIDE = SKEW @ rotation((1, 0, 0), np.pi / 2)
 ABOUT_Y = rotation((0, 1, 1), 0.4)
 #: The joints that a tree or equations hold, and how marker I differs from J at the start.
 JOINTS = {
@@ -606,7 +591,7 @@ def test_contacts_without_give(name, slip, tmp_path):
     hit = it.scene.work.hit[: it.scene.work.hit[-1]]
     it.scene.state.memory[hit, 0] = SLIP if slip else STICK
     it.scene.state.memory[hit, 1] = 1e-13
-    it.runner.hooks.joints_at(0.0)(CHOOSE, y)
+    it.runner.hooks.joints_at(0.0)(Joints.CHOOSE, y)
     held = int(it.scene.equations.active[-1])
     assert held == (0 if slip else 2 if len(hit) == 1 else 3)
     worst = it.misses(it.on_manifold(y, 0.0), coefficients=(1e3, 1e4, 1e5))

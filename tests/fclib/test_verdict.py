@@ -156,14 +156,11 @@ def test_what_decides_is_what_every_share_gives():
         given = task.Task(b, np.zeros(len(b.q)), 1e-8, 1e-8)
         sweeps.nsgs(given, 1 + seed % 5)
         u = b.q.copy()
-        jit.function(blocks.product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, given.r, u)
+        jit.function(blocks.product)(b.system, b.q, given.r, u)
         found = [
-            jit.function(cone.own_errors)(
-                b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, given.r,
-                shares, np.empty_like(u),
-            )
+            jit.function(cone.own_errors)(b.system, u, given.r, shares, np.empty_like(u))
             for shares in (cone.EVERY_SHARE, cone.DECIDING, cone.NO_SHARES)
-        ]  # fmt: skip
+        ]
         assert found[1] == (found[0][0], 0.0, *found[0][2:])
         assert found[2] == (found[0][0], 0.0, found[0][2], 0.0)
 
@@ -273,13 +270,11 @@ def test_no_method_goes_on_when_the_time_is_over():
         ptr = np.concatenate(([0], np.cumsum(chain.sum(axis=1)))).astype(np.int32)
         col = np.nonzero(chain)[1].astype(np.int32)
         val = np.where((col == np.repeat(np.arange(n), np.diff(ptr)))[:, None, None], np.eye(3), 0)
-        symbolic, back, shifted, *room, _ = jit.function(splitting.room_for_factors)(
-            3, ptr, col, val
-        )
+        shifted = jit.function(splitting.regularised)(3, ptr, col, val)
         for over in (False, True):
             until = given.until if over else clock.unlimited()
             assert over != jit.function(factor.factorise)(
-                3, ptr, col, back, shifted, symbolic, *room, until
+                3, ptr, col, shifted.back, shifted.val, shifted.analysis, shifted.factors, until
             )
 
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from helpers.decks import GROUND, contact
 
+#: of every contact
+LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
 #: shape attributes, a mesh's text, and points of its surface in shape axes
 SHAPES = ("SPHERE", "BOX", "ELLIPSOID", "CYLINDER", "FRUSTUM", "MESH")
 _OCTAHEDRON = np.array(

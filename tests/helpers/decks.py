@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 import mbsim
 from helpers.folders import MODELS
 from mbsim.errors import Interrupted
@@ -105,9 +107,11 @@ COULOMB = {
 }
 
 
+#: Ground and marker 10 at its origin, with nothing to touch.
+EARTH = '<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>'
+
 EDGE = 0.2
 INERTIA = EDGE**2 / 6.0  # of a cube of 1 kg
-FLOATING = '<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>'
 
 
 def cube(body, p, angles=(0.0, 0.0, 0.0), v=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0)):
@@ -127,3 +131,17 @@ def cube(body, p, angles=(0.0, 0.0, 0.0), v=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0)):
     <Reference_Marker id="{10 * body}" body_id="{body}" {place} {turn}/>
     <Post_Graphic id="{100 * body}" type="BoxDefinedFromCenter" center_marker_id="{10 * body}"
       length_x="{EDGE}" length_y="{EDGE}" length_z="{EDGE}"/>"""
+
+
+def drift(results):
+    """Return by how much kinetic, potential and dissipated energy miss a constant."""
+    names = ("kinetic", "potential", "dissipated")
+    total = sum(results[f"energy/{name}"] for name in names)
+    return np.abs(total - total[0]).max()
+
+
+def assert_same(one, other, tolerance):
+    """Assert that body 2 moves alike in two runs."""
+    for name in ("position", "velocity", "angular_velocity"):
+        a, b = one[f"bodies/2/{name}"], other[f"bodies/2/{name}"]
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(1.0, np.abs(a).max()))

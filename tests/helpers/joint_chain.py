@@ -18,13 +18,13 @@ import numpy as np
 from numba import carray
 from scipy.integrate import solve_ivp
 
+from helpers.equations import far, none, one, zero
 from mbsim.bench import deck as text
 from mbsim.bench import parameters as p
-from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, F3, I1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import HOOK, Problem
+from mbsim.core.problem import Problem, addresses
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
@@ -266,7 +266,7 @@ def _rhs(context, t, h, a, b):
     chain = view(context, Chain)
     n = 2 * len(chain.axis)
     accelerations(chain, carray(a, (n,)), carray(b, (n,)))
-    return 0.0
+    return 0
 
 
 def _norm(context, t, h, a, b):
@@ -280,23 +280,7 @@ def _output(context, t, h, a, b):
     place(chain, carray(a, (2 * len(chain.axis),)))
     put(chain.rows[chain.used[0]], 0, vector(chain.end[len(chain.axis)]))
     chain.used[0] += 1
-    return 0.0
-
-
-def _zero(context, t, h, a, b):
-    return 0.0
-
-
-def _one(context, t, h, a, b):
-    return 1.0
-
-
-def _none(context, t, h, a, b):
-    return -1.0
-
-
-def _far(context, t, h, a, b):
-    return 1e300
+    return 0
 
 
 def make(count: int, samples: int, tilt: float = 0.0) -> Chain:
@@ -331,9 +315,11 @@ def make(count: int, samples: int, tilt: float = 0.0) -> Chain:
 def problem(chain: Chain) -> tuple[Problem, Any]:
     """Return the chain as integrators see it, and what must live as long as it is used."""
     table = pack(chain)
-    hooks = (_rhs, _zero, _norm, _one, _zero, _zero, _none, _far, _output, _zero)
-    addresses = [jit.address(hook, HOOK) for hook in hooks]
-    return Problem(int(table.ctypes.data), *addresses), (table, chain)
+    hooks = dict(
+        rhs=_rhs, project=zero, norm=_norm, check=one, commit=zero, look=zero, inner=none,
+        limit=far, output=_output, reject=zero,
+    )  # fmt: skip
+    return Problem(int(table.ctypes.data), **addresses(hooks)), (table, chain)
 
 
 def exact(count: int, times: np.ndarray, tilt: float = 0.0) -> np.ndarray:
@@ -343,7 +329,7 @@ def exact(count: int, times: np.ndarray, tilt: float = 0.0) -> np.ndarray:
     pointer = ctypes.c_void_p
     signature = ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
     rhs, output = (
-        ctypes.CFUNCTYPE(ctypes.c_double, *signature)(hook) for hook in (found.rhs, found.output)
+        ctypes.CFUNCTYPE(ctypes.c_int64, *signature)(hook) for hook in (found.rhs, found.output)
     )
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:

@@ -7,11 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from helpers import mechanics as mech
-from helpers.mechanism_decks import Joint, Scene
-
-EYE = np.eye(3)
-X_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # z of a marker along x
-Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # z of a marker along y
+from helpers.mechanism_decks import EYE, X_UP, Y_UP, Joint, Scene
 
 
 def passive(results):

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers import mechanics as mech
 from helpers.decks import write_deck
 
+#: Axes of markers by columns; z of a marker along x, along y.
+EYE = np.eye(3)
+X_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 #: Name of a joint's type to what it does, as geometry.
 ROWS = {
     "FIXED": mech.fixed,
@@ -154,3 +159,14 @@ def apart(p, q):
     """Return the largest angle [rad] between two rows of attitudes, up to sign."""
     near = np.minimum(np.linalg.norm(p - q, axis=1), np.linalg.norm(p + q, axis=1))
     return (4.0 * np.arcsin(0.5 * near)).max()
+
+
+def rotation(axis, angle):
+    """Return a rotation about an axis."""
+    axis = np.array(axis, float)
+    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+
+
+#: Axes of a joint under test, and such that z is at right angles to that z.
+SKEW = rotation((1, 2, -1), 0.7)
+SIDE = SKEW @ rotation((1, 0, 0), np.pi / 2)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import mbsim
+from helpers.decks import EARTH
 from mbsim.errors import DeckError, Interrupted
 
-EARTH = '<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>'
 BODY = """<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Reference_Marker id="20" body_id="2" pos_z="-1"/>"""
 SPRING = """<Force_SpringDamper id="7" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"

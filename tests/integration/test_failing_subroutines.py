@@ -246,7 +246,7 @@ def test_contact_results_that_fail_keep_the_rows_so_far(tmp_path, line, time):
     ],
 )
 def test_a_library_that_would_end_the_process_is_warned_of(tmp_path, language, text, name):
-    from mbsim.plugins.shared_library import address_of, read_library
+    from mbsim.plugins.source.shared_library import address_of, read_library
 
     said = []
     library = read_library(compiled(tmp_path, text, language), "Force_Contact[1]")

@@ -242,10 +242,10 @@ def test_bushings_and_vector_forces(tmp_path: Path) -> None:
         )
     )
     model = read(tmp_path, added(text))
-    bushing = model.bushings[1]
-    assert bushing.stiffness == (1.0, 2.0, 3.0, 7.0, 8.0, 9.0)
-    assert bushing.damping == (4.0, 5.0, 6.0, 0.0, 0.0, 0.0)
-    assert bushing.preload == (0.0,) * 5 + (-1.0,)
+    values = list(model.table("BUSHING")[1].values.values())
+    assert values[:6] == [1.0, 2.0, 3.0, 7.0, 8.0, 9.0]
+    assert values[6:12] == [4.0, 5.0, 6.0, 0.0, 0.0, 0.0]
+    assert values[12:] == [0.0] * 5 + [-1.0]
     assert [force.type for force in model.vector_forces.values()] == [
         "FORCEONLY",
         "TORQUEONLY",
@@ -267,7 +267,7 @@ FAULTS = {
         "MARKER/301, PART=2\nREULER = 180D, 90D, 180D",
         ("REULER", "no statement but an argument", "comma missing that continues the line before?"),
     ),
-    "not built": ("BEAM/1, I=101", ("BEAM[1]", "not built yet")),
+    "not built": ("FIELD/1, I=101", ("FIELD[1]", "not built yet")),
     "contact": ("CONTACT/1, IGEOM=1", ("CONTACT[1]", "not built yet")),
     "second units": ("UNITS/LENGTH=METER", ("UNITS", "a second UNITS")),
     "second gravity": ("ACCGRAV/IGRAV=1", ("ACCGRAV", "the first is on line 11")),
@@ -426,11 +426,11 @@ def test_any_text_is_read_or_refused(tmp_path: Path, pieces: list[str]) -> None:
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:
-    text = added("BEAM/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
+    text = added("FIELD/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
     with pytest.raises(DeckError) as caught:
         read(tmp_path, text)
     assert [fault.line for fault in caught.value.faults[:2]] == [13, 14]
-    assert {fault.element for fault in caught.value.faults} == {"BEAM[1]", "JOINT[2]", "PART[3]"}
+    assert {fault.element for fault in caught.value.faults} == {"FIELD[1]", "JOINT[2]", "PART[3]"}
 
 
 def test_warnings(tmp_path: Path) -> None:

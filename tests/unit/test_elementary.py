@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from helpers import free_bodies as free
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.blend import step, step5_derivative, step_derivative
 from mbsim.dynamics.expressions.jets import jet, value
-from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
+from mbsim.dynamics.pipeline.hook_table import put
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Request
@@ -140,8 +141,8 @@ def test_every_elementary_function_is_in_the_list():
 
 def test_compiled_jets_are_those_of_plain_python():
     system = scene_of(*(text for text, _ in CLOSED_FORMS))
-    open_expressions(system.scene)
-    open_jets(system.scene)
+    put(system.scene, Hook.VALUE)
+    put(system.scene, Hook.JET)
     many = jit.function(_all_jets)
     found = np.zeros((len(CLOSED_FORMS), 3))
     address, table = _context(system.scene)
@@ -153,7 +154,7 @@ def test_compiled_jets_are_those_of_plain_python():
 
 def test_compiled_values_are_those_of_plain_python():
     system = scene_of(*(text for text, _ in CLOSED_FORMS))
-    open_expressions(system.scene)
+    put(system.scene, Hook.VALUE)
     found = np.zeros(len(CLOSED_FORMS))
     address, table = _context(system.scene)
     jit.function(_all_values)(address, 0.37, system.y0, found)

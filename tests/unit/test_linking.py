@@ -8,9 +8,13 @@ import sys
 
 import numpy as np
 import pytest
-from numba import float64, int64, njit
+from numba import boolean, float64, int64, njit
 from numba.core import ir, targetconfig
 from numba.core.compiler import Flags, run_frontend
+from numba.core.errors import TypingError
+from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python, rtsys
+from numba.core.types import Array, Tuple
 
 from helpers.folders import PACKAGES
 from mbsim.core import jit, linking, numba_costs
@@ -194,6 +198,95 @@ def test_types_of_mixed_operators_are_as_before():
     assert mixed(np.array([1.5]), 0.5, 4) == 2.0 + 4.0 + 2
     assert mixed.nopython_signatures[0].return_type == float64
     assert int64 in mixed.nopython_signatures[0].args
+
+
+def closures_and_lists(n):
+    def doubled(k):
+        return 2 * k
+
+    squares = [k * k for k in range(n)]
+    table = np.array([[k + j for k in range(3)] for j in range(2)])
+    return doubled(n) + sum(squares), table, np.array([1, 2, n])
+
+
+def whole_arrays(n):
+    a = np.arange(float(n))
+    b = np.sin(a) * 2.0 - a / (1.0 + a)
+    return b, -b, np.maximum(a, b) + 1, (a, (b, 1.0), [a, b])
+
+
+@njit
+def steps(n):
+    for k in range(n):
+        a = np.ones(k)
+        yield a.sum()
+
+
+def drawn(n):
+    total = 0.0
+    for value in steps(n):
+        total += value
+    return total
+
+
+@pytest.mark.parametrize("function", [closures_and_lists, whole_arrays, drawn])
+def test_what_numba_rewrites_gives_what_python_gives(function):
+    jit._register()
+
+    def flat(value):
+        if isinstance(value, tuple | list):
+            return [number for each in value for number in flat(each)]
+        return np.ravel(value).tolist()
+
+    compiled = njit(function)
+    for _ in range(3):
+        assert flat(compiled(4)) == pytest.approx(flat(function(4)), rel=1e-15)
+
+
+def test_references_are_counted_and_given_back():
+    jit._register()
+
+    @njit
+    def kept(n):
+        last = (np.zeros(1), 0)
+        for k in range(n):
+            a = np.full(3, float(k))
+            last = (a, k)
+        return last[0]
+
+    kept(1)
+    _nrt_python.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats()
+        assert kept(50).tolist() == [49.0] * 3
+        after = rtsys.get_allocation_stats()
+    finally:
+        _nrt_python.memsys_disable_stats()
+    assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free > 50
+
+
+def test_an_error_is_told_with_where_it_is():
+    jit._register()
+
+    @njit
+    def wrong(x):
+        return x + "text"
+
+    with pytest.raises(TypingError, match="During: typing of") as caught:
+        wrong(1.0)
+    assert "def wrong(x):" in str(caught.value)
+
+
+def test_sizes_of_types_are_as_llvm_says():
+    context = cpu_target.target_context
+    jit._register()
+    for kind in (float64, int64, Tuple((int64, boolean)), Array(float64, 2, "C")):
+        laid_out = context.get_value_type(kind)
+        for _ in range(2):
+            size = context.get_abi_sizeof(laid_out)
+            assert size == laid_out.get_abi_size(context.target_data)
+            alignment = context.get_abi_alignment(laid_out)
+            assert alignment == laid_out.get_abi_alignment(context.target_data)
 
 
 PAIR = """

@@ -16,7 +16,7 @@ from mbsim.dynamics.pipeline.hooks import mechanism
 
 POINTER = ctypes.c_void_p
 HOOK = ctypes.CFUNCTYPE(
-    ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, POINTER, POINTER
+    ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, POINTER, POINTER
 )
 
 

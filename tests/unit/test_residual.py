@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from mbsim.laws.residual import ALGEBRAIC, DIFFERENTIAL, KINDS, SWITCHING
-from mbsim.plugins.dual import Dual, slope
-from mbsim.plugins.residual import Unknown, _sorted
+from mbsim.plugins.compile.dual import Dual, slope
+from mbsim.plugins.compile.residual_trials import sort_unknowns
+from mbsim.plugins.types import Unknown
 
 
 def kinds(residual, count=1, sizes=(), axes=1):
@@ -22,7 +23,7 @@ def kinds(residual, count=1, sizes=(), axes=1):
         return residual(given[1 : 1 + axes], given[1 + axes : first], f, fdot, given[0])
 
     unknowns = tuple(Unknown(f"u{k}") for k in range(count))
-    return [u.kind for u in _sorted(unknowns, asked, list(sizes), axes, "it")]
+    return [u.kind for u in sort_unknowns(unknowns, asked, list(sizes), axes, "it")]
 
 
 def friction(x, v, f, g, t):
@@ -144,8 +145,8 @@ def test_several_unknowns_and_roots_that_newton_misses():
     ],
 )
 def test_what_has_no_root_is_said(residual):
-    from mbsim.dynamics.forces.force_element import UNSOLVED_ELEMENT
+    from mbsim.core.codes import Code
 
     scene = Scene(residual, [ALGEBRAIC])
-    assert scene.solve(1.0, 0.0)[0] == UNSOLVED_ELEMENT
+    assert scene.solve(1.0, 0.0)[0] == Code.UNSOLVED_ELEMENT
     assert scene.residuals.trouble[0] == 0

@@ -11,12 +11,13 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline
 from helpers import free_bodies as free
 from helpers.minimal_deck import added
 from helpers.minimal_deck import read as read_xml
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.dynamics.expressions.jets import jet, value
-from mbsim.dynamics.pipeline.force_hooks import open_expressions, open_jets
+from mbsim.dynamics.pipeline.hook_table import put
 from mbsim.errors import DeckError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import ArrayOfNumbers, Request, Spline
@@ -123,8 +124,8 @@ def _compiled(context, program, t, y, out):
 def test_compiled_splines_are_those_of_plain_python():
     texts = ["AKISPL(TIME, 0, 1)", "CUBSPL(TIME, 2*TIME, 3, 1)", "LINSPL(SIN(9*TIME), 0, 2)"]
     system = scene_of(*texts)
-    open_expressions(system.scene)
-    open_jets(system.scene)
+    put(system.scene, Hook.VALUE)
+    put(system.scene, Hook.JET)
     table, found = pack(system.scene), np.zeros(4)
     for k, text in enumerate(texts):
         for t in (-0.2, 0.3, 0.77, 1.2):

@@ -137,6 +137,70 @@ def test_stick_and_slip_in_turn_are_stiff_again_at_once(name):
     assert auto.stats["rhs_evaluations"] < 2.3 * stiff.stats["rhs_evaluations"]
 
 
+@pytest.mark.parametrize(("method", "rejected"), [("DOPRI5", 0.5), ("RADAU5", 1.0)])
+def test_steps_that_are_cut_at_kinks_do_not_outgrow_their_error(method, rejected):
+    """Whole steps doubled behind each cut and were rejected 1.7 times a step."""
+    stats = mbsim.simulate(mbsim.read_model(MODELS / "sdnd100.xml"), integrator=method, tol=1e-3)
+    stats = stats.stats
+    assert stats["rejected"] < rejected * stats["steps"]
+
+
+def test_cut_steps_count_by_their_work():
+    """At 1e-4 a held block trembles from slip to slip: 62,000 evaluations, 2,200 steps."""
+    auto = mbsim.simulate(mbsim.read_model(MODELS / "sdnd100.xml"), tol=1e-4)
+    assert auto.stats["method_changes"] >= 1
+    assert auto.stats["rhs_evaluations"] < 25_000
+
+
+def test_it_is_as_costly_as_before_where_no_window_of_steps_tells_more():
+    """What it had been was forgotten: then nothing was stiff enough for the next 200 steps."""
+    from mbsim.methods import Methods
+    from mbsim.system.build import build
+
+    from mbsim.integrators import scheme
+
+    methods = Methods(build(mbsim.read_model(MODELS / "free_top.xml")), "AUTO", 0.0)
+    memory = methods.arrays.memory
+    memory[scheme.STEP] = 1e-3
+    for pace, costly in ((500.0, 500.0), (0.0, 500.0), (80.0, 80.0)):
+        memory[scheme.PACE] = pace
+        methods.change_over()
+        assert methods.is_stiff
+        assert memory[scheme.COSTLY] == costly
+        memory[scheme.TIME] += 1.0
+        methods.change_over()
+        assert not methods.is_stiff
+
+
+def test_it_learns_what_a_change_was_worth():
+    from mbsim.methods import Methods
+    from mbsim.system.build import build
+
+    from mbsim.integrators import scheme
+
+    methods = Methods(build(mbsim.read_model(MODELS / "free_top.xml")), "AUTO", 0.0)
+    memory, counts = methods.arrays.memory, methods.arrays.counts
+    memory[scheme.STEP], memory[scheme.PACE] = 1e-3, 500.0
+    first = memory[scheme.PATIENCE]
+    methods.change_over()
+    assert memory[scheme.RELUCTANCE] == 1.0
+    # 0.01 s would have been 30 explicit evaluations
+    counts[scheme.EVALUATIONS], memory[scheme.TIME] = 200, 0.01
+    methods.change_over()
+    assert memory[scheme.PATIENCE] == 1.5 * first
+    # explicit: stiff at once
+    memory[scheme.EXPLICIT_STEPS], memory[scheme.STIFF_STEPS] = 20.0, 15.0
+    methods.change_over()
+    assert memory[scheme.RELUCTANCE] == 2.0
+    # implicit: 10 s for 300 evaluations
+    counts[scheme.EVALUATIONS], memory[scheme.TIME] = 500, 10.0
+    methods.change_over()
+    assert memory[scheme.PATIENCE] == first
+    memory[scheme.EXPLICIT_STEPS], memory[scheme.STIFF_STEPS] = 900.0, 15.0
+    methods.change_over()
+    assert memory[scheme.RELUCTANCE] == 1.0
+
+
 RAIL = """<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Reference_Marker id="20" body_id="2"/>

@@ -11,19 +11,18 @@ from helpers import mechanism_decks as decks
 from helpers.decks import GROUND, run_deck, write_deck
 from helpers.decks import sphere as free_sphere
 from helpers.mechanics import Body
+from helpers.mechanism_decks import X_UP
 from mbsim.errors import DeckError, SolverError
 
 G = 9.81
 M = 2.0
-#: Axes of markers by columns, z along the global x.
-ALONG_X = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 INERTIA = (0.02, 0.03, 0.04)
 
 
 def slider(extra, v=0.0, bodies=(), joints=(), type="TRANSLATIONAL", g=(0.0, 0.0, -G)):
     """Return a block on a guide along x; its marker 1000 and 1001 on ground have z along x."""
     block = Body(M, INERTIA, p=(0.0, 0.0, 0.0), v=(v, 0.0, 0.0))
-    held = decks.Joint(type, 1, 0, (0, 0, 0), ALONG_X)
+    held = decks.Joint(type, 1, 0, (0, 0, 0), X_UP)
     return decks.Scene([block, *bodies], [held, *joints], g=g, extra=extra)
 
 
@@ -236,7 +235,7 @@ def test_two_rails_press_as_one(tmp_path):
     """Redundant: each takes half of the weight, and their frictions are those of one."""
     mu = 0.3
     size = "(ABS(JOINT(1, 0, 4, 0)) + ABS(JOINT(2, 0, 4, 0)))"
-    rail = decks.Joint("TRANSLATIONAL", 1, 0, (0, 0, 0), ALONG_X)
+    rail = decks.Joint("TRANSLATIONAL", 1, 0, (0, 0, 0), X_UP)
     run = slider(scalar(1, f"-{mu}*{size}"), v=2.0, joints=[rail]).run(tmp_path, 0.3, 0.1)
     t = run["time"]
     np.testing.assert_allclose(x_of(run), 2 * t - 0.5 * mu * G * t**2, atol=1e-8)

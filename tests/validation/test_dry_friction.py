@@ -8,33 +8,11 @@ import numpy as np
 import pytest
 
 import mbsim
-from helpers.decks import run_deck, run_in_pieces, write_deck
+from helpers.blocks import GROUND, body, spring
+from helpers.decks import drift, run_deck, run_in_pieces, write_deck
 from mbsim.errors import DeckError, ModelError
 
 IMPLICIT = ("RADAU5", "GALPHA")
-
-
-def body(id, mass, x=0.0, v=0.0, w=0.0):
-    """Return a body with its cg marker 10 times its id."""
-    given = f'v_ic_x="{v!r}" v_ic_x_flag="TRUE" w_ic_x="{w!r}" w_ic_x_flag="TRUE"'
-    return f"""
-<Body_Rigid id="{id}" cg_id="{id}0" mass="{mass!r}" inertia_xx="0.1" inertia_yy="0.1"
-  inertia_zz="0.1" {given}/>
-<Reference_Marker id="{id}0" body_id="{id}" pos_x="{x!r}"/>"""
-
-
-def ground():
-    """Return ground with marker 10 at the origin and 11 a unit before it."""
-    return """
-<Body_Rigid id="1" isground="TRUE"/>
-<Reference_Marker id="10" body_id="1"/><Reference_Marker id="11" body_id="1" pos_x="-1"/>"""
-
-
-def spring(k):
-    """Return a spring of body 2 that is relaxed at x = 0."""
-    return f"""
-<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="11"
-  stiffness="{k!r}" length="1"/>"""
 
 
 def friction(more, i=20, j=10, type="TX"):
@@ -43,16 +21,9 @@ def friction(more, i=20, j=10, type="TX"):
 <Force_DryFriction id="7" type="{type}" i_marker_id="{i}" j_marker_id="{j}" {more}/>"""
 
 
-def drift(results):
-    """Return by how much kinetic, potential and dissipated energy miss a constant."""
-    names = ("kinetic", "potential", "dissipated")
-    total = sum(results[f"energy/{name}"] for name in names)
-    return np.abs(total - total[0]).max()
-
-
 def test_sdnd100_turns_and_stops_where_it_must(tmp_path):
     # each half period pi/100 of slip takes 2 F/k = 0.2 mm of the amplitude, until k x < F
-    model = ground() + body(2, 1.0, x=0.00085) + spring(1e4) + friction('friction="1"')
+    model = GROUND + body(2, 1.0, x=0.00085) + spring(1e4) + friction('friction="1"')
     half = math.pi / 100.0
     results = run_deck(tmp_path, model, 0.2, half, integrator="RADAU5", tol=1e-9)
     x = results["bodies/2/position"][:, 0]
@@ -73,7 +44,7 @@ def test_sdnd100_turns_and_stops_where_it_must(tmp_path):
 def test_a_spring_before_the_slider_gives_way_and_sticks_in_time(method, tmp_path):
     # stick: x = v/w sin(w t); slip from k x = F on; stick again where x' = 0
     k, c, v, f = 50.0, 4.0, 1.0, 1.0
-    model = ground() + body(2, 1.0, v=v) + spring(c) + friction('friction="1" dx="0.02"')
+    model = GROUND + body(2, 1.0, v=v) + spring(c) + friction('friction="1" dx="0.02"')
     w, slow = math.sqrt(k + c), math.sqrt(c)
     first = math.asin(f / k * w / v) / w
     speed, place = v * math.cos(w * first), f / k
@@ -90,7 +61,7 @@ def test_a_spring_before_the_slider_gives_way_and_sticks_in_time(method, tmp_pat
 
 #: The seed's oscillator on friction; 3 kg of it stop within 15 s.
 SEED = (
-    ground()
+    GROUND
     + body(2, 3.0, v=1.0)
     + """
 <Force_Scalar_TwoBody id="1" type="Force" action_only="TRUE" i_marker_id="20" j_marker_id="12"
@@ -129,7 +100,7 @@ def test_two_masses_part_and_meet_as_friction_lets_them(method, tmp_path):
     speed = 10.0 * (end**2 - parts**2) / 4.0 - 1.5 * level * (end - parts)
     meets = end + speed / (1.5 * level)
     both = 10.0 * end**2 / 2.0 / 3.0
-    model = ground() + body(2, 2.0) + body(3, 1.0) + RAMP
+    model = GROUND + body(2, 2.0) + body(3, 1.0) + RAMP
     model += friction(f'friction="{level}" friction_static="{static}"', i=30, j=20)
     results = run_deck(tmp_path, model, 1.5, integrator=method, tol=1e-7)
     events = results["events"]
@@ -141,7 +112,7 @@ def test_two_masses_part_and_meet_as_friction_lets_them(method, tmp_path):
 
 @pytest.mark.parametrize(("dx", "method"), [(0.0, "RADAU5"), (1e-3, "RADAU5"), (1e-3, "DOPRI5")])
 def test_friction_about_an_axis_stops_a_spin(dx, method, tmp_path):
-    model = ground() + body(2, 1.0, w=3.0) + friction(f'friction="0.2" dx="{dx}"', type="RX")
+    model = GROUND + body(2, 1.0, w=3.0) + friction(f'friction="0.2" dx="{dx}"', type="RX")
     results = run_deck(tmp_path, model, 2.0, integrator=method, tol=1e-8)
     events = results["events"]
     stop = events["time"][events["kind"] == "stick"][0]
@@ -154,7 +125,7 @@ def test_friction_about_an_axis_stops_a_spin(dx, method, tmp_path):
 
 
 def test_what_is_at_rest_stays_where_the_force_is_within_the_limit(tmp_path):
-    model = ground() + body(2, 1.0, x=0.05) + spring(10.0) + friction('friction="1"')
+    model = GROUND + body(2, 1.0, x=0.05) + spring(10.0) + friction('friction="1"')
     results = run_deck(tmp_path, model, 1.0)
     assert len(results["events"]) == 0
     np.testing.assert_array_equal(results["bodies/2/position"][:, 0], 0.05)
@@ -172,7 +143,7 @@ def test_what_is_at_rest_stays_where_the_force_is_within_the_limit(tmp_path):
     ],
 )
 def test_a_static_simulate_finds_where_friction_holds(more, rest, tmp_path):
-    path = write_deck(tmp_path, ground() + body(2, 1.0, x=0.05) + spring(10.0) + friction(more))
+    path = write_deck(tmp_path, GROUND + body(2, 1.0, x=0.05) + spring(10.0) + friction(more))
     both = path.read_text().replace("<Command>", '<Command><Simulate analysis_type="Static"/>')
     path.write_text(both, encoding="utf-8")
     results = mbsim.simulate(mbsim.read_model(path), integrator="RADAU5", tol=1e-8)
@@ -183,7 +154,7 @@ def test_a_static_simulate_finds_where_friction_holds(more, rest, tmp_path):
 
 @pytest.mark.parametrize(("dx", "method"), [(0.0, "RADAU5"), (0.0, "GALPHA"), (0.02, "DOPRI5")])
 def test_resumed_it_is_the_same_run(dx, method, tmp_path, monkeypatch):
-    text = ground() + body(2, 1.0, x=0.85) + spring(4.0) + friction(f'friction="0.4" dx="{dx}"')
+    text = GROUND + body(2, 1.0, x=0.85) + spring(4.0) + friction(f'friction="0.4" dx="{dx}"')
     model = mbsim.read_model(write_deck(tmp_path, text, 8.0, 0.1))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
@@ -202,7 +173,7 @@ def test_what_rests_under_a_load_that_comes_and_goes_slips_in_time(method, tmp_p
   fx_expression="1.01*SIN(9*TIME)" fy_expression="0" fz_expression="0"/>"""
     results = run_deck(
         tmp_path,
-        ground() + body(2, 1.0) + push + friction('friction="1"'),
+        GROUND + body(2, 1.0) + push + friction('friction="1"'),
         3.0,
         0.5,
         integrator=method,
@@ -216,7 +187,7 @@ def test_what_rests_under_a_load_that_comes_and_goes_slips_in_time(method, tmp_p
 def test_what_a_motion_drives_is_rubbed_both_ways(tmp_path):
     turned = 'psi="1.5707963267948966" theta="1.5707963267948966"'
     model = (
-        ground()
+        GROUND
         + body(2, 1.0)
         + f"""
 <Reference_Marker id="12" body_id="1" {turned}/><Reference_Marker id="21" body_id="2" {turned}/>
@@ -236,7 +207,7 @@ def test_what_a_motion_drives_is_rubbed_both_ways(tmp_path):
 def test_two_frictions_side_by_side_hold_together(tmp_path):
     # 1 N and 2 N hold 2.5 N, and not 3.5
     for x, held in ((0.25, True), (0.35, False)):
-        model = ground() + body(2, 1.0, x=x) + spring(10.0) + friction('friction="1"')
+        model = GROUND + body(2, 1.0, x=x) + spring(10.0) + friction('friction="1"')
         model += friction('friction="2"').replace('id="7"', 'id="8"')
         results = run_deck(tmp_path, model, 0.2, integrator="RADAU5")
         force = results["dry_frictions/7/force"][:, 0] + results["dry_frictions/8/force"][:, 0]
@@ -245,9 +216,7 @@ def test_two_frictions_side_by_side_hold_together(tmp_path):
 
 
 def test_explicit_methods_refuse_rigid_friction(tmp_path):
-    model = mbsim.read_model(
-        write_deck(tmp_path, ground() + body(2, 1.0) + friction('friction="1"'))
-    )
+    model = mbsim.read_model(write_deck(tmp_path, GROUND + body(2, 1.0) + friction('friction="1"')))
     for method in ("DOPRI5", "DOP853"):
         with pytest.raises(ModelError, match=r"Force_DryFriction\[7\]: dx=0: rigid .* GALPHA or"):
             mbsim.simulate(model, integrator=method)
@@ -256,7 +225,7 @@ def test_explicit_methods_refuse_rigid_friction(tmp_path):
 
 
 def test_auto_says_that_it_runs_the_implicit_method(tmp_path):
-    text = ground() + body(2, 1.0) + friction('friction="1"')
+    text = GROUND + body(2, 1.0) + friction('friction="1"')
     from mbsim.run.settings import settle
 
     settings = settle(mbsim.read_model(write_deck(tmp_path, text)))
@@ -276,7 +245,7 @@ def test_auto_says_that_it_runs_the_implicit_method(tmp_path):
     ],
 )
 def test_what_a_deck_may_not_say(more, said, tmp_path):
-    path = write_deck(tmp_path, ground() + body(2, 1.0) + friction(more))
+    path = write_deck(tmp_path, GROUND + body(2, 1.0) + friction(more))
     with pytest.raises(DeckError) as error:
         mbsim.read_model(path)
     assert said in str(error.value)
@@ -284,10 +253,10 @@ def test_what_a_deck_may_not_say(more, said, tmp_path):
 
 def test_the_other_types_and_markers(tmp_path):
     for type in ("TX", "TY", "TZ", "RX", "RY", "RZ"):
-        text = ground() + body(2, 1.0) + friction('friction="1" dx="0.1"', type=type)
+        text = GROUND + body(2, 1.0) + friction('friction="1" dx="0.1"', type=type)
         assert mbsim.read_model(write_deck(tmp_path, text)).dry_frictions[7].type == type
     with pytest.raises(DeckError, match='type="T": must be'):
-        mbsim.read_model(write_deck(tmp_path, ground() + body(2, 1.0) + friction("", type="T")))
-    path = write_deck(tmp_path, ground() + body(2, 1.0) + friction('friction="1"', j=99))
+        mbsim.read_model(write_deck(tmp_path, GROUND + body(2, 1.0) + friction("", type="T")))
+    path = write_deck(tmp_path, GROUND + body(2, 1.0) + friction('friction="1"', j=99))
     with pytest.raises(DeckError, match="j_marker_id"):
         mbsim.read_model(path)

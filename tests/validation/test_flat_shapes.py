@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from helpers.decks import COULOMB, FLOATING, GRAVITY, GROUND, INERTIA, contact, cube, run_deck
+from helpers.decks import COULOMB, EARTH, GRAVITY, GROUND, INERTIA, contact, cube, run_deck
 
 
 def table(x):
     """Return a slab with its top at z = 0 that ends at this x."""
-    return f"""{FLOATING}
+    return f"""{EARTH}
     <Reference_Marker id="11" body_id="1" pos_x="{x - 0.5}" pos_z="-0.1"/>
     <Post_Graphic id="100" type="BoxDefinedFromCenter" center_marker_id="11"
       length_x="1" length_y="1" length_z="0.2"/>"""
@@ -59,7 +59,7 @@ def test_a_box_slides_off_a_table(tmp_path):
 def test_a_box_lies_across_the_edge_of_another(tmp_path):
     # a cube balanced on the upper edge of a fixed one that stands on its edge
     law = {"stiffness": 1e6, "exponent": 1.5, "damping": 500, "dmax": 1e-4}
-    ridge = f"""{FLOATING}
+    ridge = f"""{EARTH}
     <Reference_Marker id="11" body_id="1" theta="{np.pi / 4}"/>
     <Post_Graphic id="100" type="BoxDefinedFromCenter" center_marker_id="11"
       length_x="0.6" length_y="0.2" length_z="0.2"/>"""
@@ -88,7 +88,7 @@ def test_a_box_lies_across_the_edge_of_another(tmp_path):
 )
 def test_an_elastic_bounce_keeps_energy(tmp_path, angles, other, allowed):
     law = {"stiffness": 1e6, "exponent": 1.5, "damping": 0, "dmax": 1e-3}
-    model = FLOATING + contact(300, 200, **law)
+    model = EARTH + contact(300, 200, **law)
     model += cube(2, (0.0, 0.0, 0.0), other)
     model += cube(3, (0.03, 0.02, 0.36), angles, v=(0.0, 0.0, -3.0))
     results = run_deck(tmp_path, model, end_time=0.1, tol=1e-8)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import mbsim
+from helpers.blocks import GROUND, body, spring
 from helpers.decks import run_deck, run_in_pieces, write_deck
 from helpers.folders import USERFUNCS
 from helpers.reference import jenkins_block
@@ -56,27 +57,6 @@ def plane(x, xdot, f, fdot, t, par):
         f[2] - 3.0 * x[2] - 0.1 * xdot[2],
     ]
 """
-
-
-def body(id, mass, x=0.0, v=0.0, w=0.0):
-    """Return a body with its cg marker 10 times its id."""
-    given = f'v_ic_x="{v!r}" v_ic_x_flag="TRUE" w_ic_x="{w!r}" w_ic_x_flag="TRUE"'
-    return f"""
-<Body_Rigid id="{id}" cg_id="{id}0" mass="{mass!r}" inertia_xx="0.1" inertia_yy="0.1"
-  inertia_zz="0.1" {given}/>
-<Reference_Marker id="{id}0" body_id="{id}" pos_x="{x!r}"/>"""
-
-
-GROUND = """
-<Body_Rigid id="1" isground="TRUE"/>
-<Reference_Marker id="10" body_id="1"/><Reference_Marker id="11" body_id="1" pos_x="-1"/>"""
-
-
-def spring(k):
-    """Return a spring of body 2 that is relaxed at x = 0."""
-    return f"""
-<Force_SpringDamper id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="11"
-  stiffness="{k!r}" length="1"/>"""
 
 
 def element(name, par, script, direction="TX", i=20, j=10):

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from helpers import mechanics as mech
-from helpers.mechanism_decks import Joint, Scene
+from helpers.mechanism_decks import X_UP, Joint, Scene
 from mbsim.errors import DeckError, SolverError
 
-Z_TO_X = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ARM = mech.Body(1.0, (0.01, 0.1, 0.1), (1.0, 0.0, 0.0))
 
 
@@ -33,7 +32,7 @@ def slider_crank(expr):
         Joint("REVOLUTE", 1, 0),
         Joint("REVOLUTE", 2, 1, (1, 1, 0)),
         Joint("REVOLUTE", 2, 3, (2, 0, 0)),
-        Joint("TRANSLATIONAL", 3, 0, (2, 0, 0), R_i=Z_TO_X),
+        Joint("TRANSLATIONAL", 3, 0, (2, 0, 0), R_i=X_UP),
     ]
     return Scene(bodies, joints, (0, 0, 0), motion(4, expr))
 

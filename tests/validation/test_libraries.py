@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import mbsim
-from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.decks import GRAVITY, GROUND, assert_same, contact, run_deck, sphere, write_deck
 from helpers.folders import MODELS, USERFUNCS
 from helpers.libraries import compiled, example
 from mbsim.cli.main import main
@@ -29,12 +29,6 @@ def ball_on_plane(**law):
         + contact(damping=50, dmax=1e-3, **law)
         + GRAVITY
     )
-
-
-def assert_same(one, other, tolerance):
-    for name in ("position", "velocity", "angular_velocity"):
-        a, b = one[f"bodies/2/{name}"], other[f"bodies/2/{name}"]
-        np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(1.0, np.abs(a).max()))
 
 
 @pytest.mark.parametrize("source", ["cffsub.c", "cffsub.f90"])

@@ -11,16 +11,25 @@ from helpers import mechanics as mech
 from helpers import squeezer
 from helpers.decks import run_deck
 from helpers.known_mechanisms import (
-    EYE,
-    X_UP,
-    Y_UP,
     bricard,
     four_bars,
     heavy_top,
     passive,
     pendulum,
 )
-from helpers.mechanism_decks import Joint, Scene, apart, residual, states
+from helpers.mechanism_decks import (
+    EYE,
+    SIDE,
+    SKEW,
+    X_UP,
+    Y_UP,
+    Joint,
+    Scene,
+    apart,
+    residual,
+    rotation,
+    states,
+)
 
 
 def balance(results, driven=True):
@@ -163,16 +172,6 @@ def test_andrews_squeezer(tol, digits, rate_digits, tmp_path):
 # --- every joint between two moving bodies, against the independent solver ---
 
 
-def rotation(axis, angle):
-    """Return a rotation about an axis."""
-    from scipy.spatial.transform import Rotation
-
-    axis = np.array(axis, float)
-    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
-
-
-SKEW = rotation((1, 2, -1), 0.7)  # axes of the joint under test
-SIDE = SKEW @ rotation((1, 0, 0), np.pi / 2)  # z at right angles to SKEW's z
 BENT = SKEW @ rotation((1, 0, 0), 0.5)
 
 PAIRS = {

@@ -11,34 +11,32 @@ from mbsim.errors import DeckError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Motion
 
-TILTED = free.rotation((1, 2, -1), 0.7)
-
 
 def moved(direction, val_type, text, ic_disp=None, w=(0, 0, 0)):
     """Run a free body whose marker 21 is moved along or about the axes of ground's marker 11."""
     at = (0.2, -0.1, 0.3)
     body = free.body(2, 1.5, p=at, w=w)
-    markers = [Marker(21, body_id=2, pos=at, R=TILTED), Marker(11, body_id=1, R=TILTED)]
+    markers = [Marker(21, body_id=2, pos=at, R=free.TILTED), Marker(11, body_id=1, R=free.TILTED)]
     motion = Motion(1, "", None, 21, 11, direction, val_type, parse(text), ic_disp)
     return free.run(free.model(body, markers=markers, motions=[motion], end_time=1.0))[0]
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_point_moves_along_an_axis_of_j(axis):
-    start = float(np.array((0.2, -0.1, 0.3)) @ TILTED[:, axis])
+    start = float(np.array((0.2, -0.1, 0.3)) @ free.TILTED[:, axis])
     rows = moved("XYZ"[axis], "D", f"{start!r}+0.5*TIME**2".replace("+-", "-"))
-    x = rows["y"][:, :3] @ TILTED
+    x = rows["y"][:, :3] @ free.TILTED
     np.testing.assert_allclose(x[:, axis], start + 0.5 * rows["time"] ** 2, atol=1e-9)
     np.testing.assert_allclose(np.delete(x - x[0], axis, axis=1), 0.0, atol=1e-12)
     # the motion's force is that of a mass which is accelerated by 1
-    np.testing.assert_allclose(rows["joint"][:, :3], 1.5 * TILTED[:, axis] + 0 * x, atol=1e-8)
+    np.testing.assert_allclose(rows["joint"][:, :3], 1.5 * free.TILTED[:, axis] + 0 * x, atol=1e-8)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_body_turns_about_an_axis_of_j(axis):
     rows = moved(f"B{axis + 1}", "V", "2*TIME")
     np.testing.assert_allclose(rows["y"][:, 3], np.cos(rows["time"] ** 2 / 2), atol=1e-8)
-    turned = rows["y"][:, 4:7] @ TILTED
+    turned = rows["y"][:, 4:7] @ free.TILTED
     np.testing.assert_allclose(turned[:, axis], np.sin(rows["time"] ** 2 / 2), atol=1e-8)
 
 

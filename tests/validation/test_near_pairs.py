@@ -7,6 +7,7 @@ import pytest
 
 import mbsim
 from helpers.crowd_decks import (
+    LAW,
     SHAPES,
     balls,
     block,
@@ -25,7 +26,6 @@ from mbsim.dynamics.contact import broadphase as crowd
 from mbsim.errors import Interrupted, ModelError, SolverError
 from mbsim.run import loop
 
-LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
 MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" inertia_yy="1"
  inertia_zz="1"/><Reference_Marker id="90000" body_id="9000" pos_z="-1.4" a00="0.8" a20="-0.6"
  a01="0" a11="1" a21="0" a02="0.6" a22="0.8"/>

@@ -12,7 +12,7 @@ from helpers.folders import MODELS, USERFUNCS
 from helpers.libraries import need
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, PluginError
-from mbsim.plugins import octave
+from mbsim.plugins.source import octave
 
 USER = {"cff_type": "USERCFF", "cff_param_string": "USER(0.3)", "interpreter": "MATLAB"}
 ARGUMENTS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"

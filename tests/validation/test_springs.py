@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from helpers import free_bodies as free
+from helpers.free_bodies import imbalance
 from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper, Variable
@@ -25,12 +26,6 @@ def oscillation(t, x0, v0, mass, stiffness, damping):
     fade, cos, sin = np.exp(-decay * t), np.cos(w * t), np.sin(w * t)
     x = fade * (x0 * cos + s * sin)
     return x, fade * (s * w * cos - x0 * w * sin) - decay * x
-
-
-def imbalance(rows):
-    """Return how far the sum of energies goes from its start, over the largest kinetic energy."""
-    total = rows["energy"][:, :3].sum(axis=1)
-    return np.abs(total - total[0]).max() / rows["energy"][:, KINETIC].max()
 
 
 @pytest.mark.parametrize("damping", [0.0, C])

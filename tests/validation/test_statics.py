@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import mbsim
-from helpers.decks import GROUND, sphere
+from helpers.decks import EARTH, GROUND, sphere
 from mbsim.errors import SolverError
 
 G = 9.81
 STATIC = '<Simulate analysis_type="Static"/>'
 GRAVITY = f'<Force_Gravity grav_z="{-G}"/>'
-EARTH = '<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>'
 
 
 def run(folder, model, command=STATIC, **settings):

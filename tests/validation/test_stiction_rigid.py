@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mbsim
-from helpers.decks import contact, run_deck, run_in_pieces, sphere, write_deck
+from helpers.decks import contact, drift, run_deck, run_in_pieces, sphere, write_deck
 from helpers.folders import MODELS, USERFUNCS
 from mbsim.errors import DeckError, ModelError
 from mbsim.run.replay import request
@@ -67,13 +67,6 @@ def events(results, kind):
     """Return when something of a kind happened, each time once for all points."""
     found = results["events"]
     return np.unique(found["time"][found["kind"] == kind])
-
-
-def drift(results):
-    """Return by how much kinetic, potential and dissipated energy miss a constant."""
-    names = ("kinetic", "potential", "dissipated")
-    total = sum(results[f"energy/{name}"] for name in names)
-    return np.abs(total - total[0]).max()
 
 
 def test_sdnd100_turns_and_stops_where_it_must():

@@ -9,7 +9,16 @@ import pytest
 from click.testing import CliRunner
 
 import mbsim
-from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.decks import (
+    COULOMB,
+    GRAVITY,
+    GROUND,
+    assert_same,
+    contact,
+    run_deck,
+    sphere,
+    write_deck,
+)
 from helpers.folders import ROOT, USERFUNCS
 from helpers.libraries import compiled, example
 from mbsim.cli.main import main
@@ -24,12 +33,6 @@ def dropped(**law):
     """A ball that falls by 0.2, bounces and slides."""
     ball = sphere(0.3, v=(0.5, 0.2, 0.0), w=(0.1, 0.2, 3.0))
     return GROUND + ball + contact(**law, **COULOMB) + GRAVITY
-
-
-def assert_same(one, other, tolerance):
-    for name in ("position", "velocity", "angular_velocity"):
-        a, b = one[f"bodies/2/{name}"], other[f"bodies/2/{name}"]
-        np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(1.0, np.abs(a).max()))
 
 
 @pytest.mark.parametrize("language", ["compiled", "interpreted", "cnfsub.c", "cnfsub.f90"])

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from helpers import free_bodies as free
-from mbsim.dynamics.forces.wrenches import turning_torque
+from helpers.free_bodies import imbalance
 from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
-from mbsim.model.elements import BodyForce, Bushing, Marker, Request, VectorForce
+from mbsim.forces.turning import turning_torque
+from mbsim.model.elements import BodyForce, Marker, Request, VectorForce
 
 KINETIC, POTENTIAL, DISSIPATED = range(3)
-TILTED = free.rotation((1, 2, -1), 0.7)
 
 
 def decaying(t, x0, v0, mass, stiffness, damping):
@@ -23,12 +23,6 @@ def decaying(t, x0, v0, mass, stiffness, damping):
     decay = damping / (2 * mass)
     w = math.sqrt(stiffness / mass - decay**2)
     return np.exp(-decay * t) * (x0 * np.cos(w * t) + (v0 + decay * x0) / w * np.sin(w * t))
-
-
-def imbalance(rows):
-    """Return how far the sum of energies goes from its start, over the largest kinetic energy."""
-    total = rows["energy"][:, :3].sum(axis=1)
-    return np.abs(total - total[0]).max() / rows["energy"][:, KINETIC].max()
 
 
 def momenta(rows, masses, inertias):
@@ -54,7 +48,7 @@ def two_bodies(**elements):
     first = free.body(2, 1.5, (0.1, 0.2, 0.25), (0, 0, 0.7), (0, 0, 1.0), (1, 2, 3))
     second = free.body(3, 1.0, (0.3, 0.2, 0.25), (1, 0, 0), (0, 0.2, 0), (0.4, -1, 0.2))
     markers = [
-        Marker(21, body_id=2, pos=(0.1, 0.2, 0.8), R=TILTED),
+        Marker(21, body_id=2, pos=(0.1, 0.2, 0.8), R=free.TILTED),
         Marker(31, body_id=3, pos=(0.9, 0.1, 0.1), R=free.rotation((0, 1, 1), 0.4)),
     ]
     return free.model(first, second, markers=markers, end_time=2.0, **elements)
@@ -69,11 +63,11 @@ def test_a_bushing_swings_along_its_axes_as_the_closed_form(axis):
     K, C, preload = (40.0, 70.0, 90.0, 0, 0, 0), (1.0, 2.0, 3.0, 0, 0, 0), 2.0
     F0 = np.zeros(6)
     F0[axis] = preload
-    e = TILTED[:, axis]
-    ground = Marker(11, body_id=1, pos=(0, 0, 0), R=TILTED)
+    e = free.TILTED[:, axis]
+    ground = Marker(11, body_id=1, pos=(0, 0, 0), R=free.TILTED)
     body = free.body(2, 1.5, p=tuple(0.3 * e), v=tuple(0.8 * e))
-    bushing = Bushing(1, "", 20, 11, K, C, tuple(F0))
-    rows, _ = free.run(free.model(body, markers=[ground], bushings=[bushing], end_time=2.0))
+    bushing = free.bushing(1, 20, 11, K, C, F0)
+    rows, _ = free.run(free.model(body, markers=[ground], marker_forces=[bushing], end_time=2.0))
     rest = preload / K[axis]
     x = rest + decaying(rows["time"], 0.3 - rest, 0.8, 1.5, K[axis], C[axis])
     np.testing.assert_allclose(rows["y"][:, :3], x[:, None] * e, atol=2e-8)
@@ -87,7 +81,7 @@ def test_a_bushing_turns_about_its_axes_as_the_closed_form(axis):
     T0, w = np.zeros(6), np.zeros(3)
     T0[3 + axis], w[axis] = preload, 3.0
     body = free.body(2, inertia=(0.3, 0.3, 0.3), w=w)
-    rows, _ = free.run(free.model(body, bushings=[Bushing(1, "", 20, 10, K, C, tuple(T0))]))
+    rows, _ = free.run(free.model(body, marker_forces=[free.bushing(1, 20, 10, K, C, T0)]))
     rest = preload / K[3 + axis]
     x = rest + decaying(rows["time"], -rest, 3.0, 0.3, K[3 + axis], C[3 + axis])
     # beyond two thirds of half a turn
@@ -121,8 +115,8 @@ def test_the_torque_is_the_gradient_of_what_a_bushing_stores(size):
 def test_a_bushing_keeps_energy_and_momenta_in_any_motion(damped):
     damping = (1.0, 2.0, 3.0, 0.1, 0.2, 0.3) if damped else (0.0,) * 6
     preload = (3.0, -1.0, 2.0) + ((0.1, -0.2, 0.3) if damped else (0.0,) * 3)
-    bushing = Bushing(1, "", 21, 31, (50, 60, 70, 5, 6, 7), damping, preload)
-    rows, _ = free.run(two_bodies(bushings=[bushing]))
+    bushing = free.bushing(1, 21, 31, (50, 60, 70, 5, 6, 7), damping, preload)
+    rows, _ = free.run(two_bodies(marker_forces=[bushing]))
     assert imbalance(rows) < 1e-8
     assert np.ptp(rows["energy"][:, KINETIC]) > 1.0
     if not damped:
@@ -155,15 +149,15 @@ def test_a_vector_force_acts_and_reacts_at_the_origin_of_i():
 
 def test_a_force_on_one_body_is_along_its_reference_marker():
     exprs = (parse("2"), None, parse("TIME"), None, parse("0.5"), None)
-    ground = Marker(11, body_id=1, pos=(5, 0, 0), R=TILTED)
+    ground = Marker(11, body_id=1, pos=(5, 0, 0), R=free.TILTED)
     body = free.body(2, 1.5, (0.1, 0.2, 0.3))
     force = BodyForce(1, "FORCEANDTORQUE", exprs, "", 20, 0, 11)
     rows, _ = free.run(free.model(body, markers=[ground], body_forces=[force]))
     t = rows["time"][:, None]
-    v = (TILTED[:, 0] * 2 * t + TILTED[:, 2] * t**2 / 2) / 1.5
+    v = (free.TILTED[:, 0] * 2 * t + free.TILTED[:, 2] * t**2 / 2) / 1.5
     np.testing.assert_allclose(rows["y"][:, 7:10], v, atol=1e-9)
     np.testing.assert_allclose(momenta(rows, (1.5,), np.array([(0.1, 0.2, 0.3)]))[:, 3:],
-        0.5 * t * TILTED[:, 1] + np.cross(rows["y"][:, :3], 1.5 * v), atol=1e-8)  # fmt: skip
+        0.5 * t * free.TILTED[:, 1] + np.cross(rows["y"][:, :3], 1.5 * v), atol=1e-8)  # fmt: skip
     assert imbalance(rows) < 1e-8
 
 
@@ -177,8 +171,8 @@ def hung(damping, preload=0.0):
     """Return two free bodies that a stiff bushing joins away from both cgs, shaken."""
     K = (4e3, 6e3, 5e3, 30.0, 20.0, 25.0)
     C = tuple(damping * k for k in K)
-    model = two_bodies(bushings=[Bushing(1, "", 21, 31, K, C, (preload, 0, 0, 0, 0, 0))])
-    place = {"pos": (0.5, 0.1, 0.4), "R": TILTED}
+    model = two_bodies(marker_forces=[free.bushing(1, 21, 31, K, C, (preload, 0, 0, 0, 0, 0))])
+    place = {"pos": (0.5, 0.1, 0.4), "R": free.TILTED}
     markers = {id: replace(model.markers[id], **place) for id in (21, 31)}
     return replace(model, markers=model.markers | markers)
 

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from mbsim.arrays.hooks import Held, Hook, answer_of
 from mbsim.arrays.scene import (
     ANGLE,
     ASKED,
@@ -33,8 +34,6 @@ from mbsim.arrays.scene import (
     PIVOT,
     PIVOT_THEN,
     PIVOT_TIME,
-    PLACE_HELD,
-    RIGID_DOOR,
     TOUCHING,
     TWIST,
     USUAL,
@@ -58,8 +57,6 @@ from mbsim.dynamics.expressions.jets import gradient, jet
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 
-#: Code of constraints that contradict each other in the course of the motion.
-CONTRADICTION = 9
 
 #: Below this part of the usual pivots a state is near a position in which a loop can fold: how far
 #: that is goes as the square root of the least pivot.
@@ -329,8 +326,8 @@ def lasting(scene: Scene) -> np.ndarray:
 @jitable
 def fill_equations(scene, t, y):
     """Fill gradient, residual and rates of the equations in use."""
-    if scene.world.doors[RIGID_DOOR] != 0:
-        call_int(scene.world.doors[RIGID_DOOR], (scene, PLACE_HELD, t, y))
+    if scene.world.hooks[Hook.HELD] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 

@@ -25,10 +25,10 @@ from mbsim.arrays.scene import (
     USUAL,
     WITHIN,
 )
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.equations import (
-    CONTRADICTION,
     RESIDUAL,
     active_count,
     factor_matrix,
@@ -261,5 +261,5 @@ def keep_choice(scene, t, y):
         choose_better(scene, t, y, least)
     if not apart <= _APART and active_count(scene) <= count:
         scene.work.trouble[1] = worst
-        return CONTRADICTION
+        return Code.CONTRADICTION
     return 0

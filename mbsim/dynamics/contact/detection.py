@@ -1,4 +1,4 @@
-"""Who touches whom: the motion bound, the closed-form kernels, the door to FCL.
+"""Who touches whom: the motion bound, the closed-form kernels, the hook to FCL.
 
 A pair that has `left` between it at the committed state cannot touch while its shapes have
 moved by less since. That is a pure function of the trial point and the committed state, so
@@ -7,16 +7,13 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import FCL_CALLS, FCL_DOOR, LIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import FCL_CALLS, LIVE, NARROWPHASE, SKIPPED, WANTED
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.geometry.catalog import COUPLE
-
-#: Code of a trial point too far away for the list of near pairs; the step has to be shorter.
-TOO_FAR = 6
-#: Code of more near pairs than there are places for.
-CROWDED = 7
 
 
 @jitable
@@ -70,9 +67,9 @@ def find_contacts(scene, y):
         work.touching[hit[k]] = 0
     hit[last] = 0
     if not place_graphics(scene, y):
-        return TOO_FAR
+        return Code.TOO_FAR
     if pairs.count[WANTED] > 0:
-        return CROWDED
+        return Code.CROWDED
 
     waiting, measured = 0, 0
     for k in range(pairs.count[LIVE]):
@@ -92,7 +89,7 @@ def find_contacts(scene, y):
     # one visit to Python for all pairs that need it
     if waiting > 0:
         log.counters[FCL_CALLS] += waiting
-        code = call_int(scene.world.doors[FCL_DOOR], (waiting,))
+        code = call_int(scene.world.hooks[Hook.FCL], (waiting,))
         if code != 0:
             return code
         for k in range(waiting):

@@ -20,6 +20,7 @@ from mbsim.arrays.scene import (
     PYTHON_CALLS,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import (
@@ -56,18 +57,7 @@ from mbsim.laws.abi import (
 )
 from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
-from mbsim.laws.user_normal import (
-    EVALUATE,
-    EXPLORE,
-    LOCI,
-    LOCJ,
-    NI,
-    NJ,
-    PLACE,
-    PYTHON,
-    TIME,
-    USER_NORMAL_FAILED,
-)
+from mbsim.laws.user_normal import EVALUATE, EXPLORE, LOCI, LOCJ, NI, NJ, PLACE, PYTHON, TIME
 from mbsim.laws.user_normal import MODE as PLACE_MODE
 from mbsim.laws.user_normal import RATE as PLACE_RATE
 
@@ -90,9 +80,6 @@ CHANGES = 1e-9
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
-
-# code of a user's law that made something else than numbers of finite input
-USER_NOT_FINITE = 5
 
 
 @jitable
@@ -312,7 +299,7 @@ def ask_normal(scene, t, y, c, at, depth, rate, out):
     code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     place[PLACE_MODE] = EXPLORE
     if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[0]):
-        return USER_NORMAL_FAILED
+        return Code.USER_NORMAL_FAILED
     return code
 
 
@@ -446,7 +433,7 @@ def add_contact(scene, t, h, y, dy, s):
             return code
         finite = math.isfinite(out[0] + out[1] + out[4])
         if not finite and contacts.framed[c] == 1 and math.isfinite(normal + slip[0] + slip[1]):
-            return USER_NOT_FINITE
+            return Code.USER_NOT_FINITE
         if scene.world.fixed_step[0] == 1 and h > 0.0:
             hold_back(scene, y, bi, bj, p, n, h, slip, out)
         if contacts.memory[c] > 0:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
 from mbsim.arrays.scene import (
-    ANGLES_DOOR,
     APPROACH,
     BODY_SIZE,
-    DRY_DOOR,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -20,10 +19,8 @@ from mbsim.arrays.scene import (
     EVENT_TIME,
     FIRST_TOUCH,
     HELD_OTHERWISE,
-    KEEP_DRY,
     LEAVE,
     LIVE,
-    NEAR_DOOR,
     PEAK_DEPTH,
     PEAK_FORCE,
     PEAK_FORCE_TIME,
@@ -404,8 +401,9 @@ def commit(scene, t, h, y):
     """
     state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
     changed = commit_incidents(scene, t, h, y)
-    if scene.world.doors[DRY_DOOR] != 0:
-        changed = max(changed, call_int(scene.world.doors[DRY_DOOR], (scene, KEEP_DRY, t, y)))
+    if scene.world.hooks[Hook.DRY] != 0:
+        answer = call_int(scene.world.hooks[Hook.DRY], (scene, Dry.KEEP, t, y))
+        changed = max(changed, answer_of(scene, answer))
     watch_peaks(scene, t)
     contacts = len(scene.contacts.id)
     for c in range(contacts):
@@ -421,8 +419,8 @@ def commit(scene, t, h, y):
         if graphics.body[g] < ground:
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
-    if scene.world.doors[ANGLES_DOOR] != 0:
-        call_int(scene.world.doors[ANGLES_DOOR], (scene,))
+    if scene.world.hooks[Hook.ANGLES] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene,)))
     if len(scene.crowds.contact) > 0:
-        call_int(scene.world.doors[NEAR_DOOR], (scene, y))
+        note_failure(scene, call_int(scene.world.hooks[Hook.NEAR], (scene, y)))
     return changed

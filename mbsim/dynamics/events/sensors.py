@@ -15,6 +15,7 @@ and it acts where it is on and was not. A located EQUAL acts wherever e comes to
 
 from __future__ import annotations
 
+from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     EQUAL,
     EVENT_ELEMENT,
@@ -81,18 +82,18 @@ def happens(scene, t, y):
         if sensors.located[k] == 1:
             excess = value(scene, t, y, sensors.program[k]) - sensors.value[k]
             if becomes_true(scene, k, excess):
-                return 1.0
+                return 1
             if scene.state.sensed[k, EXCESS] == 0.0 and excess != 0.0:
                 # it left the value to this side: without that a return within the step is not seen
                 scene.state.sensed[k, EXCESS] = LEAST if excess > 0.0 else -LEAST
-    return 0.0
+    return 0
 
 
 @jitable
 def arrive(scene, t, y):
     """Note what every sensor sees at the committed state; return 1 if one has become true."""
     place_bodies(scene, y)
-    sensors, sensed, rows, any_fired = scene.sensors, scene.state.sensed, scene.rows, 0.0
+    sensors, sensed, rows, any_fired = scene.sensors, scene.state.sensed, scene.rows, 0
     for k in range(len(sensors.id)):
         excess = value(scene, t, y, sensors.program[k]) - sensors.value[k]
         fires = becomes_true(scene, k, excess)
@@ -100,7 +101,7 @@ def arrive(scene, t, y):
         sensed[k, EXCESS] = excess
         if not fires:
             continue
-        any_fired = 1.0
+        any_fired = 1
         sensed[k, FIRED] = 1.0
         if sensors.evaluate[k] >= 0:
             sensed[k, NEXT] = value(scene, t, y, sensors.evaluate[k])
@@ -114,10 +115,14 @@ def arrive(scene, t, y):
 def happens_hook(context, t, h, a, b):
     """Whether a located sensor has become true."""
     scene = view(context, Scene)
-    return happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    answer = happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    code = failure_or(scene, 0)
+    return answer if code == 0 else -code
 
 
 def arrive_hook(context, t, h, a, b):
     """What sensors see at a committed state."""
     scene = view(context, Scene)
-    return arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    answer = arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))
+    code = failure_or(scene, 0)
+    return answer if code == 0 else -code

@@ -18,7 +18,19 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import AXIS_TORQUE, BUSHING, LIVE, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import (
+    AXIS_TORQUE,
+    BOUND_DAMPING,
+    BOUND_FORCE,
+    BOUND_STIFFNESS,
+    BOUND_TURNING,
+    BOUND_TURNING_DAMPING,
+    LIVE,
+    MARKER_FORCE,
+    REST,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+)
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, vector
@@ -165,21 +177,23 @@ def add_touching(scene, y, s, out):
 
 
 @jitable
-def add_bushing(scene, y, f):
-    """Add the largest stiffness and damping of bushing f, along every axis and about it.
+def add_marker_force(scene, y, f):
+    """Add the largest stiffness and damping of marker force f, along every axis and about it.
 
     Both bodies are pushed at I's origin P, so arms go there. A turn of body b moves P by its
-    arm, and turns the axes along which a force that the bushing already bears acts: arm times
+    arm, and turns the axes along which a force that already acts does: arm times
     force, as much again where J's axes turn with b.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
     i, j, par = applied.i[f], applied.j[f], applied.par[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
-    k, c = max(par[0], max(par[1], par[2])), max(par[6], max(par[7], par[8]))
-    turn_k, turn_c = max(par[3], max(par[4], par[5])), max(par[9], max(par[10], par[11]))
+    k, c = par[BOUND_STIFFNESS], par[BOUND_DAMPING]
+    turn_k, turn_c = par[BOUND_TURNING], par[BOUND_TURNING_DAMPING]
     at = marker_point(scene, y, i)
-    stretch = norm(sub(at, marker_point(scene, y, j)))
-    force = k * stretch + norm((par[12], par[13], par[14]))
+    stretch = sub(at, marker_point(scene, y, j))
+    for axis in range(3):
+        stretch = sub(stretch, scale(par[REST + axis], marker_axis(scene, j, axis)))
+    force = k * norm(stretch) + par[BOUND_FORCE]
     for side in range(2):
         m = i if side == 0 else j
         b = markers.body[m]
@@ -204,8 +218,8 @@ def add_spring(scene, y, f):
     torque F r. Stiffness across and by F is bounded by what the smallest moment of inertia gives.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
-    if applied.kind[f] == BUSHING:
-        add_bushing(scene, y, f)
+    if applied.kind[f] == MARKER_FORCE:
+        add_marker_force(scene, y, f)
         return
     i, j, par = applied.i[f], applied.j[f], applied.par[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0

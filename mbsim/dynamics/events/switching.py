@@ -9,20 +9,9 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    ASK_HELD,
-    AUDIT_TOL,
-    EVALUATE_DOOR,
-    HEAT,
-    HOT,
-    LOAD_HELD,
-    RIGID_DOOR,
-    SIDE,
-    SLIDE_LIMIT,
-    SLIDES,
-    Scene,
-)
-from mbsim.core.address import call_float, call_int, vector_at, view
+from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
+from mbsim.arrays.scene import AUDIT_TOL, HEAT, HOT, SIDE, SLIDE_LIMIT, SLIDES, Scene
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -104,6 +93,12 @@ def leaves_branch(scene):
 
 
 @jitable
+def look_at(scene, context, t, y, dy):
+    """Evaluate a point that is no step's; a failure is noted."""
+    note_failure(scene, call_int(scene.world.hooks[Hook.EVALUATE], (context, t, 0.0, y, dy)))
+
+
+@jitable
 def decide(scene, context, t, y):
     """Evaluate again with the rates of normal forces, where a branch depends on them."""
     hit, work, h = scene.work.hit, scene.work, math.inf
@@ -122,13 +117,13 @@ def decide(scene, context, t, y):
     for i in range(len(y)):
         work.ahead[0, i] = y[i] + h * work.idle[i]
     there, then = work.ahead[0], work.ahead[1]
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t + h, 0.0, there, then))
+    look_at(scene, context, t + h, there, then)
     for s in range(len(work.slot)):
         row = work.slot[s]
         if row[FOUND_AT] == t:
             row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
             row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    look_at(scene, context, t, y, work.idle)
 
 
 @jitable
@@ -147,16 +142,18 @@ def side(scene, t, y, k):
 def watch_held(scene, t, y, what):
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
-    A step that was cut for that heats by 1, whether a mode changed then or not; one that was not
-    leaves half of the heat. So where cuts follow each other a whole step is taken now and then.
+    Of a step that was taken: 1 if it was cut for that. Such a step heats by 1, whether a mode
+    changed then or not; one that was not leaves half of the heat. So where cuts follow each other
+    a whole step is taken now and then.
     """
-    heat, differs = scene.state.heat, 0.0
+    heat, differs = scene.state.heat, 0
     if what == PASS:
+        differs = 1 if heat[1] == 1.0 else 0
         heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
         heat[1] = 0.0
     elif heat[0] <= HOT:
-        if call_int(scene.world.doors[RIGID_DOOR], (scene, ASK_HELD, t, y)) == 1:
-            heat[1], differs = 1.0, 2.0
+        if answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.ASK, t, y))) == 1:
+            heat[1], differs = 1.0, 2
     return differs
 
 
@@ -172,15 +169,15 @@ def load(scene, context, t, y):
             most = 0.0
     if most < 0.0 or scene.state.frozen[0] == 0:
         return -1.0
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+    look_at(scene, context, t, y, scene.work.idle)
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0:
             force = holding_force(scene, f)
             if not math.isnan(force):
                 most = max(most, abs(force) / scene.applied.par[f, STATIC])
-    if scene.world.doors[RIGID_DOOR] != 0:
-        held = call_int(scene.world.doors[RIGID_DOOR], (scene, LOAD_HELD, t, y))
-        most = max(most, 1e-6 * held)
+    if scene.world.hooks[Hook.HELD] != 0:
+        held = call_int(scene.world.hooks[Hook.HELD], (scene, Held.LOAD, t, y))
+        most = max(most, 1e-6 * answer_of(scene, held))
     return most
 
 
@@ -188,12 +185,12 @@ def load(scene, context, t, y):
 def watch(scene, context, t, y, what):
     """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
-    Unless it is only asked, the sides are kept.
+    Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
-    sides, differs, last = scene.state.sides, 0.0, len(scene.kinks.program) - 1
+    sides, differs, last = scene.state.sides, 0, len(scene.kinks.program) - 1
     if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
         # what friction does follows from all the rest
-        call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, scene.work.idle))
+        look_at(scene, context, t, y, scene.work.idle)
         if what == ASK and len(scene.work.ahead) > 0:
             decide(scene, context, t, y)
     else:
@@ -206,13 +203,15 @@ def watch(scene, context, t, y, what):
         # friction with a memory of its own is on the side that it keeps
         exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
         leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
-        if leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
-            differs = max(differs, 2.0 if exact else 1.0)
+        if what == PASS:
+            differs = 1 if other else differs
+        elif leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
+            differs = max(differs, 2 if exact else 1)
         if what == PASS:
             sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
-    if scene.world.doors[RIGID_DOOR] != 0:
+    if scene.world.hooks[Hook.HELD] != 0:
         differs = max(differs, watch_held(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
     hot = sides[last, HEAT] > HOT_MODES
@@ -291,7 +290,7 @@ def follow_half(scene, context, t, y):
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
         kept[0], kept[1], kept[2] = row[ALONG_X], row[ALONG_Y], counts_as(scene, s)
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    look_at(scene, context, t, y, work.idle)
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         for j in range(state.memory.shape[1]):
@@ -307,7 +306,7 @@ def follow_half(scene, context, t, y):
 def follow_halves(scene, context, t, y):
     """Return how far friction at a step's end is from that of its second half, as an error."""
     state, work, hit, worst = scene.state, scene.work, scene.state.hit, 0.0
-    call_float(scene.world.doors[EVALUATE_DOOR], (context, t, 0.0, y, work.idle))
+    look_at(scene, context, t, y, work.idle)
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
@@ -320,21 +319,31 @@ def follow_halves(scene, context, t, y):
     return worst
 
 
+@jitable
+def serve_kinks(scene, context, t, what, a, b):
+    """Do what the hook `kinks` is asked for; return its answer."""
+    n = scene.rows.y.shape[1]
+    if what == LOAD:
+        b[0] = load(scene, context, t, vector_at(a, n))
+        return 1 if b[0] >= 0.0 else 0
+    if what >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
+        return 0
+    if what == HIDES:
+        return 1 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0
+    if what == BENDS:
+        return 1 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0
+    if what == HALF:
+        follow_half(scene, context, t, vector_at(a, n))
+        return 0
+    if what == HALVES:
+        b[0] = follow_halves(scene, context, t, vector_at(a, n))
+        return 0
+    return watch(scene, context, t, vector_at(a, n), what)
+
+
 def kinks_hook(context, t, h, a, b):
     """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
     scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    if h == LOAD:
-        return load(scene, context, t, vector_at(a, n))
-    if h >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
-        return 0.0
-    if h == HIDES:
-        return 1.0 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0.0
-    if h == BENDS:
-        return 1.0 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0.0
-    if h == HALF:
-        follow_half(scene, context, t, vector_at(a, n))
-        return 0.0
-    if h == HALVES:
-        return follow_halves(scene, context, t, vector_at(a, n))
-    return watch(scene, context, t, vector_at(a, n), h)
+    answer = serve_kinks(scene, context, t, h, a, b)
+    code = failure_or(scene, 0)
+    return answer if code == 0 else -code

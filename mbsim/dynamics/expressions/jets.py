@@ -1,6 +1,6 @@
 """Values, jets and gradients of the programs of expressions; `place_bodies` has been called.
 
-In compiled code the interpreter stands behind a door, so that what asks for a value does
+In compiled code the interpreter stands behind a hook, so that what asks for a value does
 not compile it anew; plain Python runs it directly.
 """
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.scene import EXPRESSION_DOOR, VALUE_DOOR
+from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.expressions.interpreter import interpret
@@ -25,10 +25,12 @@ def run(scene, t, y, program, body, way):
 
 @overload(run)
 def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
-    """Give compiled code its form of `run`: a call through the door."""
+    """Give compiled code its form of `run`: a call of the hook."""
 
     def compiled(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
-        return call_int(scene.world.doors[EXPRESSION_DOOR], (scene, t, y, program, body, way))
+        code = call_int(scene.world.hooks[Hook.JET], (scene, t, y, program, body, way))
+        note_failure(scene, code)
+        return code
 
     return compiled
 
@@ -40,10 +42,10 @@ def value(scene, t, y, program):
 
 @overload(value)
 def _value(scene: Any, t: Any, y: Any, program: Any) -> Any:
-    """Give compiled code its form of `value`: a call through the door."""
+    """Give compiled code its form of `value`: a call of the hook."""
 
     def compiled(scene: Any, t: Any, y: Any, program: Any) -> Any:
-        return call_float(scene.world.doors[VALUE_DOOR], (scene, t, y, program))
+        return call_float(scene.world.hooks[Hook.VALUE], (scene, t, y, program))
 
     return compiled
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.expressions.jets import value
 
 
@@ -17,5 +17,5 @@ def add_slopes(scene, t, y, dy):
         slope = value(scene, t, y, states.program[k])
         dy[states.place[k]] = slope
         if not math.isfinite(slope):
-            return NOT_FINITE
+            return Code.NOT_FINITE
     return 0

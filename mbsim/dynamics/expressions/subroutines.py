@@ -1,7 +1,7 @@
 """Results of user subroutines as numbers in expressions.
 
 A subroutine stands behind (scene, t, y, results) -> code, 0 being good. What it
-asks of the trial state comes back through the door of expressions, see
+asks of the trial state comes back through the hook of expressions, see
 `compile_model.subroutines`.
 """
 
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import PYTHON_CALLS, RESIDUAL_DOOR
+from mbsim.arrays.hooks import Hook, note_failure
+from mbsim.arrays.scene import PYTHON_CALLS
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 
@@ -21,20 +22,13 @@ def user_result(scene, t, y, row, component, calls):
     if component == 0 or calls == 1:
         element = users.element[row]
         if element >= 0:
-            door = scene.world.doors[RESIDUAL_DOOR]
-            code = call_int(door, (scene, t, y, element, component))
+            hook = scene.world.hooks[Hook.ELEMENT]
+            code = call_int(hook, (scene, t, y, element, component))
         else:
             scene.log.counters[PYTHON_CALLS] += 1
             code = call_int(users.address[row], (scene, t, y, users.result[row]))
         if code != 0:
-            if users.failed[0] == 0:
-                users.failed[0] = code
+            note_failure(scene, code)
             for k in range(users.result.shape[1]):
                 users.result[row, k] = math.nan
     return users.result[row, component]
-
-
-@jitable
-def failure_or(scene, code):
-    """Return the code of a subroutine that failed, else `code`."""
-    return scene.users.failed[0] if scene.users.failed[0] != 0 else code

@@ -16,7 +16,7 @@ with the sign turned, for nothing says what part of it could come back. Where th
 coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
 depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
 later (`forces.joint_friction`), and so do forces by expressions of reactions
-(`forces.reaction_forces`); bushings and vector forces are in `forces.wrenches`, dry friction in
+(`forces.reaction_forces`); marker and vector forces are in `forces.wrenches`, dry friction in
 `forces.dry_friction`.
 """
 
@@ -36,8 +36,8 @@ from mbsim.arrays.scene import (
     VECTOR_FORCE,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
@@ -137,7 +137,7 @@ def add_applied(scene, t, y, dy):
         if is_dry(kind):
             lost += add_dry(scene, y, f)
             if not math.isfinite(dot(vector(work.applied[f]), vector(work.applied[f]))):
-                return NOT_FINITE
+                return Code.NOT_FINITE
             continue
         if kind == LINE_FORCE:
             n, x, rate = along_line(scene, y, f)
@@ -164,7 +164,7 @@ def add_applied(scene, t, y, dy):
         work.applied[f, LOST_POWER] = power
         lost += power
         if not math.isfinite(size):
-            return NOT_FINITE
+            return Code.NOT_FINITE
     if scene.world.ledger[1] >= 0:
         dy[scene.world.ledger[1]] = lost
     return 0

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Dry
 from mbsim.arrays.scene import (
     DRY_SLIDE,
     DRY_TURN,
-    KEEP_DRY,
     LOST_POWER,
     SLIDER,
     SLIDER_BEFORE,
@@ -195,5 +195,5 @@ def commit_dry(scene, t, y):
 
 @jitable
 def serve_dry(scene, what, t, y):
-    """Do what is asked for at the door of dry friction where none is rigid; return 0."""
-    return commit_dry(scene, t, y) if what == KEEP_DRY else 0
+    """Do what dry friction is asked for (`Dry`) where none is rigid; return 0."""
+    return commit_dry(scene, t, y) if what == Dry.KEEP else 0

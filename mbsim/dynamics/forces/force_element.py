@@ -23,18 +23,16 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import KEEP_DRY, PYTHON_CALLS
+from mbsim.arrays.hooks import Dry
+from mbsim.arrays.scene import PYTHON_CALLS
 from mbsim.core.address import call_int
+from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import AT_ONCE
 from mbsim.core.rotation import dot, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.forces.wrenches import velocity_at
 from mbsim.laws.residual import ALGEBRAIC, DIFFERENTIAL, SWITCHING
-
-#: Code of an element whose residual is nowhere 0.
-UNSOLVED_ELEMENT = 12
 
 # entries of `State.residual`
 NOW, BEFORE = range(2)
@@ -471,7 +469,7 @@ def solve(scene, e, h):
         code = 0
     if code == -1:
         R.trouble[0] = e
-        return UNSOLVED_ELEMENT
+        return Code.UNSOLVED_ELEMENT
     if code == 0:
         put_unknowns(scene, e, h)
     return code
@@ -563,7 +561,7 @@ def serve_residual(scene, t, y, e, component):
 @jitable
 def keep_residuals(scene, what, t, y):
     """Keep what all elements make of the point evaluated last; return 0."""
-    if what != KEEP_DRY:
+    if what != Dry.KEEP:
         return 0
     R = scene.residuals
     for e in range(len(R.id)):

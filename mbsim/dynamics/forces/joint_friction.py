@@ -31,8 +31,8 @@ from mbsim.arrays.scene import (
     TURN_FRICTION,
 )
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_velocity
 from mbsim.dynamics.constraints.equations import active_count, hold_again
@@ -44,8 +44,6 @@ SPEED, FORCE, MISS = 6, 7, 8
 # entries of `Applied.par`
 RADIUS, PRELOAD, ARM = range(3)
 
-#: Code of friction and reactions that raise each other without end.
-JAMMED = 10
 
 #: Friction has settled when it changes by less than this part of the largest.
 SETTLED = 1e-13
@@ -165,7 +163,7 @@ def settle_friction(scene, t, y, stresses):
             # this tells which it is, and no contact is at fault
             scene.work.applied[row, 0] = worst
             scene.work.trouble[1] = -1
-            return NOT_FINITE
+            return Code.NOT_FINITE
         enough = SETTLED if k < MOST_ROUNDS - 1 else GOOD_ENOUGH
         if worst <= enough * largest:
             scene.work.trouble[1] = -1
@@ -175,7 +173,7 @@ def settle_friction(scene, t, y, stresses):
             if applied.connection[f] >= 0:
                 add_force(scene, f, step * rub[f, MISS])
         hold_again(scene, t)
-    return JAMMED
+    return Code.JAMMED
 
 
 @jitable

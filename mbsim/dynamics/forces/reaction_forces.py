@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
@@ -25,19 +26,17 @@ from mbsim.arrays.scene import (
     RUBBING,
     SCALAR,
 )
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.constraints.equations import active_count, hold_again
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.expressions.subroutines import failure_or
 from mbsim.dynamics.forces.applied import along_axis, along_line, push
 from mbsim.dynamics.forces.joint_friction import (
     GOOD_ENOUGH,
-    JAMMED,
     SETTLED,
     SPEED,
     add_force,
@@ -49,8 +48,6 @@ from mbsim.dynamics.forces.wrenches import push_at, velocity_at
 # columns of `Work.late`
 SIZE, MISS, STEP, CHANGE, ROW = range(5)
 
-#: Code of forces and reactions that do not settle.
-UNSETTLED = 13
 
 #: Rounding of reactions, in parts of the largest.
 ROUNDING = 1e-15
@@ -253,7 +250,7 @@ def settle(scene, t, y, stresses):
         if broken >= 0:
             # the row of `Work.applied` tells which it is, and no contact is at fault
             work.trouble[1] = -1
-            return NOT_FINITE
+            return Code.NOT_FINITE
         if k == 0:
             bound = TOO_LARGE * max(largest, reaction)
         at, worst = worst_unknown(scene)
@@ -267,7 +264,7 @@ def settle(scene, t, y, stresses):
         next_step(scene)
         add_to_all(scene, y)
         hold_again(scene, t)
-    return JAMMED if scene.applied.late[at, 1] == RUBBING else UNSETTLED
+    return Code.JAMMED if scene.applied.late[at, 1] == RUBBING else Code.UNSETTLED
 
 
 @jitable
@@ -306,4 +303,4 @@ def add_late(scene, t, y, dy):
         lost += power
     dy[scene.world.ledger[1]] += lost
     # bodies that no joint holds may be pushed too
-    return 0 if math.isfinite(accelerate(scene, y, dy)) else NOT_FINITE
+    return 0 if math.isfinite(accelerate(scene, y, dy)) else Code.NOT_FINITE

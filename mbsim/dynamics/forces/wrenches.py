@@ -1,22 +1,7 @@
-"""Bushings and vector forces: force and torque at I's origin, the opposite there on J's body.
+"""Marker and vector forces: force and torque at I's origin, the opposite there on J's body.
 
-With K, C, preload F0, T0 along and about J's axes, d = P_I - P_J seen from J, d' its rate there,
-w the spin of I against J, and theta the rotation vector that takes J's axes to I's, all along
-J's axes, a bushing exerts on I
-
-    F = F0 - K d - C d'            T = T0 - J(theta)^-T K theta - C w
-
-and stores d'K d/2 - F0.d + theta'K theta/2. As theta' = J(theta)^-1 w, the torque is the exact
-gradient of that:
-
-    J(theta)^-T K theta = K theta + theta x K theta/2 + c theta x (theta x K theta)
-    c = (1 - a cot a) / phi^2,  a = phi/2,  phi = abs(theta)
-
-(left Jacobian of SO(3): T. D. Barfoot, State Estimation for Robotics, 2017, section 7.1). For a
-turn about one axis of J this is K times the angle, for small ones K times each angle, as if
-angles were projected. At half a turn (phi = pi) theta changes its sign: a bushing holds for
-less. A constant torque T0 has no potential: its work counts as lost, with the sign turned, as
-does that of a vector force.
+What a marker force is stands in `forces.catalog`. A vector force has no potential: its work counts
+as lost, with the sign turned.
 """
 
 from __future__ import annotations
@@ -26,17 +11,15 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.scene import BUSHING, LOST_POWER, STORED_ENERGY, WRENCH_DOOR
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import LOST_POWER, MARKER_FORCE, STORED_ENERGY
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.expressions.jets import value
-
-# below this angle the series of c is exact to rounding: its next term is phi^4/30240
-_SMALL = 1e-3
 
 
 def wrench(scene, t, y, f):
@@ -46,10 +29,10 @@ def wrench(scene, t, y, f):
 
 @overload(wrench)
 def _wrench(scene: Any, t: Any, y: Any, f: Any) -> Any:
-    """Give compiled code its form of `wrench`: a call through the door."""
+    """Give compiled code its form of `wrench`: a call of the hook."""
 
     def compiled(scene: Any, t: Any, y: Any, f: Any) -> Any:
-        return call_int(scene.world.doors[WRENCH_DOOR], (scene, t, y, f))
+        return call_int(scene.world.hooks[Hook.WRENCH], (scene, t, y, f))
 
     return compiled
 
@@ -96,25 +79,6 @@ def rotation_vector(scene, i, j):
 
 
 @jitable
-def turning_torque(theta, k):
-    """Return J(theta)^-T k theta, `k` the three stiffnesses about J's axes."""
-    return turned_back(theta, (k[0] * theta[0], k[1] * theta[1], k[2] * theta[2]))
-
-
-@jitable
-def turned_back(theta, a):
-    """Return J(theta)^-T a."""
-    square = dot(theta, theta)
-    if square < _SMALL * _SMALL:
-        c = 1.0 / 12.0 + square / 720.0
-    else:
-        half = 0.5 * math.sqrt(square)
-        c = (1.0 - half / math.tan(half)) / square
-    turned = cross(theta, a)
-    return add(add(a, scale(0.5, turned)), scale(c, cross(theta, turned)))
-
-
-@jitable
 def velocity_at(scene, y, b, p):
     """Return the velocity of the point of body b that is at p."""
     w = vector(scene.work.w[b])
@@ -129,35 +93,6 @@ def push_at(scene, y, b, p, force, torque):
     for k in range(3):
         work.force[b, k] += force[k]
         work.torque[b, k] += moment[k] + torque[k]
-
-
-@jitable
-def bushing_wrench(scene, y, f, v, w):
-    """Return force and torque of a bushing on I, stored energy and lost power.
-
-    `v` and `w` are velocity (at I's origin) and spin of I's body against J's, global axes.
-    """
-    i, j, par = scene.applied.i[f], scene.applied.j[f], scene.applied.par[f]
-    d = along(scene, j, sub(marker_point(scene, y, i), marker_point(scene, y, j)))
-    v, w = along(scene, j, v), along(scene, j, w)
-    theta = rotation_vector(scene, i, j)
-    spring = turning_torque(theta, (par[3], par[4], par[5]))
-    force = (
-        par[12] - par[0] * d[0] - par[6] * v[0],
-        par[13] - par[1] * d[1] - par[7] * v[1],
-        par[14] - par[2] * d[2] - par[8] * v[2],
-    )
-    torque = (
-        par[15] - spring[0] - par[9] * w[0],
-        par[16] - spring[1] - par[10] * w[1],
-        par[17] - spring[2] - par[11] * w[2],
-    )
-    stored, lost = 0.0, 0.0
-    for k in range(3):
-        stored += d[k] * (0.5 * par[k] * d[k] - par[12 + k])
-        stored += 0.5 * par[3 + k] * theta[k] * theta[k]
-        lost += par[6 + k] * v[k] * v[k] + (par[9 + k] * w[k] - par[15 + k]) * w[k]
-    return combined(scene, j, force), combined(scene, j, torque), stored, lost
 
 
 @jitable
@@ -185,25 +120,69 @@ def vector_wrench(scene, t, y, f):
 
 
 @jitable
-def add_wrench(scene, t, y, f):
-    """Add the wrench of row f to its bodies and fill its row of `Work.applied`; return 0."""
-    applied, row = scene.applied, scene.work.applied[f]
+def add_vector_force(scene, t, y, f):
+    """Add a vector force to its bodies and fill its row of `Work.applied`; return 0."""
+    applied = scene.applied
     i, alone = applied.i[f], applied.alone[f] == 1
     p, b = marker_point(scene, y, i), scene.markers.body[i]
     other = len(scene.bodies.mass) if alone else scene.markers.body[applied.j[f]]
     v = sub(velocity_at(scene, y, b, p), velocity_at(scene, y, other, p))
     w = sub(vector(scene.work.w[b]), vector(scene.work.w[other]))
-    if applied.kind[f] == BUSHING:
-        force, torque, stored, lost = bushing_wrench(scene, y, f, v, w)
-    else:
-        force, torque = vector_wrench(scene, t, y, f)
-        stored, lost = 0.0, -dot(force, v) - dot(torque, w)
-    push_at(scene, y, b, p, force, torque)
-    if not alone:
+    force, torque = vector_wrench(scene, t, y, f)
+    return apply(scene, y, f, force, torque, 0.0, -dot(force, v) - dot(torque, w))
+
+
+@jitable
+def fill_motion(scene, y, f):
+    """Fill `Work.motion` with how I of marker force f stands and moves as seen from J."""
+    i, j, motion = scene.applied.i[f], scene.applied.j[f], scene.work.motion
+    p, b, other = marker_point(scene, y, i), scene.markers.body[i], scene.markers.body[j]
+    d = along(scene, j, sub(p, marker_point(scene, y, j)))
+    theta = rotation_vector(scene, i, j)
+    v = along(scene, j, sub(velocity_at(scene, y, b, p), velocity_at(scene, y, other, p)))
+    w = along(scene, j, sub(vector(scene.work.w[b]), vector(scene.work.w[other])))
+    for k in range(3):
+        motion[k] = d[k]
+        motion[3 + k] = theta[k]
+        motion[6 + k] = v[k]
+        motion[9 + k] = w[k]
+
+
+@jitable
+def add_marker_force(scene, y, f):
+    """Add a force of a kind of `forces.catalog`, as `add_vector_force`; return 0 or a code."""
+    applied, out = scene.applied, scene.work.wrench
+    fill_motion(scene, y, f)
+    code = call_int(applied.law[f], (scene.work.motion, applied.law_par[f], out))
+    if code != 0:
+        return code
+    j = applied.j[f]
+    force = combined(scene, j, (out[0], out[1], out[2]))
+    torque = combined(scene, j, (out[3], out[4], out[5]))
+    return apply(scene, y, f, force, torque, out[6], out[7])
+
+
+@jitable
+def apply(scene, y, f, force, torque, stored, lost):
+    """Add force and torque on I at I's origin, the opposite on J's body; return 0 or a code."""
+    applied, row = scene.applied, scene.work.applied[f]
+    i = applied.i[f]
+    p = marker_point(scene, y, i)
+    push_at(scene, y, scene.markers.body[i], p, force, torque)
+    if applied.alone[f] == 0:
+        other = scene.markers.body[applied.j[f]]
         push_at(scene, y, other, p, scale(-1.0, force), scale(-1.0, torque))
     for k in range(3):
         row[k] = force[k]
         row[3 + k] = torque[k]
     row[STORED_ENERGY] = stored
     row[LOST_POWER] = lost
-    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else NOT_FINITE
+    return 0 if math.isfinite(dot(force, force) + dot(torque, torque)) else Code.NOT_FINITE
+
+
+@jitable
+def add_wrench(scene, t, y, f):
+    """Add a vector force or a marker force; return 0 or a code."""
+    if scene.applied.kind[f] == MARKER_FORCE:
+        return add_marker_force(scene, y, f)
+    return add_vector_force(scene, t, y, f)

@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.scene import ANGLE, CHOOSE, DISPLACE, MATRIX, PROJECT, SPEED_UP, Scene
+from mbsim.arrays.hooks import Joints
+from mbsim.arrays.scene import ANGLE, Scene
 from mbsim.compile_model.build import System
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting
 from mbsim.dynamics.initial.start import MOST_DIRECTIONS, start_velocities
 
 Array = np.ndarray[Any, Any]
-#: Asks the joints' door: what, y.
+#: Asks joints: what (`arrays.hooks.Joints`), y.
 Serve = Callable[[int, Array], None]
 
 #: Newton ends below the first, fails above the second: residuals over their units.
@@ -70,24 +71,24 @@ def assemble(scene: Scene, y: Array, serve: Serve, given: dict[int, Array]) -> A
     n = len(equations.program)
     if n > 0:
         scene.sweep.multiplier[:] = 0.0
-        serve(MATRIX, y)
-        serve(DISPLACE, y)
+        serve(Joints.MATRIX, y)
+        serve(Joints.DISPLACE, y)
         _count_turns(scene, y, serve)
-        _close(scene, y, serve, DISPLACE, 2, _RESIDUAL)
+        _close(scene, y, serve, Joints.DISPLACE, 2, _RESIDUAL)
     else:
-        serve(PROJECT, positions := y.copy())
+        serve(Joints.PROJECT, positions := y.copy())
         for b in scene.tree.body:
             at = BODY_SIZE * b
             y[at : at + 7] = positions[at : at + 7]
     if given and int(scene.tree.free.sum()) <= MOST_DIRECTIONS:
-        serve(MATRIX, y)
+        serve(Joints.MATRIX, y)
         start_velocities(scene, y, given)
     if n > 0:
-        _close(scene, y, serve, SPEED_UP, 1, _MISMATCH)
-        serve(MATRIX, y)
-        serve(CHOOSE, y)
+        _close(scene, y, serve, Joints.SPEED_UP, 1, _MISMATCH)
+        serve(Joints.MATRIX, y)
+        serve(Joints.CHOOSE, y)
     chosen = [int(e) for e in equations.active[: equations.active[-1]]]
-    serve(PROJECT, y)
+    serve(Joints.PROJECT, y)
     moved, sped = _changes(scene, before, y)
     lasts = lasting(scene)
     return Assembly(
@@ -114,7 +115,7 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
 def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
     """Begin the angles that motions give with as many whole turns as the motions say."""
     equations = scene.equations
-    serve(MATRIX, y)
+    serve(Joints.MATRIX, y)
     for e in range(len(equations.program)):
         k = int(equations.first[e])
         is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
@@ -137,7 +138,7 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
         return
     best, stuck = np.inf, 0
     for _ in range(_MOST_ROUNDS):
-        serve(MATRIX, y)
+        serve(Joints.MATRIX, y)
         residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
         residual[starts] -= given[starts]
         worst = float(np.max(np.abs(residual) / scene.equations.unit[:n]))

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.scene import CHOOSE, MATRIX, Scene
+from mbsim.arrays.hooks import Joints
+from mbsim.arrays.scene import Scene
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting
 from mbsim.dynamics.constraints.selection import sticks
@@ -48,7 +49,7 @@ class Hooks:
     """What is asked of the mechanism at the time of the equilibrium.
 
     `rhs(y, f)` returns a code and `project(y)`, `commit(y, f)` none; `serve(what, y)` asks
-    the joints' door and is None where there are no joints.
+    joints (`arrays.hooks.Joints`) and is None where there are no joints.
     """
 
     rhs: Callable[[Array, Array], float]
@@ -152,13 +153,13 @@ class Search:
         at = y.copy()
         if len(scene.equations.program):
             # what sticks too
-            self.hooks.serve(CHOOSE, at)
-        self.hooks.serve(MATRIX, at)
+            self.hooks.serve(Joints.CHOOSE, at)
+        self.hooks.serve(Joints.MATRIX, at)
         found = tree_map(scene)
         if len(scene.equations.program):
             rows = equation_rows(scene, found, self.holding())
             found = found @ _null(rows)
-            self.hooks.serve(CHOOSE, at)
+            self.hooks.serve(Joints.CHOOSE, at)
         held = np.zeros((6 * self.count, found.shape[1]))
         for k, b in enumerate(tree.body):
             held[6 * b : 6 * b + 6] = found[6 * k : 6 * k + 6]

@@ -15,16 +15,10 @@ point on the child, f = (n, F),
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import (
-    BEND_DOOR,
-    BODY_SIZE,
-    SLOPES_DOOR,
-    TURN_AXIS,
-    TURN_CROSS,
-    TURN_FREE,
-    TURN_ROOT,
-)
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import BODY_SIZE, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
@@ -45,8 +39,6 @@ from mbsim.dynamics.linearization.stiffness import (
     pushed,
 )
 
-#: Code of a mechanism with more coupled bodies than there is room for.
-NO_ROOM = 11
 #: Differences for the gradients of equations.
 _PUSH = 1e-7
 
@@ -321,7 +313,7 @@ def add_bends(scene, T, t, y):
 def linearise(scene, T, t, h, y, dy):
     """Keep the mechanism linearised at (t, y), where dy = f(t, y); return a code."""
     if not find_couplings(scene, T):
-        return NO_ROOM
+        return Code.NO_ROOM
     clear(scene, T)
     keep_bodies(scene, T.linear, y, dy)
     fill_joint_forces(scene, T.linear)
@@ -329,8 +321,10 @@ def linearise(scene, T, t, h, y, dy):
         fill_joint(scene, T.linear, y, k)
     fill_rows(scene, T.linear, t)
     if active_count(scene) > 0:
-        call_int(scene.world.doors[BEND_DOOR], (scene, t, y))
+        code = call_int(scene.world.hooks[Hook.BEND], (scene, t, y))
+        if code != 0:
+            return code
     code = add_contacts_slopes(scene, T, t, h, y)
-    if code == 0 and scene.world.doors[SLOPES_DOOR] != 0:
-        code = call_int(scene.world.doors[SLOPES_DOOR], (scene, t, y))
+    if code == 0 and scene.world.hooks[Hook.SLOPES] != 0:
+        code = call_int(scene.world.hooks[Hook.SLOPES], (scene, t, y))
     return code

@@ -10,23 +10,19 @@ The methods ask for c3 d zeta - d zeta' = r, so that with Z = (c3 - A)^-1
     d zeta = Z (B (du, dN) + r)            dF = C Z B (du, dN) + C Z r
 
 is added to the equations of the two bodies, and d zeta is found when their displacements are.
-Behind doors of the scene, so that only scenes with such friction compile it.
+Behind hooks of the scene, so that only scenes with such friction compile it.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
-from numba import types
-
-from mbsim.arrays.scene import MEMORY_DOOR, MEMORY_PAIR_DOOR, TANGENT_DOOR, Scene
+from mbsim.arrays.hooks import Hook, Memory
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
-from mbsim.core import jit
 from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub
 from mbsim.dynamics.contact.forces import contact_of, in_marker, sides
-from mbsim.dynamics.linearization.newton_matrix import FACTOR, RECOVER, RIGHT, times_rate
+from mbsim.dynamics.linearization.newton_matrix import times_rate
 from mbsim.dynamics.linearization.stiffness import ask_friction
 from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT
 
@@ -313,45 +309,33 @@ def recover(scene, T, M, r, d):
             d[K.carries[k, i]] = total
 
 
-def _real(context, what, r, d):
-    """What is asked for at the door of real systems."""
+def serve_memory(context, what, r, d):
+    """What friction with memory does in real systems (`Memory`)."""
     scene = view(context, Scene)
-    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     n = scene.rows.y.shape[1]
     a, b = vector_at(r, n), vector_at(d, n)
-    if what == FACTOR:
+    if what == Memory.FACTOR:
         add_to_matrix(scene, T, T.real)
-    elif what == RIGHT:
+    elif what == Memory.RIGHT:
         add_to_right_side(scene, T, T.real, a)
-    elif what == RECOVER:
+    elif what == Memory.RECOVER:
         recover(scene, T, T.real, a, b)
     else:
         return fill(scene, T, a)
     return 0
 
 
-def _pair(context, what, r, d):
+def serve_memory_pair(context, what, r, d):
     """The same of complex ones."""
     scene = view(context, Scene)
-    T = view(scene.world.doors[TANGENT_DOOR], Tangent)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     n = scene.rows.y.shape[1]
     a, b = vector_at(r, n), vector_at(d, n)
-    if what == FACTOR:
+    if what == Memory.FACTOR:
         add_to_matrix(scene, T, T.pair)
-    elif what == RIGHT:
+    elif what == Memory.RIGHT:
         add_to_right_side(scene, T, T.pair, a)
     else:
         recover(scene, T, T.pair, a, b)
     return 0
-
-
-def open_memory(scene: Scene, pair: bool) -> None:
-    """Open the doors; `pair`: that of complex systems too."""
-
-    def signature(kind: Any) -> Any:
-        pointer = types.CPointer(kind)
-        return types.int64(types.int64, types.int64, pointer, pointer)
-
-    scene.world.doors[MEMORY_DOOR] = jit.address(_real, signature(types.float64))
-    if pair:
-        scene.world.doors[MEMORY_PAIR_DOOR] = jit.address(_pair, signature(types.complex128))

@@ -24,10 +24,11 @@ Both are taken over c1 or c2, so that rows of the border have one size.
 
 from __future__ import annotations
 
+from mbsim.arrays.hooks import Memory, note_failure
 from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import SINGULAR
 from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.constraints.equations import active_count
 from mbsim.dynamics.linearization.blocks import (
@@ -38,9 +39,6 @@ from mbsim.dynamics.linearization.blocks import (
     solve_bodies,
     solve_small,
 )
-
-# what is asked for at the doors of `memory_slopes`
-FACTOR, RIGHT, RECOVER = range(1, 4)
 
 
 @jitable
@@ -163,9 +161,9 @@ def fill_matrix(scene, T, M):
 @jitable
 def ask_memory(scene, M, what, r, d):
     """Let friction that carries numbers in y add its part, see `memory_slopes`."""
-    door = scene.world.doors[M.door[0]]
-    if door != 0:
-        call_int(door, (scene, what, r, d))
+    hook = scene.world.hooks[M.hook[0]]
+    if hook != 0:
+        note_failure(scene, call_int(hook, (scene, what, r, d)))
 
 
 @jitable
@@ -174,9 +172,9 @@ def factor(scene, T, M, h):
     P, L, free = T.pattern, T.linear, scene.tree.free
     fill_turns(T, M, h)
     fill_matrix(scene, T, M)
-    ask_memory(scene, M, FACTOR, M.r[0], M.r[1])
+    ask_memory(scene, M, Memory.FACTOR, M.r[0], M.r[1])
     if not eliminate(P, M, L, free):
-        return SINGULAR
+        return Code.SINGULAR
     return factor_rest(scene, T, M)
 
 
@@ -416,13 +414,13 @@ def write_answer(scene, T, M, r, d):
 def solve(scene, T, M, r, d):
     """Solve for the residual r; r and d (n,) in the layout of y."""
     fill_right_side(scene, T, M, r)
-    ask_memory(scene, M, RIGHT, r, d)
+    ask_memory(scene, M, Memory.RIGHT, r, d)
     solve_bodies(T.pattern, M, T.linear, scene.tree.free, M.g)
     solve_border_part(scene, T, M, r)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
         # work and losses are sums of what bodies do
         d[k] = r[k] / M.c[0, 2]
-    ask_memory(scene, M, RECOVER, r, d)
+    ask_memory(scene, M, Memory.RECOVER, r, d)
     write_answer(scene, T, M, r, d)
     held = active_count(scene)
     for z in range(len(scene.states.program)):

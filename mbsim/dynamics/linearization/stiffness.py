@@ -15,15 +15,15 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
     BODY_SIZE,
-    BUSHING,
     DRY_TURN,
     LATE,
     LINE_FORCE,
-    MEMORY_DOOR,
+    MARKER_FORCE,
     RESIDUAL,
     SLIDE_FRICTION,
     SLIDE_LIMIT,
@@ -73,8 +73,6 @@ SLOW = 1e-3
 AT_REST = 1e-4
 #: Differences of slip that is rigid, as a part of what it was at the committed state.
 _PART_OF_SLIP = 1e-3
-#: What `memory_slopes` is asked to keep.
-FILL = 0
 #: Differences of the state for user subroutines, as parts of length or speed, and radians.
 _PUSH = 1e-7
 
@@ -366,11 +364,11 @@ def add_contact_slopes(scene, T, t, h, y, s):
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
     if region:
         add_moves_of_place(scene, T, y, s, by_rate)
-    if scene.world.doors[MEMORY_DOOR] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
+    if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]
         K.held[count], K.press[count, 0], K.press[count, 1] = s, by_depth, by_rate
-        return call_int(scene.world.doors[MEMORY_DOOR], (scene, FILL, y, y))
+        return call_int(scene.world.hooks[Hook.MEMORY], (scene, Memory.FILL, y, y))
     return 0
 
 
@@ -787,14 +785,14 @@ def add_dry_slopes(scene, T, y, f):
 
 @jitable
 def add_applied_slopes(scene, T, t, y):
-    """Add what forces between markers do, but for those of `connection_slopes`."""
+    """Add what forces between markers do, but for marker forces and friction in joints."""
     for f in range(len(scene.applied.kind)):
         kind = base_kind(scene, f)
         if kind == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
         elif is_dry(kind):
             add_dry_slopes(scene, T, y, f)
-        elif kind != BUSHING and kind != RESIDUAL and kind < SLIDE_FRICTION:
+        elif kind != MARKER_FORCE and kind != RESIDUAL and kind < SLIDE_FRICTION:
             add_scalar_slopes(scene, T, t, y, f)
     return 0
 

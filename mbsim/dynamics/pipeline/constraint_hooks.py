@@ -1,32 +1,14 @@
-"""What joints are asked for, behind one door: accelerations, projection, reactions, assembly."""
+"""What joints are asked for, behind one hook: accelerations, projection, reactions, assembly."""
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    ACCELERATE,
-    ALONG_JOINTS,
-    CHOOSE,
-    DISPLACE,
-    DRIFT,
-    DRIFTER,
-    FOLD_AT,
-    FOLD_BEGINS,
-    FOLD_OFF,
-    FOLD_POWER,
-    FRICTION_DOOR,
-    KEEP,
-    MATRIX,
-    NEAR_FOLD,
-    PROJECT,
-    REACT,
-    SEAT,
-    SPEED_UP,
-)
+from mbsim.arrays.hooks import Hook, Joints
+from mbsim.arrays.scene import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.core.rotation import add, cross, dot, vector
 from mbsim.dynamics.constraints.equations import (
     MISMATCH,
@@ -55,9 +37,9 @@ def constrain(scene, t, y, dy):
     """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
     prepare(scene, y)
     hold(scene, t, y)
-    if scene.world.doors[FRICTION_DOOR] != 0:
+    if scene.world.hooks[Hook.LATE] != 0:
         # friction follows from reactions, and these from friction
-        code = call_int(scene.world.doors[FRICTION_DOOR], (scene, t, y, dy))
+        code = call_int(scene.world.hooks[Hook.LATE], (scene, t, y, dy))
         if code != 0:
             return code
     show_held(scene)
@@ -67,7 +49,7 @@ def constrain(scene, t, y, dy):
         passing = passes_fold(scene, t)
         power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
         dy[ledger] = power
-    return 0 if math.isfinite(total) else NOT_FINITE
+    return 0 if math.isfinite(total) else Code.NOT_FINITE
 
 
 @jitable
@@ -105,43 +87,40 @@ def return_to_equations(scene, t, y):
 
 @jitable
 def serve(scene, what, t, y, dy):
-    """Do what is asked for at the door of joints; return 0 or a code.
-
-    The last four are for assembly, in Python: residuals and matrix of all equations at y; bodies
-    displaced, or sped up, by the multipliers as they stand; the choice of equations.
-    """
-    if what == ACCELERATE:
+    """Do what joints are asked for (`Joints`); return 0 or a code."""
+    if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
-    if what == SEAT:
+    if what == Joints.SEAT:
         quality = scene.sweep.quality
         drift, drifter = quality[DRIFT], quality[DRIFTER]
         project(scene, t, y, 1)
         quality[DRIFT], quality[DRIFTER] = drift, drifter
-    elif what == PROJECT or what == ALONG_JOINTS:
-        project(scene, t, y, 1 if what == PROJECT else 2)
-    elif what == REACT:
+    elif what == Joints.PROJECT or what == Joints.ALONG:
+        project(scene, t, y, 1 if what == Joints.PROJECT else 2)
+    elif what == Joints.REACT:
         if passes_fold(scene, t):
             hold_all(scene, t, y)
         fill_reactions(scene, t, y)
-    elif what == KEEP:
+    elif what == Joints.KEEP:
         code = keep_choice(scene, t, y)
         if code == LEFT:
             return_to_equations(scene, t, y)
+            return 0
         return code
-    elif what == MATRIX:
+    elif what == Joints.MATRIX:
         use_all(scene, 0)
         prepare_equations(scene, t, y)
         fill_matrix(scene)
         for e in range(active_count(scene)):
             fill_size(scene, e)
-    elif what == CHOOSE:
+    elif what == Joints.CHOOSE:
         prepare_equations(scene, t, y)
         choose(scene, t, y)
-    elif what == DISPLACE:
+    elif what == Joints.DISPLACE:
         push(scene)
         displace(scene, y)
         seat_all(scene, y)
-    elif what == SPEED_UP:
+    elif what == Joints.SPEED_UP:
         push(scene)
         speed_up(scene, y)
         carry_all(scene, y)

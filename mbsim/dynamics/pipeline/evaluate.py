@@ -4,23 +4,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    ACCELERATE,
-    APPLIED_DOOR,
-    BODY_SIZE,
-    DRY_DOOR,
-    HOLD_AGAIN,
-    JOINTS_DOOR,
-    NEAR_FOLD,
-    NOW,
-    RIGID_DOOR,
-    SEAT,
-    SHARE_HELD,
-    WITHIN,
-)
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
+from mbsim.arrays.scene import BODY_SIZE, NEAR_FOLD, NOW, WITHIN
 from mbsim.core.address import call_int
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.detection import find_contacts
@@ -60,7 +48,9 @@ def evaluate(scene, t, h, y, dy):
     place_bodies(scene, y)
     if scene.sweep.quality[NEAR_FOLD] == 1.0:
         # near a position in which a loop can fold, equations are sound only where they hold
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, SEAT, t, y, dy))
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.SEAT, t, y, dy))
+        if code != 0:
+            return code
 
     # who touches whom
     code = find_contacts(scene, y)
@@ -73,16 +63,16 @@ def evaluate(scene, t, h, y, dy):
     if code != 0:
         return code
 
-    if scene.world.doors[APPLIED_DOOR] != 0:
-        code = call_int(scene.world.doors[APPLIED_DOOR], (scene, t, y, dy))
+    if scene.world.hooks[Hook.APPLIED] != 0:
+        code = call_int(scene.world.hooks[Hook.APPLIED], (scene, t, y, dy))
         if code != 0:
             return code
 
     # what follows
     if not math.isfinite(accelerate(scene, y, dy)):
-        return NOT_FINITE
-    if scene.world.doors[JOINTS_DOOR] != 0:
-        return call_int(scene.world.doors[JOINTS_DOOR], (scene, ACCELERATE, t, y, dy))
+        return Code.NOT_FINITE
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        return call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.ACCELERATE, t, y, dy))
     return 0
 
 
@@ -90,10 +80,10 @@ def evaluate(scene, t, h, y, dy):
 def evaluate_past(scene, t, h, y, dy):
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = WITHIN
-    if scene.world.doors[DRY_DOOR] != 0:
-        call_int(scene.world.doors[DRY_DOOR], (scene, HOLD_AGAIN, t, y))
+    if scene.world.hooks[Hook.DRY] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
     code = evaluate(scene, t, h, y, dy)
-    if code == 0 and scene.world.doors[RIGID_DOOR] != 0:
-        call_int(scene.world.doors[RIGID_DOOR], (scene, SHARE_HELD, t, y))
+    if code == 0 and scene.world.hooks[Hook.HELD] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, y)))
     scene.world.past[0] = NOW
-    return code
+    return failure_or(scene, code)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import (
     BODY_SIZE,
     CONTACT_COLUMNS,
@@ -25,11 +26,8 @@ from mbsim.arrays.scene import (
     INC_TANGENT,
     INC_TOUCHES,
     INC_X,
-    JOINTS_DOOR,
     LIVE,
-    REACT,
     STORED_ENERGY,
-    VALUES_DOOR,
 )
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
@@ -174,15 +172,16 @@ def write_row(scene, t, h, y, f):
             rows.accel[k, 6 * b + j] = f[at + 7 + j]
             rows.accel[k, 6 * b + 3 + j] = alpha[j]
     fill_contacts(scene, y, rows.contact[k])
-    if scene.world.doors[JOINTS_DOOR] != 0:
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, REACT, t, y, f))
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        reacts = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.REACT, t, y, f))
+        note_failure(scene, reacts)
     for j in range(len(scene.applied.kind)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
     for j in range(len(work.reaction)):
         rows.joint[k, j] = work.reaction[j]
-    if scene.world.doors[VALUES_DOOR] != 0:
-        call_int(scene.world.doors[VALUES_DOOR], (scene, t, y))
+    if scene.world.hooks[Hook.REQUESTS] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.REQUESTS], (scene, t, y)))
     fill_energy(scene, y, rows.energy[k])
     rows.incident_count[k] = fill_incidents(scene, h, y)
     rows.used[0] = k + 1

@@ -7,6 +7,7 @@ same code gives the same numbers to the last bit.
 
 from __future__ import annotations
 
+from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     AGAIN,
     CONTACT_COLUMNS,
@@ -100,4 +101,5 @@ def again_hook(context, t, h, a, b):
     count = scene.rows.used[1]
     room = vector_at(b, n + size + count * wide)
     table = room[n + size :].reshape(count, wide)
-    return float(evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table))
+    found = evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table)
+    return failure_or(scene, found)

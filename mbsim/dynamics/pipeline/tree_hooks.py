@@ -1,12 +1,12 @@
-"""What the door of joints opens to where the tree holds all of them: no equations to compile."""
+"""What joints are asked for where the tree holds all of them: no equations to compile."""
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import ACCELERATE, ALONG_JOINTS, MATRIX, PROJECT, REACT
+from mbsim.arrays.hooks import Joints
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import NOT_FINITE
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
@@ -16,20 +16,20 @@ from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
 @jitable
 def serve_limbs(scene, what, t, y, dy):
     """Do what `constraints.serve` does, for a scene without equations."""
-    if what == ACCELERATE:
+    if what == Joints.ACCELERATE:
         prepare(scene, y)
         load(scene)
         respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
-        return 0 if math.isfinite(write_accelerations(scene, dy)) else NOT_FINITE
-    if what == REACT:
+        return 0 if math.isfinite(write_accelerations(scene, dy)) else Code.NOT_FINITE
+    if what == Joints.REACT:
         reaction = scene.work.reaction
         for i in range(len(reaction)):
             reaction[i] = 0.0
         add_tree_reactions(scene, y, scene.sweep.a, reaction)
-    elif what == MATRIX:
+    elif what == Joints.MATRIX:
         place_bodies(scene, y)
         prepare(scene, y)
-    elif what == PROJECT or what == ALONG_JOINTS:
+    elif what == Joints.PROJECT or what == Joints.ALONG:
         place_bodies(scene, y)
         seat_all(scene, y)
         carry_all(scene, y)

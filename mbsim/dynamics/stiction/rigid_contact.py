@@ -1,7 +1,7 @@
 """STICTION of contacts without give: what sticks is held by two equations of velocities a slot.
 
 As `stiction.rigid_friction`, which takes equations into use and out of it, and keeps what it does
-for contacts here, behind one door. The equations are those of `equations.touching_term`; how the
+for contacts here, behind one hook. The equations are those of `equations.touching_term`; how the
 contact point and its normal move is found by differences of the closed form along the velocities
 of both bodies. Where equations follow from others (four points of a block) multipliers are not
 known point by point: forces are taken whose largest part of mu_s N is least (`stiction.cones`).
@@ -16,23 +16,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    ASK_HELD,
-    BEGIN_HELD,
-    BODY_SIZE,
-    CHANGED_HELD,
-    CONE_ROWS,
-    EVALUATE_DOOR,
-    LOAD_HELD,
-    PLACE_HELD,
-    RECORD_HELD,
-    RELEASE_HELD,
-    SHARE_HELD,
-    TOLERANCE,
-)
+from mbsim.arrays.hooks import Held, Hook, note_failure
+from mbsim.arrays.scene import BODY_SIZE, CONE_ROWS, TOLERANCE
 from mbsim.arrays.scene import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import STICK as STICK_EVENT
-from mbsim.core.address import call_float, call_int
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
@@ -541,7 +529,8 @@ def fill_sliding(scene, t, y, count):
         s = scene.equations.slot[int(cone[WHICH, k])]
         x, z = scene.work.held[s, 0], scene.work.held[s, 1]
         let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
-    call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
+    note_failure(scene, code)
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
         point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
@@ -591,7 +580,8 @@ def release_held(scene, t, y):
             released += 1
     if released == 0:
         # sliding would rub more than sticking holds: it goes on to stick
-        call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+        code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
+        note_failure(scene, code)
         share_held(scene, t, y)
     return released
 
@@ -632,23 +622,23 @@ def changed_held(scene):
 
 @jitable
 def serve_held(scene, what, t, y):
-    """Do what is asked for at the door of rigid contacts; return an answer or 0."""
-    if what == PLACE_HELD:
+    """Do what contacts with rigid friction are asked for (`Held`); return an answer or 0."""
+    if what == Held.PLACE:
         place_held(scene, t, y)
-    elif what == SHARE_HELD:
+    elif what == Held.SHARE:
         share_held(scene, t, y)
-    elif what == ASK_HELD:
+    elif what == Held.ASK:
         share_held(scene, t, y)
         return ask_held(scene, y)
-    elif what == BEGIN_HELD:
+    elif what == Held.BEGIN:
         return begin_held(scene, y)
-    elif what == RELEASE_HELD:
+    elif what == Held.RELEASE:
         return release_held(scene, t, y)
-    elif what == RECORD_HELD:
+    elif what == Held.RECORD:
         record_held(scene, t)
-    elif what == CHANGED_HELD:
+    elif what == Held.CHANGED:
         return changed_held(scene)
-    elif what == LOAD_HELD:
+    elif what == Held.LOAD:
         share_held(scene, t, y)
         return load_held(scene)
     return 0

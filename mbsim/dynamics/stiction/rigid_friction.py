@@ -5,25 +5,16 @@ multiplier is the friction force. Where that passes the limit the step ends, the
 of use and f is a force of that size against the slip; where x' comes back to 0 the step ends too,
 the equation is taken into use, and goes out again at once where the force that it would need is
 above the limit. Integrators begin anew there, for accelerations jump. Contacts have two equations
-at each point and do their part behind a door, `stiction.rigid_contact`.
+at each point and do their part behind a hook, `stiction.rigid_contact`.
 """
 
 from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import (
-    BEGIN_HELD,
-    CHANGED_HELD,
-    CHOOSE,
-    EVALUATE_DOOR,
     HELD_OTHERWISE,
-    JOINTS_DOOR,
-    KEEP_DRY,
-    PROJECT,
-    RECORD_HELD,
-    RELEASE_HELD,
-    RIGID_DOOR,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -31,7 +22,7 @@ from mbsim.arrays.scene import (
     SLIP,
     STICK,
 )
-from mbsim.core.address import call_float, call_int
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.forces.dry_friction import (
     AT_REST,
@@ -67,17 +58,23 @@ def begin_or_go_on(scene, y, f):
 
 @jitable
 def ask_contacts(scene, what, t, y):
-    """Return what contacts answer whose friction is rigid, 0 where there are none."""
-    door = scene.world.doors[RIGID_DOOR]
-    return call_int(door, (scene, what, t, y)) if door != 0 else 0
+    """Return what contacts answer whose friction is rigid; 0 if there are none, or it fails."""
+    hook = scene.world.hooks[Hook.HELD]
+    return answer_of(scene, call_int(hook, (scene, what, t, y))) if hook != 0 else 0
+
+
+@jitable
+def ask_joints(scene, what, t, y):
+    """Ask joints for something; a failure is noted."""
+    note_failure(scene, call_int(scene.world.hooks[Hook.JOINTS], (scene, what, t, y, y)))
 
 
 @jitable
 def hold_sticking(scene, t, y):
     """Take the equations of what sticks into use, bring y onto them and evaluate; return a code."""
-    call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
-    call_int(scene.world.doors[JOINTS_DOOR], (scene, PROJECT, t, y, y))
-    return call_float(scene.world.doors[EVALUATE_DOOR], (scene, t, 0.0, y, scene.work.idle))
+    ask_joints(scene, Joints.CHOOSE, t, y)
+    ask_joints(scene, Joints.PROJECT, t, y)
+    return call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
 
 
 @jitable
@@ -100,19 +97,22 @@ def release(scene):
 @jitable
 def commit_rigid(scene, t, y):
     """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
-    changed = ask_contacts(scene, BEGIN_HELD, t, y) == 1
+    changed = ask_contacts(scene, Held.BEGIN, t, y) == 1
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
-        ask_contacts(scene, RECORD_HELD, t, y)
+        ask_contacts(scene, Held.RECORD, t, y)
         return 0
     # one more slides each time, so this ends
-    while hold_sticking(scene, t, y) == 0.0:
+    code = hold_sticking(scene, t, y)
+    while code == 0:
         # contacts are asked for all of theirs at once, under what the rest does
-        if release(scene) == 0 and ask_contacts(scene, RELEASE_HELD, t, y) == 0:
+        if release(scene) == 0 and ask_contacts(scene, Held.RELEASE, t, y) == 0:
             break
-    ask_contacts(scene, RECORD_HELD, t, y)
+        code = hold_sticking(scene, t, y)
+    note_failure(scene, code)
+    ask_contacts(scene, Held.RECORD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
@@ -128,20 +128,20 @@ def commit_rigid(scene, t, y):
 @jitable
 def hold_again(scene, t, y):
     """Take into use what holds at the point to be evaluated, where the last step changed that."""
-    kept, contacts = scene.state.dry, ask_contacts(scene, CHANGED_HELD, t, y)
+    kept, contacts = scene.state.dry, ask_contacts(scene, Held.CHANGED, t, y)
     if contacts == 1:
-        call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
+        ask_joints(scene, Joints.CHOOSE, t, y)
         return
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and kept[f, SLIDES] != kept[f, SLIDES_BEFORE]:
-            call_int(scene.world.doors[JOINTS_DOOR], (scene, CHOOSE, t, y, y))
+            ask_joints(scene, Joints.CHOOSE, t, y)
             return
 
 
 @jitable
 def serve_rigid(scene, what, t, y):
-    """Do what is asked for at the door of dry friction; return 0 or HELD_OTHERWISE."""
-    if what == KEEP_DRY:
+    """Do what dry friction is asked for (`Dry`); return 0, HELD_OTHERWISE, or less a code."""
+    if what == Dry.KEEP:
         commit_dry(scene, t, y)
         return commit_rigid(scene, t, y)
     hold_again(scene, t, y)

@@ -2,10 +2,10 @@
 
 Sweeps first: they are the cheapest and often all that is needed. Where they become slow, ADMM gets
 a trial (stacks need few iterations of it), then proximal Newton, which needs a good start but
-finishes. Between them, once hardly a contact changes its state, a dash: a few steps of Newton's
-method alone, which then end at rounding. Where all that fails a few contacts in the plane get every
-combination of their states. Work is counted in estimated seconds, not measured, so that a run does
-the same on every machine.
+finishes. Between them, once hardly a contact changes its state, a Newton phase: a few steps of
+Newton's method alone, which then end at rounding. Where all that fails a few contacts in the plane
+get every combination of their states. Work is counted in estimated seconds, not measured, so that a
+run does the same on every machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mbsim.fclib.clock import compiled
 from mbsim.fclib.cone import count_changes
 from mbsim.fclib.factor import factor_work
 from mbsim.fclib.ordering import analyse, elimination_flops
-from mbsim.fclib.solvers import newton, splitting, states, sweeps
+from mbsim.fclib.solvers import newton, proximal, splitting, states, sweeps
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ STACKS, TRIAL = 50, 30
 SETTLED = 3e-4
 #: Seconds that beginning another method takes, whatever the size.
 BEGIN = 2e-4
-#: Seconds that beginning a dash of Newton's method takes, the share of all work or of what would
+#: Seconds that beginning a Newton phase takes, the share of all work or of what would
 #: come next that it may take, and how many of its steps in a row need not gain at the end.
-BEGIN_DASH, SHARE, SHARE_NEXT, PATIENCE = 5e-5, 0.4, 0.25, 2
+BEGIN_PHASE, SHARE, SHARE_NEXT, PATIENCE = 5e-5, 0.4, 0.25, 2
 #: Share of the contacts, beside one, that may have changed their state where all have settled.
 CHANGES = 0.01
 #: Iterations of ADMM that show whether all bodies rest.
@@ -72,18 +72,18 @@ class Costs(NamedTuple):
     factor: float
 
 
-class Dashes:
+class NewtonPhases:
     """Newton's method tried now and then from the best point, where that costs little.
 
     Sweeps and ADMM gain ever less near the solution, Newton's method ever more, once hardly a
-    contact changes between open, stick and slip. What a dash costs in vain is not counted as work.
+    contact changes between open, stick and slip. What a phase costs in vain is not counted as work.
     `step`: seconds of a Newton iteration.
     """
 
     def __init__(self, task: Task, step: float) -> None:
         self.task = task
         self.step = step
-        self.cost = BEGIN_DASH + step
+        self.cost = BEGIN_PHASE + step
         self.due = 0.0
         self.states = np.zeros(task.blocks.contacts, np.int8)
         self.looked_at: Vector | None = None
@@ -91,7 +91,7 @@ class Dashes:
         self.settled = False
 
     def run(self, instead: float = 0.0) -> None:
-        """Dash if it is time; `instead`: seconds of what would come next, which count as well."""
+        """Begin a phase if it is time; `instead`: seconds of what would come next, which count."""
         task, b = self.task, self.task.blocks
         sweeps.mend(task)
         if task.over or task.r is self.begun_at:
@@ -102,10 +102,10 @@ class Dashes:
             self.looked_at = task.r
         spent = task.work if self.settled and task.work >= self.due else 0.0
         # what costs hardly more than to begin is worth a try at once
-        at_once = 1.5 * BEGIN_DASH if self.begun_at is None else 0.0
+        at_once = 1.5 * BEGIN_PHASE if self.begun_at is None else 0.0
         if self.cost <= max(SHARE * spent, SHARE_NEXT * instead, at_once):
             self.begun_at = task.r
-            newton.Proximal(task, newton.DASH_ALPHA).dash()
+            newton.Proximal(task, newton.PHASE_ALPHA).newton_phase()
             if task.r is self.begun_at:
                 self.due = 2.0 * task.work
 
@@ -114,9 +114,10 @@ class Dashes:
         task = self.task
         if task.history[-1][0] == "PROX":
             return
-        if task.distance > newton.WELL and self.cost <= SHARE * task.work and not task.late:
+        if task.distance > proximal.WELL and self.cost <= SHARE * task.work and not task.late:
             most = max(1, int(0.25 * SHARE * task.work / self.step))
-            newton.Proximal(task, newton.DASH_ALPHA).dash(min(most, newton.MOST_DASH), PATIENCE)
+            most = min(most, newton.MOST_PHASE)
+            newton.Proximal(task, newton.PHASE_ALPHA).newton_phase(most, PATIENCE)
 
 
 def run(task: Task) -> None:
@@ -126,32 +127,32 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
-    dashes = Dashes(task, costs.newton)
+    phases = NewtonPhases(task, costs.newton)
     if task.blocks.rolling:
-        _rolling(task, costs, dashes)
+        _rolling(task, costs, phases)
     else:
-        _solve(task, costs, dashes)
+        _solve(task, costs, phases)
     if task.distance > 1.0 and len(task.blocks.tangent) == 1 and not task.blocks.rolling:
         if task.blocks.contacts <= states.FEW:
             states.run(task)
-    dashes.polish()
+    phases.polish()
 
 
-def _solve(task: Task, costs: Costs, dashes: Dashes) -> None:
+def _solve(task: Task, costs: Costs, phases: NewtonPhases) -> None:
     """Solve with sweeps, ADMM and Newton's method."""
-    _sweep(task, BEGIN, dashes)
+    _sweep(task, BEGIN, phases)
     finish = FINISH * costs.newton
     far = max(SETTLED, task.tol)
     if not task.over and task.blocks.contacts >= STACKS and task.error > far:
         trial = BEGIN + costs.factor + 2.0 * RESTED * costs.splitting
-        _sweep(task, trial, dashes)
-        dashes.run(trial)
+        _sweep(task, trial, phases)
+        phases.run(trial)
         if not task.over and task.error > far:
-            _try_splitting(task, costs, finish, dashes)
-    dashes.run(BEGIN)
+            _try_splitting(task, costs, finish, phases)
+    phases.run(BEGIN)
     if task.error <= task.tol:
         finish = FINISH_NEAR * costs.newton
-    _sweep(task, finish, dashes, near=True)
+    _sweep(task, finish, phases, near=True)
     if not task.over:
         _finish(task)
 
@@ -160,21 +161,21 @@ def _costs(task: Task) -> Costs:
     """Estimate what the methods cost."""
     b = task.blocks
     d = 1 + len(b.tangent) + len(b.rolling)
-    symbolic = compiled(analyse)(b.contacts, b.ptr, b.col, d)
-    flops = compiled(elimination_flops)(symbolic, d)
-    entries = float(symbolic[5][-1])
+    analysis = compiled(analyse)(b.contacts, b.ptr, b.col, d)
+    flops = compiled(elimination_flops)(analysis, d)
+    entries = float(analysis.factor_ptr[-1])
     factor = compiled(factor_work)(flops, len(b.col))
     once = 1e-9 * entries + 1.2e-7 * b.contacts
     step = math.inf if b.rolling else factor + once
     return Costs(step, once + 5e-9 * len(b.col), factor)
 
 
-def _rolling(task: Task, costs: Costs, dashes: Dashes) -> None:
+def _rolling(task: Task, costs: Costs, phases: NewtonPhases) -> None:
     """Go on with sweeps; rolling friction has no Newton's method here, but ADMM."""
     trial = TRIAL * costs.splitting
-    _sweep(task, costs.factor + trial, dashes)
+    _sweep(task, costs.factor + trial, phases)
     if not task.over:
-        _try_splitting(task, costs, 20.0 * trial, dashes)
+        _try_splitting(task, costs, 20.0 * trial, phases)
     if not task.over:
         sweeps.run(task)
 
@@ -198,7 +199,7 @@ def _remaining(rows: Any, task: Task, aim: float = 0.0) -> float:
     return float(math.log(wanted) / rate)
 
 
-def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> None:
+def _sweep(task: Task, work: float, phases: NewtonPhases, *, near: bool = False) -> None:
     """Sweep on while that is predicted to take less than `work`; spend no more than twice that.
 
     `near`: sweep as well to get near enough for the proximal method. Within the first goal it is
@@ -206,7 +207,7 @@ def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> No
     """
     cost = sweeps.sweep_work(task.blocks)
     spent = task.work
-    dashes.run()
+    phases.run()
     while not task.over and task.work - spent < 2.0 * work:
         rows = task.history[-1][1]
         left = _remaining(rows, task)
@@ -221,10 +222,10 @@ def _sweep(task: Task, work: float, dashes: Dashes, *, near: bool = False) -> No
         sweeps.nsgs(task, chunk)
         if task.r is best:
             return  # the next ones would be the same
-        dashes.run()
+        phases.run()
 
 
-def _try_splitting(task: Task, costs: Costs, finish: float, dashes: Dashes) -> None:
+def _try_splitting(task: Task, costs: Costs, finish: float, phases: NewtonPhases) -> None:
     """Give ADMM a trial, and more while it is predicted to end before another method would.
 
     `finish`: what another method would take.
@@ -241,7 +242,7 @@ def _try_splitting(task: Task, costs: Costs, finish: float, dashes: Dashes) -> N
     limit = TRIAL
     while run.advance(limit) and not task.over:
         left = _remaining(task.history[-1][1], task)
-        dashes.run()
+        phases.run()
         if task.over or left * costs.splitting > finish or task.work - spent > 2.0 * finish:
             return
         limit = 30

@@ -8,6 +8,7 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import (
+    DelassusSystem,
     add_row,
     block_rows,
     compressed_rows,
@@ -32,7 +33,7 @@ from mbsim.fclib.cone import (
     rounding,
 )
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
-from mbsim.fclib.solvers.task import POLISHED, ROWS, Task
+from mbsim.fclib.solvers.task import POLISHED, ROWS, Goal, Task, record
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -43,8 +44,8 @@ if TYPE_CHECKING:
 GRACE = 20
 #: POLISHED with few contacts, where a sweep costs next to nothing.
 POLISHED_FEW = 1e-3
-#: With few contacts, sweeps between leaps ahead.
-LEAP = 8
+#: With few contacts, sweeps between extrapolations.
+CYCLE = 8
 #: Rounds in which weak contacts are mended where they are no more than one in so many.
 MENDING, WEAK = 5, 20
 #: Contacts whose sweep takes long enough to ask the clock after each.
@@ -52,8 +53,11 @@ LONG = 200
 
 
 @jitable
-def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some, work):
+def sweep(system, r, some, work):
     """Solve contacts `some` once, with the newest impulses of the others; return |change|^2."""
+    tangent, rolling, diagonal = system.tangent, system.rolling, system.diagonal
+    ptr, col, val, q = system.ptr, system.col, system.val, system.q
+    mu, mu_r = system.mu, system.mu_r
     d = 1 + len(tangent) + len(rolling)
     change = 0.0
     for a in some:
@@ -67,9 +71,8 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some, work)
             work[d + row] = r[first + row]
         if len(rolling) > 0:
             contact_rolling(
-                tangent, rolling, val, own, work, mu[a], mu_r[a], r, first,
-                work[2 * d : 3 * d], work[3 * d : 5 * d],
-            )  # fmt: skip
+                tangent, rolling, val, own, work, mu[a], mu_r[a], r, first, work[2 * d :]
+            )
         elif len(tangent) == 1:
             r[first], r[first + 1] = contact_2d(
                 val, own, work[0], work[1], mu[a], r[first], r[first + 1]
@@ -85,23 +88,23 @@ def sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some, work)
 
 
 @jitable
-def local_sweeps(
-    tangent, m, nz, p, i, x, q, mu, r, tol, tol_q, sweeps, every, grace, until, history, check
-):
+def local_sweeps(tangent, stored, q, mu, r, goal, sweeps, every, history, check):
     """Bring a local problem as it is stored into blocks and sweep (`gauss_seidel`).
 
-    `check` gets the figures of the verdict, with the stored W: |F| / max(|q|, |r|, |u|), |F| / |q|,
-    and those of `own_errors`. Returns the blocks, u, and what `gauss_seidel` does.
+    `stored` is W: (rows, nz, p, i, x); `goal` what `Goal` has. Both are plain tuples, and so is
+    what is returned, since this one call is often all that a small problem takes: named ones cost
+    1 us to hand over and 7 us to return. `check` gets the figures of the verdict, with the stored
+    W: |F| / max(|q|, |r|, |u|), |F| / |q|, and those of `own_errors`. Returns the blocks, u, and
+    what `gauss_seidel` does.
     """
     d = 1 + len(tangent)
+    m, nz, p, i, x = stored
     ptr, col, val = block_rows(d, len(mu), *compressed_rows(m, m, nz, p, i, x))
     diagonal = diagonal_places(ptr, col)
     rho = own_units(val, diagonal)
     # without rolling directions the numbers of mu_r do not matter
-    done, error, error_q, rows = gauss_seidel(
-        tangent, (), ptr, col, val, diagonal, q, mu, mu, rho, r, tol, tol_q, sweeps, every, grace,
-        until, history,
-    )  # fmt: skip
+    system = DelassusSystem(tangent, (), ptr, col, val, diagonal, q, mu, mu, rho)
+    done, error, error_q, rows = gauss_seidel(system, r, Goal(*goal), sweeps, every, history)
     u = q.copy()
     product_of_stored(m, nz, p, i, x, r, u)
     work = np.empty(m)
@@ -109,14 +112,12 @@ def local_sweeps(
     scale = max(bound, norm(r), norm(u))
     check[0] = missing / scale if scale > 0.0 else missing
     check[1] = missing / bound if bound > 0.0 else missing
-    check[2], check[3], check[4], check[5] = own_errors(
-        tangent, (), ptr, col, val, mu, mu, rho, q, u, r, EVERY_SHARE, work
-    )
+    check[2], check[3], check[4], check[5] = own_errors(system, u, r, EVERY_SHARE, work)
     return ptr, col, val, diagonal, rho, u, done, error, error_q, rows
 
 
 @jitable
-def _leap(r, old, older, trial):
+def _extrapolate(r, old, older, trial):
     """Write where three iterates lead if one slow direction is left; return whether they do.
 
     The change shrinks by a factor c each sweep, so that c / (1 - c) of the last one is to come
@@ -138,103 +139,83 @@ def _leap(r, old, older, trial):
 
 
 @jitable
-def gauss_seidel(
-    tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, tol_q, sweeps, every,
-    grace, until, history,
-):  # fmt: skip
-    """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q`.
+def _errors(system, r, u, shares, tol, work):
+    """Return the errors of an iterate (`relative_errors`); PUBLISHED says all only above `tol`."""
+    product(system, system.q, r, u)
+    error, error_q = relative_errors(system, u, r, shares, work)
+    if shares == PUBLISHED and error <= tol:
+        error, error_q = relative_errors(system, u, r, DECIDING, work)
+    return error, error_q
 
-    With the first reached, the second gets as many sweeps again, and `grace` more, at most; with
+
+@jitable
+def gauss_seidel(system, r, goal, sweeps, every, history):
+    """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q` (`Goal`).
+
+    With the first reached, the second gets as many sweeps again, and GRACE more, at most; with
     both reached, as many sweeps again may bring a tenth of them (POLISHED), with few contacts a
     thousandth. The last sweep is the one after which it is late (`clock.until`).
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
     """
-    d = 1 + len(tangent) + len(rolling)
-    work = np.empty(5 * d)
-    every_one = np.arange(len(mu))
-    u = np.empty(len(q))
-    missing = np.empty(len(q))
-    few = len(q) if every == 1 else 0
+    tol, tol_q = goal.tol, goal.tol_q
+    nc, m = len(system.mu), len(system.q)
+    work = np.empty(5 * (1 + len(system.tangent) + len(system.rolling)))
+    every_one = np.arange(nc)
+    u, missing = np.empty(m), np.empty(m)
+    few = m if every == 1 else 0
     old, older, trial = np.empty(few), np.empty(few), np.empty(few)
-    rows = 0
+    rows, done, looked, most = 0, 0, -1, sweeps
     error, error_q = np.inf, np.inf
-    done = 0
-    looked = -1
-    most = sweeps
-    between = 1 + LONG // max(len(mu), 1)
+    between = 1 + LONG // max(nc, 1)
     kept = np.empty(0)
     kept_error, kept_q = np.inf, np.inf
     # with few contacts every sweep is looked at, and rows say little of the sweeps to come
     shares = PUBLISHED if every == 1 else DECIDING
     over = False
     while done < most and not over:
-        change = sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, every_one, work)
+        change = sweep(system, r, every_one, work)
         done += 1
-        over = done % between == 0 and late(until)
+        over = done % between == 0 and late(goal.until)
         small = False
         if done - looked > 1 and done % every:
             size = 0.0
-            for k in range(len(r)):
+            for k in range(m):
                 size += r[k] * r[k]
             small = change <= tol * tol * size
-        if done % every == 0 or small or done == most or over:
-            looked = done
-            product(tangent, rolling, ptr, col, val, q, r, u)
-            error, error_q = relative_errors(
-                tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, shares, missing
-            )
-            if shares == PUBLISHED and error <= tol:
-                error, error_q = relative_errors(
-                    tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, DECIDING, missing
-                )
-            if rows < len(history):
-                history[rows, 0] = done
-                history[rows, 1] = error
-                history[rows, 2] = error_q
-                rows += 1
-            if error <= tol:
-                if error_q <= (POLISHED_FEW if every == 1 else POLISHED) * tol_q:
-                    break
-                if error_q <= tol_q and len(kept) == 0:
-                    most = 2 * done
-                    kept = r.copy()
-                    kept_error, kept_q = error, error_q
-                elif most == sweeps:
-                    most = min(sweeps, 2 * done + grace)
-            elif every == 1 and done >= LEAP:
-                # few contacts: one slow direction is often all that is left
-                phase = done % LEAP
-                if phase == LEAP - 2:
-                    older[:] = r
-                elif phase == LEAP - 1:
-                    old[:] = r
-                elif phase == 0 and _leap(r, old, older, trial):
-                    sweep(
-                        tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, trial, every_one,
-                        work,
-                    )  # fmt: skip
-                    product(tangent, rolling, ptr, col, val, q, trial, u)
-                    leapt, leapt_q = relative_errors(
-                        tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, shares, missing
-                    )
-                    if leapt <= tol:
-                        leapt, leapt_q = relative_errors(
-                            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, trial, DECIDING,
-                            missing,
-                        )  # fmt: skip
-                    done += 1
-                    if leapt < error:
-                        r[:] = trial
-                        error, error_q = leapt, leapt_q
-                        if error <= tol and error_q <= tol_q:
-                            break
+        if not (done % every == 0 or small or done == most or over):
+            continue
+        looked = done
+        error, error_q = _errors(system, r, u, shares, tol, missing)
+        rows = record(history, rows, done, error, error_q)
+        if error <= tol:
+            if error_q <= (POLISHED_FEW if every == 1 else POLISHED) * tol_q:
+                break
+            if error_q <= tol_q and len(kept) == 0:
+                most = 2 * done
+                kept = r.copy()
+                kept_error, kept_q = error, error_q
+            elif most == sweeps:
+                most = min(sweeps, 2 * done + GRACE)
+        elif every == 1 and done > CYCLE:
+            # few contacts: one slow direction is often all that is left
+            phase = done % CYCLE
+            if phase == CYCLE - 2:
+                older[:] = r
+            elif phase == CYCLE - 1:
+                old[:] = r
+            elif phase == 0 and _extrapolate(r, old, older, trial):
+                sweep(system, trial, every_one, work)
+                done += 1
+                ahead, ahead_q = _errors(system, trial, u, shares, tol, missing)
+                if ahead < error:
+                    r[:] = trial
+                    error, error_q = ahead, ahead_q
+                    if error <= tol and error_q <= tol_q:
+                        break
     if shares == PUBLISHED and error > tol:
-        product(tangent, rolling, ptr, col, val, q, r, u)
-        error, error_q = relative_errors(
-            tangent, rolling, ptr, col, val, mu, mu_r, rho, q, u, r, DECIDING, missing
-        )
+        error, error_q = _errors(system, r, u, DECIDING, tol, missing)
     if len(kept) > 0 and not (error <= tol and improves(error_q, norm(r), kept_q, norm(kept))):
         r[:] = kept
         error, error_q = kept_error, kept_q
@@ -242,22 +223,25 @@ def gauss_seidel(
 
 
 @jitable
-def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, tol, most):
+def mend_weak(system, r, tol, most):
     """Sweep over weak contacts, whose share (`own_share`) is above a third of the `tol` for it.
 
     That is done as long as they are not more than `most` and one of them is above; returns whether
     in the end none is.
     """
-    d = 1 + len(tangent) + len(rolling)
-    u, missing, work = np.empty(len(q)), np.empty(len(q)), np.empty(5 * d)
+    tangent, rolling, mu, mu_r = system.tangent, system.rolling, system.mu, system.mu_r
+    d, m = 1 + len(tangent) + len(rolling), len(system.q)
+    u, missing, work = np.empty(m), np.empty(m), np.empty(5 * d)
     some = np.empty(most, np.int64)
-    velocity, reach = rounding(d, rho, q, r)
+    velocity, reach = rounding(system, r)
     for _ in range(MENDING):
-        product(tangent, rolling, ptr, col, val, q, r, u)
+        product(system, system.q, r, u)
         found, above = 0, 0
         for a in range(len(mu)):
-            square = natural_map(tangent, rolling, mu[a], mu_r[a], u, r, d * a, rho[a], missing)
-            share = own_share(d, ptr, col, val, rho, q, u, r, a, square, velocity, reach)[1]
+            square = natural_map(
+                tangent, rolling, mu[a], mu_r[a], u, r, d * a, system.rho[a], missing
+            )
+            share = own_share(system, u, r, a, square, velocity, reach)[1]
             above += 1 if share > tol else 0
             if 3.0 * share > tol:
                 if found == most:
@@ -267,7 +251,7 @@ def mend_weak(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, rho, r, to
         if above == 0:
             return True
         for _ in range(3):
-            sweep(tangent, rolling, ptr, col, val, diagonal, q, mu, mu_r, r, some[:found], work)
+            sweep(system, r, some[:found], work)
     return False
 
 
@@ -275,10 +259,7 @@ def mended(task: Task) -> Vector | None:
     """Return the best iterate with its weak contacts mended, if these are few and that works."""
     b = task.blocks
     r = task.r.copy()
-    done = compiled(mend_weak)(
-        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
-        FREE * task.tol_q, 1 + b.contacts // WEAK,
-    )  # fmt: skip
+    done = compiled(mend_weak)(b.system, r, FREE * task.tol_q, 1 + b.contacts // WEAK)
     return r if done else None
 
 
@@ -303,9 +284,8 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
     r: Vector = (task.r if start is None else start).copy()
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
     done, error, error_q, rows = compiled(gauss_seidel)(
-        b.tangent, b.rolling, b.ptr, b.col, b.val, b.diagonal, b.q, b.mu, b.mu_r, b.rho, r,
-        task.tol, task.tol_q, sweeps, every, GRACE, task.until, history,
-    )  # fmt: skip
+        b.system, r, task.goal, sweeps, every, history
+    )
     history[:rows, 0] += task.iterations
     task.iterations += done
     task.work += done * sweep_work(b)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import product
 from mbsim.fclib.clock import clock, compiled, until
 from mbsim.fclib.cone import DECIDING, improves, relative_errors
@@ -25,6 +26,28 @@ POLISHED = 0.1
 FAR_OFF = 10.0
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
+
+
+class Goal(NamedTuple):
+    """What a method is to reach, as compiled code takes it.
+
+    error <= tol and error_q <= tol_q (`Task`), or the end of the time (`clock.until`).
+    """
+
+    tol: float
+    tol_q: float
+    until: Any
+
+
+@jitable
+def record(history, rows, iterations, error, error_q):
+    """Add a row to the history, as long as it has room; return the number of rows."""
+    if rows >= len(history):
+        return rows
+    history[rows, 0] = iterations
+    history[rows, 1] = error
+    history[rows, 2] = error_q
+    return rows + 1
 
 
 @dataclass(eq=False)
@@ -99,6 +122,11 @@ class Task:
         """Whether to stop: done, or out of time."""
         return self.done or self.late
 
+    @property
+    def goal(self) -> Goal:
+        """The goal as compiled code takes it."""
+        return Goal(self.tol, self.tol_q, self.until)
+
     def tighten(self, factor: float, factor_q: float) -> None:
         """Want smaller errors, by these factors."""
         self.tol *= factor
@@ -107,13 +135,12 @@ class Task:
 
     def look(self, r: Vector) -> tuple[float, float]:
         """Return the errors of an iterate."""
-        b = self.blocks
+        system = self.blocks.system
         u = np.empty_like(r)
-        compiled(product)(b.tangent, b.rolling, b.ptr, b.col, b.val, b.q, r, u)
+        compiled(product)(system, system.q, r, u)
         errors: tuple[float, float] = compiled(relative_errors)(
-            b.tangent, b.rolling, b.ptr, b.col, b.val, b.mu, b.mu_r, b.rho, b.q, u, r,
-            DECIDING, np.empty_like(r),
-        )  # fmt: skip
+            system, u, r, DECIDING, np.empty_like(r)
+        )
         return errors
 
     def offer(self, r: Vector, error: float, error_q: float) -> bool:

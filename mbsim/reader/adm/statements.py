@@ -20,6 +20,7 @@ from mbsim.reader.adm.declare import (
     angles,
     numbers,
 )
+from mbsim.reader.adm.marker_forces import marker_forces
 from mbsim.reader.adm.subroutine import function_or_user, routine
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.controls import add_sensor
@@ -359,29 +360,6 @@ def _build_scalar(entry: Entry) -> None:
     entry.register(entry.draft.scalar_forces, force)
 
 
-def _six(entry: Entry, force: str, torque: str) -> tuple[float, ...]:
-    """Return three numbers along the axes of J, then three about them."""
-    none = (0.0, 0.0, 0.0)
-    return (*entry.get(force, none), *entry.get(torque, none))
-
-
-def _build_bushing(entry: Entry) -> None:
-    """Add a bushing."""
-    for name in ("K", "C", "KT", "CT"):
-        if any(value < 0.0 for value in entry.get(name, ())):
-            entry.fault("must be 3 numbers >= 0", name)
-    bushing = el.Bushing(
-        id=entry.get("id", 0),
-        i_marker_id=entry.get("I", 0),
-        j_marker_id=entry.get("J", 0),
-        stiffness=_six(entry, "K", "KT"),
-        damping=_six(entry, "C", "CT"),
-        preload=_six(entry, "FORCE", "TORQUE"),
-        source=entry.source,
-    )
-    entry.register(entry.draft.bushings, bushing)
-
-
 _VECTORS = {"VFORCE": "FORCEONLY", "VTORQUE": "TORQUEONLY", "GFORCE": "FORCEANDTORQUE"}
 _VECTOR_SUBROUTINES = {"VFORCE": "VFOSUB", "VTORQUE": "VTOSUB", "GFORCE": "GFOSUB"}
 
@@ -719,16 +697,7 @@ STATEMENTS = (
         words=_TYPE_WORDS | {"ACTIONONLY": ("ACTIONONLY", "TRUE")},
         xml="Force_Scalar_TwoBody",
     ),
-    AdmStatement(
-        "BUSHING",
-        {
-            **_ID,
-            **_MARKERS,
-            **{name: Spec(numbers(3)) for name in ("K", "C", "KT", "CT", "FORCE", "TORQUE")},
-        },
-        _build_bushing,
-        xml="Force_Bushing",
-    ),
+    *marker_forces(),
     _vector("VFORCE", _COMPONENTS[:3]),
     _vector("VTORQUE", _COMPONENTS[3:]),
     _vector("GFORCE", _COMPONENTS),
@@ -846,9 +815,11 @@ STATEMENTS = (
 )
 BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
-# the others of the language, which would change the motion or what is known of it
-NOT_BUILT = (
+# the others of the language, which would change the motion or what is known of it; those that have
+# been built are none of them
+_DOCUMENTED = (
     "BEAM CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
     "GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
     "PTCV PTSF STRING SURFACE TFSISO TIRE UCON"
 ).split()
+NOT_BUILT = [name for name in _DOCUMENTED if fold(name) not in BY_KEY]

@@ -106,9 +106,8 @@ def _module_nodes(tree: ast.Module) -> list[ast.AST]:
     return found
 
 
-def module_globals(tree: ast.Module, values: dict[str, Any]) -> Globals:
-    """Sort the names that a module binds; `values` is its namespace after it has run."""
-    known = Globals()
+def _times_bound(tree: ast.Module) -> Counter[str]:
+    """Return how often a module binds each of its names; more than once under `global`."""
     bound: Counter[str] = Counter()
     for node in _module_nodes(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, (ast.Store, ast.Del)):
@@ -123,29 +122,43 @@ def module_globals(tree: ast.Module, values: dict[str, Any]) -> Globals:
     for node in ast.walk(tree):
         if isinstance(node, ast.Global):
             bound.update(name for name in node.names for _ in range(2))
+    return bound
 
+
+def _constants(bound: Counter[str], values: dict[str, Any]) -> dict[str, Any]:
+    """Return the names bound once, to a number or a tuple of numbers."""
+    constants: dict[str, Any] = {}
     # the value counts, not how it was computed: DRAG = 0.5 * rho * area is a number
     for name, count in bound.items():
         value = values.get(name)
         numbers = value if isinstance(value, tuple) and value else (value,)
         if count == 1 and all(isinstance(number, (int, float)) for number in numbers):
             if all(isinstance(number, float) or abs(number) < 2**62 for number in numbers):
-                known.constants[name] = value
+                constants[name] = value
+    return constants
+
+
+def _imported(node: ast.Import | ast.ImportFrom, bound: Counter[str], known: Globals) -> None:
+    """Add what an import at the top of a module brings of `math` and of mbsim's `espy`."""
+    names = {alias.asname or alias.name: alias.name for alias in node.names}
+    once = {name: of for name, of in names.items() if bound[name] == 1}
+    if isinstance(node, ast.Import):
+        known.math_modules.update(name for name, of in once.items() if of == "math")
+    elif node.module == "math" and not node.level:
+        known.math_names.update((name, of) for name, of in once.items() if of != "*")
+    elif node.module == "mbsim" and not node.level:
+        known.spies.update(name for name, of in once.items() if of == "espy")
+
+
+def module_globals(tree: ast.Module, values: dict[str, Any]) -> Globals:
+    """Sort the names that a module binds; `values` is its namespace after it has run."""
+    bound = _times_bound(tree)
+    known = Globals(constants=_constants(bound, values))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and bound[node.name] == 1:
             known.functions[node.name] = node
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                if alias.name == "math" and bound[alias.asname or "math"] == 1:
-                    known.math_modules.add(alias.asname or "math")
-        elif isinstance(node, ast.ImportFrom) and node.module == "math" and not node.level:
-            for alias in node.names:
-                if alias.name != "*" and bound[alias.asname or alias.name] == 1:
-                    known.math_names[alias.asname or alias.name] = alias.name
-        elif isinstance(node, ast.ImportFrom) and node.module == "mbsim" and not node.level:
-            for alias in node.names:
-                if alias.name == "espy" and bound[alias.asname or "espy"] == 1:
-                    known.spies.add(alias.asname or "espy")
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            _imported(node, bound, known)
     sorted_names = {*known.constants, *known.functions, *known.math_names, *known.math_modules}
     known.others = set(bound) - sorted_names - {"*"}
     if any(

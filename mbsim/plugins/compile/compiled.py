@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from mbsim.core import jit
-from mbsim.plugins.adapter import friction_address
-from mbsim.plugins.rewrite import rewritten
-from mbsim.plugins.whitelist import Refused, check, module_globals
+from mbsim.plugins.adapters.friction import friction_address
+from mbsim.plugins.compile.rewrite import rewritten
+from mbsim.plugins.compile.whitelist import Refused, check, module_globals
 
 #: `par` becomes a tuple; a longer one would make compilation slow
 PAR_MAX = 32
@@ -37,7 +37,7 @@ def compile_friction(
 
 def compile_normal(text: str, values: dict[str, Any], name: str, par_count: int) -> tuple[int, str]:
     """Return the address of a compiled CNFSUB and '', or 0 and the reason: `compile_friction`."""
-    from mbsim.plugins.normal_adapter import normal_address
+    from mbsim.plugins.adapters.normal import normal_address
 
     return _compile(text, values, name, par_count, normal_address, 13)
 
@@ -46,7 +46,7 @@ def compile_residual(
     text: str, values: dict[str, Any], name: str, par_count: int, axes: int, unknowns: int
 ) -> tuple[int, str]:
     """Return the address of a compiled residual and '', or 0 and the reason."""
-    from mbsim.plugins.residual_adapter import residual_address
+    from mbsim.plugins.adapters.residual import residual_address
 
     adapted = functools.partial(residual_address, axes=axes, unknowns=unknowns)
     return _compile(text, values, name, par_count, adapted, 6)

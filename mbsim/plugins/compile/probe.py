@@ -15,7 +15,7 @@ from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 
 if TYPE_CHECKING:
-    from mbsim.plugins.normal import UserNormal
+    from mbsim.plugins.types import UserNormal
 
 _THRESHOLD_MAX = 24
 _TOLERANCE = 1e-14

@@ -1,6 +1,6 @@
 """The arguments of a residual on the inside of its compiled function.
 
-Apart from `compiled`, as `adapter` is, for the cache's sake.
+A file of its own, as `friction` is, for the cache's sake.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -15,7 +15,8 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
 from mbsim.core.address import vector_at
-from mbsim.laws.abi import FRICTION_SIGNATURE, RAISED_COMPILED
+from mbsim.core.codes import Code
+from mbsim.laws.abi import FRICTION_SIGNATURE
 
 
 def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -> Any:
@@ -40,7 +41,7 @@ def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -
             for k in range(unknowns):
                 result[k] = found[k]
         except Exception:  # the only kind Numba can catch; the interpreted twin says which
-            code = RAISED_COMPILED
+            code = Code.RAISED_COMPILED
         return code
 
     return entry

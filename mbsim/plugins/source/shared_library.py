@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.errors import ModelError
-from mbsim.plugins.symbols import ends_the_process, functions_of
+from mbsim.plugins.source.symbols import ends_the_process, functions_of
 
 if TYPE_CHECKING:
-    from mbsim.plugins.library_adapter import LibraryCall
+    from mbsim.plugins.adapters.library import LibraryCall
 
 SUFFIXES = (".so", ".dll", ".dylib", ".sl")
 C, FORTRAN = "C", "Fortran"
@@ -168,7 +168,7 @@ def friction(
     from mbsim.core import jit
     from mbsim.core.address import pack
     from mbsim.laws.abi import FRICTION_SIGNATURE
-    from mbsim.plugins.library_adapter import LibraryCall, call_c, call_fortran
+    from mbsim.plugins.adapters.library import LibraryCall, call_c, call_fortran
 
     call = LibraryCall(
         address=np.array([address], dtype=np.int64),

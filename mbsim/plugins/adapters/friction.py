@@ -16,7 +16,8 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
 from mbsim.core.address import vector_at
-from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, MEMORY_OUT, RAISED_COMPILED
+from mbsim.core.codes import Code
+from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, MEMORY_OUT
 
 
 def _adapt(function: Callable[..., Any], count: int) -> Any:
@@ -52,7 +53,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
             result[3] = 0.0
             result[4] = force[2]
         except Exception:  # the only kind Numba can catch; `reproduce` finds out which
-            code = RAISED_COMPILED
+            code = Code.RAISED_COMPILED
         return code
 
     return entry
@@ -102,7 +103,7 @@ def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> 
                 # found where forces are looked at
                 result[0] = math.nan
         except Exception:  # as above
-            code = RAISED_COMPILED
+            code = Code.RAISED_COMPILED
         return code
 
     return entry

@@ -1,6 +1,6 @@
 """CNFSUB in compiled Python, C and Fortran behind the internal signature of normal laws.
 
-Apart from `normal`, as `adapter` and `library_adapter` are, for the cache's sake. The parameters
+A file of its own, as `friction` and `library` are, for the cache's sake. The parameters
 of such a law begin with an address: of its place (`laws.user_normal`), or of a `NormalCall`.
 """
 
@@ -20,6 +20,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from mbsim.core import jit
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, I1
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.laws.abi import NORMAL_SIGNATURE
@@ -34,7 +35,6 @@ from mbsim.laws.user_normal import (
     NJ,
     PLACE,
     TIME,
-    USER_NORMAL_FAILED,
     begin,
     keep,
     question,
@@ -157,7 +157,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
                 )
                 keep(result, k, depth, only_one(force))
         except Exception:  # the only kind Numba can catch; the interpreted twin finds out which
-            code = USER_NORMAL_FAILED
+            code = Code.USER_NORMAL_FAILED
         return code
 
     return entry

@@ -12,7 +12,13 @@ import copy
 import math
 from typing import Any
 
-from mbsim.plugins.whitelist import MATH_CHECKED, MATH_CONSTANTS, Globals, callee, local_names
+from mbsim.plugins.compile.whitelist import (
+    MATH_CHECKED,
+    MATH_CONSTANTS,
+    Globals,
+    callee,
+    local_names,
+)
 
 _HEADER = (
     "# written by mbsim from a user's script; do not edit\n"

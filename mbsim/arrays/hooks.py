@@ -1,0 +1,106 @@
+"""Names of a scene's hooks, what they are asked for, and how a failure is handed on.
+
+What only some scenes need stands behind an address in `World.hooks`, 0 where a scene lacks it:
+`pipeline.hook_table` says of each when that is, its signature, what it does and what its result
+means. A hook returns 0, or the code of its failure; one that answers returns its answer, or less
+the code. Its caller hands a code on; where it cannot, as deep within an equation, the code is noted
+and the hook that an integrator called returns it.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from mbsim.core.jitable import jitable
+
+
+class Hook(IntEnum):
+    """Entries of `World.hooks`, in the order in which a step comes to them first."""
+
+    FCL = 0  # distances of pairs without a closed form
+    VALUE = 1  # value of an expression
+    JET = 2  # its value and rates
+    APPLIED = 3  # forces between markers, states of the user's own
+    WRENCH = 4  # a bushing or a vector force
+    ELEMENT = 5  # a Force_Element by its residual
+    JOINTS = 6  # what joints are asked for: `Joints`
+    HELD = 7  # contacts whose friction holds without give: `Held`
+    LATE = 8  # forces that follow from reactions: friction in joints, expressions of them
+    EVALUATE = 9  # the whole rhs
+    TANGENT = 10  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 11  # how forces of equations turn with the bodies
+    MEMORY = 12  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 13  # derivatives of forces between markers
+    MEMORY_PAIR = 14  # as MEMORY in complex systems
+    DRY = 15  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 16  # turns of followed angles
+    NEAR = 17  # the lists of near pairs
+    REQUESTS = 18  # expressions of requests
+
+
+class Joints(IntEnum):
+    """What joints are asked for; the last four are for assembly, in Python."""
+
+    SEAT = 0  # bring a trial point onto the equations, near a fold
+    ACCELERATE = 1  # replace accelerations by those that constraints leave
+    PROJECT = 2  # bring y onto the equations
+    ALONG = 3  # the same of displacements a time
+    KEEP = 4  # choose equations anew at a committed state, where the choice has worn
+    REACT = 5  # fill reactions
+    CHOOSE = 6  # choose the equations to be used
+    MATRIX = 7  # residuals and matrix of all equations at y
+    DISPLACE = 8  # displace bodies by the multipliers as they stand
+    SPEED_UP = 9  # change velocities by them
+
+
+class Dry(IntEnum):
+    """What dry friction is asked for."""
+
+    HOLD_AGAIN = 0  # that what sticks at the point to be evaluated is held, and nothing else
+    KEEP = 1  # what it is at a committed state; the answer is 0 or `HELD_OTHERWISE`
+
+
+class Held(IntEnum):
+    """What contacts are asked for whose friction is rigid: see stiction.rigid_contact."""
+
+    PLACE = 0  # where equations of what sticks act
+    SHARE = 1  # share the friction that holds between the contacts
+    ASK = 2  # whether one asks for another mode than it has: 1, else 0
+    LOAD = 3  # a million times the largest force that holds over its limit
+    BEGIN = 4  # modes at a committed state: 1 if one changed, else 0
+    RELEASE = 5  # let slip what is not held: how many do
+    RECORD = 6  # append events
+    CHANGED = 7  # whether other slots stick than in the last step: 1, else 0
+
+
+class Memory(IntEnum):
+    """What friction with memory does in linear systems: see linearization.memory_slopes."""
+
+    FILL = 0  # keep its slopes
+    FACTOR = 1  # add its part to the matrix
+    RIGHT = 2  # and to a right-hand side
+    RECOVER = 3  # write how what slots carry changes
+
+
+@jitable
+def note_failure(scene, code):
+    """Keep the first code where it cannot be returned: `failure_or` hands it on."""
+    if code != 0 and scene.users.failed[0] == 0:
+        scene.users.failed[0] = code
+
+
+@jitable
+def failure_or(scene, code):
+    """Return the code that was noted, which is forgotten, or `code` if there is none."""
+    noted = scene.users.failed[0]
+    scene.users.failed[0] = 0
+    return noted if noted != 0 else code
+
+
+@jitable
+def answer_of(scene, answer):
+    """Return what a hook answers; 0 where it failed, which is noted."""
+    if answer < 0:
+        note_failure(scene, -answer)
+        return 0
+    return answer

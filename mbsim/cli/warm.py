@@ -1,0 +1,114 @@
+"""`mbsim warm`: compile ahead, for this machine or for a family of processors."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+
+
+@click.command("warm")
+@click.argument("models", nargs=-1, type=click.Path(), metavar="[MODEL]...")
+@click.option(
+    "--all",
+    "everything",
+    is_flag=True,
+    help="Every law, pair of shapes, joint, method and FCLIB solver; of MODELs every method.",
+)
+@click.option(
+    "--target",
+    metavar="FAMILY",
+    help="Code for a family of processors, e.g. x86-64-v3, to be shipped; with -o.",
+)
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for that code; MBSIM_SHIPPED_CODE=DIR has it read.",
+)
+def command(
+    models: tuple[str, ...], everything: bool, target: str | None, output: Path | None
+) -> None:
+    """Compile what MODELs need (default: most models), so that first runs begin at once."""
+    if (target is None) != (output is None):
+        raise click.UsageError("--target and -o go together")
+    if target is not None and output is not None:
+        _ship(target, output, [*models, *(["--all"] if everything else [])])
+        return
+    from mbsim.core import jit
+    from mbsim.warming.tasks import refused, tasks
+
+    began = time.perf_counter()
+    before = jit.total
+    todo = tasks(everything, models)
+    failed = _do_all(todo, refused)
+    for line in failed:
+        click.echo(f"mbsim: warning: {line}", err=True)
+    click.echo(
+        f"{jit.total - before} functions compiled in {time.perf_counter() - began:.0f} s; "
+        f"they are in {jit.cache_root()}"
+    )
+    if failed and len(failed) == len(todo):
+        from mbsim.errors import ModelError
+
+        raise ModelError("nothing of it could be run")
+
+
+def _do_all(todo, refused):  # type: ignore[no-untyped-def]
+    """Do all tasks behind a progress bar, and return what failed."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from mbsim.core import jit
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.description}"),
+        TextColumn("{task.fields[now]}"),
+    )
+    failed = []
+    with Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        refresh_per_second=4,
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        line = bar.add_task("", total=len(todo), now="")
+        jit.on_compile = lambda name: bar.update(line, now=name)
+        for task in todo:
+            bar.update(line, description=task.name, now="")
+            why = refused(task)
+            if why:
+                failed.append(f"{task.name}: {why}")
+            bar.advance(line)
+        jit.on_compile = None
+    return failed
+
+
+def _ship(family: str, output: Path, arguments: list[str]) -> None:
+    """Compile in a process that takes its processor to be of a family.
+
+    Numba asks for the processor once, when it is imported.
+    """
+    from mbsim.core import processors
+    from mbsim.errors import MbsimError
+
+    folder = output / processors.folder_of(family)
+    environment = {
+        **os.environ,
+        **processors.settings(family),
+        "MBSIM_CACHE_DIR": str(folder.resolve()),
+    }
+    done = subprocess.run([sys.executable, "-m", "mbsim", "warm", *arguments], env=environment)
+    if done.returncode != 0:
+        raise MbsimError(f"compiling for {family} ended with exit code {done.returncode}")
+    # what was compiled of users' functions is found without their text
+    shutil.rmtree(folder / "plugins", ignore_errors=True)

@@ -1,0 +1,187 @@
+"""Where compiled code is kept: the user's folder, and folders of code that was shipped.
+
+A root's code is stored under a digest of *all* project files that it can reach through imports:
+Numba's own check sees only the file of the function itself, and would go on using an edited
+helper's old code. Numba's version, the link policy, Python's minor version, signature and processor
+are part of the key as well.
+
+A shipped folder (`mbsim warm --target`) holds code for families of processors. It is looked into
+for what the user's folder has not, and never written.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    _CacheLocator,
+)
+
+from mbsim.core import linking, processors
+
+PACKAGE = Path(__file__).resolve().parent.parent
+_IMPORT = re.compile(
+    r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
+)
+#: Below a folder of code: that of other versions and policies is not mixed with ours.
+_VERSION = f"{numba.__version__}-{linking.POLICY}"
+
+
+def cache_root() -> Path:
+    """Return the folder of compiled code: $MBSIM_CACHE_DIR, or the user's cache folder."""
+    named = os.environ.get("MBSIM_CACHE_DIR")
+    if named:
+        return Path(named)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library/Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mbsim"
+
+
+@functools.cache
+def shipped() -> tuple[tuple[Path, str], ...]:
+    """Return folders of shipped code that this machine runs, and the family of each.
+
+    $MBSIM_SHIPPED_CODE names them in place of the one within the package.
+    """
+    named = os.environ.get("MBSIM_SHIPPED_CODE")
+    folders = [PACKAGE / "shipped_code"]
+    if named is not None:
+        folders = [Path(folder) for folder in named.split(os.pathsep) if folder]
+    return tuple(
+        (found, family)
+        for folder in folders
+        for family in processors.runnable()
+        if (found := folder / processors.folder_of(family) / _VERSION).is_dir()
+    )
+
+
+@functools.cache
+def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Return the digest of a file and the project files that it imports."""
+    text = path.read_bytes()
+    found = []
+    for module, names, plain in _IMPORT.findall(text.decode("utf-8")):
+        parts = (module or plain).split(".")[1:]
+        candidates = [parts] + [[*parts, name] for name in re.findall(r"\w+", names)]
+        for candidate in candidates:
+            file = PACKAGE.joinpath(*candidate).with_suffix(".py") if candidate else None
+            if file is not None and file.is_file():
+                found.append(file)
+    return hashlib.sha256(text).digest(), tuple(found)
+
+
+def source_digest(files: list[Path]) -> str:
+    """Return a digest of `files` and of every project file they reach through imports."""
+    reached: dict[Path, bytes] = {}
+    waiting = [file.resolve() for file in files]
+    while waiting:
+        file = waiting.pop()
+        if file not in reached:
+            reached[file], imported = _imports(file)
+            waiting.extend(imported)
+    # names too: a file that moves changes what its callers mean
+    lines = sorted(file.name.encode() + digest for file, digest in reached.items())
+    return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
+
+
+def is_known(function: Callable[..., Any]) -> bool:
+    """Return whether all that a function can reach is seen by the digest of the cache."""
+    file = Path(function.__code__.co_filename).resolve()
+    return PACKAGE in file.parents or cache_root().resolve() in file.parents
+
+
+class _ContentLocator(_CacheLocator):
+    """A folder named by content."""
+
+    def __init__(self, digest: str) -> None:
+        self.digest = digest
+
+    def get_cache_path(self) -> str:
+        return str(cache_root() / _VERSION / self.digest)
+
+    def get_source_stamp(self) -> str:
+        return "content"  # the folder's name already says it
+
+    def get_disambiguator(self) -> str:
+        return ""
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ContentLocator:
+        # an adapter closes over the law it adapts: that law's file counts as well
+        cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
+        files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
+        return cls(source_digest([Path(py_file), *files]))
+
+
+class _ByContent(CompileResultCacheImpl):
+    _locator_classes = (_ContentLocator,)
+
+
+class CodeCache(FunctionCache):
+    """Numba's cache of one function, in the user's folder and in shipped ones."""
+
+    _impl_class = _ByContent
+
+    def __init__(self, py_func: Callable[..., Any], on_miss: Callable[[str], None]) -> None:
+        super().__init__(py_func)
+        self._on_miss = on_miss
+
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        data = self._find(self._index_key(sig, target_context.codegen()))
+        if data is None:
+            self._on_miss(self._py_func.__qualname__)
+            return None
+        return self._impl.rebuild(target_context, data)
+
+    def _save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super()._save_overload(sig, data)
+        except OSError:
+            pass  # a folder that cannot be written, or is full, keeps nothing
+
+    def _find(self, key: Any) -> Any:
+        """Return what is stored of a root, None where nothing is."""
+        signature, (triple, *_), code = key
+        for file, family in [(self._cache_file, ""), *self._shipped()]:
+            wanted = key
+            if family:
+                wanted = signature, (triple, family, processors.features(family)), code
+            try:
+                data = file.load(wanted)
+            except OSError:  # a folder that cannot be read holds nothing
+                continue
+            if data is not None:
+                return data
+        return None
+
+    def _shipped(self) -> list[tuple[IndexDataCacheFile, str]]:
+        """Return this function's files in the folders of shipped code, and their families."""
+        locator, name = self._impl.locator, self._impl.filename_base
+        return [
+            (IndexDataCacheFile(str(path), name, locator.get_source_stamp()), family)
+            for folder, family in shipped()
+            if (path := folder / locator.digest).is_dir()
+        ]
+
+    def is_empty(self) -> bool:
+        """Return whether nothing is stored of this function, with any signature."""
+        files = [self._cache_file, *(file for file, _ in self._shipped())]
+        try:
+            return not any(file._load_index() for file in files)
+        except OSError:
+            return True

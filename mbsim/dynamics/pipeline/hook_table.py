@@ -1,0 +1,421 @@
+"""The table of a scene's hooks, in the order in which a step comes to them first.
+
+Each row says what a hook is called with, what it does, when a scene has it and what its result
+means; `fill` puts the addresses into `World.hooks`, and nothing else does, but for the detector,
+which is Python (`run.simulation`). What a scene lacks is neither imported nor compiled.
+
+y, dy (n,) are pointers to doubles, t is a double, all else int64; `context` is the packed scene.
+Requests are those of `arrays.hooks`. Entries that share most of what they compile are one hook with
+requests: each C function costs 0.2 to 0.4 s to compile for itself.
+
+A result is 0, or a `Code`, unless the row says otherwise: an answer is >= 0, or less a code. Every
+caller looks at it: it returns the code, or notes it (`arrays.hooks.note_failure`), and the hook
+that an integrator called (`core.problem`) returns what was noted. So a hook that fails ends the
+step, and the run where a shorter step does not help.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import (
+    BALL_FRICTION,
+    DRY_SLIDE,
+    DRY_TURN,
+    MARKER_FORCE,
+    RESIDUAL,
+    SLIDE_FRICTION,
+    VECTOR_FORCE,
+    Scene,
+)
+from mbsim.compile_model.tangent import Tangent
+from mbsim.core import jit
+from mbsim.core.problem import HOOK
+
+_INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
+_COMPLEX = types.CPointer(types.complex128)
+_AT = _INT(_INT, _T, _PTR)  # context, t, y
+_FORCES = _INT(_INT, _T, _PTR, _PTR)  # context, t, y, dy
+_KEEPS = _INT(_INT, _INT, _T, _PTR)  # context, request, t, y
+
+
+class Method(NamedTuple):
+    """What a method asks of a scene beside y'."""
+
+    tangent: Tangent | None = None  # its linearisation, where it is implicit
+    pair: bool = False  # in complex systems too
+
+
+class Row(NamedTuple):
+    """A hook."""
+
+    hook: Hook
+    signature: Any
+    when: Callable[[Scene, Method], bool]  # whether a scene has it
+    entry: Callable[[Scene], Callable[..., Any]]  # the C function that this scene needs
+    does: str
+    result: str = "0 or a code"
+
+
+def _never(scene: Scene, method: Method) -> bool:
+    """What Python puts there."""
+    return False
+
+
+def _no_entry(scene: Scene) -> Callable[..., Any]:
+    raise ValueError("this hook has no compiled function")
+
+
+def _has_programs(scene: Scene, method: Method) -> bool:
+    return len(scene.programs.start) > 1
+
+
+def _value(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import evaluate_expression
+
+    return evaluate_expression
+
+
+def _needs_jets(scene: Scene, method: Method) -> bool:
+    """Equations need them, and slopes of forces."""
+    if (scene.equations.program >= 0).any():
+        return True
+    return _needs_slopes(scene, method) and len(scene.programs.start) > 1
+
+
+def _jet(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import express
+
+    return express
+
+
+def _has_applied(scene: Scene, method: Method) -> bool:
+    driven = len(scene.states.program) > 0 or bool((scene.world.weight >= 0).any())
+    return len(scene.applied.kind) > 0 or driven
+
+
+def _applied(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import act, drive_alone
+
+    return act if len(scene.applied.kind) > 0 else drive_alone
+
+
+def _has_wrenches(scene: Scene, method: Method) -> bool:
+    return bool(np.isin(scene.applied.kind, (VECTOR_FORCE, MARKER_FORCE, RESIDUAL)).any())
+
+
+def _wrench(scene: Scene) -> Callable[..., Any]:
+    """Return what adds the wrenches that there are, so that no other is compiled."""
+    from mbsim.dynamics.pipeline import force_hooks as of
+
+    kind = scene.applied.kind
+    vectors = np.isin(kind, (VECTOR_FORCE, RESIDUAL)).any()
+    if (kind == MARKER_FORCE).any():
+        return of.act_by_wrench if vectors else of.act_by_marker_force
+    return of.act_by_vector_force
+
+
+def _has_elements(scene: Scene, method: Method) -> bool:
+    return len(scene.residuals.id) > 0
+
+
+def _element(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.element_hooks import serve_element
+
+    return serve_element
+
+
+def _has_joints(scene: Scene, method: Method) -> bool:
+    return len(scene.tree.body) > 0
+
+
+def _joints(scene: Scene) -> Callable[..., Any]:
+    """Return what joints do; a tree alone compiles no equations."""
+    from mbsim.dynamics.pipeline.joint_hooks import serve_joints, serve_tree
+
+    rubs = bool((scene.applied.kind >= SLIDE_FRICTION).any())
+    return serve_joints if len(scene.equations.program) > 0 or rubs else serve_tree
+
+
+def _has_held(scene: Scene, method: Method) -> bool:
+    return bool(scene.contacts.rigid.any())
+
+
+def _held(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import serve_held_contacts
+
+    return serve_held_contacts
+
+
+def _has_late(scene: Scene, method: Method) -> bool:
+    return len(scene.applied.late) > 0 or bool((scene.applied.connection >= 0).any())
+
+
+def _late(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import rub, settle
+
+    # forces by reactions are compiled with all that they need
+    return settle if len(scene.applied.late) > 0 else rub
+
+
+def _has_kinks(scene: Scene, method: Method) -> bool:
+    return len(scene.kinks.program) > 0 and scene.world.fixed_step[0] == 0
+
+
+def _evaluate(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.hooks import rhs
+
+    return rhs
+
+
+def _has_equations(scene: Scene, method: Method) -> bool:
+    return method.tangent is not None and len(scene.equations.program) > 0
+
+
+def _bend(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.implicit_hooks import bend, bend_and_drive
+
+    return bend_and_drive if (scene.equations.level < 2).any() else bend
+
+
+def _has_memory(scene: Scene, method: Method) -> bool:
+    return method.tangent is not None and len(method.tangent.keeps.table) > 0
+
+
+def _memory(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.linearization.memory_slopes import serve_memory
+
+    return serve_memory
+
+
+def _needs_slopes(scene: Scene, method: Method) -> bool:
+    acts = len(scene.applied.kind) > 0 or len(scene.states.program) > 0
+    return method.tangent is not None and acts
+
+
+def _slopes(scene: Scene) -> Callable[..., Any]:
+    kinds = set(scene.applied.kind.tolist())
+    if RESIDUAL in kinds:
+        from mbsim.dynamics.pipeline.element_hooks import residual_slopes
+
+        return residual_slopes
+    from mbsim.dynamics.pipeline import implicit_hooks as of
+
+    rubs = bool(kinds & set(range(SLIDE_FRICTION, BALL_FRICTION + 1)))
+    if MARKER_FORCE in kinds:
+        return of.slopes_with_both if rubs else of.slopes_with_marker_forces
+    return of.slopes_with_rubs if rubs else of.slopes
+
+
+def _memory_pair(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.linearization.memory_slopes import serve_memory_pair
+
+    return serve_memory_pair
+
+
+def _has_dry(scene: Scene, method: Method) -> bool:
+    keeps = np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any() or scene.contacts.rigid.any()
+    return bool(keeps) or len(scene.residuals.id) > 0
+
+
+def _dry(scene: Scene) -> Callable[..., Any]:
+    """Return what keeps of a step what there is: elements, dry friction, rigid friction."""
+    rigid = bool((scene.applied.equation >= 0).any() or scene.contacts.rigid.any())
+    if len(scene.residuals.id) > 0:
+        from mbsim.dynamics.pipeline import element_hooks as of
+
+        if rigid:
+            return of.keep_with_rigid
+        dry = np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any()
+        return of.keep_with_dry if dry else of.keep_elements
+    from mbsim.dynamics.pipeline.force_hooks import serve_dry_alone, serve_rigid_alone
+
+    return serve_rigid_alone if rigid else serve_dry_alone
+
+
+def _has_angles(scene: Scene, method: Method) -> bool:
+    return len(scene.angles.i) > 0
+
+
+def _angles(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import commit_turns
+
+    return commit_turns
+
+
+def _has_crowds(scene: Scene, method: Method) -> bool:
+    return len(scene.crowds.contact) > 0
+
+
+def _near(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.hooks import list_near
+
+    return list_near
+
+
+def _has_requests(scene: Scene, method: Method) -> bool:
+    return scene.rows.value.shape[1] > 0
+
+
+def _requests(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import evaluate_requests
+
+    return evaluate_requests
+
+
+TABLE = (
+    # evaluation
+    Row(
+        Hook.FCL,
+        _INT(_INT),  # how many pairs of `Work.fcl`
+        _never,
+        _no_entry,
+        "writes the points of pairs without a closed form; a scene with such a pair has it",
+    ),
+    Row(
+        Hook.VALUE,
+        _T(_INT, _T, _PTR, _INT),  # context, t, y, program
+        _has_programs,
+        _value,
+        "evaluates an expression",
+        "the value; a user's subroutine that fails notes its code, and the value is nan",
+    ),
+    Row(
+        Hook.JET,
+        _INT(_INT, _T, _PTR, _INT, _INT, _INT),  # context, t, y, program, body, way
+        _needs_jets,
+        _jet,
+        "leaves an expression and its rates in the first row of `Programs.stack`",
+    ),
+    Row(
+        Hook.APPLIED,
+        _FORCES,
+        _has_applied,
+        _applied,
+        "adds forces between markers and gravity over time, and the slopes of states",
+    ),
+    Row(
+        Hook.WRENCH,
+        _INT(_INT, _T, _PTR, _INT),  # context, t, y, row of `Applied`
+        _has_wrenches,
+        _wrench,
+        "adds a marker force or a vector force",
+    ),
+    Row(
+        Hook.ELEMENT,
+        _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
+        _has_elements,
+        _element,
+        "solves a Force_Element for what expressions ask of it",
+    ),
+    Row(
+        Hook.JOINTS,
+        _INT(_INT, _INT, _T, _PTR, _PTR),  # context, request, t, y, dy
+        _has_joints,
+        _joints,
+        "does what joints are asked for: `Joints`",
+    ),
+    Row(
+        Hook.HELD,
+        _KEEPS,
+        _has_held,
+        _held,
+        "does what contacts are asked for whose friction is rigid: `Held`",
+        "an answer, or less a code",
+    ),
+    Row(
+        Hook.LATE,
+        _FORCES,
+        _has_late,
+        _late,
+        "finds forces that follow from reactions, and the accelerations with them",
+    ),
+    Row(
+        Hook.EVALUATE,
+        HOOK,
+        _has_kinks,
+        _evaluate,
+        "evaluates y' at a point that is no step's, to see what branch forces are on there",
+    ),
+    # linearisation
+    Row(
+        Hook.BEND,
+        _AT,
+        _has_equations,
+        _bend,
+        "adds how forces of equations turn with the bodies",
+    ),
+    Row(
+        Hook.MEMORY,
+        _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
+        _has_memory,
+        _memory,
+        "does what friction with memory is asked for in real systems: `Memory`",
+    ),
+    Row(
+        Hook.SLOPES,
+        _AT,
+        _needs_slopes,
+        _slopes,
+        "adds the derivatives of forces between markers and of the slopes of states",
+    ),
+    Row(
+        Hook.MEMORY_PAIR,
+        _INT(_INT, _INT, _COMPLEX, _COMPLEX),
+        lambda scene, method: _has_memory(scene, method) and method.pair,
+        _memory_pair,
+        "does the same in complex systems",
+    ),
+    # a step is taken
+    Row(
+        Hook.DRY,
+        _KEEPS,
+        _has_dry,
+        _dry,
+        "keeps what dry friction and Force_Elements do in a step: `Dry`",
+        "an answer, or less a code",
+    ),
+    Row(
+        Hook.ANGLES,
+        _INT(_INT),
+        _has_angles,
+        _angles,
+        "counts the turns of angles",
+    ),
+    Row(
+        Hook.NEAR,
+        _INT(_INT, _PTR),  # context, y
+        _has_crowds,
+        _near,
+        "lists near pairs anew where shapes have moved far enough",
+    ),
+    # a row is written
+    Row(
+        Hook.REQUESTS,
+        _AT,
+        _has_requests,
+        _requests,
+        "evaluates the expressions of requests",
+    ),
+)
+
+
+def fill(scene: Scene, method: Method | None = None, only: Iterable[Hook] | None = None) -> None:
+    """Put the hooks that a scene and a method need into `World.hooks`, those of `only` if given."""
+    wanted = set(Hook) if only is None else set(only)
+    for row in TABLE:
+        if row.hook in wanted and row.when(scene, method or Method()):
+            put(scene, row.hook)
+
+
+def put(scene: Scene, *hooks: Hook) -> None:
+    """Put hooks into `World.hooks` that are not there yet."""
+    for row in TABLE:
+        # what was only counted, to say how much is to be compiled, is not there either
+        if row.hook in hooks and scene.world.hooks[row.hook] in (0, jit.NOT_YET):
+            scene.world.hooks[row.hook] = jit.address(row.entry(scene), row.signature)

@@ -1,0 +1,1 @@
+"""Kinds of forces between markers, one a file."""

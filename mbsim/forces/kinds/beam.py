@@ -1,0 +1,185 @@
+"""Force_Beam, Adams' BEAM: a straight massless beam of constant section from J to I.
+
+Its neutral axis is J's x, I's origin at `length` on it and I's axes along J's where nothing
+bends it. With q = (d - length e_x, theta), a linear Timoshenko beam exerts on I
+
+    F = F0 - (K q)_d - (C u)_v         T = T0 - J(theta)^-T (K q)_theta - (C u)_w,   u = (v, w)
+
+and stores q'K q/2 - F0.d, of which both are the exact gradient; a constant torque T0 has no
+potential. The work of that counts as lost, with the sign turned. K is (J. S. Przemieniecki, Theory
+of Matrix Structural Analysis, 1968, section 5.6), with Py = 12 E Izz ASY / (G A L^2) and Pz
+likewise of Iyy and ASZ,
+
+    x x   E A / L                            tx tx   G Ixx / L
+    y y   12 E Izz / (L^3 (1 + Py))          tz tz   (4 + Py) E Izz / (L (1 + Py))
+    z z   12 E Iyy / (L^3 (1 + Pz))          ty ty   (4 + Pz) E Iyy / (L (1 + Pz))
+    y tz  -6 E Izz / (L^2 (1 + Py))          z ty    6 E Iyy / (L^2 (1 + Pz))
+
+and C is `cratio` K or `cmatrix`. Bending is small, what carries the beam along is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, norm, scale, sub
+from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, force
+from mbsim.forces.turning import turned_back
+
+_PRELOAD = tuple(f"preload_{axis}" for axis in ("x", "y", "z", "tx", "ty", "tz"))
+#: Half of the difference of angles [rad].
+_PUSH = 1e-7
+#: Where K, C and the preload stand among the constants, behind the length.
+_K, _C, _F0 = 1, 37, 73
+#: Negative parts of a damping matrix, over its diagonal, that are rounding.
+_ROUNDING = 1e-12
+
+
+def _stiffness(values):
+    """Return K, shape (6, 6)."""
+    L, E, G, A = (values[name] for name in ("length", "E", "G", "area"))
+    K = np.zeros((6, 6))
+    K[0, 0], K[3, 3] = E * A / L, G * values["ixx"] / L
+    for y, tz, name, ratio, sign in ((1, 5, "izz", "ASY", -1.0), (2, 4, "iyy", "ASZ", 1.0)):
+        EI = E * values[name]
+        P = 12.0 * EI * values[ratio] / (G * A * L * L)
+        K[y, y] = 12.0 * EI / (L**3 * (1.0 + P))
+        K[tz, tz] = (4.0 + P) * EI / (L * (1.0 + P))
+        K[y, tz] = K[tz, y] = sign * 6.0 * EI / (L * L * (1.0 + P))
+    return K
+
+
+def _damping(values):
+    """Return C, shape (6, 6); `cmatrix` has its columns from the diagonal down."""
+    if not values["cmatrix"]:
+        return values["cratio"] * _stiffness(values)
+    C = np.zeros((6, 6))
+    C.T[np.triu_indices(6)] = values["cmatrix"]
+    return C + np.tril(C, -1).T
+
+
+def _check(values) -> Iterator[Finding]:
+    if not values["cmatrix"]:
+        return
+    if values["cratio"]:
+        yield Finding("give the damping once: cratio or a matrix", "cratio")
+    C = _damping(values)
+    size = np.sqrt(np.maximum(np.diag(C), 0.0))
+    size[size == 0.0] = 1.0
+    if np.linalg.eigvalsh(C / np.outer(size, size))[0] < -_ROUNDING:
+        message = "feeds energy: no velocities may have negative losses (positive semidefinite)"
+        yield Finding(message, "cmatrix")
+
+
+def _constants(values):
+    """Return length, K and C by rows, preload."""
+    preload = [values[name] for name in _PRELOAD]
+    return (values["length"], *_stiffness(values).flat, *_damping(values).flat, *preload)
+
+
+@jitable
+def _times(par, first, a, b):
+    """Return the two halves of the 6 x 6 matrix from `first` on times (a, b)."""
+    out = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(3):
+        at = first + k
+        by_a = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
+        at += 3
+        by_b = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
+        upper = add(scale(a[k], by_a[0]), scale(b[k], by_b[0]))
+        lower = add(scale(a[k], by_a[1]), scale(b[k], by_b[1]))
+        out = add(out[0], upper), add(out[1], lower)
+    return out
+
+
+@jitable
+def _elastic(d, theta, par):
+    """Return what the beam's own force and torque on I are less than the preload."""
+    bent = _times(par, _K, (d[0] - par[0], d[1], d[2]), theta)
+    return bent[0], turned_back(theta, bent[1])
+
+
+def _wrench(motion, par):
+    d, theta, v, w = motion.d, motion.theta, motion.v, motion.w
+    q = (d[0] - par[0], d[1], d[2])
+    bent = _times(par, _K, q, theta)
+    slowed = _times(par, _C, v, w)
+    f0, t0 = (par[_F0], par[_F0 + 1], par[_F0 + 2]), (par[_F0 + 3], par[_F0 + 4], par[_F0 + 5])
+    force = sub(sub(f0, bent[0]), slowed[0])
+    torque = sub(sub(t0, turned_back(theta, bent[1])), slowed[1])
+    stored, lost = 0.0, 0.0
+    for k in range(3):
+        stored += 0.5 * (q[k] * bent[0][k] + theta[k] * bent[1][k]) - f0[k] * d[k]
+        lost += v[k] * slowed[0][k] + w[k] * (slowed[1][k] - t0[k])
+    return force, torque, stored, lost
+
+
+def _slopes(motion, par, K, D):
+    d, theta = motion.d, motion.theta
+    for r in range(6):
+        for k in range(6):
+            D[r, k] = par[_C + 6 * r + k]
+    for k in range(3):
+        e = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        force, torque = _times(par, _K, e, (0.0, 0.0, 0.0))
+        torque = turned_back(theta, torque)
+        # d theta = J(theta)^-1 e as I turns, which is J^-T of -theta
+        turn = scale(_PUSH, turned_back(scale(-1.0, theta), e))
+        up, low = _elastic(d, add(theta, turn), par), _elastic(d, sub(theta, turn), par)
+        for r in range(3):
+            K[r, k] = force[r]
+            K[3 + r, k] = torque[r]
+            K[r, 3 + k] = (up[0][r] - low[0][r]) / (2.0 * _PUSH)
+            K[3 + r, 3 + k] = (up[1][r] - low[1][r]) / (2.0 * _PUSH)
+
+
+def _bounds(par) -> Bounds:
+    """Return twice the halves of the diagonals: no less than a semidefinite matrix as a whole."""
+    made = []
+    for first in (_K, _C):
+        matrix = np.reshape(par[first : first + 36], (6, 6))
+        for half in (matrix[:3, :3], matrix[3:, 3:]):
+            made.append(2.0 * float(np.linalg.norm(half, 2)))
+    return Bounds(*made, force=norm(par[_F0 : _F0 + 3]), rest=(par[0], 0.0, 0.0))
+
+
+force(
+    "BEAM",
+    "Force_Beam",
+    "beams",
+    Parameter("length", None, positive=True),
+    Parameter("E", None, positive=True, alias="e_modulus"),
+    Parameter("G", None, positive=True, alias="g_modulus"),
+    Parameter("area", None, positive=True, alias="area_x_section"),
+    *(Parameter(name, None, positive=True) for name in ("ixx", "iyy", "izz")),
+    Parameter("ASY", alias="shear_y_area_ratio"),
+    Parameter("ASZ", alias="shear_z_area_ratio"),
+    Parameter("cratio"),
+    Parameter("cmatrix", (), signed=True, count=21),
+    *(Parameter(name, signed=True) for name in _PRELOAD),
+    constants=_constants,
+    wrench=_wrench,
+    slopes=_slopes,
+    bounds=_bounds,
+    check=_check,
+    function="BEAM",
+    adams=Adams(
+        "BEAM",
+        {
+            "LENGTH": ("length",),
+            "IXX": ("ixx",),
+            "IYY": ("iyy",),
+            "IZZ": ("izz",),
+            "AREA": ("area",),
+            "ASY": ("ASY",),
+            "ASZ": ("ASZ",),
+            "EMODULUS": ("E",),
+            "GMODULUS": ("G",),
+            "CRATIO": ("cratio",),
+            "CMATRIX": ("cmatrix",),
+        },
+    ),
+)

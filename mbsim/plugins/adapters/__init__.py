@@ -1,0 +1,1 @@
+"""Compiled code between the laws' internal signatures and what users write."""

@@ -1,0 +1,1 @@
+"""From what a deck names to a file that has been read: scripts, libraries, Octave."""

@@ -1,0 +1,56 @@
+"""Adams' statements of forces between two markers, as `forces.catalog` has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbsim.forces.catalog import FORCES, Adams, ForceKind
+from mbsim.reader.adm.declare import AdmStatement, numbers
+from mbsim.reader.kinds import ID
+from mbsim.reader.marker_forces import add_force, kind_of
+from mbsim.reader.statement import Entry, Spec
+
+
+def _counts(kind: ForceKind, adams: Adams) -> dict[str, int]:
+    """Return how many numbers each word takes."""
+    count = {each.name: each.count for each in kind.parameters}
+    return {word: sum(count[name] for name in names) for word, names in adams.words.items()}
+
+
+def _statement(kind: ForceKind, adams: Adams) -> AdmStatement:
+    """Return the statement of a kind."""
+    parameters = {each.name: each for each in kind.parameters}
+    counts = _counts(kind, adams)
+    words = {name: word for word, names in adams.words.items() for name in names}
+
+    def given(entry: Entry, word: str) -> dict[str, Any]:
+        """Return the attributes that a word gives, None where it must be there and is not."""
+        names, value = adams.words[word], entry.get(word)
+        if value is None:
+            return {name: parameters[name].default for name in names}
+        if len(names) == 1:
+            return {names[0]: value}
+        if any(v < 0.0 and not parameters[n].signed for n, v in zip(names, value, strict=True)):
+            entry.fault(f"must be {len(names)} numbers >= 0", word)
+        return dict(zip(names, value, strict=True))
+
+    def build(entry: Entry) -> None:
+        found = {each.name: each.default for each in kind.parameters}
+        for word in adams.words:
+            found |= given(entry, word)
+        add_force(entry, kind, found, entry.get("I", 0), entry.get("J", 0), words)
+
+    def spec(word: str) -> Spec:
+        first = parameters[adams.words[word][0]]
+        one = kind_of(first) if counts[word] == 1 else numbers(counts[word])
+        return Spec(one, required=first.default is None)
+
+    attributes = {name: Spec(ID, required=True) for name in ("id", "I", "J")}
+    attributes |= {word: spec(word) for word in adams.words}
+    return AdmStatement(adams.name, attributes, build, xml=kind.statement)
+
+
+def marker_forces() -> list[AdmStatement]:
+    """Return the statements of all kinds that Adams has."""
+    kinds = [FORCES[name] for name in FORCES]
+    return [_statement(kind, kind.adams) for kind in kinds if kind.adams is not None]

@@ -1,0 +1,1 @@
+"""Compiling ahead (`mbsim warm`): what there is to compile, by running small models."""

@@ -1,0 +1,150 @@
+"""A hook that fails ends the run with its code, whichever it is and whoever asks."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba import types
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import crowd_decks
+import mechanism_decks
+from decks_io import MODELS, write_deck
+from mechanics import Body
+
+import mbsim
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
+from mbsim.arrays.scene import NEAR_FOLD
+from mbsim.dynamics.pipeline import hook_table, hooks, implicit_hooks
+from mbsim.errors import SolverError
+
+FAILS = 77
+SIGNATURES = {row.hook: row.signature for row in hook_table.TABLE}
+#: Those that answer, so that a code is negative.
+ANSWERS = {row.hook for row in hook_table.TABLE if "answer" in row.result}
+
+# hook, request (None for any), deck, method
+CASES = [
+    (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
+    (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),
+    (Hook.JET, None, "cam", "DOPRI5"),
+    (Hook.APPLIED, None, "cam", "DOPRI5"),
+    (Hook.WRENCH, None, "stiff/bushing_chain", "DOPRI5"),
+    (Hook.ELEMENT, None, "dry_friction_element", "DOPRI5"),
+    *((Hook.JOINTS, what, "cam", "DOPRI5") for what in Joints),
+    *((Hook.HELD, what, "stiction_rigid", "RADAU5") for what in Held),
+    (Hook.LATE, None, "pin", "DOPRI5"),
+    (Hook.EVALUATE, None, "dry_friction_element", "DOPRI5"),
+    (Hook.BEND, None, "four_bar", "RADAU5"),
+    *((Hook.MEMORY, what, "lugre_stick_slip", "RADAU5") for what in Memory),
+    (Hook.SLOPES, None, "stiff/bushing_chain", "RADAU5"),
+    (Hook.MEMORY_PAIR, None, "lugre_stick_slip", "RADAU5"),
+    *((Hook.DRY, what, "dry_friction_element", "DOPRI5") for what in Dry),
+    (Hook.ANGLES, None, "cam", "DOPRI5"),
+    (Hook.NEAR, None, "crowd", "DOPRI5"),
+    (Hook.REQUESTS, None, "dry_friction_element", "DOPRI5"),
+]
+# joints are asked for displacements a time by implicit methods alone
+CASES = [
+    (hook, what, deck, "RADAU5" if what is Joints.ALONG else method)
+    for hook, what, deck, method in CASES
+]
+
+
+def _pin():
+    # a pendulum whose pin rubs
+    body = Body(2.0, (0.06, 0.05, 0.04), p=(0.7, 0.0, 0.0))
+    axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    rubs = (
+        '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY" '
+        'mu_dynamic="0.2" friction_trans_vel="0.001" pin_radius="0.1"/>'
+    )
+    joint = mechanism_decks.Joint("REVOLUTE", 1, 0, (0, 0, 0), axes)
+    return mechanism_decks.Scene([body], [joint], extra=rubs).xml()
+
+
+def _crowd():
+    return crowd_decks.pile(crowd_decks.block(4, 0.25))
+
+
+def model_of(deck, folder):
+    """Return the model of a deck of `models/`, or of one above."""
+    made = {"pin": _pin, "crowd": _crowd}
+    path = write_deck(folder, made[deck]()) if deck in made else MODELS / f"{deck}.xml"
+    return mbsim.read_model(path)
+
+
+def c_type(kind):
+    """Return the type that `ctypes` has for one of a signature."""
+    plain = {types.int64: ctypes.c_int64, types.float64: ctypes.c_double}
+    return plain.get(kind, ctypes.c_void_p)
+
+
+class Failure:
+    """A hook that returns its code from some call on, or for one request, as else the hook does."""
+
+    def __init__(self, hook, request):
+        self.hook, self.request, self.asked, self.kept = hook, request, 0, []
+
+    def put(self, scene):
+        """Take the place of the hook of a scene, which has one."""
+        address = int(scene.world.hooks[self.hook])
+        if address == 0 or self.kept:
+            return
+        signature = SIGNATURES[self.hook]
+        form = ctypes.CFUNCTYPE(c_type(signature.return_type), *map(c_type, signature.args))
+        own = form(address)
+
+        def serve(*given):
+            if self.request is Joints.SEAT:
+                scene.sweep.quality[NEAR_FOLD] = 1.0
+            if self.request is not None and given[1] != self.request:
+                return own(*given)
+            self.asked += 1
+            if self.hook is Hook.VALUE:
+                # it returns a number: its code is noted
+                scene.users.failed[0] = FAILS
+                return math.nan
+            return -FAILS if self.hook in ANSWERS else FAILS
+
+        self.kept.append(form(serve))
+        scene.world.hooks[self.hook] = ctypes.cast(self.kept[0], ctypes.c_void_p).value
+
+
+@pytest.mark.parametrize(
+    ("hook", "request_", "deck", "method"),
+    CASES,
+    ids=[f"{hook.name}-{what.name if what is not None else 'any'}" for hook, what, *_ in CASES],
+)
+def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, monkeypatch):
+    failure = Failure(hook, request_)
+    for module in (hooks, implicit_hooks):
+
+        def fill(scene, *given, plain=module.fill):
+            plain(scene, *given)
+            failure.put(scene)
+
+        monkeypatch.setattr(module, "fill", fill)
+    detector = "fcl" if hook is Hook.FCL else "auto"
+    with pytest.raises(SolverError, match=f"code {FAILS} at time"):
+        mbsim.simulate(model_of(deck, tmp_path), integrator=method, detector=detector)
+    assert failure.asked > 0
+
+
+def test_every_hook_and_request_is_tried():
+    tried = {(hook, what) for hook, what, *_ in CASES}
+    requests = {Hook.JOINTS: Joints, Hook.HELD: Held, Hook.DRY: Dry, Hook.MEMORY: Memory}
+    for hook in set(Hook) - {Hook.TANGENT}:
+        for what in requests.get(hook, (None,)):
+            assert (hook, what) in tried, (hook, what)
+
+
+def test_the_table_has_a_row_for_every_hook_in_its_order():
+    order = [row.hook for row in hook_table.TABLE]
+    assert order == [hook for hook in Hook if hook is not Hook.TANGENT]
