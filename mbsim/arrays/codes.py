@@ -185,8 +185,14 @@ INC_REGION = 4
 INC_HELD = INC_MEMORY + 3
 
 
-#: Entry of `World.scale` that holds the tolerance of a run.
-TOLERANCE = 3
+# entries of `World.scale`
+SCALE_LENGTH, SCALE_SPEED, SCALE_ENERGY, TOLERANCE = range(4)
+
+# entries of `Rows.used`
+USED_ROWS, USED_INCIDENTS, USED_EVENTS = range(3)
+
+# columns of `Rows.events`
+EVENT_TIME, EVENT_KIND, EVENT_ELEMENT, EVENT_SLOT = range(4)
 
 #: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
 CONE_ROWS = 12

@@ -38,6 +38,7 @@ from mbsim.compile_model.pairing import (
 from mbsim.compile_model.rigid_slots import grips
 from mbsim.compile_model.scratch import empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes
+from mbsim.core.layout import AT_Q, AT_V, AT_W
 from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
@@ -167,9 +168,9 @@ def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
     for k, body in enumerate(bodies):
         row = y[a.BODY_SIZE * k : a.BODY_SIZE * (k + 1)]
         row[0:3] = body.p
-        row[3:7] = body.q
-        row[7:10] = body.v
-        row[10:13] = body.R.T @ body.w
+        row[AT_Q:AT_V] = body.q
+        row[AT_V:AT_W] = body.v
+        row[AT_W:] = body.R.T @ body.w
     return y
 
 

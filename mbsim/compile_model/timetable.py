@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.arrays.scene import SCALE_LENGTH, SCALE_SPEED
 from mbsim.compile_model.programs import SPLINE
 from mbsim.expressions import intervals
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, IF, NUMBER, SIGN, TIME
@@ -178,7 +179,7 @@ def _lever(scene: a.Scene, marker: int, tol_v: float, tol_l: float, turning: boo
     bodies = scene.bodies
     if body >= len(bodies.mass):
         return np.zeros(4)
-    length = float(scene.world.scale[0])
+    length = float(scene.world.scale[SCALE_LENGTH])
     stiffest = float(np.linalg.norm(bodies.inverse[body], 2))
     if turning:
         rate = length * stiffest
@@ -204,7 +205,7 @@ def _forces(scene: a.Scene, tol_v: float, tol_l: float) -> Iterator[tuple[int, i
 
 def _acting(scene: a.Scene, tol: float) -> Iterator[tuple[int, int, Any]]:
     """Yield program, role and factors of all that moves something."""
-    length, speed = float(scene.world.scale[0]), float(scene.world.scale[1])
+    length, speed = float(scene.world.scale[SCALE_LENGTH]), float(scene.world.scale[SCALE_SPEED])
     tol_v, tol_l = PART * tol * speed, PART * tol * length
     yield from _forces(scene, tol_v, tol_l)
     for program in scene.states.program:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.arrays.scene import BODY_SIZE
+from mbsim.core.layout import AT_Q, AT_V, AT_W
 from mbsim.model.elements import Array
 
 
@@ -62,13 +63,13 @@ def motion(body_ids: Sequence[int], y: Array, accel: Array) -> Motion:
     n, nb = len(y), len(body_ids)
     bodies: np.ndarray[Any, Any] = y[:, : BODY_SIZE * nb].reshape(n, nb, BODY_SIZE)
     rates = accel.reshape(n, nb, 6)
-    q = bodies[..., 3:7]
+    q = bodies[..., AT_Q:AT_V]
     return Motion(
         body_ids=body_ids,
         p=bodies[..., 0:3],
         q=q,
-        v=bodies[..., 7:10],
-        w=rotate(q, bodies[..., 10:13]),
+        v=bodies[..., AT_V:AT_W],
+        w=rotate(q, bodies[..., AT_W:]),
         a=rates[..., 0:3],
         alpha=rates[..., 3:6],
     )

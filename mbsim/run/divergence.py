@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from mbsim.arrays.scene import SCALE_LENGTH, SCALE_SPEED
 from mbsim.errors import SolverError
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class Pace:
         if pace is not None and (self.end - t) / max(pace, 1e-300) > HOPELESS:
             long_ago = t - LATELY * passed
             before = next((v for _, when, v in reversed(self.seen) if when <= long_ago), 0.0)
-            if speed > max(FAST * system.scene.world.scale[1], GROWTH * before):
+            if speed > max(FAST * system.scene.world.scale[SCALE_SPEED], GROWTH * before):
                 _give_up(system, y, t, pace, "the motion leaves all bounds")
         pace = self._pace(STALLED)
         if pace is not None and pace < SLIVER * passed:
@@ -74,12 +75,12 @@ class Pace:
 
 def _speeds(system: System, y: Any) -> Any:
     """Return the speed of each body: of its cg, or of a point L away as it turns."""
-    from mbsim.core.layout import BODY_SIZE
+    from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
 
     nb = len(system.body_ids)
     rows = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)
-    turning = np.linalg.norm(rows[:, 10:13], axis=1) * system.scene.world.scale[0]
-    return np.maximum(np.linalg.norm(rows[:, 7:10], axis=1), turning)
+    turning = np.linalg.norm(rows[:, AT_W:], axis=1) * system.scene.world.scale[SCALE_LENGTH]
+    return np.maximum(np.linalg.norm(rows[:, AT_V:AT_W], axis=1), turning)
 
 
 def _fastest(system: System, y: Any) -> float:
@@ -111,7 +112,7 @@ def _culprit(system: System, y: Any, t: float) -> str:
         size = abs(float(jets[-1])) / scene.equations.unit[e]
         found.append((size, f"{equation_name(system, int(e))} asks for {said}"))
     speeds = _speeds(system, y)
-    if found and max(found)[0] * scene.world.scale[0] > speeds.max():
+    if found and max(found)[0] * scene.world.scale[SCALE_LENGTH] > speeds.max():
         return max(found)[1]
     body = int(speeds.argmax())
     return f"{system.body_name(body)} has the speed {speeds[body]:.3g}"

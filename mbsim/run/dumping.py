@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core.layout import AT_V, AT_W
 from mbsim.errors import ModelError, ResultsError
 
 if TYPE_CHECKING:
@@ -162,8 +163,8 @@ class ContactProblems:
         free = total.ravel() - pushed
         base = self._accelerations(t, y, free)
         bodies = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)
-        spin = np.einsum("bij,bj->bi", work.R[:nb], bodies[:, 10:13])
-        velocity = np.hstack([bodies[:, 7:10], spin]).ravel()
+        spin = np.einsum("bij,bj->bi", work.R[:nb], bodies[:, AT_W:])
+        velocity = np.hstack([bodies[:, AT_V:AT_W], spin]).ravel()
         q = H.T @ (velocity + h * base)
 
         jointed = np.repeat(scene.tree.of_body[:nb] >= 0, 6)
@@ -202,7 +203,7 @@ class ContactProblems:
         scene = self.system.scene
         nb, work = len(scene.bodies.mass), scene.work
         given = forces.reshape(nb, 6)
-        w = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)[:, 10:13]
+        w = y[: BODY_SIZE * nb].reshape(nb, BODY_SIZE)[:, AT_W:]
         found = np.empty((nb, 6))
         for b in range(nb):
             R, inertia = work.R[b], scene.bodies.inertia[b]

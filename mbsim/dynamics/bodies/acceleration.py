@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_Q, AT_V, AT_W
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 
 
@@ -14,15 +15,16 @@ def accelerate(scene, y, dy):
     total = 0.0
     for b in range(len(bodies.mass)):
         at = BODY_SIZE * b
-        w = (y[at + 10], y[at + 11], y[at + 12])
-        qw, qx, qy, qz = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        dy[at + 3] = 0.5 * (-qx * w[0] - qy * w[1] - qz * w[2])
-        dy[at + 4] = 0.5 * (qw * w[0] + qy * w[2] - qz * w[1])
-        dy[at + 5] = 0.5 * (qw * w[1] + qz * w[0] - qx * w[2])
-        dy[at + 6] = 0.5 * (qw * w[2] + qx * w[1] - qy * w[0])
+        w = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
+        q = at + AT_Q
+        qw, qx, qy, qz = y[q], y[q + 1], y[q + 2], y[q + 3]
+        dy[q] = 0.5 * (-qx * w[0] - qy * w[1] - qz * w[2])
+        dy[q + 1] = 0.5 * (qw * w[0] + qy * w[2] - qz * w[1])
+        dy[q + 2] = 0.5 * (qw * w[1] + qz * w[0] - qx * w[2])
+        dy[q + 3] = 0.5 * (qw * w[2] + qx * w[1] - qy * w[0])
 
         for k in range(3):
-            dy[at + k] = y[at + 7 + k]
+            dy[at + k] = y[at + AT_V + k]
         if scene.tree.of_body[b] >= 0:
             # joints have their say first
             continue
@@ -31,7 +33,7 @@ def accelerate(scene, y, dy):
         alpha = rotate(bodies.inverse[b], sub(torque, gyroscopic))
         for k in range(3):
             a = work.force[b, k] / bodies.mass[b]
-            dy[at + 7 + k] = a
-            dy[at + 10 + k] = alpha[k]
+            dy[at + AT_V + k] = a
+            dy[at + AT_W + k] = alpha[k]
             total += a + alpha[k]
     return total

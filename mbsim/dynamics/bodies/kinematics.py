@@ -6,6 +6,7 @@ import math
 
 from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_Q, AT_V, AT_W
 from mbsim.core.rotation import matrix_from_quaternion, rotate
 
 
@@ -13,10 +14,10 @@ from mbsim.core.rotation import matrix_from_quaternion, rotate
 def place_body(scene, y, b):
     """Fill R, v and w (global) of moving body b from y."""
     work, at = scene.work, BODY_SIZE * b
-    matrix_from_quaternion(y[at + 3 : at + 7], work.R[b])
-    w = rotate(work.R[b], (y[at + 10], y[at + 11], y[at + 12]))
+    matrix_from_quaternion(y[at + AT_Q : at + AT_V], work.R[b])
+    w = rotate(work.R[b], (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2]))
     for k in range(3):
-        work.v[b, k] = y[at + 7 + k]
+        work.v[b, k] = y[at + AT_V + k]
         work.w[b, k] = w[k]
 
 
@@ -75,7 +76,7 @@ def place_graphics(scene, y):
             dx, dy, dz = frame[0] - centre[0], frame[1] - centre[1], frame[2] - centre[2]
             way = math.sqrt(dx * dx + dy * dy + dz * dz)
             if graphics.turns[g] == 1:
-                at, before = BODY_SIZE * b + 3, state.q[b]
+                at, before = BODY_SIZE * b + AT_Q, state.q[b]
                 d, qq = 0.0, 0.0
                 for k in range(4):
                     d += y[at + k] * before[k]

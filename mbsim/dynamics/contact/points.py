@@ -13,6 +13,10 @@ from mbsim.arrays.scene import (
     APPROACH,
     BODY_SIZE,
     ENERGY_LOST,
+    EVENT_ELEMENT,
+    EVENT_KIND,
+    EVENT_SLOT,
+    EVENT_TIME,
     FIRST_TOUCH,
     HELD_OTHERWISE,
     LEAVE,
@@ -22,9 +26,11 @@ from mbsim.arrays.scene import (
     PEAK_FORCE_TIME,
     PEAK_SLIP,
     REBOUND,
+    SCALE_LENGTH,
     STICK,
     TOUCH,
     TOUCHES,
+    USED_EVENTS,
 )
 from mbsim.arrays.scene import SLIP as SLIP_EVENT
 from mbsim.core.address import call_int
@@ -73,7 +79,7 @@ def deepest_of_impact(scene, c, energy):
     contacts, out = scene.contacts, scene.work.law_out
     if energy <= 0.0:
         return 0.0
-    depth = 1e-4 * scene.world.scale[0]
+    depth = 1e-4 * scene.world.scale[SCALE_LENGTH]
     for _ in range(50):
         call_int(contacts.normal_law[c], (depth, 0.0, contacts.normal_par[c], out))
         if out[2] <= 0.0 or not out[1] > 0.0:
@@ -126,13 +132,13 @@ def first_depth(scene, t, h, y):
 def record_event(scene, t, kind, s):
     """Append an event; the driver empties the table before it can overflow."""
     rows = scene.rows
-    k = rows.used[2]
+    k = rows.used[USED_EVENTS]
     if k < len(rows.events):
-        rows.events[k, 0] = t
-        rows.events[k, 1] = kind
-        rows.events[k, 2] = scene.contacts.id[contact_of(scene, s)]
-        rows.events[k, 3] = s
-        rows.used[2] = k + 1
+        rows.events[k, EVENT_TIME] = t
+        rows.events[k, EVENT_KIND] = kind
+        rows.events[k, EVENT_ELEMENT] = scene.contacts.id[contact_of(scene, s)]
+        rows.events[k, EVENT_SLOT] = s
+        rows.used[USED_EVENTS] = k + 1
 
 
 @jitable

@@ -18,6 +18,10 @@ from __future__ import annotations
 from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     EQUAL,
+    EVENT_ELEMENT,
+    EVENT_KIND,
+    EVENT_SLOT,
+    EVENT_TIME,
     EXCESS,
     FIRED,
     LESS,
@@ -27,6 +31,7 @@ from mbsim.arrays.scene import (
     NOT_MORE,
     ON,
     SENSOR,
+    USED_EVENTS,
     Scene,
 )
 from mbsim.core.address import vector_at, view
@@ -100,10 +105,10 @@ def arrive(scene, t, y):
         sensed[k, FIRED] = 1.0
         if sensors.evaluate[k] >= 0:
             sensed[k, NEXT] = value(scene, t, y, sensors.evaluate[k])
-        at = rows.used[2]
-        rows.events[at, 0], rows.events[at, 1] = t, SENSOR
-        rows.events[at, 2], rows.events[at, 3] = sensors.id[k], -1.0
-        rows.used[2] = at + 1
+        at = rows.used[USED_EVENTS]
+        rows.events[at, EVENT_TIME], rows.events[at, EVENT_KIND] = t, SENSOR
+        rows.events[at, EVENT_ELEMENT], rows.events[at, EVENT_SLOT] = sensors.id[k], -1.0
+        rows.used[USED_EVENTS] = at + 1
     return any_fired
 
 

@@ -28,6 +28,8 @@ from mbsim.arrays.scene import (
     LIVE,
     MARKER_FORCE,
     REST,
+    SCALE_LENGTH,
+    SCALE_SPEED,
 )
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
@@ -53,7 +55,7 @@ SUBSTITUTIONS = 6
 @jitable
 def slopes(scene, c, depth, out):
     """Return stiffness dF/dd and damping dF/dd' of contact c's law at a depth."""
-    contacts, speed = scene.contacts, scene.world.scale[1]
+    contacts, speed = scene.contacts, scene.world.scale[SCALE_SPEED]
     call_int(contacts.normal_law[c], (depth, speed, contacts.normal_par[c], out))
     here, damping = out[1], (out[0] - out[1]) / speed
     call_int(contacts.normal_law[c], (1.001 * depth, 0.0, contacts.normal_par[c], out))
@@ -113,7 +115,7 @@ def depth_to_come(scene, c, energy, force):
     shrinks by 1/(e + 1) each time.
     """
     # without an impact something has to begin the substitution
-    depth = 1e-4 * scene.world.scale[0]
+    depth = 1e-4 * scene.world.scale[SCALE_LENGTH]
     for _ in range(SUBSTITUTIONS if force > 0.0 else 1):
         depth = deepest_of_impact(scene, c, energy + force * depth)
     return depth

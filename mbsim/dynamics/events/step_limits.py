@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import AUDIT_TOL, BODY_SIZE, LIVE
+from mbsim.arrays.scene import AUDIT_TOL, BODY_SIZE, LIVE, SCALE_LENGTH
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_V, AT_W
 from mbsim.core.rotation import dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair
@@ -140,7 +141,8 @@ def step_to_leave(scene, f, s, h):
     if pushes and leave < 2.0 * h:
         last = seen_part(scene, c, depth, leave * inverse)
         if last < 0.9:
-            h = min(h, max(min(SEEN, 1.0 - last) * leave, ROUNDING * scene.world.scale[0] / -rate))
+            least = ROUNDING * scene.world.scale[SCALE_LENGTH] / -rate
+            h = min(h, max(min(SEEN, 1.0 - last) * leave, least))
     if leave > h and pushes_at(scene, c, h, depth, rate, bend) == pushes:
         return h
     before, part = 0.0, 1.0
@@ -158,7 +160,7 @@ def step_to_leave(scene, f, s, h):
             break
         before = after
     # a little more, so that it is over then; a way that rounding swallows would never be gone
-    return max(1.0001 * leave, ROUNDING * scene.world.scale[0] / -rate)
+    return max(1.0001 * leave, ROUNDING * scene.world.scale[SCALE_LENGTH] / -rate)
 
 
 @jitable
@@ -251,7 +253,7 @@ def step_to_touch(scene, y, f, pair, h):
     if scene.kinds.kernel[pairs.kind[pair]] == 0:
         # found by iterations, which leave more than rounding
         return t + first if t < first else (1.0 - 1e-6) * t
-    shortest = ROUNDING * scene.world.scale[0] / speed
+    shortest = ROUNDING * scene.world.scale[SCALE_LENGTH] / speed
     c = contact_of(scene, s)
     first *= seen_part(scene, c, first * speed, first / mass)
     first = min(first, max(longest_at_jump(scene, c, first * speed, speed, mass), shortest))
@@ -273,11 +275,11 @@ def longest_stay(scene, y, f):
         if b < len(scene.bodies.mass):
             reach = graphics.reach[g] + norm(vector(graphics.p[g]))
             at = BODY_SIZE * b
-            turning = norm((y[at + 10], y[at + 11], y[at + 12]))
-            speed = norm((y[at + 7], y[at + 8], y[at + 9]))
+            turning = norm((y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2]))
+            speed = norm((y[at + AT_V], y[at + AT_V + 1], y[at + AT_V + 2]))
             # a plane, which has no reach, is never passed through
             speed += turning * reach if reach < math.inf else 0.0
-            push = norm((f[at + 7], f[at + 8], f[at + 9]))
+            push = norm((f[at + AT_V], f[at + AT_V + 1], f[at + AT_V + 2]))
             work.speed[g, 0], work.speed[g, 1] = speed, push
             room = scene.crowds.room[g]
             if room < math.inf:
