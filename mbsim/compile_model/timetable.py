@@ -29,9 +29,10 @@ import numpy as np
 
 from mbsim.arrays import scene as a
 from mbsim.compile_model.programs import SPLINE
-from mbsim.expressions import intervals
+from mbsim.expressions import bounds, intervals
+from mbsim.expressions.bounds import Bound
+from mbsim.expressions.curve_bounds import Curve
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, IF, NUMBER, SIGN, TIME
-from mbsim.expressions.intervals import Bound, Curve
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -272,9 +273,9 @@ class _Group:
         stack: list[Bound] = []
         for k, (op, rows, _) in enumerate(self.code):
             if op == NUMBER:
-                stack.append(intervals.number(self.numbers[k][member]))
+                stack.append(bounds.number(self.numbers[k][member]))
             elif op == TIME:
-                stack.append(intervals.time(lo, hi))
+                stack.append(bounds.time(lo, hi))
             elif op == SPLINE:
                 stack.pop()
                 stack.append(self.curves[rows].bound(stack.pop()))
