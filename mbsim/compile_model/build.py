@@ -30,11 +30,7 @@ from mbsim.compile_model.gravity import Pull
 from mbsim.compile_model.groups import Groups, find_groups, natural_speed
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.mechanism import sweep
-from mbsim.compile_model.pairing import (
-    Plans,
-    plan_pairs,
-    shape_class,
-)
+from mbsim.compile_model.pairing import Plans, plan_pairs, shape_class
 from mbsim.compile_model.rigid_slots import grips
 from mbsim.compile_model.scratch import empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.compile_model.instructions import USER, Instruction
 from mbsim.compile_model.markers import MarkerTable
-from mbsim.compile_model.programs import USER, Instruction, ProgramTable
+from mbsim.compile_model.programs import ProgramTable
 from mbsim.laws.residual import DIFFERENTIAL, inputs
 from mbsim.model.elements import ForceElement, Model
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from mbsim.arrays import scene as a
-from mbsim.compile_model.programs import ELEMENT, NET, ProgramTable
+from mbsim.compile_model.instructions import ELEMENT, NET
+from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError, Fault
 from mbsim.model.elements import Model
 from mbsim.model.names import element_name

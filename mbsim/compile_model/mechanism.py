@@ -9,30 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
+from mbsim.compile_model.tree import AXES, Limb, empty_tree, is_plain, limb_of, nearest_flip
 from mbsim.errors import DeckError, Fault
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
-from mbsim.model.elements import (
-    Array,
-    Coupler,
-    DryFriction,
-    GeneralConstraint,
-    Joint,
-    Model,
-    Motion,
-)
+from mbsim.model.elements import Coupler, DryFriction, GeneralConstraint, Joint, Model, Motion
 from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
 
-_AXES = "xyz"
 _KINDS = {
     "offset": a.OFFSET,
     "perp": a.PERP,
@@ -40,12 +32,6 @@ _KINDS = {
     "spin": a.ANGLE,
     "distance": a.DISTANCE,
     "twist": a.TWIST,
-}
-#: What of a rotation is left free by these cosines held at 0 (axis of I, axis of J).
-_TURNS = {
-    frozenset[tuple[str, str]](): a.TURN_FREE,
-    frozenset({("z", "x"), ("z", "y")}): a.TURN_AXIS,
-    frozenset({("z", "x"), ("z", "y"), ("x", "y")}): a.TURN_LOCKED,
 }
 #: A joint that holds less than this is cheaper as equations than as a limb of the tree.
 _LEAST_ROWS = 3
@@ -65,100 +51,6 @@ _DIRECTIONS = {
     "Y": offset("y"),
     "Z": offset("z"),
 }
-#: Directions free at each kind of turn.
-_FREE_TURNS = {a.TURN_LOCKED: 0, a.TURN_AXIS: 1, a.TURN_CROSS: 2, a.TURN_FREE: 3, a.TURN_ROOT: 6}
-
-
-@dataclass(frozen=True)
-class Limb:
-    """A joint that can hang a body on another: what it leaves free; bodies and markers by rows."""
-
-    connection: int
-    i: int
-    j: int
-    turn: int
-    slide: tuple[int, int, int]
-    axis_i: int = 0
-    axis_j: int = 0
-
-    @property
-    def held(self) -> int:
-        """Number of directions that the joint holds."""
-        return 6 - _FREE_TURNS[self.turn] - sum(self.slide)
-
-    @property
-    def both_ways(self) -> bool:
-        """Whether I's body may be the parent: slides are then along I's axes as well."""
-        return self.turn in (a.TURN_LOCKED, a.TURN_AXIS) or sum(self.slide) in (0, 3)
-
-
-@dataclass
-class _Sums:
-    """Equations and their terms as they are found."""
-
-    first: list[int] = field(default_factory=lambda: [0])
-    program: list[int] = field(default_factory=list)
-    level: list[int] = field(default_factory=list)
-    general: list[int] = field(default_factory=list)
-    constant: list[float] = field(default_factory=list)
-    start: list[tuple[float, float]] = field(default_factory=list)
-    unit: list[float] = field(default_factory=list)
-    connection: list[int] = field(default_factory=list)
-    dry: list[int] = field(default_factory=list)
-    slot: list[int] = field(default_factory=list)
-    terms: list[tuple[int, int, int, int, int, float, int]] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-
-    def close(
-        self,
-        connection: int,
-        name: str,
-        constant: float,
-        unit: float,
-        program: int = -1,
-        level: int = 2,
-        general: int = 0,
-        start: tuple[float | None, float | None] = (None, None),
-    ) -> None:
-        """End an equation whose terms have been added."""
-        self.first.append(len(self.terms))
-        self.program.append(program)
-        self.level.append(level)
-        self.general.append(general)
-        self.constant.append(constant)
-        self.start.append(tuple(np.nan if value is None else value for value in start))
-        self.unit.append(unit)
-        self.connection.append(connection)
-        self.dry.append(-1)
-        self.slot.append(-1)
-        self.names.append(name)
-
-    def arrays(self) -> a.Equations:
-        """Return the equations as arrays, all in use."""
-        n = len(self.program)
-
-        def ints(values: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-            return np.array(list(values), dtype=np.int64)
-
-        return a.Equations(
-            first=ints(self.first),
-            program=ints(self.program),
-            level=ints(self.level),
-            general=ints(self.general),
-            constant=np.array(self.constant, dtype=np.float64),
-            start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
-            unit=np.array(self.unit, dtype=np.float64),
-            connection=ints(self.connection),
-            dry=ints(self.dry),
-            slot=ints(self.slot),
-            kind=ints(t[0] for t in self.terms),
-            i=ints(t[1] for t in self.terms),
-            j=ints(t[2] for t in self.terms),
-            axis=np.array([t[3:5] for t in self.terms], dtype=np.int64).reshape(-1, 2),
-            factor=np.array([t[5] for t in self.terms], dtype=np.float64),
-            angle=ints(t[6] for t in self.terms),
-            active=np.append(np.arange(n), n),
-        )
 
 
 @dataclass
@@ -190,7 +82,7 @@ class _Builder:
     def __init__(self, model: Model, markers: MarkerTable, programs: ProgramTable) -> None:
         self.model, self.markers, self.programs = model, markers, programs
         self.length = markers.length
-        self.sums = _Sums()
+        self.sums = Sums()
         self.elements: list[tuple[str, int]] = []
         self.pairs: list[tuple[int, int]] = []
         self.limbs: dict[int, Limb] = {}
@@ -200,9 +92,9 @@ class _Builder:
         """Return what a row is at the start."""
         (p_i, R_i), (p_j, R_j) = self.markers.frame(i), self.markers.frame(j)
         if row.kind == "offset":
-            return float(R_j[:, _AXES.index(row.j)] @ (p_i - p_j))
+            return float(R_j[:, AXES.index(row.j)] @ (p_i - p_j))
         if row.kind == "perp":
-            return float(R_i[:, _AXES.index(row.i)] @ R_j[:, _AXES.index(row.j)])
+            return float(R_i[:, AXES.index(row.i)] @ R_j[:, AXES.index(row.j)])
         if row.kind == "distance":
             return float(np.linalg.norm(p_i - p_j))
         if row.kind == "twist":
@@ -240,8 +132,8 @@ class _Builder:
         elif row.kind == "twist":
             j = self.untwisted(i, j)
         slot = self.markers.angle(i, j) if row.kind in ("angle", "spin") else -1
-        axis_i = _AXES.index(row.i) if row.i else 0
-        axis_j = _AXES.index(row.j) if row.j else 0
+        axis_i = AXES.index(row.i) if row.i else 0
+        axis_j = AXES.index(row.j) if row.j else 0
         self.sums.terms.append((_KINDS[row.kind], i, j, axis_i, axis_j, factor, slot))
         return factor * self.row_value(row, i, j)
 
@@ -267,7 +159,7 @@ class _Builder:
         i, j = self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
         connection = self.connect(statement, joint.id, i, j)
         self.joints[connection] = joint
-        limb = _limb(connection, i, j, JOINTS[joint.type].equations)
+        limb = limb_of(connection, i, j, JOINTS[joint.type].equations)
         if limb is not None and limb.turn == a.TURN_CROSS:
             self.check_cross(statement, joint, limb)
         if limb is not None and limb.held >= _LEAST_ROWS:
@@ -280,7 +172,7 @@ class _Builder:
         if float(np.linalg.norm(np.cross(arm_i, arm_j))) < _PARALLEL:
             name = f"Constraint_J{'oint' if statement == 'JOINT' else 'prim'}[{joint.id}]"
             message = (
-                f"{_AXES[limb.axis_i]} of marker {joint.i_marker_id} (I) and {_AXES[limb.axis_j]} "
+                f"{AXES[limb.axis_i]} of marker {joint.i_marker_id} (I) and {AXES[limb.axis_j]} "
                 f"of marker {joint.j_marker_id} (J) are parallel; must be at right angles "
                 f"({joint.type})"
             )
@@ -291,7 +183,7 @@ class _Builder:
         for connection, joint in self.joints.items():
             equations = JOINTS[joint.type].equations
             for k, rows in enumerate(equations):
-                if not (connection in in_tree and _is_plain(rows)):
+                if not (connection in in_tree and is_plain(rows)):
                     self.add_equation(connection, joint, rows, k == len(equations) - 1)
 
     def joint_markers(self, joint_id: int) -> tuple[int, int]:
@@ -354,7 +246,7 @@ class _Builder:
             row = angle()
             i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
         else:
-            row = offset(_AXES[axis])
+            row = offset(AXES[axis])
         self.add_term(row, i, j, 1.0)
         self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
 
@@ -448,40 +340,9 @@ class _Builder:
             made.parent_p[k] = self.markers.frames[parent_row][1]
             made.parent_R[k] = self.markers.frames[parent_row][2]
             relative = self.markers.frame(parent_row)[1].T @ self.markers.frame(child_row)[1]
-            made.child_R[k] = self.markers.frames[child_row][2] @ _nearest_flip(limb.turn, relative)
+            made.child_R[k] = self.markers.frames[child_row][2] @ nearest_flip(limb.turn, relative)
         made.end[:] = made.end[made.root]
         return made, of_connection
-
-
-def _nearest_flip(turn: int, relative: Array) -> Array:
-    """Return the half turn (or none) of the child's axes that brings them nearest to the parent's.
-
-    Cosines held at 0 do not tell an axis from its opposite.
-    """
-    if turn == a.TURN_AXIS:
-        return np.eye(3) if relative[2, 2] >= 0.0 else np.diag([1.0, -1.0, -1.0])
-    if turn == a.TURN_LOCKED:
-        flips = [np.diag([x, y, x * y]) for x, y in product((1.0, -1.0), repeat=2)]
-        return max(flips, key=lambda flip: float(np.trace(relative @ flip)))
-    return np.eye(3)
-
-
-def _is_plain(rows: tuple[Row, ...]) -> bool:
-    """Return whether an equation is one offset or one cosine, which a limb can hold."""
-    return len(rows) == 1 and rows[0].kind in ("offset", "perp")
-
-
-def _limb(connection: int, i: int, j: int, equations: tuple[tuple[Row, ...], ...]) -> Limb | None:
-    """Return what a joint is as a limb, None where it cannot be one."""
-    plain = [rows[0] for rows in equations if _is_plain(rows)]
-    held = {row.j for row in plain if row.kind == "offset"}
-    cosines = [(row.i, row.j) for row in plain if row.kind == "perp"]
-    slide = (int("x" not in held), int("y" not in held), int("z" not in held))
-    if len(cosines) == 1:
-        axis_i, axis_j = (_AXES.index(axis) for axis in cosines[0])
-        return Limb(connection, i, j, a.TURN_CROSS, slide, axis_i, axis_j)
-    turn = _TURNS.get(frozenset(cosines))
-    return None if turn is None else Limb(connection, i, j, turn, slide)
 
 
 def _describe(rows: tuple[Row, ...]) -> str:
@@ -495,29 +356,6 @@ def _describe(rows: tuple[Row, ...]) -> str:
         "twist": "twist about the shafts",
     }
     return " with ".join(words[row.kind].format(i=row.i, j=row.j) for row in rows)
-
-
-def empty_tree(ground: int, n: int) -> a.Tree:
-    """Return a tree of n places to be filled."""
-
-    def ints(*shape: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-        return np.zeros(shape, dtype=np.int64)
-
-    return a.Tree(
-        body=ints(n),
-        parent=ints(n),
-        of_body=np.full(ground + 1, -1, dtype=np.int64),
-        root=ints(n),
-        end=ints(n),
-        turn=ints(n),
-        slide=ints(n, 3),
-        axis=ints(n, 2),
-        child_p=np.zeros((n, 3)),
-        child_R=np.zeros((n, 3, 3)),
-        parent_p=np.zeros((n, 3)),
-        parent_R=np.zeros((n, 3, 3)),
-        free=ints(n),
-    )
 
 
 def constrain(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.arrays.scene import Scene
-from mbsim.compile_model import programs as p
+from mbsim.compile_model import instructions as p
 from mbsim.compile_model.tangent import Depends
 
 #: How many of an instruction's numbers are markers, from the first on.

@@ -1,83 +1,52 @@
-"""Expressions of a model as programs of a stack machine.
-
-A program pushes jets (value, first and second derivative by time) on a stack and replaces the
-topmost by functions of them; its last jet is the result. An instruction is its operation and
-up to five numbers:
-
-| operation          | numbers                                                               |
-|--------------------|-----------------------------------------------------------------------|
-| NUMBER, TIME       | row of `Programs.number`; none                                        |
-| elementary         | how many arguments it takes from the stack                            |
-| DISTANCE           | markers i, j                                                          |
-| OFFSET             | markers i, j, k and axis of k                                         |
-| ANGLE              | row of `Angles`                                                       |
-| TURN               | markers i, j, place in `TURNS`                                        |
-| ORIENT             | markers i, j, which Euler parameter (0 to 3)                          |
-| SPEED              | markers i, j, l                                                       |
-| CLOSING            | markers i, j                                                          |
-| VELOCITY           | markers i, j, k, l and axis of k                                      |
-| TURNING            | markers i, j                                                          |
-| SPIN               | markers i, j, k and axis of k                                         |
-| INCLUDED           | markers i, j, k                                                       |
-| ACCELERATION       | markers i, j, k, l and axis of k, 3 for the magnitude                 |
-| SPIN_UP            | the same                                                              |
-| NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
-| STATE              | place in y                                                            |
-| SENSED             | row of `Sensors`                                                      |
-| ELEMENT            | 0 a connection, 1 an applied force, 2 a contact, its row, jflag,      |
-|                    | comp, marker k                                                        |
-| SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
-|                    | topmost jets                                                          |
-| USER               | row of `Users`, which of its results, 1 to call it; so does result 0  |
-"""
+"""Expressions of a model as programs of a stack machine, see `instructions`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.compile_model.instructions import (
+    ACCELERATION,
+    ANGLE,
+    CLOSING,
+    DISTANCE,
+    ELEMENT,
+    INCLUDED,
+    NET,
+    OFFSET,
+    ORIENT,
+    SENSED,
+    SPEED,
+    SPIN,
+    SPIN_UP,
+    SPLINE,
+    STATE,
+    TURN,
+    TURNING,
+    TURNS,
+    USER,
+    VELOCITY,
+    Instruction,
+)
 from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.program_quick import quicken, stack_depth
 from mbsim.compile_model.splines import SplineTable
 from mbsim.errors import DeckError, Fault
 from mbsim.expressions import elementary
-from mbsim.expressions.elementary import CODES, FIRST_MEASURE, NUMBER, TIME
+from mbsim.expressions.elementary import CODES, NUMBER, TIME
 from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
 from mbsim.model.elements import ArrayOfNumbers, Differential, Spline, Variable
 from mbsim.model.names import element_name
 
-DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEASURE + 6)
-SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
-ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)
-STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
-#: Of values alone: the topmost with a number, x + n and so on, then n - x, n / x.
-#: TIME n; x + TIME n.
-ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
-TIME_N, ADD_TIME_N = range(SPLINE + 8, SPLINE + 10)
-TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
-
 #: Variables that use each other, and instructions of a program with all its variables.
 DEEPEST_VARIABLE = 50
 LONGEST_PROGRAM = 50_000
-
-_BY_RIGHT = {
-    elementary.ADD: ADD_N,
-    elementary.SUB: SUB_N,
-    elementary.MUL: MUL_N,
-    elementary.DIV: DIV_N,
-    elementary.POW: POW_N,
-}
-_BY_LEFT = {
-    elementary.ADD: ADD_N,
-    elementary.SUB: N_SUB,
-    elementary.MUL: MUL_N,
-    elementary.DIV: N_DIV,
-}
 _COMPONENTS = ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")
 _STATEMENTS = {
     "Motion": "Motion_Joint",
@@ -94,15 +63,6 @@ _STATEMENTS = {
 
 
 Rows = Mapping[tuple[str, int], tuple[int, int]]
-
-
-class Instruction(NamedTuple):
-    """One instruction; `element` is (statement, id) where the row is not known yet."""
-
-    op: int
-    rows: tuple[int, ...] = ()
-    value: float = 0.0
-    element: tuple[str, int] | None = None
 
 
 @dataclass
@@ -204,9 +164,9 @@ class ProgramTable:
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         numbers: dict[float, int] = {}
         start, code = _table(self.programs, rows, numbers)
-        shortened = [_quick(program) for program in self.programs]
+        shortened = [quicken(program) for program in self.programs]
         quick_start, quick = _table(shortened, rows, numbers)
-        deepest = max(map(_deepest, self.programs), default=0)
+        deepest = max(map(stack_depth, self.programs), default=0)
         return a.Programs(
             start,
             code,
@@ -239,49 +199,6 @@ def _table(
             at += 1
     lengths = [len(program) for program in programs]
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64), code
-
-
-def _quick(program: list[Instruction]) -> list[Instruction]:
-    """Return a program with what is done by a number as one instruction."""
-    made: list[Instruction] = []
-    starts: list[int] = []  # of what stands on the stack
-    for instruction in program:
-        taken = _taken(instruction)
-        first = starts[-taken] if taken else len(made)
-        right = starts[-1] if taken == 2 else 0
-        if taken == 2 and instruction.op in _BY_RIGHT and _is_number(made[right:]):
-            made[-1] = Instruction(_BY_RIGHT[instruction.op], value=made[-1].value)
-        elif taken == 2 and instruction.op in _BY_LEFT and _is_number(made[first:right]):
-            made.append(Instruction(_BY_LEFT[instruction.op], value=made.pop(first).value))
-        else:
-            made.append(instruction)
-        if len(made) > 1 and made[-1].op == MUL_N and made[-2].op == TIME:
-            made[-2:] = [Instruction(TIME_N, value=made[-1].value)]
-        if len(made) > 1 and made[-1].op == elementary.ADD and made[-2].op == TIME_N:
-            made[-2:] = [Instruction(ADD_TIME_N, value=made[-2].value)]
-        if taken:
-            del starts[-taken:]
-        starts.append(first)
-    return made
-
-
-def _is_number(part: list[Instruction]) -> bool:
-    return len(part) == 1 and part[0].op == NUMBER
-
-
-def _taken(instruction: Instruction) -> int:
-    """Return how many jets an instruction takes from the stack."""
-    op = instruction.op
-    return instruction.rows[0] if TIME < op < FIRST_MEASURE else 2 if op == SPLINE else 0
-
-
-def _deepest(program: list[Instruction]) -> int:
-    """Return how many jets stand on the stack at most."""
-    depth, most = 0, 0
-    for instruction in program:
-        depth += 1 - _taken(instruction)
-        most = max(most, depth)
-    return most
 
 
 class _Compiler:

@@ -17,7 +17,8 @@ import numpy as np
 from mbsim.arrays import scene as a
 from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.acting import wanted
-from mbsim.compile_model.programs import ANGLE, Instruction, ProgramTable
+from mbsim.compile_model.instructions import ANGLE, Instruction
+from mbsim.compile_model.programs import ProgramTable
 from mbsim.core.address import pack
 from mbsim.errors import DeckError
 from mbsim.expressions.elementary import TIME

@@ -24,7 +24,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from mbsim.arrays import scene as a
-from mbsim.compile_model.programs import ELEMENT, NET, USER, Instruction, ProgramTable
+from mbsim.compile_model.instructions import ELEMENT, NET, USER, Instruction
+from mbsim.compile_model.programs import ProgramTable
 from mbsim.expressions.elementary import NUMBER
 from mbsim.expressions.tree import Call, Expression, Node, Number
 from mbsim.laws.catalog import FRICTION_LAWS

@@ -16,7 +16,6 @@ import numpy as np
 from mbsim.core.codes import Code
 from mbsim.geometry.hull_overlap import Hull, Solid, hull_of, least_overlap, touching_point
 from mbsim.geometry.mesh_contact import (
-    Surface,
     against_convex,
     lowest_side,
     of_meshes,
@@ -24,6 +23,7 @@ from mbsim.geometry.mesh_contact import (
     under_plane,
     under_sphere,
 )
+from mbsim.geometry.mesh_surface import Surface
 from mbsim.geometry.support import CONVEX, ROUND, face_normal, round_normal, support
 from mbsim.model.elements import Graphic
 

@@ -120,7 +120,8 @@ def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepe
 
     Tilted, the sectors are set around the deepest point (u), so that it carries wherever the
     tilt turns. Flat, the tilt has no direction: a rim that is cut is divided around its own
-    middle `own`, so that the centre of pressure does not turn with a tilt of 1e-9.
+    middle `own`, so that the centre of pressure does not turn with a tilt of 1e-9. Many arguments
+    because compiled code is given numbers, not records.
     """
     _, _, _, r, _, rise = disc
     tilted = fade(2.0 * r * abs(rise) / max(deepest, 1e-300) - 0.5)

@@ -228,7 +228,8 @@ def overlapping(a, hull_j, frame_j, points):
 def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
     """Write the vertices of two faces' common polygon, seen along n, into their rows.
 
-    `turn` says how n turns with I.
+    `turn` says how n turns with I. Long because all three kinds of vertices (a corner of I, one of
+    J, a crossing of edges) need where both faces lie in the packed polyhedra.
     """
     starts_i, loops_i = int(a[AT_STARTS]), int(a[AT_LOOPS])
     starts_j, loops_j = int(b[AT_STARTS]), int(b[AT_LOOPS])

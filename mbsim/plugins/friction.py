@@ -18,13 +18,7 @@ from mbsim.plugins.source.diagnose import lint, reads_parameter
 from mbsim.plugins.source.find import find_subroutine
 from mbsim.plugins.source.octave import OctaveFile, running
 from mbsim.plugins.source.script import CFFSUB, Script, Scripts, user_function
-from mbsim.plugins.source.shared_library import (
-    Library,
-    address_of,
-    choose,
-    friction,
-    sees_x,
-)
+from mbsim.plugins.source.shared_library import Library, address_of, choose, friction, sees_x
 from mbsim.plugins.types import UserFriction
 
 #: Numbers that a friction function of the user may keep at most.

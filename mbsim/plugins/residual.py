@@ -21,11 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.errors import ModelError
-from mbsim.laws.residual import (
-    KINDS,
-    MOST_UNKNOWNS,
-    inputs,
-)
+from mbsim.laws.residual import KINDS, MOST_UNKNOWNS, inputs
 from mbsim.model.elements import ForceElement
 from mbsim.plugins import guard
 from mbsim.plugins.compile.residual_trials import points, refuse_jumps, sort_unknowns

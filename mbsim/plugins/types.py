@@ -11,11 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.laws import user_normal as at
-from mbsim.laws.residual import (
-    DIFFERENTIAL,
-    KINDS,
-    SWITCHING,
-)
+from mbsim.laws.residual import DIFFERENTIAL, KINDS, SWITCHING
 from mbsim.plugins.helpers import host
 from mbsim.plugins.returned import force_and_state, only_one, three_numbers
 

@@ -52,8 +52,8 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     draft: Draft
     said_so: Callable[[Fault], Fault] = _as_it_is
     if is_adams(deck.name):
+        from mbsim.reader.adm.draft import AdmDraft
         from mbsim.reader.adm.read import fill, in_words
-        from mbsim.reader.adm.statements import AdmDraft
 
         draft, said_so = AdmDraft(str(path), deck.absolute().parent), in_words
         fill(data, draft, overrides)

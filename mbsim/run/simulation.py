@@ -71,6 +71,8 @@ def simulate(
 ) -> Results:
     """Run a model and return its results.
 
+    Many arguments because each option of a run is one, by keyword.
+
     Parameters
     ----------
     model : Model
@@ -160,21 +162,31 @@ def simulate(
         log.line(f"{type(error).__name__}: {error}")
         raise
     finally:
-        recorder.take()
-        stats = runner.stats(time.perf_counter() - began, jit.compile_seconds - compiled_before)
-        audit = runner.audit()
-        for warning in audit.warnings if audit is not None else ():
-            tell(f"warning: {warning}")
-        try:
-            results = _keep(runner, status, stats, audit)
-        finally:
-            log.close(status, stats, recorder.watch, audit)
-            if any(user.language == "Octave" for _, user in system.user_laws):
-                from mbsim.plugins.subroutine import end_run
-
-                end_run()
+        compiled = jit.compile_seconds - compiled_before
+        results = _finish(runner, status, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
+
+
+def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Results | None:
+    """Keep what was recorded, close the log, and return the results, if there are any.
+
+    `wall` and `compiled` are the seconds of the call, and of its compiling.
+    """
+    system = runner.system
+    runner.recorder.take()
+    stats = runner.stats(wall, compiled)
+    audit = runner.audit()
+    for warning in audit.warnings if audit is not None else ():
+        runner.tell(f"warning: {warning}")
+    try:
+        return _keep(runner, status, stats, audit)
+    finally:
+        runner.log.close(status, stats, runner.recorder.watch, audit)
+        if any(user.language == "Octave" for _, user in system.user_laws):
+            from mbsim.plugins.subroutine import end_run
+
+            end_run()
 
 
 def _announce(system: System, settings: Settings, said: list[str], tell: Notify) -> list[str]:

@@ -13,7 +13,8 @@ pytest.importorskip("fcl")
 from helpers.pairs import random_rotation
 from mbsim.geometry.catalog import POINT
 from mbsim.geometry.fcl_detector import FclDetector
-from mbsim.geometry.mesh_contact import Surface, against_convex, lowest_side
+from mbsim.geometry.mesh_contact import against_convex, lowest_side
+from mbsim.geometry.mesh_surface import Surface
 from mbsim.geometry.support import support
 from mbsim.model.elements import Graphic
 from mbsim.model.hull import polyhedron_of

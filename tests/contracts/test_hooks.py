@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import types
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import crowd_decks
-import mechanism_decks
-from decks_io import MODELS, write_deck
-from mechanics import Body
-
 import mbsim
+from helpers import crowd_decks, mechanism_decks
+from helpers.decks import write_deck
+from helpers.folders import MODELS
+from helpers.mechanics import Body
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
 from mbsim.arrays.scene import NEAR_FOLD
 from mbsim.dynamics.pipeline import hook_table, hooks, implicit_hooks

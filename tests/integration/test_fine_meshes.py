@@ -7,7 +7,7 @@ import pytest
 
 import mbsim
 from mbsim.geometry.hull_overlap import Solid, hull_of, least_overlap
-from mbsim.geometry.mesh_contact import Surface
+from mbsim.geometry.mesh_surface import Surface
 
 pytest.importorskip("fcl")
 

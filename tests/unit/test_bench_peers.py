@@ -12,7 +12,7 @@ import pytest
 from mbsim.bench import parameters as p
 from mbsim.bench import peers
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.peers import common
+from mbsim.bench.peers import common, exudyn_scenes, mujoco_laws
 from mbsim.bench.scenes import all_scenes
 
 
@@ -114,7 +114,7 @@ def test_every_setting_stores_the_rows_that_are_asked_for(engine):
 
 def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
     for name, scene in all_scenes().items():
-        cases = [make() for make in peers.load("exudyn")._cases(name).values()]
+        cases = [make() for make in exudyn_scenes.cases(name).values()]
         if not cases:
             assert name.startswith("S11_"), "only the stiff decks are ours alone"
             continue
@@ -125,8 +125,7 @@ def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
 def test_laws_that_are_compiled_use_plain_numbers():
     # a field of a dataclass cannot be read in compiled code, which fails at the first run only
     _run("mujoco", "S5", "mjcb_passive compiled Euler dt=0.0001")
-    mujoco = peers.load("mujoco")
-    assert mujoco._hertz(1e-4, 0.0) == p.S5.k * 1e-4**p.S5.e
+    assert mujoco_laws.hertz(1e-4, 0.0) == p.S5.k * 1e-4**p.S5.e
 
 
 def test_box_sticks_and_the_body_is_where_it_was():

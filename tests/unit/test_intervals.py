@@ -10,7 +10,7 @@ from mbsim.compile_model import timetable as tt
 from mbsim.compile_model.build import build
 from mbsim.compile_model.splines import pieces
 from mbsim.dynamics.expressions.jets import jet
-from mbsim.expressions import intervals
+from mbsim.expressions import bounds, intervals
 from mbsim.expressions.elementary import CODES
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
@@ -104,7 +104,7 @@ def test_a_curve_lies_within_its_bounds(method, order):
     curve = tt.Curve(piece, order)
     n = 200
     lo, w = chance.uniform(x[0] - 0.3, x[-1] + 0.1, n), 10.0 ** chance.uniform(-4, 0.2, n)
-    bound = curve.bound(intervals.time(lo, lo + w))
+    bound = curve.bound(bounds.time(lo, lo + w))
     for part in np.linspace(0.0, 1.0, 9):
         at = lo + part * w
         row = np.searchsorted(curve.knots, at, "right")

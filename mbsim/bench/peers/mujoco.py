@@ -7,12 +7,11 @@ every step is a row).
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import itertools
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,30 +19,18 @@ from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 from mbsim.bench.peers import mujoco_linkages as jointed
+from mbsim.bench.peers.mujoco_laws import (
+    Case,
+    Law,
+    callback,
+    hertz,
+    hunt_crossley,
+    impact,
+    linear,
+    stiff,
+)
 
 NAME = "mujoco"
-
-Law = Callable[[float, float], float]
-RowsOf = Callable[[np.ndarray, np.ndarray, np.ndarray], common.Rows]
-
-
-class Case(NamedTuple):
-    """A scene under one setting: free bodies in the order of the scene, or what `rows` knows."""
-
-    xml: str
-    dt: float  # s
-    end_time: float  # s
-    velocity: np.ndarray  # of free bodies (n, 6): linear global, angular in the body's frame
-    note: str = ""
-    law: Law | None = None  # force (N) of penetration (m) and its rate, through mjcb_passive
-    compiled: bool = False
-    gap: str = "plane"  # what the law acts on: the "plane" z = 0 or "balls" in a row along x
-    radius: float = 0.0  # m
-    sample: float = p.SAMPLE  # s
-    cap: float = float("inf")  # s of wall time
-    settle: bool = False  # start at the rest that gravity's part along z leads to
-    position: np.ndarray | None = None  # qpos at the start, where it is not the model's own
-    rows: RowsOf | None = None  # from times, qpos and qvel; None: free bodies
 
 
 def _engine() -> Any:
@@ -90,7 +77,7 @@ def _run(case: Case, repeats: int) -> Outcome:
         return march(model, data, steps, case.cap)
 
     try:
-        mujoco.set_mjcb_passive(_callback(case, data))
+        mujoco.set_mjcb_passive(callback(case, data))
         wall, (qpos, qvel) = common.measure(once, repeats)
     finally:
         mujoco.set_mjcb_passive(None)
@@ -162,111 +149,6 @@ def _free_rows(time: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> common.R
 
 
 # ---------------------------------------------------------------------------------------------
-# A law of ours, in Python or compiled
-
-
-def _callback(case: Case, data: Any) -> Any:
-    """What ``mjcb_passive`` calls: a Python function, a compiled one, or nothing."""
-    if case.law is None:
-        return None
-    if case.compiled:
-        return _compiled(case, data)
-    law, radius = case.law, case.radius
-    position, velocity, force = data.qpos, data.qvel, data.qfrc_passive
-
-    def passive(model: Any, data: Any) -> None:
-        depth = radius - position[2]
-        if depth > 0.0:
-            force[2] += law(depth, -velocity[2])
-
-    return passive
-
-
-def _compiled(case: Case, data: Any) -> Any:
-    """The law as a C function on the addresses of qpos, qvel and qfrc_passive."""
-    import numba
-
-    law = numba.njit(case.law)
-    pointer = _pointer()
-    q, v, f = (int(a.ctypes.data) for a in (data.qpos, data.qvel, data.qfrc_passive))
-    radius, balls = case.radius, len(case.velocity)
-
-    def on_plane(model: Any, data: Any) -> None:
-        position, velocity, force = pointer(q), pointer(v), pointer(f)
-        depth = radius - position[2]
-        if depth > 0.0:
-            force[2] += law(depth, -velocity[2])
-
-    def on_balls(model: Any, data: Any) -> None:
-        position, velocity, force = pointer(q), pointer(v), pointer(f)
-        for i in range(balls - 1):
-            depth = 2 * radius - (position[7 * i + 7] - position[7 * i])
-            if depth > 0.0:
-                push = law(depth, velocity[6 * i] - velocity[6 * i + 6])
-                force[6 * i] -= push
-                force[6 * i + 6] += push
-
-    body = on_plane if case.gap == "plane" else on_balls
-    signature = numba.types.void(numba.types.voidptr, numba.types.voidptr)
-    return _keep(numba.cfunc(signature)(body))
-
-
-#: Machine code must not be freed while MuJoCo may call it.
-_kept: list[Any] = []
-
-
-def _keep(compiled: Any) -> Any:
-    """A compiled callback as the ctypes function that MuJoCo takes."""
-    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(compiled.address)
-    _kept.append((compiled, function))
-    return function
-
-
-@functools.cache
-def _pointer() -> Any:
-    """A compiled function from an address to a pointer to float64."""
-    from numba import types
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def pointer(context: Any, address: Any) -> Any:
-        result = types.CPointer(types.float64)
-
-        def make(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return builder.inttoptr(arguments[0], context.get_value_type(result))
-
-        return result(types.int64), make
-
-    return pointer
-
-
-def _impact(depth: float, rate: float) -> float:
-    s = min(depth / p.S2A_LAW.dmax, 1.0)
-    damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
-    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
-
-
-def _linear(depth: float, rate: float) -> float:
-    return max(0.0, p.S2B_LAW.k * depth + p.S2B_LAW.c * rate)
-
-
-def _hunt_crossley(depth: float, rate: float) -> float:
-    return p.S2C_LAW.k * depth * max(0.0, 1.0 + p.S2C_LAW.dissipation * rate)
-
-
-def _stiff(depth: float, rate: float) -> float:
-    return max(0.0, p.S10A_LAW.k * depth + p.S10A_LAW.c * rate)
-
-
-#: Plain numbers: compiled code reads no field of a dataclass.
-_HERTZ_K, _HERTZ_E = p.S5.k, p.S5.e
-
-
-def _hertz(depth: float, rate: float) -> float:
-    return _HERTZ_K * depth**_HERTZ_E
-
-
-# ---------------------------------------------------------------------------------------------
 # Scenes
 
 
@@ -278,9 +160,9 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         return dict(_chain(int(scene[3:])))
     scenes: dict[str, Callable[[], Iterator[tuple[str, Callable[[], Case]]]]] = {
         "S1": lambda: _free(p.S1),
-        "S2a": lambda: _callback_drop(p.S2, _impact, "impact"),
+        "S2a": lambda: _callback_drop(p.S2, impact, "impact"),
         "S2b": _soft_drop,
-        "S2c": lambda: _callback_drop(p.S2, _hunt_crossley, "hc"),
+        "S2c": lambda: _callback_drop(p.S2, hunt_crossley, "hc"),
         "S3": _rolling,
         "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (1e-2, 2e-3, 5e-4)),
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (1e-2, 2e-3, 5e-4, 1e-4)),
@@ -380,7 +262,7 @@ def _soft_drop() -> Iterator[tuple[str, Callable[[], Case]]]:
     for integrator in ("Euler", "RK4"):
         for dt in (1e-3, 1e-4, 1e-5):
             yield f"soft {integrator} dt={dt:g}", functools.partial(case, integrator, dt)
-    yield from _callback_drop(p.S2, _linear, "linear")
+    yield from _callback_drop(p.S2, linear, "linear")
 
 
 def _stiff_drop() -> Iterator[tuple[str, Callable[[], Case]]]:
@@ -399,7 +281,7 @@ def _stiff_drop() -> Iterator[tuple[str, Callable[[], Case]]]:
         yield f"default solref dt={dt:g}", functools.partial(case, dt, False)
     for dt in (1e-3, 1e-4, 1e-5, 1e-6):
         yield f"solref -k/m -c/m dt={dt:g}", functools.partial(case, dt, True)
-    yield from _callback_drop(p.S10A, _stiff, "linear", (1e-5, 1e-6))
+    yield from _callback_drop(p.S10A, stiff, "linear", (1e-5, 1e-6))
 
 
 def _rolling() -> Iterator[tuple[str, Callable[[], Case]]]:
@@ -473,7 +355,7 @@ def _row() -> Iterator[tuple[str, Callable[[], Case]]]:
         xml = _xml(option, world(""), 'contact="disable" constraint="disable"')
         note = "hertz; law through mjcb_passive, compiled"
         end, radius = p.S5.end_time, p.S5.radius
-        return Case(xml, dt, end, velocity, note, _hertz, True, "balls", radius)
+        return Case(xml, dt, end, velocity, note, hertz, True, "balls", radius)
 
     for solref in ("0.002 0.01", "-1e7 0"):
         for dt in (1e-3, 1e-4, 1e-5):

@@ -20,20 +20,13 @@ from mbsim.arrays.hooks import Held, Hook, answer_of
 from mbsim.arrays.scene import (
     ANGLE,
     ASKED,
-    AUDIT_TOL,
-    FOLD_BEGINS,
-    FOLD_ENDS,
-    FOLD_HALT,
     FOLD_POWER,
-    FOLDS,
     GENERAL,
     KEPT,
     KEPT_PIVOT,
     OFFSET,
     PERP,
     PIVOT,
-    PIVOT_THEN,
-    PIVOT_TIME,
     TOUCHING,
     TWIST,
     USUAL,
@@ -41,210 +34,26 @@ from mbsim.arrays.scene import (
 )
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, scale, sub, vector
-from mbsim.dynamics.bodies.angles import followed_angle
-from mbsim.dynamics.bodies.kinematics import position
-from mbsim.dynamics.bodies.markers import (
-    marker_arm,
-    marker_axis,
-    marker_point,
-    marker_quaternion,
-    marker_velocity,
+from mbsim.core.rotation import cross, dot, vector
+from mbsim.dynamics.constraints.folding import SAMPLED, is_held, near_fold, passes_fold
+from mbsim.dynamics.constraints.in_use import active_count, is_friction
+from mbsim.dynamics.constraints.terms import (
+    angle_term,
+    distance_term,
+    general_term,
+    offset_term,
+    perp_term,
+    touching_term,
+    twist_term,
 )
-from mbsim.dynamics.constraints.tree import load, origin, put, respond
-from mbsim.dynamics.expressions.jets import gradient, jet
+from mbsim.dynamics.constraints.tree import load, respond
+from mbsim.dynamics.expressions.jets import jet
 
 # columns of `Sweep.rate`
 RESIDUAL, MISMATCH, GAMMA, FLOW = range(4)
 
-
-#: Below this part of the usual pivots a state is near a position in which a loop can fold: how far
-#: that is goes as the square root of the least pivot.
-NEAR = 0.01
-#: Below this part what multipliers do is foreseen, until the fold is as far behind. A loop whose
-#: lengths are wrong by a rounding error e is accelerated by e/part**1.5 beside what it should.
-FOLDING = 2.5e-4
-#: Equations are released there whose pivots are below this part.
-RELEASED = 0.05
-#: From this part on steps go no farther than `CLOSER` of the way to the fold, so that there are
-#: samples of accelerations from which what is ahead can be told.
-WATCHED, CLOSER = 0.25, 0.3
-#: And so much farther at a tolerance of 1e-3, where fewer samples are enough.
-LOOSER = 0.2
-#: Samples are taken where the least pivot has fallen to this part of the last one's.
-SAMPLED = 0.6
-#: It is foreseen from so many times as far from the fold as `FOLDING` is, or, where samples do not
-#: tell it to this part of tol, from nearer up to this.
-ENTERED, DOUBT, NEAREST = 1.5, 0.1, 0.4
-#: What rounding makes of that.
-NOISE = 1e-10
-#: What is foreseen lasts at most so many times the time over which samples were taken.
-REACH = 1.0
 #: Pivots of this part are none: there an equation fades out.
 NAUGHT = 1e-8
-
-
-@jitable
-def add_side(scene, y, G, m, at, force, torque):
-    """Write force at a point and torque, on the body of marker m, as a wrench about its O."""
-    b = scene.markers.body[m]
-    k = scene.tree.of_body[b]
-    if k < 0:
-        for i in range(6):
-            G[i] = 0.0
-        return
-    put(G, add(torque, cross(sub(at, origin(scene, y, k)), force)), force)
-
-
-@jitable
-def centripetal(scene, m):
-    """Return the acceleration of marker m that the turning of its body alone causes."""
-    w = vector(scene.work.w[scene.markers.body[m]])
-    return cross(w, cross(w, marker_arm(scene, m)))
-
-
-@jitable
-def offset_term(scene, y, i, j, axis, G):
-    """Return value, rate and second rate of e_J . (P_I - P_J), and fill its gradient."""
-    e = marker_axis(scene, j, axis)
-    at = marker_point(scene, y, i)
-    d = sub(at, marker_point(scene, y, j))
-    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
-    w = vector(scene.work.w[scene.markers.body[j]])
-    turned = cross(w, e)
-    zero = (0.0, 0.0, 0.0)
-    add_side(scene, y, G[0:6], i, at, e, zero)
-    add_side(scene, y, G[6:12], j, at, scale(-1.0, e), zero)
-    a = sub(centripetal(scene, i), centripetal(scene, j))
-    second = dot(e, a) + 2.0 * dot(turned, v) + dot(cross(w, turned), d)
-    return dot(e, d), dot(e, v) + dot(turned, d), second
-
-
-@jitable
-def fill_turn(scene, y, i, j, torque, G):
-    """Fill the gradient of a term that only turns: opposite torques on the two bodies."""
-    zero = (0.0, 0.0, 0.0)
-    add_side(scene, y, G[0:6], i, zero, zero, torque)
-    add_side(scene, y, G[6:12], j, zero, zero, scale(-1.0, torque))
-
-
-@jitable
-def cosine(scene, i, axis_i, j, axis_j):
-    """Return value, rate, second rate and torque of a_I . b_J."""
-    a, b = marker_axis(scene, i, axis_i), marker_axis(scene, j, axis_j)
-    w_i, w_j = (
-        vector(scene.work.w[scene.markers.body[i]]),
-        vector(scene.work.w[scene.markers.body[j]]),
-    )
-    da, db = cross(w_i, a), cross(w_j, b)
-    second = dot(cross(w_i, da), b) + 2.0 * dot(da, db) + dot(a, cross(w_j, db))
-    return dot(a, b), dot(da, b) + dot(a, db), second, cross(a, b)
-
-
-@jitable
-def perp_term(scene, y, i, j, axis_i, axis_j, G):
-    """Return value, rate and second rate of a_I . b_J, and fill its gradient."""
-    value, rate, second, torque = cosine(scene, i, axis_i, j, axis_j)
-    fill_turn(scene, y, i, j, torque, G)
-    return value, rate, second
-
-
-@jitable
-def angle_term(scene, y, i, j, slot, G):
-    """Return value, rate and second rate of the angle about z, and fill its gradient.
-
-    With c, s the cosines of x_I against x_J and y_J, n = c^2 + s^2: the rate is
-    (c s' - s c')/n.
-    """
-    c, dc, ddc, about_c = cosine(scene, i, 0, j, 0)
-    s, ds, dds, about_s = cosine(scene, i, 0, j, 1)
-    n = c * c + s * s
-    rate = (c * ds - s * dc) / n
-    second = (c * dds - s * ddc) / n - rate * 2.0 * (c * dc + s * ds) / n
-    fill_turn(scene, y, i, j, sub(scale(c / n, about_s), scale(s / n, about_c)), G)
-    return followed_angle(scene, slot), rate, second
-
-
-@jitable
-def twist_term(scene, y, i, j, G):
-    """Return value, rate and second rate of 2 z of the quaternion from J to I; fill its gradient.
-
-    With q = (w, x, y, z), W = w_I - w_J and J's axes e: q' = (0, W) q/2 in these axes, so that
-    2 z' = n . W, n = w e_z + y e_x - x e_y, |n|^2 = 1 - z^2, and where no body is accelerated
-    2 z'' = -z W^2/2 - n . (w_J x w_I).
-    """
-    a, b = marker_quaternion(scene, y, j), marker_quaternion(scene, y, i)
-    # conj(a) b
-    w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    qx = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]
-    qy = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1]
-    qz = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
-    e_x, e_y = marker_axis(scene, j, 0), marker_axis(scene, j, 1)
-    n = add(scale(w, marker_axis(scene, j, 2)), sub(scale(qy, e_x), scale(qx, e_y)))
-    w_i = vector(scene.work.w[scene.markers.body[i]])
-    w_j = vector(scene.work.w[scene.markers.body[j]])
-    turning = sub(w_i, w_j)
-    fill_turn(scene, y, i, j, n, G)
-    second = -0.5 * qz * dot(turning, turning) - dot(n, cross(w_j, w_i))
-    return 2.0 * qz, dot(n, turning), second
-
-
-@jitable
-def distance_term(scene, y, i, j, G):
-    """Return value, rate and second rate of the distance of I and J, and fill its gradient."""
-    at_i, at_j = marker_point(scene, y, i), marker_point(scene, y, j)
-    d = sub(at_i, at_j)
-    length = math.sqrt(dot(d, d))
-    e = scale(1.0 / length, d) if length > 0.0 else (0.0, 0.0, 1.0)
-    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
-    zero = (0.0, 0.0, 0.0)
-    add_side(scene, y, G[0:6], i, at_i, e, zero)
-    add_side(scene, y, G[6:12], j, at_j, scale(-1.0, e), zero)
-    along = dot(e, v)
-    second = dot(e, sub(centripetal(scene, i), centripetal(scene, j)))
-    if length > 0.0:
-        second += (dot(v, v) - along * along) / length
-    return length, along, second
-
-
-@jitable
-def touching_term(scene, y, i, j, way, s, G):
-    """Return rate and second rate of slip along x or y of slot s, and fill its gradient.
-
-    With p where the surfaces touch, t the axis and n the normal, which all go with the contact:
-
-        slip = t . v,  v = v_I + w_I x (p - x_I) - v_J - w_J x (p - x_J)
-        its second rate by velocities = t' . v + t . (w_I x (p' - v_I) - w_J x (p' - v_J)),
-
-    and where nothing slips t' . v = -(t . n') (n . v). `stiction.rigid_contact` places the slot.
-    """
-    row = scene.work.hold[s]
-    p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
-    if way == 1:
-        t = cross(n, t)
-    dp, dn = (row[9], row[10], row[11]), (row[12], row[13], row[14])
-    bi, bj = scene.markers.body[i], scene.markers.body[j]
-    wi, wj = vector(scene.work.w[bi]), vector(scene.work.w[bj])
-    vi, vj = vector(scene.work.v[bi]), vector(scene.work.v[bj])
-    at_i = add(vi, cross(wi, sub(p, position(scene, y, bi))))
-    v = sub(at_i, add(vj, cross(wj, sub(p, position(scene, y, bj)))))
-    zero = (0.0, 0.0, 0.0)
-    add_side(scene, y, G[0:6], i, p, t, zero)
-    add_side(scene, y, G[6:12], j, p, scale(-1.0, t), zero)
-    turning = sub(cross(wi, sub(dp, vi)), cross(wj, sub(dp, vj)))
-    return dot(t, v), dot(t, turning) - dot(t, dn) * dot(n, v)
-
-
-@jitable
-def general_term(scene, t, y, i, program, G):
-    """Fill the gradient of a program with respect to the body of marker i."""
-    b = scene.markers.body[i]
-    out = scene.sweep.jet
-    gradient(scene, t, y, program, b, out)
-    force, torque = (out[0], out[1], out[2]), (out[3], out[4], out[5])
-    add_side(scene, y, G[0:6], i, position(scene, y, b), force, torque)
-    for k in range(6, 12):
-        G[k] = 0.0
 
 
 @jitable
@@ -293,29 +102,6 @@ def fill_equation(scene, t, y, e):
     sweep.rate[e, MISMATCH] = rate
     sweep.rate[e, GAMMA] = second
     sweep.rate[e, FLOW] = flow
-
-
-@jitable
-def active_count(scene):
-    """Return the number of equations in use."""
-    active = scene.equations.active
-    return active[len(active) - 1]
-
-
-@jitable
-def is_active(scene, e):
-    """Return whether equation e is in use."""
-    active = scene.equations.active
-    for r in range(active_count(scene)):
-        if active[r] == e:
-            return True
-    return False
-
-
-@jitable
-def is_friction(scene, e):
-    """Return whether equation e is of friction: it holds only while that sticks."""
-    return scene.equations.dry[e] >= 0 or scene.equations.slot[e] >= 0
 
 
 def lasting(scene: Scene) -> np.ndarray:
@@ -510,98 +296,6 @@ def impose(scene, t):
         for p in range(nt):
             for c in range(6):
                 sweep.a[p, c] += sweep.answer[p, c]
-
-
-@jitable
-def near_fold(scene):
-    """Return whether the factor at hand is of a state near a position in which a loop can fold."""
-    quality = scene.sweep.quality
-    return quality[PIVOT] < NEAR * quality[USUAL]
-
-
-@jitable
-def passes_fold(scene, t):
-    """Return whether at t a loop passes a fold.
-
-    Steps begin and end where that does; times before are those of output rows.
-    """
-    quality = scene.sweep.quality
-    return t >= quality[FOLD_BEGINS] and (t < quality[FOLD_ENDS] or quality[FOLDS] == 1.0)
-
-
-@jitable
-def is_held(scene, e, t):
-    """Return whether equation e holds at t: what is released does not while a fold is passed."""
-    return scene.sweep.released[e] == 0 or not passes_fold(scene, t)
-
-
-@jitable
-def watch_fold(scene, t):
-    """Look at the committed state how far ahead a fold is, and begin to pass one that is near.
-
-    The time until there follows from how the square root of the least pivot falls. Through the
-    fold, and as far behind it, equations whose pivots vanish there are released.
-    """
-    sweep, active, quality = scene.sweep, scene.equations.active, scene.sweep.quality
-    least, before, since = quality[PIVOT], quality[PIVOT_THEN], t - quality[PIVOT_TIME]
-    quality[PIVOT_THEN], quality[PIVOT_TIME], quality[FOLD_HALT] = least, t, math.inf
-    if not (since > 0.0 and 0.0 < least < min(before, WATCHED * quality[USUAL])):
-        return
-    ahead = since / (math.sqrt(before / least) - 1.0)
-    last, tol = int(quality[KEPT]) - 1, scene.audit.plan[AUDIT_TOL]
-    within = math.sqrt(least / (FOLDING * quality[USUAL]))
-    near = within <= ENTERED and last > 0 and 2.0 * ahead < REACH * (t - sweep.kept_at[last])
-    # where samples are too few a nearer one makes up for that
-    if near and (
-        within <= NEAREST or 2.0 * ahead * doubted(scene, t + ahead) <= max(DOUBT * tol, NOISE)
-    ):
-        quality[FOLDS], quality[FOLD_BEGINS], quality[FOLD_ENDS] = 1.0, t, t + 2.0 * ahead
-        quality[FOLD_HALT] = quality[FOLD_ENDS]
-        for r in range(active_count(scene)):
-            pivot = (sweep.A[r, r] / sweep.size[active[r]]) ** 2
-            sweep.released[active[r]] = 1 if pivot < RELEASED * quality[USUAL] else 0
-    elif within > NEAREST:
-        part = CLOSER + LOOSER * min(max(0.25 * math.log10(tol) + 1.75, 0.0), 1.0)
-        until = 1.0 if within > ENTERED else NEAREST
-        quality[FOLD_HALT] = t + ahead * min(part, 1.0 - until / within)
-
-
-@jitable
-def doubted(scene, t):
-    """Return by how much accelerations foreseen at t differ with one sample less, over V [1/T]."""
-    sweep, scales, when, off = scene.sweep, scene.scales, scene.sweep.kept_at, 0.0
-    count = int(sweep.quality[KEPT])
-    for p in range(len(scene.tree.body)):
-        for c in range(6):
-            sweep.answer[p, c] = 0.0
-    for i in range(count):
-        # the divided difference times the product of distances: what the last one adds
-        part = 1.0
-        for j in range(count):
-            if j < count - 1:
-                part *= t - when[j]
-            if j != i:
-                part /= when[i] - when[j]
-        for p in range(len(scene.tree.body)):
-            for c in range(6):
-                sweep.answer[p, c] += part * sweep.kept_a[i, p, c]
-    for p in range(len(scene.tree.body)):
-        g, D = scales.group[scene.tree.body[p]], sweep.answer[p]
-        shift = add((D[3], D[4], D[5]), cross((D[0], D[1], D[2]), vector(sweep.arm[p])))
-        off = max(off, math.sqrt(dot(shift, shift) / scene.work.squares[g]))
-    return off
-
-
-@jitable
-def leave_fold(scene, t):
-    """Return whether a fold that was being passed is left behind at the committed time t."""
-    quality = scene.sweep.quality
-    begins, ends = quality[FOLD_BEGINS], quality[FOLD_ENDS]
-    if t < ends - 1e-9 * (ends - begins):
-        return False
-    quality[FOLDS], quality[FOLD_ENDS] = 0.0, t
-    quality[FOLD_HALT], quality[PIVOT_THEN] = math.inf, 0.0
-    return True
 
 
 @jitable

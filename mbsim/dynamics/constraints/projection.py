@@ -13,15 +13,14 @@ from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.equations import (
     MISMATCH,
     RESIDUAL,
-    active_count,
     add_wrench,
     factor_matrix,
     fill_equations,
     fill_matrix,
-    is_held,
-    near_fold,
     solve_matrix,
 )
+from mbsim.dynamics.constraints.folding import is_held, near_fold
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import prepare, respond
 from mbsim.dynamics.constraints.tree_projection import (
     carry_all,

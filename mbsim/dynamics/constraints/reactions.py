@@ -11,15 +11,13 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.constraints.equations import (
-    active_count,
     add_wrench,
     along,
     fill_equation,
-    is_active,
-    is_friction,
     side_place,
     solve_matrix,
 )
+from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
 from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.constraints.tree_reactions import add_reaction, add_tree_reactions
 

@@ -30,19 +30,15 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.equations import (
     RESIDUAL,
-    active_count,
     factor_matrix,
     fill_equation,
     fill_equations,
     fill_matrix,
-    is_active,
-    is_friction,
     keep_accelerations,
-    leave_fold,
-    near_fold,
     side_place,
-    watch_fold,
 )
+from mbsim.dynamics.constraints.folding import leave_fold, near_fold, watch_fold
+from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
 from mbsim.laws.catalog import STICK
 
 #: What `keep_choice` returns where a fold was left behind.

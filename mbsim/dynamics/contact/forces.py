@@ -242,7 +242,10 @@ def show_state(scene, y):
 
 @jitable
 def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
-    """Call the friction law of contact c for slot s into `law_out`; return its code."""
+    """Call the friction law of contact c for slot s into `law_out`; return its code.
+
+    Many arguments because compiled code is given numbers, not records.
+    """
     contacts, work = scene.contacts, scene.work
     given = work.law_in
     at = scene.slots.x[s]
@@ -369,7 +372,10 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
 
 @jitable
 def add_contact(scene, t, h, y, dy, s):
-    """Add the wrench of the touching slot s; return 0 or the code of the law that failed."""
+    """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
+
+    Long because normal force, friction and torques share the contact's frame and velocities.
+    """
     contacts, work = scene.contacts, scene.work
     c = contact_of(scene, s)
     gi, gj = sides(scene, s)

@@ -15,7 +15,7 @@ from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.dynamics.constraints.equations import is_friction
+from mbsim.dynamics.constraints.in_use import is_friction
 from mbsim.dynamics.contact.forces import (
     ALONG_X,
     ALONG_Y,

@@ -1,9 +1,9 @@
-"""The stack machine of expressions, see `compile_model.programs` for its instructions."""
+"""The stack machine of expressions, see `compile_model.instructions` for its instructions."""
 
 from __future__ import annotations
 
 from mbsim.arrays.scene import SHOWN
-from mbsim.compile_model.programs import (
+from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,
     CLOSING,

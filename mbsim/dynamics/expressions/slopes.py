@@ -10,7 +10,7 @@ With arm r of marker m on the body, theta the turn and dv, dw the added velociti
 
 from __future__ import annotations
 
-from mbsim.compile_model.programs import CLOSING, SPEED, SPIN, STATE, TURNING, VELOCITY
+from mbsim.compile_model.instructions import CLOSING, SPEED, SPIN, STATE, TURNING, VELOCITY
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, sub, vector
 from mbsim.dynamics.bodies.markers import marker_arm, marker_point, marker_velocity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.compile_model.programs import (
+from mbsim.compile_model.instructions import (
     ADD_N,
     ADD_TIME_N,
     ANGLE,
@@ -67,10 +67,11 @@ def rate_value(scene, y, code):
 
 
 @jitable
-def evaluate_program(scene, t, y, program):
+def evaluate_program(scene, t, y, program):  # noqa: C901
     """Return the value of a program.
 
-    The topmost value is `x`; those below it stand in `values` from row 1 on.
+    The topmost value is `x`; those below it stand in `values` from row 1 on. Many branches because
+    of a chain of equalities a table of jumps is made.
     """
     programs = scene.programs
     s, operand = programs.values, programs.operand
@@ -78,7 +79,7 @@ def evaluate_program(scene, t, y, program):
     for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
         code = programs.quick[at]
         op = code[0]
-        # what is frequent in one chain of equalities, of which a table of jumps is made
+        # what is frequent stands in the chain
         if op == NUMBER:
             s[top] = x
             top += 1

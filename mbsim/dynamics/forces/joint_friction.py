@@ -35,7 +35,8 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_velocity
-from mbsim.dynamics.constraints.equations import active_count, hold_again
+from mbsim.dynamics.constraints.equations import hold_again
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.forces.applied import push
 

@@ -31,7 +31,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
-from mbsim.dynamics.constraints.equations import active_count, hold_again
+from mbsim.dynamics.constraints.equations import hold_again
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import along_axis, along_line, push

@@ -22,7 +22,9 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
-from mbsim.dynamics.constraints.equations import active_count, fill_equation, is_held, side_place
+from mbsim.dynamics.constraints.equations import fill_equation, side_place
+from mbsim.dynamics.constraints.folding import is_held
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import child_axis, origin, parent_axis
 from mbsim.dynamics.linearization.blocks import (
     COUPLINGS,

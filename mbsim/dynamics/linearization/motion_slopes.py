@@ -10,13 +10,8 @@ from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
-from mbsim.dynamics.constraints.equations import (
-    FLOW,
-    GAMMA,
-    active_count,
-    fill_equation,
-    side_place,
-)
+from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, side_place
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import POSES, WAYS
 from mbsim.dynamics.linearization.stiffness import keep_spin, pushed

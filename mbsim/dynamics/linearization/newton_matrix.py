@@ -30,7 +30,7 @@ from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
-from mbsim.dynamics.constraints.equations import active_count
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.linearization.blocks import (
     BLOCKS,
     COUPLINGS,

@@ -30,7 +30,7 @@ from mbsim.arrays.scene import (
     TURN_LIMIT,
     VECTOR_FORCE,
 )
-from mbsim.compile_model.programs import USER
+from mbsim.compile_model.instructions import USER
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at

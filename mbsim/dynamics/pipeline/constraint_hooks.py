@@ -10,14 +10,9 @@ from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, vector
-from mbsim.dynamics.constraints.equations import (
-    MISMATCH,
-    active_count,
-    fill_matrix,
-    hold,
-    passes_fold,
-    power_of_equations,
-)
+from mbsim.dynamics.constraints.equations import MISMATCH, fill_matrix, hold, power_of_equations
+from mbsim.dynamics.constraints.folding import passes_fold
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import (
     displace,
     prepare_equations,

@@ -17,43 +17,34 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.hooks import Held, Hook, note_failure
-from mbsim.arrays.scene import BODY_SIZE, CONE_ROWS, TOLERANCE
 from mbsim.arrays.scene import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import STICK as STICK_EVENT
+from mbsim.arrays.scene import TOLERANCE
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
-from mbsim.dynamics.constraints.equations import (
-    active_count,
-    add_wrench,
-    along,
-    fill_equation,
-)
+from mbsim.core.rotation import cross, dot, sub, vector
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
-from mbsim.dynamics.constraints.tree import respond
-from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides, tangent, velocity_at
+from mbsim.dynamics.contact.forces import FORCE, sides, velocity_at
 from mbsim.dynamics.contact.points import record_event
 from mbsim.dynamics.forces.dry_friction import AT_REST, ROUNDING
-from mbsim.dynamics.stiction.cones import (
-    CAPACITY,
-    LOAD,
-    MOVES,
-    SHARED,
-    SLIDE,
-    SLIPPING,
-    solve_cones,
+from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.stiction.rigid_shares import (
+    LEAST_PART,
+    SLIDING,
+    STATIC,
+    WHICH,
+    capacity,
+    fill_cones,
+    fill_slip,
+    first_of_slots,
+    most_capacity,
+    share_held,
 )
-from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
+from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_held
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
 
-#: Half of the time over which rates of a contact's place are found, over that in which the model's
-#: speed goes its length: truncation and rounding are about as large.
-MOMENT = 1e-5
-#: What of a second difference, over the model's length, is no jump of the point from one place to
-#: another.
-SMOOTH = 1e-8
 #: A slip that turns below this part of the tolerance, over the model's speed, has come to rest.
 SETTLED = 0.1
 #: Slip whose part against the way it had is larger than this part of it goes back, and has not only
@@ -62,268 +53,9 @@ BACK = 0.7
 #: What is let go while it moves goes back only where it is so many times faster, and keeps to the
 #: way in which it is accelerated until it is that many times faster again.
 BEYOND = 3.0
-#: What presses less than this part of what presses most counts as that: no limit is 0.
-LEAST_PART = 1e-9
 #: Slots that slip are sought with limits that are lower by this part: where they are just reached
 #: accelerations are 0, and do not tell the way.
 OVER = 1e-5
-# last rows of `Sweep.cone`, by slots that stick: what they hold and rub with, and their equation
-STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
-
-
-@jitable
-def move_on(scene, y, b, time):
-    """Let body b go on for a time as it moves."""
-    if b == len(scene.bodies.mass):
-        return
-    at, half = BODY_SIZE * b, 0.5 * time
-    w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-    a, c, d = y[at + 10], y[at + 11], y[at + 12]
-    for k in range(3):
-        y[at + k] += time * y[at + 7 + k]
-    y[at + 3] += half * (-x * a - yy * c - z * d)
-    y[at + 4] += half * (w * a + yy * d - z * c)
-    y[at + 5] += half * (w * c + z * a - x * d)
-    y[at + 6] += half * (w * d + x * c - yy * a)
-    place_body(scene, y, b)
-
-
-@jitable
-def pose(scene, y, b):
-    """Return position and quaternion of body b; anything for ground."""
-    at = BODY_SIZE * b if b < len(scene.bodies.mass) else 0
-    return (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
-
-
-@jitable
-def put_pose(scene, y, b, kept):
-    """Put body b back to a pose."""
-    if b == len(scene.bodies.mass):
-        return
-    for k in range(7):
-        y[BODY_SIZE * b + k] = kept[k]
-    place_body(scene, y, b)
-
-
-@jitable
-def look(scene, y, pair, row):
-    """Fill a row of `Work.look` with the candidates of a pair."""
-    pairs, kinds, graphics, work = scene.pairs, scene.kinds, scene.graphics, scene.work
-    kind, i, j = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
-    for g in (i, j):
-        if graphics.body[g] < len(scene.bodies.mass):
-            place_graphic(scene, y, g)
-    points = work.look[row]
-    frames, size = work.frames, graphics.size
-    call_int(kinds.kernel[kind], (frames[i], size[i], frames[j], size[j], points))
-    if kinds.swapped[kind] == 1:
-        for s in range(kinds.slots[kind]):
-            for k in range(4, 7):
-                points[s, k] = -points[s, k]
-
-
-@jitable
-def look_around(scene, y, pair, moment):
-    """Fill all rows of `Work.look`: now, a moment later, a moment before."""
-    graphics, pairs = scene.graphics, scene.pairs
-    bi = graphics.body[pairs.graphic_i[pair]]
-    bj = graphics.body[pairs.graphic_j[pair]]
-    kept_i, kept_j = pose(scene, y, bi), pose(scene, y, bj)
-    for row in range(3):
-        # the last as it is
-        time = moment if row == 0 else -moment
-        if row < 2:
-            move_on(scene, y, bi, time)
-            move_on(scene, y, bj, time)
-        look(scene, y, pair, (row + 1) % 3)
-        put_pose(scene, y, bi, kept_i)
-        put_pose(scene, y, bj, kept_j)
-
-
-@jitable
-def fill_hold(scene, t, y, s, moment):
-    """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
-    points, row = scene.work.look, scene.work.hold[s]
-    k = s - scene.pairs.slot[scene.slots.pair[s]]
-    now, later, before = points[0, k], points[1, k], points[2, k]
-    ahead = sub(vector(later[1:4]), vector(now[1:4]))
-    back = sub(vector(now[1:4]), vector(before[1:4]))
-    jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
-    first, last, time = 2, 1, 2.0 * moment
-    if jump > 0.1 * way + SMOOTH * scene.world.scale[0]:
-        # the shapes touch at another corner: the side on which they do not
-        if norm(ahead) < norm(back):
-            first, time = 0, moment
-        else:
-            last, time = 0, moment
-    n = vector(now[4:7])
-    gi, gj = sides(scene, s)
-    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
-    for i in range(3):
-        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], x[i]
-        row[9 + i] = (points[last, k, 1 + i] - points[first, k, 1 + i]) / time
-        row[12 + i] = (points[last, k, 4 + i] - points[first, k, 4 + i]) / time
-
-
-@jitable
-def place_held(scene, t, y):
-    """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
-    slot, last = scene.equations.slot, -1
-    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
-    for e in range(first_of_slots(scene), len(slot), 2):
-        if not sticks(scene, e):
-            continue
-        pair = scene.slots.pair[slot[e]]
-        if pair != last:
-            look_around(scene, y, pair, moment)
-            last = pair
-        fill_hold(scene, t, y, slot[e], moment)
-
-
-@jitable
-def first_of_slots(scene):
-    """Return the first equation of slots: they are the last."""
-    return len(scene.equations.slot) - len(scene.sweep.share)
-
-
-@jitable
-def fill_slip(scene, t, y, e, first, row):
-    """Fill row e of S of `stiction.cones`, from the equation in use `first` on.
-
-    Of A = L L' of the equations in use and b how they act on e, it is the end of L^-1 b. Returns
-    what is left of e, of a slip that they do not imply. p is lost.
-    """
-    sweep, active = scene.sweep, scene.equations.active
-    nt, n, z = len(scene.tree.body), active_count(scene), scene.sweep.rhs
-    fill_equation(scene, t, y, e)
-    for k in range(nt):
-        for i in range(6):
-            sweep.p[k, i] = 0.0
-    add_wrench(scene, e, 1.0)
-    respond(scene, 0, nt, 0, sweep.answer)
-    left = along(scene, e, sweep.answer, -1)
-    for i in range(n):
-        total = along(scene, active[i], sweep.answer, -1)
-        for k in range(sweep.skyline[i], i):
-            total -= sweep.A[i, k] * z[k]
-        z[i] = total / sweep.A[i, i]
-        left -= z[i] * z[i]
-    for k in range(first, n):
-        row[k - first] = z[k]
-    return left
-
-
-@jitable
-def fill_load(scene, first, m):
-    """Fill what is held of m of `stiction.cones`: L' times the multipliers."""
-    sweep, n = scene.sweep, active_count(scene)
-    for k in range(first, n):
-        m[k - first] = 0.0
-        for j in range(k, n):
-            # a multiplier of a pivot that is infinite is none
-            if sweep.skyline[j] <= k and sweep.multiplier[j] != 0.0:
-                m[k - first] += sweep.A[j, k] * sweep.multiplier[j]
-
-
-@jitable
-def capacity(scene, s):
-    """Return what slot s holds at most."""
-    held = scene.contacts.friction_par[contact_of(scene, s), 0]
-    return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
-
-
-@jitable
-def most_capacity(scene):
-    """Return what the slot that sticks best holds at most."""
-    slot, most = scene.equations.slot, 0.0
-    for e in range(first_of_slots(scene), len(slot), 2):
-        if sticks(scene, e):
-            most = max(most, capacity(scene, slot[e]))
-    return most
-
-
-@jitable
-def fill_cones(scene, t, y, most):
-    """Fill limits, slips and load of all slots that stick; return rows and equations in use.
-
-    p and multipliers stay.
-    """
-    sweep, slot, active = scene.sweep, scene.equations.slot, scene.equations.active
-    first, begin, count, n = first_of_slots(scene), 0, 0, active_count(scene)
-    while begin < n and active[begin] < first:
-        begin += 1
-    fill_load(scene, begin, sweep.cone[LOAD])
-    for k in range(len(sweep.p)):
-        for i in range(6):
-            sweep.kept_p[k, i] = sweep.p[k, i]
-    for e in range(first, len(slot), 2):
-        if sticks(scene, e):
-            sweep.cone[WHICH, count // 2] = e
-            sweep.cone[CAPACITY, count // 2] = max(capacity(scene, slot[e]), LEAST_PART * most)
-            fill_slip(scene, t, y, e, begin, sweep.share[count])
-            fill_slip(scene, t, y, e + 1, begin, sweep.share[count + 1])
-            count += 2
-    for k in range(len(sweep.p)):
-        for i in range(6):
-            sweep.p[k, i] = sweep.kept_p[k, i]
-    return count, n - begin
-
-
-@jitable
-def is_loaded(scene, r):
-    """Return whether anything is to be held."""
-    for k in range(r):
-        if scene.sweep.cone[LOAD, k] != 0.0:
-            return True
-    return False
-
-
-@jitable
-def spread(scene, t, y, most):
-    """Share what is held out over all slots that stick, in `Work.held`."""
-    sweep, slot = scene.sweep, scene.equations.slot
-    count, r = fill_cones(scene, t, y, most)
-    if not is_loaded(scene, r):
-        return
-    level, _ = solve_cones(sweep.share, count, r, sweep.cone, sweep.mix, SHARED)
-    for k in range(count):
-        s = slot[int(sweep.cone[WHICH, k // 2])]
-        scene.work.held[s, k % 2] = sweep.cone[HELD_BY, k] / level
-
-
-@jitable
-def share_held(scene, t, y):
-    """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
-    held, active, first = scene.work.held, scene.equations.active, first_of_slots(scene)
-    slot, count = scene.equations.slot, 0
-    for e in range(first, len(slot), 2):
-        held[slot[e], 0] = held[slot[e], 1] = 0.0
-        count += 2 if sticks(scene, e) else 0
-    if count == 0:
-        return
-    for r in range(active_count(scene)):
-        if active[r] >= first:
-            held[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
-            count -= 1
-    most = most_capacity(scene)
-    if count > 0 and most > 0.0:
-        spread(scene, t, y, most)
-    for e in range(first, len(slot), 2):
-        if sticks(scene, e) and scene.work.touching[slot[e]] == 1:
-            show_held(scene, slot[e])
-
-
-@jitable
-def show_held(scene, s):
-    """Write the force on slot s with what holds it."""
-    row, held = scene.work.slot[s], scene.work.held[s]
-    point = scene.work.points[s]
-    n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
-    rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))
-    force = add(scale(row[NORMAL], n), rubs)
-    for k in range(3):
-        row[FORCE + k] = force[k]
 
 
 @jitable

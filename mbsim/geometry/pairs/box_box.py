@@ -227,7 +227,8 @@ def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
     """Write the vertices of the two faces' common polygon, seen along n, into their rows.
 
     n is the axis `best` of the 15. Return the area of what overlaps of the polygon, seen along n,
-    if that is asked for.
+    if that is asked for. Long because each vertex needs the components of both faces' axes, which
+    are some thirty numbers.
     """
     # the faces that look at each other: J's along n, I's against it
     kj = _steepest(n[0], n[1], n[2])

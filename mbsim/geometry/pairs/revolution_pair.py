@@ -172,7 +172,8 @@ def rims_cross(a, b, n, sign):
 def put_disc(points, first, arcs, own, other, n, side, start, stop, crossed, f):
     """Write the points of a disc's rim over the other disc, from `start` round to `stop`.
 
-    `arcs` is a row to work in; `side` is 1 for the disc of I, -1 for that of J.
+    `arcs` is a row to work in; `side` is 1 for the disc of I, -1 for that of J. Many arguments
+    because compiled code is given numbers, not records.
     """
     centre, r, o, u, _ = own
     # depth = side (q - p).oo / n.oo along n, with oo, q of the other disc; it rises along u

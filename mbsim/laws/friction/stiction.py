@@ -164,7 +164,7 @@ def rigid(inputs, memory, mu_static, mu_dynamic):
         "STICTION", rigid, ("mu_static", "mu_dynamic"), memory=5, takes_function=True, modes=True
     ),
 )
-def stiction(
+def stiction(  # noqa: C901
     inputs,
     memory,
     mu_static,
@@ -176,7 +176,11 @@ def stiction(
     torsion_radius,
     incremental,
 ):
-    """Return (Fx, ..., energy of the springs, mode, branch, size, unit) and what is kept, rates."""
+    """Return (Fx, ..., energy of the springs, mode, branch, size, unit) and what is kept, rates.
+
+    Long, and with many branches, because sticking and slipping begin from the same memory and end
+    in the same one: cut in two, each half would take a dozen numbers and return as many.
+    """
     k, growth, of_depth = tangential_stiffness, 0.0, math.isnan(tangential_stiffness)
     if of_depth:
         k = 2.0 * (1.0 - poisson_ratio) / (2.0 - poisson_ratio) * inputs.stiffness

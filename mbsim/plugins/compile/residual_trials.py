@@ -10,13 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from mbsim.errors import ModelError
-from mbsim.laws.residual import (
-    ALGEBRAIC,
-    DIFFERENTIAL,
-    KINDS,
-    SWITCHING,
-    inputs,
-)
+from mbsim.laws.residual import ALGEBRAIC, DIFFERENTIAL, KINDS, SWITCHING, inputs
 from mbsim.plugins.compile.dual import Dual, slope
 from mbsim.plugins.helpers import StopRun, host
 from mbsim.plugins.returned import numbers

@@ -10,12 +10,7 @@ from mbsim.errors import ModelError
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins.source.octave import SUFFIX, OctaveFile, read_octave
 from mbsim.plugins.source.script import Script, Scripts, load_script, require
-from mbsim.plugins.source.shared_library import (
-    Library,
-    choose,
-    is_library,
-    read_library,
-)
+from mbsim.plugins.source.shared_library import Library, choose, is_library, read_library
 
 Found = TypeVar("Found", Script, Script | Library | OctaveFile)
 

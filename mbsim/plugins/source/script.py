@@ -20,9 +20,7 @@ from typing import Any
 from mbsim.errors import ModelError
 from mbsim.plugins.helpers import namespace
 from mbsim.plugins.source.diagnose import diagnose
-from mbsim.plugins.source.shared_library import (
-    is_library,
-)
+from mbsim.plugins.source.shared_library import is_library
 
 #: Names of the arguments of a friction function, in order.
 CFFSUB = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"

@@ -1,0 +1,28 @@
+"""Which constraint equations are in use."""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+
+
+@jitable
+def active_count(scene):
+    """Return the number of equations in use."""
+    active = scene.equations.active
+    return active[len(active) - 1]
+
+
+@jitable
+def is_active(scene, e):
+    """Return whether equation e is in use."""
+    active = scene.equations.active
+    for r in range(active_count(scene)):
+        if active[r] == e:
+            return True
+    return False
+
+
+@jitable
+def is_friction(scene, e):
+    """Return whether equation e is of friction: it holds only while that sticks."""
+    return scene.equations.dry[e] >= 0 or scene.equations.slot[e] >= 0

@@ -1,0 +1,129 @@
+"""Where the slots of rigid stiction are: contact points and normals, and how they move."""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import BODY_SIZE
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, norm, sub, vector
+from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
+from mbsim.dynamics.constraints.selection import sticks
+from mbsim.dynamics.contact.forces import contact_of, sides, tangent
+from mbsim.dynamics.stiction.rigid_shares import first_of_slots
+
+#: Half of the time over which rates of a contact's place are found, over that in which the model's
+#: speed goes its length: truncation and rounding are about as large.
+MOMENT = 1e-5
+#: What of a second difference, over the model's length, is no jump of the point from one place to
+#: another.
+SMOOTH = 1e-8
+
+
+@jitable
+def move_on(scene, y, b, time):
+    """Let body b go on for a time as it moves."""
+    if b == len(scene.bodies.mass):
+        return
+    at, half = BODY_SIZE * b, 0.5 * time
+    w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+    a, c, d = y[at + 10], y[at + 11], y[at + 12]
+    for k in range(3):
+        y[at + k] += time * y[at + 7 + k]
+    y[at + 3] += half * (-x * a - yy * c - z * d)
+    y[at + 4] += half * (w * a + yy * d - z * c)
+    y[at + 5] += half * (w * c + z * a - x * d)
+    y[at + 6] += half * (w * d + x * c - yy * a)
+    place_body(scene, y, b)
+
+
+@jitable
+def pose(scene, y, b):
+    """Return position and quaternion of body b; anything for ground."""
+    at = BODY_SIZE * b if b < len(scene.bodies.mass) else 0
+    return (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
+
+
+@jitable
+def put_pose(scene, y, b, kept):
+    """Put body b back to a pose."""
+    if b == len(scene.bodies.mass):
+        return
+    for k in range(7):
+        y[BODY_SIZE * b + k] = kept[k]
+    place_body(scene, y, b)
+
+
+@jitable
+def look(scene, y, pair, row):
+    """Fill a row of `Work.look` with the candidates of a pair."""
+    pairs, kinds, graphics, work = scene.pairs, scene.kinds, scene.graphics, scene.work
+    kind, i, j = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
+    for g in (i, j):
+        if graphics.body[g] < len(scene.bodies.mass):
+            place_graphic(scene, y, g)
+    points = work.look[row]
+    frames, size = work.frames, graphics.size
+    call_int(kinds.kernel[kind], (frames[i], size[i], frames[j], size[j], points))
+    if kinds.swapped[kind] == 1:
+        for s in range(kinds.slots[kind]):
+            for k in range(4, 7):
+                points[s, k] = -points[s, k]
+
+
+@jitable
+def look_around(scene, y, pair, moment):
+    """Fill all rows of `Work.look`: now, a moment later, a moment before."""
+    graphics, pairs = scene.graphics, scene.pairs
+    bi = graphics.body[pairs.graphic_i[pair]]
+    bj = graphics.body[pairs.graphic_j[pair]]
+    kept_i, kept_j = pose(scene, y, bi), pose(scene, y, bj)
+    for row in range(3):
+        # the last as it is
+        time = moment if row == 0 else -moment
+        if row < 2:
+            move_on(scene, y, bi, time)
+            move_on(scene, y, bj, time)
+        look(scene, y, pair, (row + 1) % 3)
+        put_pose(scene, y, bi, kept_i)
+        put_pose(scene, y, bj, kept_j)
+
+
+@jitable
+def fill_hold(scene, t, y, s, moment):
+    """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
+    points, row = scene.work.look, scene.work.hold[s]
+    k = s - scene.pairs.slot[scene.slots.pair[s]]
+    now, later, before = points[0, k], points[1, k], points[2, k]
+    ahead = sub(vector(later[1:4]), vector(now[1:4]))
+    back = sub(vector(now[1:4]), vector(before[1:4]))
+    jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
+    first, last, time = 2, 1, 2.0 * moment
+    if jump > 0.1 * way + SMOOTH * scene.world.scale[0]:
+        # the shapes touch at another corner: the side on which they do not
+        if norm(ahead) < norm(back):
+            first, time = 0, moment
+        else:
+            last, time = 0, moment
+    n = vector(now[4:7])
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
+    for i in range(3):
+        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], x[i]
+        row[9 + i] = (points[last, k, 1 + i] - points[first, k, 1 + i]) / time
+        row[12 + i] = (points[last, k, 4 + i] - points[first, k, 4 + i]) / time
+
+
+@jitable
+def place_held(scene, t, y):
+    """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
+    slot, last = scene.equations.slot, -1
+    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if not sticks(scene, e):
+            continue
+        pair = scene.slots.pair[slot[e]]
+        if pair != last:
+            look_around(scene, y, pair, moment)
+            last = pair
+        fill_hold(scene, t, y, slot[e], moment)

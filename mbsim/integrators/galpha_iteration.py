@@ -1,0 +1,351 @@
+"""The unknowns of a step of generalised-alpha, and Newton's iteration for them: see `galpha`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.address import call_float, call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
+from mbsim.integrators.newton import (
+    GO_ON,
+    LEFT,
+    OFF,
+    QUARTER,
+    SOLVED,
+    as_failure,
+    begin,
+    is_rate,
+    judge,
+    linearise,
+    may_help,
+    note,
+    target,
+    unless_singular,
+)
+from mbsim.integrators.rotation import turn
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    FACTORED_STEP,
+    FACTORIZATIONS,
+    FRESH,
+    HAVE_JACOBIAN,
+    LAST_STEP,
+    RATE,
+    RETRY,
+    TOL,
+    project,
+)
+
+#: What a step leaves of a vibration that is fast against it.
+RHO = 0.8
+AM, AF = (2.0 * RHO - 1.0) / (RHO + 1.0), RHO / (RHO + 1.0)
+GAMMA = 0.5 - AM + AF
+BETA = 0.25 * (GAMMA + 0.5) ** 2
+#: a is v' + SHIFT h v'' + ...
+SHIFT = AM - AF
+
+#: Corrections in one step at most: with an old linearisation, which another may better, with one
+#: of this step, and with a linearisation and a line search for each.
+MOST_OLD, MOST_NEW, MOST_DAMPED = 6, 12, 20
+#: The second correction may be larger than the first by so much: work and losses, which only sum
+#: up what bodies do, are a correction late.
+LATE = 3.0
+#: The least part of a correction that a line search takes.
+LEAST_PART = 1.0 / 128.0
+#: A linearisation is kept for another step where the iteration converged so fast with it.
+KEEP = 0.2
+#: A turn across an angular velocity, over that, which is none but for rounding.
+SWUNG = 1e-14
+
+# rows of k: f at the iterate, residual, correction, the one that a line search foretells, a at
+# begin and end, a before a line search, f at the trial point
+F, R, D, D_NEXT, A0, A1, A_BEFORE, LAST = range(1, 9)
+# rows of `kept`: a and v' at the end of the last step, and the mean v'' of that step
+ALGORITHMIC, DOT, SLOPE = range(3)
+
+
+@jitable
+def evaluate(p, m, t, h, anew):
+    """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
+    settle(p, m, t, h)
+    if anew:
+        return linearise(p, m, t + h, h, m.trial, m.k[F])
+    m.counts[EVALUATIONS] += 1
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[F]))
+
+
+@jitable
+def correction(p, m, t, h, d):
+    """Write Newton's correction of y for the f evaluated last into d; return code and size."""
+    if m.memory[FACTORED_STEP] != h:
+        code = factor(p, m, t, h)
+        if code != 0:
+            return unless_singular(code), 0.0
+    end = BODY_SIZE * m.bodies[0]
+    for i in range(len(m.y)):
+        m.k[R, i] = m.k[F, i] - true_rate(m, i) if is_rate(i, end) else 0.0
+    code = call_int(p.solve, (p.context, t, h, m.k[R], d))
+    if code != 0:
+        return code, 0.0
+    return 0, call_float(p.norm, (p.context, t, 0.0, d, m.trial))
+
+
+@jitable
+def take(m, h, part, d):
+    """Add a part of the correction d of y to a.
+
+    The unknown is a, in turns as in shifts: with c1 dtheta - dtheta x w / 2 = dw of the linear
+    system, a changes by dtheta / (beta h^2), not by dw / (gamma h).
+    """
+    end = BODY_SIZE * m.bodies[0]
+    step = part / (GAMMA * h)
+    for i in range(len(m.y)):
+        if is_rate(i, end):
+            m.k[A1, i] += step * d[i]
+    half = 0.5 * BETA * h / GAMMA * step
+    for at in range(10, end, BODY_SIZE):
+        wx, wy, wz = m.trial[at], m.trial[at + 1], m.trial[at + 2]
+        m.k[A1, at] += half * (d[at + 1] * wz - d[at + 2] * wy)
+        m.k[A1, at + 1] += half * (d[at + 2] * wx - d[at] * wz)
+        m.k[A1, at + 2] += half * (d[at] * wy - d[at + 1] * wx)
+
+
+@jitable
+def iterate(p, m, t, h, anew):
+    """Solve for a by Newton's simplified iteration; return a code, < 0 for no solution."""
+    begin(m)
+    most = MOST_NEW if anew else MOST_OLD
+    before, rate, word, iteration = 0.0, 0.0, GO_ON, 0
+    while word == GO_ON:
+        iteration += 1
+        code = evaluate(p, m, t, h, anew and iteration == 1)
+        if code != 0:
+            return code
+        code, size = correction(p, m, t, h, m.k[D])
+        if code != 0:
+            return code
+        take(m, h, 1.0, m.k[D])
+        word, rate = judge(m, iteration, most, size, before, rate, LATE)
+        before = size
+    m.memory[RATE] = rate
+    return 0 if word == SOLVED else -1
+
+
+@jitable
+def search(p, m, t, h, size):
+    """Take the largest part of a correction after which the next is smaller; return a code.
+
+    That is Deuflhard's natural test: it does not depend on the scales of the equations.
+    """
+    for i in range(len(m.y)):
+        m.k[A_BEFORE, i] = m.k[A1, i]
+    part = 1.0
+    while part >= LEAST_PART:
+        for i in range(len(m.y)):
+            m.k[A1, i] = m.k[A_BEFORE, i]
+        take(m, h, part, m.k[D])
+        code = evaluate(p, m, t, h, False)
+        if not may_help(code):
+            return code
+        if code == 0:
+            code, left = correction(p, m, t, h, m.k[D_NEXT])
+            if code == 0 and left <= (1.0 - 0.25 * part) * size:
+                return 0
+        part *= 0.5
+    return -1
+
+
+@jitable
+def iterate_damped(p, m, t, h):
+    """Solve for a with a linearisation and a line search for each correction; return a code."""
+    m.memory[RETRY] = QUARTER
+    for _ in range(MOST_DAMPED):
+        code = evaluate(p, m, t, h, True)
+        if code != 0:
+            return code
+        code, size = correction(p, m, t, h, m.k[D])
+        if code != 0:
+            return code
+        note(m, size)
+        if size <= target(m.memory[TOL]):
+            take(m, h, 1.0, m.k[D])
+            m.memory[RATE] = 0.0
+            return 0
+        code = search(p, m, t, h, size)
+        if code == -1 and size <= LEFT * m.memory[TOL]:
+            # nothing is better: what is left is rounding
+            for i in range(len(m.y)):
+                m.k[A1, i] = m.k[A_BEFORE, i]
+            m.memory[RATE] = 0.0
+            return 0
+        if code != 0:
+            return code
+    return -1
+
+
+@jitable
+def arrive(p, m, t, h):
+    """Write the point that a leads to into m.trial, and f there; return a code."""
+    if settle(p, m, t, h):
+        show_drift(p, m, t, h)
+    m.counts[EVALUATIONS] += 1
+    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[LAST]))
+
+
+@jitable
+def is_off(p, m, t, h):
+    """Return whether f where a leads to is so far from what a says that it matters in the step.
+
+    Corrections of a linearisation in touch are small where nothing is touched any more, however
+    large a residual they leave. Of that, what is across joints is none.
+    """
+    e, w, end = m.error, m.k[D], BODY_SIZE * m.bodies[0]
+    for i in range(len(m.y)):
+        e[i] = h * (m.k[LAST, i] - true_rate(m, i)) if is_rate(i, end) else 0.0
+    most = OFF * m.memory[TOL]
+    if call_float(p.norm, (p.context, t, h, e, m.trial)) <= most:
+        return False
+    for i in range(end):
+        w[i] = m.trial[i] + e[i]
+    for i in range(end, len(m.y)):
+        w[i] = m.trial[i]
+    project(p, m, t + h, h, w)
+    for i in range(end):
+        e[i] = w[i] - m.trial[i]
+    return not call_float(p.norm, (p.context, t, h, e, m.trial)) <= most
+
+
+@jitable
+def solve_step(p, m, t, h):
+    """Solve for a, with a linearisation kept if one is good, anew, then damped, and f there.
+
+    Returns a code.
+    """
+    good = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[RATE] <= KEEP
+    code = -1
+    for level in range(0 if good else 1, 3):
+        foretell(m, h)
+        code = iterate_damped(p, m, t, h) if level == 2 else iterate(p, m, t, h, level == 1)
+        if code == 0:
+            code = arrive(p, m, t, h)
+        if code == 0 and level < 2 and is_off(p, m, t, h):
+            code = iterate_damped(p, m, t, h)
+            if code == 0:
+                code = arrive(p, m, t, h)
+        if code == 0 or not may_help(code):
+            return code
+    # what fails may still be near a better one
+    m.memory[HAVE_JACOBIAN] = 0.0
+    return as_failure(code)
+
+
+@jitable
+def factor(p, m, t, h):
+    """Factor the system of a step of length h; return a code."""
+    m.counts[FACTORIZATIONS] += 1
+    part = (1.0 - AM) / (1.0 - AF)
+    c = np.array((GAMMA / (BETA * h), part / (BETA * h * h), part / (GAMMA * h), 1.0))
+    code = call_int(p.factor, (p.context, t, h, c, c))
+    m.memory[FACTORED_STEP] = h if code == 0 else 0.0
+    return code
+
+
+@jitable
+def foretell(m, h):
+    """Write a at the begin for a step of length h, and as it is at the end if v'' stays."""
+    before = step_before(m)
+    for i in range(len(m.y)):
+        slope, dot = m.kept[SLOPE, i], m.kept[DOT, i]
+        a = m.kept[ALGORITHMIC, i] + SHIFT * (h - before) * slope
+        m.k[A0, i] = a
+        m.k[A1, i] = ((1.0 - AF) * (dot + h * slope) + AF * dot - AM * a) / (1.0 - AM)
+
+
+@jitable
+def true_rate(m, i):
+    """Return v' at the end of the step, of a at its begin and end."""
+    a0, a1 = m.k[A0, i], m.k[A1, i]
+    return ((1.0 - AM) * a1 + AM * a0 - AF * m.kept[DOT, i]) / (1.0 - AF)
+
+
+@jitable
+def mean_velocity(m, h, i):
+    """Return the velocity y[i] in the mean of the step, which positions see."""
+    return m.y[i] + h * ((0.5 - BETA) * m.k[A0, i] + BETA * m.k[A1, i])
+
+
+@jitable
+def place(m, h):
+    """Write the point that a leads to into m.trial."""
+    y, w, end = m.y, m.trial, BODY_SIZE * m.bodies[0]
+    for i in range(len(y)):
+        if is_rate(i, end):
+            w[i] = y[i] + h * ((1.0 - GAMMA) * m.k[A0, i] + GAMMA * m.k[A1, i])
+    for at in range(0, end, BODY_SIZE):
+        for i in range(at, at + 3):
+            w[i] = y[i] + h * mean_velocity(m, h, i + 7)
+        wx, wy = mean_velocity(m, h, at + 10), mean_velocity(m, h, at + 11)
+        turn(y, at, h, wx, wy, mean_velocity(m, h, at + 12), w)
+
+
+@jitable
+def swung(m):
+    """Return whether a body was turned between m.error and m.trial across its angular velocity.
+
+    The turn is twice the vector part of conj(q) q' in body axes.
+    """
+    p, q = m.error, m.trial
+    for at in range(3, BODY_SIZE * m.bodies[0], BODY_SIZE):
+        x = p[at] * q[at + 1] - p[at + 1] * q[at] - p[at + 2] * q[at + 3] + p[at + 3] * q[at + 2]
+        y = p[at] * q[at + 2] + p[at + 1] * q[at + 3] - p[at + 2] * q[at] - p[at + 3] * q[at + 1]
+        z = p[at] * q[at + 3] - p[at + 1] * q[at + 2] + p[at + 2] * q[at + 1] - p[at + 3] * q[at]
+        u, v, w = p[at + 7], p[at + 8], p[at + 9]
+        across = max(abs(y * w - z * v), max(abs(z * u - x * w), abs(x * v - y * u)))
+        if across > SWUNG * max(abs(u), max(abs(v), abs(w))):
+            return True
+    return False
+
+
+@jitable
+def settle(p, m, t, h):
+    """Write the point that a leads to into m.trial, where joints allow it, and let a follow.
+
+    Returns whether it was projected twice: the norm has then not seen how far the first went.
+    So a has across joints what velocities on them ask for, as in a formulation of index 2, and
+    what is stiff does not come in. Of free bodies `project` leaves velocities as they are.
+    """
+    place(m, h)
+    end = BODY_SIZE * m.bodies[0]
+    for i in range(end):
+        m.error[i] = m.trial[i]
+    project(p, m, t + h, h, m.trial)
+    twice = swung(m)
+    if twice:
+        # that turned velocities along joints as well, in body axes: only what is across counts
+        for at in range(7, end, BODY_SIZE):
+            for i in range(at, at + 6):
+                m.trial[i] = m.error[i]
+        project(p, m, t + h, h, m.trial)
+    for at in range(7, end, BODY_SIZE):
+        for i in range(at, at + 6):
+            m.k[A1, i] += (m.trial[i] - m.error[i]) / (GAMMA * h)
+    return twice
+
+
+@jitable
+def show_drift(p, m, t, h):
+    """Let the norm see by how much joints put the trial point right."""
+    n = len(m.y)
+    for i in range(n):
+        m.k[D, i] = m.trial[i]
+    place(m, h)
+    project(p, m, t + h, h, m.trial)
+    for i in range(n):
+        m.trial[i] = m.k[D, i]
+
+
+@jitable
+def step_before(m):
+    """Return the length of the last step; at the start `kept` is as after one of no length."""
+    return 0.0 if m.memory[FRESH] == 1.0 else m.memory[LAST_STEP]

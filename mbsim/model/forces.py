@@ -1,0 +1,189 @@
+"""The forces of a deck beside contacts, as `elements` has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbsim.expressions import Expression
+from mbsim.model.source import Source, Subroutine
+
+
+@dataclass(frozen=True)
+class SpringDamper:
+    """Force_SpringDamper, Adams' SPRINGDAMPER: F = preload - k (x - length) - c dx/dt.
+
+    `type` TRANSLATIONAL: x [L] is the distance of the markers, F > 0 pushes them apart;
+    ROTATIONAL: x [rad] is the angle of I about J's z, F the torque on I about it.
+    """
+
+    id: int
+    type: str = "TRANSLATIONAL"
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    length: float = 0.0
+    preload: float = 0.0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class ScalarForce:
+    """Force_Scalar_TwoBody, Adams' SFORCE: an expression along the line of two markers, or about z.
+
+    `type` TRANSLATIONAL: a positive force pushes I and J apart; ROTATIONAL: a positive torque
+    acts on I about J's z. `action_only`: nothing acts on J; the line (or axis) is J's z.
+    """
+
+    id: int
+    type: str
+    expr: Expression
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    action_only: bool = False
+    user: Subroutine | None = None  # `expr` is then what it returns
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class MarkerForce:
+    """A force between two markers of one of the kinds in `forces.catalog`.
+
+    `parameters` are the attributes of its statement by name, defaults among them.
+    """
+
+    id: int
+    kind: str
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    parameters: tuple[tuple[str, Any], ...] = ()
+    source: Source = Source()
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The attributes by name."""
+        return dict(self.parameters)
+
+
+@dataclass(frozen=True)
+class VectorForce:
+    """Force_Vector_TwoBody, Adams' VFORCE, VTORQUE and GFORCE: six expressions.
+
+    `exprs` are force and torque on I along the axes of the reference marker (None and 0: global),
+    None where there is none. The body of the floating J marker takes the opposite at the origin
+    of I, wherever that marker is.
+    """
+
+    id: int
+    type: str = "FORCEANDTORQUE"
+    exprs: tuple[Expression | None, ...] = (None,) * 6
+    label: str = ""
+    i_marker_id: int = 0
+    j_floating_marker_id: int = 0
+    ref_marker_id: int | None = None
+    user: Subroutine | None = None  # `exprs` are then what it returns
+    source: Source = Source()
+
+    @property
+    def action_only(self) -> bool:
+        """Whether nothing acts on a second body."""
+        return False
+
+
+@dataclass(frozen=True)
+class BodyForce(VectorForce):
+    """Force_Vector_OneBody: the same on I alone."""
+
+    @property
+    def action_only(self) -> bool:
+        """Whether nothing acts on a second body."""
+        return True
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """Force_JointFriction: a friction law in a joint, pressed by the joint's own reaction.
+
+    Normal force: the reaction across the free axis (of SPHERICAL all of it) + `preload` + the
+    reaction torque across that axis over `bending_reaction_arm`, where that is > 0.
+    """
+
+    id: int
+    joint_id: int
+    label: str = ""
+    cff_type: str = "COULOMB_ON"
+    mu_static: float = 0.0
+    mu_dynamic: float = 0.0
+    stiction_trans_vel: float = 1e-3  # [L/T]
+    friction_trans_vel: float = 1e-3  # [L/T]
+    pin_radius: float | None = None  # REVOLUTE, CYLINDRICAL [L]
+    ball_radius: float | None = None  # SPHERICAL [L]
+    preload: float = 0.0  # [F]
+    bending_reaction_arm: float = 0.0  # [L]
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """Force_JointLimit (ours): a normal law pushes a joint's displacement back between bounds.
+
+    `direction` T: of I along J's z [L]; R: the angle about it [rad], whole turns counted. The
+    law's force is then a torque, and its depth an angle.
+    """
+
+    id: int
+    joint_id: int
+    direction: str
+    label: str = ""
+    lower: float | None = None
+    upper: float | None = None
+    cnf_type: str = "IMPACT"
+    stiffness: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    dmax: float | None = None
+    penalty: float = 0.1
+    restitution_coef: float | None = None
+    ref_velocity: float | None = None
+    normal_trans_vel: float = 1e-3
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    """Force_DryFriction (ours; Muscade's DryFriction): a slider, with a spring in series.
+
+    `type` TX, TY, TZ: along that axis of J [L]; RX, RY, RZ: the angle about it [rad]. `friction`
+    is the force or torque of slip, `friction_static` the one that begins it, and `dx` what the
+    spring gives until it reaches `friction`: its stiffness is friction/dx. 0: there is none.
+    """
+
+    id: int
+    type: str
+    friction: float
+    dx: float = 0.0
+    friction_static: float | None = None
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class ForceElement:
+    """Force_Element (ours): forces along and about axes of J by a user's residual.
+
+    `directions` are TX ... RZ, each once. The function and its unknowns are in the user's script.
+    """
+
+    id: int
+    directions: tuple[str, ...]
+    user: Subroutine
+    label: str = ""
+    i_marker_id: int = 0
+    j_marker_id: int = 0
+    source: Source = Source()

@@ -1,0 +1,31 @@
+"""What the elements of a deck have in common: where they stand, and subroutines of the user."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+#: Marks a field from which no result follows: where a file is, how a deck says something.
+ASIDE = "aside"
+NO_RESULT = {ASIDE: True}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an element stands: deck file and line."""
+
+    file: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Subroutine:
+    """A user subroutine as the deck names it: USER(...) values, function, file."""
+
+    par: tuple[float, ...] = ()
+    fnc_name: str = ""
+    dll_name: str = field(default="", metadata=NO_RESULT)  # absolute path of a library, or empty
+    # absolute path, or empty where --plugin must give it
+    script_name: str = field(default="", metadata=NO_RESULT)
+    interpreter: str = ""
+    language: str = ""  # of the library's function: C, FORTRAN, or empty where its name tells
+    source: Source = Source()
