@@ -12,11 +12,9 @@ import numpy as np
 from numba import types
 
 from mbsim.arrays.scene import (
-    BALL_FRICTION,
     BEND_DOOR,
     MARKER_FORCE,
     RESIDUAL,
-    SLIDE_FRICTION,
     SLOPES_DOOR,
     TANGENT_DOOR,
     Scene,
@@ -166,7 +164,7 @@ def open_slopes(scene: Scene) -> None:
     if len(scene.applied.kind) == 0 and len(scene.states.program) == 0:
         return
     kinds = set(scene.applied.kind.tolist())
-    rubs = bool(kinds & set(range(SLIDE_FRICTION, BALL_FRICTION + 1)))
+    rubs = bool((scene.applied.connection >= 0).any())
     hook = _slopes_with_rubs if rubs else _slopes
     if MARKER_FORCE in kinds:
         hook = _slopes_with_both if rubs else _slopes_with_marker_forces

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import types
 
-from mbsim.arrays.scene import JOINTS_DOOR, SLIDE_FRICTION, Scene
+from mbsim.arrays.scene import JOINTS_DOOR, Scene
 from mbsim.core import jit
 from mbsim.core.address import vector_at, view
 from mbsim.dynamics.pipeline.constraint_hooks import serve
@@ -30,6 +30,6 @@ def _limbs(context, what, t, y, dy):
 
 def open_joints(scene: Scene) -> None:
     """Put what joints are asked for behind their door; a tree alone compiles no equations."""
-    rubs = bool((scene.applied.kind >= SLIDE_FRICTION).any())
-    served = _joints if len(scene.equations.program) > 0 or rubs else _limbs
+    settles = bool(scene.applied.with_reactions.any())
+    served = _joints if len(scene.equations.program) > 0 or settles else _limbs
     scene.world.doors[JOINTS_DOOR] = jit.address(served, _JOINTS)
