@@ -1,7 +1,7 @@
 """The stiff decks of `models/stiff/`: what each is, and the table of positions that it is held to.
 
 A deck's table lies beside it: `NAME.csv`, comments first, then a line a time with positions of
-centres of mass, `2/x` being x of body 2. `tests/models/stiff_references.py` writes the tables.
+centres of mass, `2/x` being x of body 2. `tests/stiff_references.py` writes the tables.
 """
 
 from __future__ import annotations

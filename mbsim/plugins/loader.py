@@ -587,7 +587,7 @@ def _run(code: types.CodeType, path: Path, element: str) -> dict[str, Any]:
     module.__dict__.update(namespace(), __file__=str(path))
     # dataclasses look their module up, and a script may import its neighbours
     sys.modules[module.__name__] = module
-    sys.path.insert(0, str(path.parent))
+    sys.path.insert(0, str(path.parent))  # noqa: TID251
     try:
         with contextlib.redirect_stdout(sys.stderr):
             exec(code, module.__dict__)
@@ -600,6 +600,6 @@ def _run(code: types.CodeType, path: Path, element: str) -> dict[str, Any]:
         what = traceback.format_exception_only(type(error), error)[-1].strip()
         raise ModelError(f"{element}: {place}: the script fails when it is read: {what}") from None
     finally:
-        sys.path.remove(str(path.parent))
+        sys.path.remove(str(path.parent))  # noqa: TID251
         del sys.modules[module.__name__]
     return module.__dict__

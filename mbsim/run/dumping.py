@@ -213,8 +213,9 @@ class ContactProblems:
             work.force[:nb], work.torque[:nb] = given[:, :3], given[:, 3:]
             dy = np.zeros(len(y))
             self._accelerate(t, y, dy)
-            for b in np.flatnonzero(scene.tree.of_body[:nb] >= 0):
-                at = BODY_SIZE * int(b) + 7
+            for row in np.flatnonzero(scene.tree.of_body[:nb] >= 0):
+                b = int(row)
+                at = BODY_SIZE * b + 7
                 found[b] = np.hstack([dy[at : at + 3], work.R[b] @ dy[at + 3 : at + 6]])
         return found.ravel()
 

@@ -13,11 +13,12 @@ from mbsim.dynamics.initial.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balanc
 from mbsim.dynamics.initial.equilibrium_states import Rest, settle_states
 from mbsim.errors import SolverError
 from mbsim.expressions.elementary import NUMBER, TIME
-from mbsim.model.elements import Static
+from mbsim.model.elements import Simulation, Static
 from mbsim.model.names import element_name
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+    from mbsim.run.hook_calls import HookCalls
 
 Array = np.ndarray[Any, Any]
 
@@ -126,3 +127,39 @@ def _failure(system: System, found: Balance, t: float) -> str:
         f"no static equilibrium found at time {t:.9g} in {found.iterations} iterations: "
         f"{_share(found)}; {why}"
     )
+
+
+def balance_bodies(
+    system: System,
+    hooks: HookCalls,
+    simulation: Simulation,
+    at: Array,
+    f: Array,
+    tell: Callable[[str], None],
+) -> None:
+    """Put the bodies of the state `at` into equilibrium; `f` has its length, and is scratch."""
+    t, problem, scene = simulation.start_time, hooks.problem, system.scene
+    asked = Hooks(
+        lambda y, f: hooks.call(problem.rhs, t, 0.0, y, f),
+        lambda y: hooks.call(problem.project, t, 0.0, y, y),
+        lambda y, f: hooks.call(problem.commit, t, 0.0, y, f),
+        hooks.joints_at(t),
+    )
+    groups = (scene.state, scene.pairs, scene.crowds, scene.log, scene.rows)
+    before = [[np.array(array) for array in group] for group in groups]
+
+    # there are no steps here that could end where friction changes
+    scene.state.frozen[0] = 0
+    y = at.copy()
+    find(system, y, t, asked, simulation.static, tell)
+    # turns are counted on the way; all else is as if the bodies had jumped
+    turns = scene.state.angle.copy()
+    for group, kept in zip(groups, before, strict=True):
+        for array, old in zip(group, kept, strict=True):
+            array[...] = old
+    scene.state.angle[...] = turns
+    at[...] = y
+    for _ in range(2):
+        # near pairs of crowds are listed first, then looked at
+        hooks.call(problem.rhs, t, 0.0, at, f)
+        hooks.call(problem.commit, t, 0.0, at, f)

@@ -6,20 +6,14 @@ python -m pytest -m bench -s tests/bench/test_accuracy.py
 from __future__ import annotations
 
 import functools
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, USERFUNCS, contact, run_deck, run_model, sphere
-from models.reference import angle_between, top_attitude
-from models.test_models import rotation_matrices
-from validation.test_contact_physics import RESTITUTION
-
+from helpers.decks import GROUND, contact, run_deck, run_model, sphere
+from helpers.folders import USERFUNCS
+from helpers.reference import RESTITUTION, angle_between, rotation_matrices, top_attitude
 from mbsim.integrators.catalog import SCHEMES, load
 
 pytestmark = pytest.mark.bench

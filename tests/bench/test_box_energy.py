@@ -5,20 +5,14 @@ python -m pytest -m bench -s tests/bench/test_box_energy.py
 
 from __future__ import annotations
 
-import sys
 import time
-from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from contracts.test_polyhedra import CUBE, box, box_mesh, mesh, rotation
-from decks_io import contact, run_deck
-from validation.test_flat_shapes import FLOATING, cube
-
+from helpers.decks import FLOATING, contact, cube, run_deck
+from helpers.polyhedra import CUBE, box, box_mesh, mesh, rotation
 from mbsim.compile_model.contacts import pair_address
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import PAIRS, POINT

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-import joint_chain
 import numpy as np
 import pytest
 
 import mbsim
+from helpers import joint_chain
 from mbsim.bench import parameters as p
 from mbsim.bench import report
 from mbsim.bench.scenes.s01_top import rotations

@@ -6,20 +6,15 @@ python -m pytest -m bench -s tests/bench/test_crowd.py
 from __future__ import annotations
 
 import math
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import njit
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from crowd_decks import block, pile, random_axes, sets, shape_graphic, solid
-from decks_io import COULOMB, GRAVITY, GROUND, write_deck
-
 import mbsim
+from helpers.crowd_decks import block, pile, random_axes, sets, shape_graphic, solid
+from helpers.decks import COULOMB, GRAVITY, GROUND, write_deck
 from mbsim.arrays.scene import LIVE, Scene
 from mbsim.compile_model import pairing
 from mbsim.compile_model.build import build

@@ -10,17 +10,12 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit

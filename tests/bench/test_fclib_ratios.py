@@ -10,20 +10,19 @@ from __future__ import annotations
 
 import csv
 import math
-from pathlib import Path
 
 import pytest
 
+from helpers.folders import SHARED
 from mbsim.fclib.compare import TOO_SHORT, compare
 
 pytestmark = pytest.mark.bench
-DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 
 def fastest(tol):
     """Return the shortest time of Siconos by problem, and |F|/|q| and MERIT_1 of that solver."""
     found = {}
-    with (DATA / "siconos_baseline.csv").open(newline="", encoding="utf-8") as file:
+    with (SHARED / "siconos_baseline.csv").open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
             if row["solved"] != "1" or float(row["tol"]) != tol:
                 continue
@@ -36,10 +35,10 @@ def fastest(tol):
     return found
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"{DATA} is not there")
+@pytest.mark.skipif(not SHARED.is_dir(), reason=f"{SHARED} is not there")
 @pytest.mark.parametrize("tol", [1e-4, 1e-8])
 def test_times_over_those_of_siconos(tol):
-    files, theirs, ratios = sorted((DATA / "fclib").glob("*.hdf5")), fastest(tol), {}
+    files, theirs, ratios = sorted((SHARED / "fclib").glob("*.hdf5")), fastest(tol), {}
     rows = compare(
         files,
         tol,

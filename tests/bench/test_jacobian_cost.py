@@ -6,22 +6,18 @@ python -m pytest -q -m bench -s tests/bench/test_jacobian_cost.py
 from __future__ import annotations
 
 import ctypes
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-import joint_chain
-
 import mbsim
+from helpers import joint_chain
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
-from mbsim.run.simulation import Runner
+from mbsim.run.start import assemble_model
 
 pytestmark = pytest.mark.bench
 
@@ -46,7 +42,7 @@ def costs(folder, count):
     settings = settle(model)
     system = build(model)
     runner = Runner(system, settings, None, Silent(), lambda text: None)
-    runner.assemble()
+    assemble_model(system, runner.hooks, 0.0, runner.method.y, print, print)
     problem, _kept = implicit_hooks(system.scene, runner.problem, True)
     y = runner.method.y.copy()
     y[np.arange(len(y)) % 13 >= 7] += 0.1

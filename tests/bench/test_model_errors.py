@@ -6,16 +6,14 @@ python -m pytest -m bench -s tests/bench/test_model_errors.py
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, run_model
-from models.reference import (
+import mbsim
+from helpers.decks import run_model
+from helpers.folders import MODELS
+from helpers.reference import (
     Governor,
     elastic_stop,
     flat_follower,
@@ -26,8 +24,6 @@ from models.reference import (
     loose_slider,
     roller_follower,
 )
-
-import mbsim
 
 pytestmark = pytest.mark.bench
 TOLS = (1e-5, 1e-9, 1e-12)

@@ -6,14 +6,10 @@ python -m pytest -m bench -s tests/bench/test_oblique_errors.py
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "validation"))
-
-from test_oblique_impact import MU, TABLE, E, rebound
+from helpers.oblique_impact import MU, TABLE, E, rebound
 
 pytestmark = pytest.mark.bench
 SPRINGS = {

@@ -6,16 +6,13 @@ import statistics
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, MODELS, USERFUNCS, contact, sphere, write_deck
-
 import mbsim
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
+from helpers.folders import MODELS, USERFUNCS
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 
@@ -198,8 +195,7 @@ def ns_a_call(user, count):
 
 @pytest.mark.parametrize("source", ["cffsub.c", "cffsub.f90"])
 def test_calls_of_libraries(tmp_path, source):
-    from libraries import example
-
+    from helpers.libraries import example
     from mbsim.plugins import load_friction
 
     deck = mbsim.read_model(MODELS / "seed_contact.xml")
@@ -232,8 +228,7 @@ def test_calls_of_user_subroutines():
 
 
 def test_calls_by_octave():
-    from libraries import need
-
+    from helpers.libraries import need
     from mbsim.plugins import load_friction
     from mbsim.plugins.subroutine import end_run
 
@@ -254,8 +249,7 @@ def _normal_calls(address, par, out, count):
 
 @pytest.mark.parametrize("how", ["cnfsub.c", "cnfsub.f90", "compiled", "interpreted"])
 def test_calls_of_users_normal_laws(tmp_path, how):
-    from libraries import example
-
+    from helpers.libraries import example
     from mbsim.core import jit
     from mbsim.laws import user_normal
     from mbsim.model.elements import Contact, Subroutine

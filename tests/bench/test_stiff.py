@@ -12,18 +12,13 @@ of the method DOPRI5 needs, by evaluations and by law calls.
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, USERFUNCS
-
 import mbsim
+from helpers.folders import MODELS, USERFUNCS
 from mbsim.bench import ours, stiff
 from mbsim.bench.front import Point, front, time_at
 from mbsim.errors import ModelError, SolverError

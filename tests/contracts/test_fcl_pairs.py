@@ -10,8 +10,7 @@ import pytest
 
 pytest.importorskip("fcl")
 
-from test_pairs import random_rotation
-
+from helpers.pairs import random_rotation
 from mbsim.geometry.catalog import POINT
 from mbsim.geometry.fcl_detector import FclDetector
 from mbsim.geometry.mesh_contact import Surface, against_convex, lowest_side

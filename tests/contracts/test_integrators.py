@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
@@ -12,17 +11,14 @@ import numpy as np
 import pytest
 from numba import carray, cfunc
 
+import mbsim
+from helpers.decks import run_model
+from helpers.folders import MODELS
 from mbsim.core import jit
 from mbsim.core.address import call_float, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.problem import DONE, HOOK, PAUSED, STEP_TOO_SMALL, Problem
 from mbsim.integrators import catalog, dop853, driver, scheme
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, run_model
-
-import mbsim
 
 
 def is_explicit(method):

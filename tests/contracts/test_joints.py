@@ -7,18 +7,13 @@ derivatives taken by differences; what a joint lets through is compared with geo
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from mechanism_decks import ROWS, Joint, Scene, apart
-
+from helpers import mechanics as mech
+from helpers.mechanism_decks import ROWS, Joint, Scene, apart
 from mbsim.joints.catalog import JOINTS
 
 SKEW = mech.euler313(20, 50, -35)

@@ -7,21 +7,15 @@ Derivatives by time are compared with high-order differences of the independent 
 from __future__ import annotations
 
 import functools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit"))
-
-import free_bodies as free
-from decks import deck, read
-from language_truth import CASES, MOST_ARGS
-from measure_truth import Motion, component, fixed, measure, opposite
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
+from helpers import free_bodies as free
+from helpers.language_truth import CASES, MOST_ARGS
+from helpers.measure_truth import Motion, component, fixed, measure, opposite
+from helpers.minimal_deck import deck, read
 from mbsim.arrays.scene import SHOWN, Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit

@@ -8,26 +8,24 @@ not unknowns: their rows are left out.
 from __future__ import annotations
 
 import ctypes
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, write_deck
-from mechanics import Body
-from mechanism_decks import Joint, Scene, marker
 from scipy.spatial.transform import Rotation
 
 import mbsim
+from helpers.decks import write_deck
+from helpers.folders import MODELS
+from helpers.mechanics import Body
+from helpers.mechanism_decks import Joint, Scene, marker
 from mbsim.arrays.scene import CHOOSE
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
+from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
-from mbsim.run.simulation import Runner
+from mbsim.run.start import assemble_model
 
 COEFFICIENTS = (1.0, 10.0, 1e3)
 #: Half of the step of differences, and how many times f is rounded on its way from a state.
@@ -49,7 +47,8 @@ class Linearised:
         settings = settle(model)
         self.system = build(model)
         self.runner = Runner(self.system, settings, None, Silent(), lambda text: None)
-        self.runner.assemble()
+        runner = self.runner
+        assemble_model(self.system, runner.hooks, 0.0, runner.method.y, print, print)
         self.scene = self.system.scene
         self.problem, self.kept = implicit_hooks(self.scene, self.runner.problem, True)
         self.y = self.runner.method.y.copy()
@@ -607,7 +606,7 @@ def test_contacts_without_give(name, slip, tmp_path):
     hit = it.scene.work.hit[: it.scene.work.hit[-1]]
     it.scene.state.memory[hit, 0] = SLIP if slip else STICK
     it.scene.state.memory[hit, 1] = 1e-13
-    it.runner._door(0.0)(CHOOSE, y)
+    it.runner.hooks.joints_at(0.0)(CHOOSE, y)
     held = int(it.scene.equations.active[-1])
     assert held == (0 if slip else 2 if len(hit) == 1 else 3)
     worst = it.misses(it.on_manifold(y, 0.0), coefficients=(1e3, 1e4, 1e5))

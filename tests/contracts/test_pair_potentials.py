@@ -5,18 +5,12 @@ Judged by central differences over small displacements and turns of I, at random
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
 from scipy.spatial import ConvexHull
-from test_pairs import candidates, frame, random_rotation, turned
-from test_polyhedra import PLANE, Shape, box, box_mesh, mesh, points_of
 
+from helpers.pairs import candidates, frame, random_rotation, turned
+from helpers.polyhedra import PLANE, Shape, box, box_mesh, mesh, points_of
 from mbsim.geometry.catalog import COUPLE, PAIRS
 
 #: Step of the differences, as a length and an angle; their error is some 1e-16 / STEP + STEP^2.

@@ -9,9 +9,8 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from test_merit import dense, some_global
-from test_solvers import some_local, wedge
 
+from helpers.fclib_problems import dense, some_global, some_local, wedge
 from mbsim.cli.main import main
 from mbsim.fclib import compare, hdf5, peers
 from mbsim.fclib.merit import judge

@@ -7,8 +7,8 @@ from dataclasses import fields, is_dataclass, replace
 import h5py
 import numpy as np
 import pytest
-from fclib_folder import NAMES, problem_file
 
+from helpers.fclib_folder import NAMES, problem_file
 from mbsim.errors import ModelError, ResultsError
 from mbsim.fclib import hdf5
 from mbsim.fclib.problem import (

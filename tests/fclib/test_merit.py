@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fclib_folder import problem_file
 
+from helpers.fclib_folder import problem_file
+from helpers.fclib_problems import dense, some_global
 from mbsim.fclib import hdf5
 from mbsim.fclib.cone import cone_height
 from mbsim.fclib.merit import OPEN, SLIP, STICK, completed, judge
@@ -155,34 +156,6 @@ def test_libfclib_leaves_out_compressed_rows_and_we_do_not(libfclib, tmp_path):
     without = replace(problem, W=matrix(np.zeros((6, 6))))
     assert judge(without, solution).merit1 == pytest.approx(theirs, rel=1e-12)
     assert judge(problem, solution).merit1 != pytest.approx(theirs, rel=1e-3)
-
-
-def some_global(equalities=0):
-    rng = np.random.default_rng(4)
-    mass = np.kron(np.diag(rng.uniform(1, 2, 4)), np.eye(3))
-    return Global(
-        3,
-        matrix(mass, "triplet"),
-        matrix(rng.normal(size=(12, 6)), "triplet"),
-        rng.normal(size=12),
-        rng.normal(size=6),
-        np.full(2, 0.4),
-        matrix(rng.normal(size=(12, equalities)), "triplet") if equalities else None,
-        rng.normal(size=equalities) if equalities else None,
-    )
-
-
-def dense(problem):
-    """Return W and q after condensation and elimination, by full matrices."""
-    m, h = problem.M.csr().toarray(), problem.H.csr().toarray()
-    inverse = np.linalg.inv(m)
-    w, q = h.T @ inverse @ h, h.T @ inverse @ problem.f + problem.w
-    if problem.G is None:
-        return w, q
-    g = problem.G.csr().toarray()
-    v, r = h.T @ inverse @ g, g.T @ inverse @ g
-    s = g.T @ inverse @ problem.f + problem.b
-    return w - v @ np.linalg.solve(r, v.T), q - v @ np.linalg.solve(r, s)
 
 
 def full(blocks):

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from fclib_folder import NAMES, problem_file
 
+from helpers.fclib_folder import NAMES, problem_file
+from helpers.fclib_problems import some_local, wedge
 from mbsim.core import jit
 from mbsim.errors import ModelError
 from mbsim.fclib import clock, factor, hdf5, ordering
@@ -22,26 +23,6 @@ from mbsim.fclib.solvers.catalog import SOLVERS
 from mbsim.fclib.solvers.task import Task
 
 COULOMB = ("AUTO", "NSGS", "PROX", "ADMM", "NSN")
-
-
-def some_local(nc, d=3, seed=0, mu=0.4):
-    """Return a problem with a regular W of contacts in a row, each coupled with its neighbours."""
-    rng = np.random.default_rng(seed)
-    m = d * nc
-    w = np.zeros((m, m))
-    for a in range(nc + 1):
-        rows = slice(max(0, d * (a - 1)), min(m, d * (a + 1)))
-        half = rng.normal(size=(rows.stop - rows.start, 6))
-        w[rows, rows] += half @ half.T
-    return Local(d, matrix(w), rng.normal(size=m) - 0.5, np.full(nc, mu))
-
-
-def wedge():
-    """Return two contacts that press on each other: no finite impulses keep both from closing."""
-    w = np.zeros((6, 6))
-    w[np.ix_([0, 3], [0, 3])] = [[1.0, -1.0], [-1.0, 1.0]]
-    w[[1, 2, 4, 5], [1, 2, 4, 5]] = 1.0
-    return Local(3, matrix(w), np.array([-1.0, 0, 0, -1.0, 0, 0]), np.full(2, 0.3))
 
 
 def law_error(a, b, mu, r):

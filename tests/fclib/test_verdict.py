@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numba.core.compiler_lock import global_compiler_lock
-from test_solvers import some_local, wedge
 
+from helpers.fclib_problems import some_local, wedge
 from mbsim.cli.main import main
 from mbsim.core import jit
 from mbsim.fclib import blocks, clock, cone, factor, hdf5

@@ -8,26 +8,22 @@ earlier versions are kept as arrays of what their samples saw.
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from audit_runs import FREE_FLIGHT, INCLINE, LOOPS
 from click.testing import CliRunner
-from decks_io import GROUND, MODELS, contact, run_in_pieces, run_model, sphere, write_deck
 
 import mbsim
+from helpers.audit_runs import FREE_FLIGHT, INCLINE, LOOPS
+from helpers.decks import GROUND, contact, run_in_pieces, run_model, sphere, write_deck
+from helpers.folders import MODELS
 from mbsim.arrays import scene as a
 from mbsim.cli.main import main
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.audit import examine
 from mbsim.integrators import scheme
 from mbsim.results.audit import ENTRIES, audit_of
-from mbsim.run import simulation
+from mbsim.run import loop
 
 ENERGY = {"energy", "energy_step"}
 
@@ -40,7 +36,7 @@ def names_of(warnings):
 
 def with_fault(monkeypatch, when, fault):
     """Let `fault(runner)` happen at the first step that ends at `when` or later."""
-    plain = simulation.Runner.__init__
+    plain = loop.Runner.__init__
 
     def begin(runner, *given, **named):
         plain(runner, *given, **named)
@@ -57,7 +53,7 @@ def with_fault(monkeypatch, when, fault):
 
         runner._advance = advance_to_fault
 
-    monkeypatch.setattr(simulation.Runner, "__init__", begin)
+    monkeypatch.setattr(loop.Runner, "__init__", begin)
 
 
 @pytest.mark.parametrize("integrator", ["DOPRI5", "GALPHA"])

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit"))
-
-from decks import deck
-
 import mbsim
+from helpers.minimal_deck import deck
 
 #: A sliding ball: force, torque about its cg and about ground's origin, acceleration of its cg.
 REQUESTS = """

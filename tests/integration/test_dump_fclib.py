@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, MODELS, sphere, write_deck
-
 import mbsim
+from helpers.decks import GROUND, sphere, write_deck
+from helpers.folders import MODELS
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
 from mbsim.fclib import hdf5

@@ -6,18 +6,12 @@ rounding lets them touch, so that it asks nothing and proves nothing.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
-from libraries import compiled, need
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.libraries import compiled, need
 from mbsim.cli.main import main
 from mbsim.errors import PluginError, SolverError
 
@@ -52,15 +46,15 @@ def small(results):
 @pytest.fixture
 def counters(monkeypatch):
     """Return the counters of the run that failed."""
-    from mbsim.run import simulation
+    from mbsim.run import loop
 
-    found, kept = {}, simulation.Runner.stats
+    found, kept = {}, loop.Runner.stats
 
     def stats(self, *arguments):
         found.update(kept(self, *arguments))
         return found
 
-    monkeypatch.setattr(simulation.Runner, "stats", stats)
+    monkeypatch.setattr(loop.Runner, "stats", stats)
     return found
 
 

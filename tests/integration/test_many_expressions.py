@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.expressions.parse import parse

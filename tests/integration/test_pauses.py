@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS
-
 import mbsim
+from helpers.folders import MODELS
 from mbsim.compile_model import scratch
 from mbsim.core import problem
 from mbsim.errors import Interrupted, SolverError
 from mbsim.integrators import scheme
 from mbsim.run import divergence as runaway
-from mbsim.run import simulation
+from mbsim.run import loop
 from mbsim.run.methods import Methods
 
 #: Evaluations from one return to the next, and rows and events that fit until then.
@@ -50,8 +44,8 @@ RUNS = {
 
 def returning(patch, budget, rows):
     """Let compiled code come back after so many evaluations or rows."""
-    patch.setattr(simulation, "FIRST_BUDGET", budget)
-    patch.setattr(simulation, "next_budget", lambda *called: budget)
+    patch.setattr(loop, "FIRST_BUDGET", budget)
+    patch.setattr(loop, "next_budget", lambda *called: budget)
     patch.setattr(scratch, "ROWS", rows)
 
 

@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, MODELS, ROOT, contact, sphere, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, sphere, write_deck
+from helpers.folders import MODELS, PACKAGES
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results.curves import Choice, collect, names_of
@@ -521,7 +519,7 @@ def test_run_and_info_import_no_matplotlib(files, tmp_path):
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(PACKAGES)},
     )
     assert done.stdout.splitlines()[-1] == "False", done.stderr
 

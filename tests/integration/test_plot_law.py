@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from helpers.folders import USERFUNCS
 from mbsim.cli.main import main
 from mbsim.cli.plot_law import USUAL
 from mbsim.errors import PluginError
@@ -16,7 +16,6 @@ from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.laws.rubbing import Conditions, cycle, sample_of, steady
 
 pytest.importorskip("matplotlib")
-USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
 WITH_STATE = USERFUNCS / "stiction_with_state.py"
 
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import write_deck
-
 import mbsim
+from helpers.decks import write_deck
 from mbsim.errors import Interrupted
 
 #: Two arms that swing in space, with a spring from the tip to ground and a drive at the hinge.

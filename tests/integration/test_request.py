@@ -6,19 +6,17 @@ import csv
 import io
 import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import mbsim
+from helpers.folders import MODELS, USERFUNCS
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
 from mbsim.run.replay import Again, request
 
-USERFUNCS = Path(__file__).resolve().parents[2] / "userfuncs"
-MODELS = Path(__file__).resolve().parents[2] / "models"
 SLIP = 'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
 USER = 'cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="law.py"'
 FRICTIONS = {

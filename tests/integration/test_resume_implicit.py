@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS
-
 import mbsim
+from helpers.folders import MODELS
 from mbsim.errors import Interrupted
 from mbsim.integrators import scheme
 from mbsim.results import recorder
-from mbsim.run import simulation
+from mbsim.run import loop
 
 STIFF = MODELS / "stiff"
 COUNTED = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorizations", "method_changes")
@@ -26,8 +21,8 @@ COUNTED = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorizations"
 @pytest.fixture
 def impatient(monkeypatch):
     """Let runs come back to Python every few evaluations, and write all each time."""
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
 
 
 def same(one, other):

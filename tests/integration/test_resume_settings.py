@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, sphere
-
 import mbsim
+from helpers.decks import GROUND, sphere
 from mbsim.compile_model.build import build
 from mbsim.errors import Interrupted, ModelError
 from mbsim.model import elements
 from mbsim.results.identity import Identity, plain
-from mbsim.run import simulation
+from mbsim.run import loop
 from mbsim.run.settings import Settings, Stage, settle
 
 LAW = """
@@ -76,8 +71,8 @@ def begun(tmp_path_factory):
     """Return the folder of a deck whose run was interrupted."""
     folder = tmp_path_factory.mktemp("deck")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "FIRST_BUDGET", 10)
-        patch.setattr(simulation, "next_budget", lambda *called: 10)
+        patch.setattr(loop, "FIRST_BUDGET", 10)
+        patch.setattr(loop, "next_budget", lambda *called: 10)
         left = [10]
 
         def stop(time, step, until):

@@ -10,11 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
 from mbsim.errors import ModelError, PluginError, SolverError
 
 CLI = [sys.executable, "-c", "from mbsim.cli.main import main; main()"]
@@ -352,11 +349,11 @@ def test_two_methods_in_one_run_are_refused(tmp_path):
 
 
 def test_pauses_do_not_change_a_run(tmp_path, monkeypatch):
-    from mbsim.run import simulation
+    from mbsim.run import loop
 
     ends = []
     for budget in (50, 10**9):
-        monkeypatch.setattr(simulation, "FIRST_BUDGET", budget)
+        monkeypatch.setattr(loop, "FIRST_BUDGET", budget)
         results = run_deck(tmp_path, BOUNCE, end_time=1.0, tol=1e-4)
         ends.append([results.stats["steps"], *results["bodies/2/position"][-1]])
     assert ends[0] == ends[1]

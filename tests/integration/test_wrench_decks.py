@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import csv
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import write_deck
-
 import mbsim
+from helpers.decks import write_deck
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
 

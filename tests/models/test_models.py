@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, USERFUNCS, run_model
-from models.reference import (
+import mbsim
+from helpers.decks import run_model
+from helpers.folders import MODELS, SHARED, USERFUNCS
+from helpers.reference import (
     Governor,
     angle_between,
     drop_height,
@@ -27,14 +26,13 @@ from models.reference import (
     jenkins_block,
     loose_slider,
     roller_follower,
+    rotation_matrices,
     slider_crank,
     top_attitude,
     wall_pendulum,
 )
 
-import mbsim
-
-REFERENCES = Path(__file__).resolve().parents[3] / "shared/data/references.json"
+REFERENCES = SHARED / "references.json"
 BOTH = pytest.mark.parametrize("detector", ["auto", "fcl"])
 
 
@@ -214,17 +212,6 @@ def test_both_methods_agree_on_the_bouncing_sphere():
         # scene S2a, self-consistent to 6e-9; heights of the lowest point
         reference = json.loads(REFERENCES.read_text(encoding="utf-8"))["S2"]["impact"]["z"]
         assert np.abs(z - 0.1 - reference).max() < 2e-8
-
-
-def rotation_matrices(q):
-    w, x, y, z = q.T
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    ).transpose(2, 0, 1)
 
 
 def test_drop_in_metres_and_in_millimetres():

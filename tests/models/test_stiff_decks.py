@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import squeezer
-from decks_io import MODELS
-from models.reference import Governor, four_bar_on_stop
-from models.stiff_references import CLOSED, named, planned_times, run
-
 import mbsim
+from helpers import squeezer
+from helpers.folders import MODELS
+from helpers.reference import Governor, four_bar_on_stop
 from mbsim.bench import ours, stiff
+from stiff_references import CLOSED, named, planned_times, run
 
 G = 9.81
 EACH = pytest.mark.parametrize("deck", stiff.DECKS, ids=lambda deck: deck.name)
@@ -68,7 +63,7 @@ def test_table_has_the_rows_and_columns_of_its_deck(deck):
     assert exact.shape == (len(planned), len(deck.columns))
     lines = stiff.table_path(deck).read_text(encoding="utf-8").splitlines()
     assert lines[2] == ",".join(["time", *deck.columns])
-    assert lines[1] == f"# python tests/models/stiff_references.py {deck.name}"
+    assert lines[1] == f"# python tests/stiff_references.py {deck.name}"
 
 
 @pytest.mark.parametrize("name", ["overdamped", "preloaded_stop"])

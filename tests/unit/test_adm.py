@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from helpers.folders import ROOT, data_file
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions.tree import Call, Number
@@ -21,15 +22,6 @@ from mbsim.model.placement import place
 from mbsim.reader.adm.lexer import split_statements, unique
 from mbsim.reader.xml import read_model
 from mbsim.run.settings import settle
-
-ADAMS = next(
-    (
-        path
-        for folder in Path(__file__).resolve().parents
-        if (path := folder / "shared" / "data" / "adams").is_dir()
-    ),
-    None,
-)
 
 # one statement a line, so that tests can name the line
 PENDULUM = """a pendulum, this line is the title
@@ -400,7 +392,7 @@ def test_a_name_that_only_ends_alike_is_not_suggested(tmp_path: Path) -> None:
 
 
 def test_readme_has_a_deck_that_is_read(tmp_path: Path) -> None:
-    readme = Path(__file__).parents[2] / "README.md"
+    readme = ROOT / "README.md"
     blocks = readme.read_text(encoding="utf-8").split("```")
     (text,) = [block for block in blocks if "a pendulum; the first line" in block]
     model = read(tmp_path, text.lstrip("\n"))
@@ -499,11 +491,9 @@ REAL = {
 }
 
 
-@pytest.mark.skipif(ADAMS is None, reason="no shared/data/adams above this checkout")
 @pytest.mark.parametrize("name", sorted(REAL))
 def test_real_decks(name: str) -> None:
-    assert ADAMS is not None
-    model = read_model(ADAMS / f"test_{name}.adm")
+    model = read_model(data_file(f"adams/test_{name}.adm"))
     joint, constraints, forces, position = REAL[name]
     assert [j.type for j in model.joints.values()] == ([joint] if joint else [])
     assert len(model.general_constraints) == constraints

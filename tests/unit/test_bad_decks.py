@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from decks import (
+
+from helpers.minimal_deck import (
     BODY_LINE,
     CONTACT_LINE,
     FRICTION_LINE,
@@ -21,7 +22,6 @@ from decks import (
     deck,
     read,
 )
-
 from mbsim.errors import DeckError, ModelError
 
 END_OF_MODEL, END_OF_COMMAND = 14, 18  # lines of statements that `added` puts in

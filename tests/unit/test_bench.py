@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from helpers.folders import SHARED
 from mbsim.bench import linkages, oracle, peers, plot, report, runner
 from mbsim.bench import ours as own
 from mbsim.bench import parameters as p
@@ -28,14 +29,7 @@ from mbsim.integrators.catalog import METHODS
 from mbsim.model.frames import marker_frames
 from mbsim.reader.xml import read_model
 
-REFERENCES = next(
-    (
-        file
-        for folder in Path(__file__).resolve().parents
-        if (file := folder / "shared" / "data" / "references.json").is_file()
-    ),
-    None,
-)
+REFERENCES = SHARED / "references.json"
 MACHINE = {"date": "2026-01-01", "cpu": "none", "python": "3"}
 
 
@@ -270,7 +264,7 @@ def test_rolling_tends_to_rigid_friction():
     assert x - p.S3.end_x == pytest.approx(2.0 / 7.0 * late, rel=1e-4)
 
 
-@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+@pytest.mark.skipif(not REFERENCES.is_file(), reason=f"no reference data at {REFERENCES}")
 def test_references_are_those_of_the_shared_file():
     shared = json.loads(REFERENCES.read_text(encoding="utf-8"))
     for top, name in ((p.S1, "S1"), (p.S10C, "S10c")):
@@ -531,7 +525,7 @@ def test_errors_of_a_crank_that_follows_its_reference():
     assert np.ptp(energy) < 1e-11 * energy[0]
 
 
-@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+@pytest.mark.skipif(not REFERENCES.is_file(), reason=f"no reference data at {REFERENCES}")
 @pytest.mark.parametrize("count", [2, 10, pytest.param(40, marks=pytest.mark.slow)])
 def test_free_end_is_that_of_the_shared_file(count):
     shared = json.loads(REFERENCES.read_text(encoding="utf-8"))[f"S8_{count}"]
@@ -539,7 +533,7 @@ def test_free_end_is_that_of_the_shared_file(count):
     assert np.abs(oracle.s8_tip(count) - tip).max() < 2e-11
 
 
-@pytest.mark.skipif(REFERENCES is None, reason="no shared/data/references.json above this checkout")
+@pytest.mark.skipif(not REFERENCES.is_file(), reason=f"no reference data at {REFERENCES}")
 def test_crank_angle_is_that_of_the_shared_file():
     shared = json.loads(REFERENCES.read_text(encoding="utf-8"))["S8b"]
     assert np.abs(oracle.s8b_angle() - shared["th"]).max() < 2e-11

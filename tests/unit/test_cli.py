@@ -11,18 +11,17 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from decks import CONTACT_LINE, MINIMAL, deck
-from fake_run import SETTINGS, add_rows, checkpoint, fake_system
 
 import mbsim
+from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
+from helpers.folders import PACKAGES
+from helpers.minimal_deck import CONTACT_LINE, MINIMAL, deck
 from mbsim.cli.main import COMMANDS, main
 from mbsim.cli.progress import Display
 from mbsim.errors import Interrupted, ModelError, PluginError, ResultsError, SolverError
 from mbsim.results.reading import Results
 from mbsim.results.recorder import Recorder
 from mbsim.run import simulation
-
-ROOT = str(Path(mbsim.__file__).parent.parent)
 
 
 def call(*arguments: str) -> Result:
@@ -39,7 +38,7 @@ def process(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]
         [sys.executable, *arguments],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": ROOT},
+        env={**os.environ, "PYTHONPATH": str(PACKAGES)},
         check=False,
         **options,
     )
@@ -84,7 +83,7 @@ def faked(monkeypatch: Any) -> Any:
 
 
 def test_python_m_mbsim_is_the_command_line(tmp_path: Path) -> None:
-    done = process("-m", "mbsim", "check", "no.xml", cwd=ROOT)
+    done = process("-m", "mbsim", "check", "no.xml", cwd=PACKAGES)
     assert done.returncode == 2
     assert done.stderr == "mbsim: error: no.xml: cannot be read: No such file or directory\n"
 
@@ -334,7 +333,11 @@ def test_help_imports_no_numpy() -> None:
 def test_a_reader_that_goes_away(model: str) -> None:
     command = f'"{sys.executable}" -m mbsim.cli.main info "{model}" | true'
     done = subprocess.run(
-        command, shell=True, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ROOT}
+        command,
+        shell=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(PACKAGES)},
     )
     assert done.stderr == ""
 

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit

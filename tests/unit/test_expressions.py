@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
+from helpers.folders import ROOT
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError
@@ -271,7 +267,7 @@ NOT_FUNCTIONS = set("FUNCTION GCON VTORQUE SPLINE ARRAY NUMBERS IC".split())
 
 
 def test_every_function_is_in_the_readme() -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
     section = readme.split("## Expressions\n")[1].split("\n## ")[0]
     named = " ".join(re.findall(r"`([^`]*)`", section))
     words = set(re.findall(r"[A-Z][A-Z0-9]+", named))

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from decks import added, read
-from fake_run import SETTINGS, add_rows, checkpoint, fake_system_of
 
+from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system_of
+from helpers.minimal_deck import added, read
 from mbsim.arrays import scene as a
 from mbsim.cli import info
 from mbsim.cli.main import main

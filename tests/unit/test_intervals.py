@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.compile_model import timetable as tt
 from mbsim.compile_model.build import build
 from mbsim.compile_model.splines import pieces

@@ -12,6 +12,7 @@ from numba import float64, int64, njit
 from numba.core import ir, targetconfig
 from numba.core.compiler import Flags, run_frontend
 
+from helpers.folders import PACKAGES
 from mbsim.core import jit, linking, numba_costs
 from mbsim.core.jitable import jitable
 
@@ -65,7 +66,6 @@ import ctypes, pathlib, sys
 {before}
 from mbsim.core import jit, linking
 from numba import float64, int64
-sys.path.insert(0, str(jit.cache_root() / "plugins"))
 import helpers
 found = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double)(
     jit.address(helpers.root, float64(int64, float64))
@@ -84,7 +84,8 @@ def in_a_process(folder, before=""):
     """Return what RUN prints in a process of its own, whose cache is in `folder`."""
     (folder / "plugins").mkdir(exist_ok=True)
     (folder / "plugins" / "helpers.py").write_text(HELPERS)
-    environment = {**os.environ, "MBSIM_CACHE_DIR": str(folder)}
+    path = os.pathsep.join([str(folder / "plugins"), str(PACKAGES)])
+    environment = {**os.environ, "MBSIM_CACHE_DIR": str(folder), "PYTHONPATH": path}
     done = subprocess.run(
         [sys.executable, "-c", RUN.format(before=before)],
         capture_output=True,

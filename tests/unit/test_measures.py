@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-from free_bodies import rotation
-
+from helpers import free_bodies as free
+from helpers.free_bodies import rotation
 from mbsim.compile_model.build import build
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
 from mbsim.dynamics.bodies.kinematics import place_bodies

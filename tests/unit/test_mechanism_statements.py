@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from decks import added, deck, read
 
+from helpers.minimal_deck import added, deck, read
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions.tree import Call, Number
 from mbsim.joints.catalog import JOINTS

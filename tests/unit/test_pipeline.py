@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, MODELS, contact, sphere, write_deck
-
 import mbsim
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
+from helpers.folders import MODELS
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.hooks import mechanism
 

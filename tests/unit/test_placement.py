@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from decks import BODY_LINE, MINIMAL, TETRAHEDRON, added, deck, read
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers.minimal_deck import BODY_LINE, MINIMAL, TETRAHEDRON, added, deck, read
 from mbsim.errors import DeckError
 from mbsim.model.elements import Body, Marker, Model, Units
 from mbsim.model.frames import quaternion, rotation_313

@@ -6,7 +6,6 @@ import os
 import py_compile
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mbsim.plugins as plugins
+from helpers.folders import PACKAGES, ROOT
 from mbsim.errors import ModelError, PluginError
 from mbsim.laws.catalog import FRICTION_LAWS, FrictionInput
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import helpers
 
-ROOT = Path(__file__).resolve().parents[2]
 PAR = (0.05, 0.01, 0.1, 0.5)
 ARGS = "id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag"
 INPUTS = [0.7, 0.0, 0.01, -0.02, 0.03, 0.3, -0.4, 0.2, 0, 0, 5.0, 0, 0, 1, 2, 3, 4, 5, 6]
@@ -117,7 +116,7 @@ def test_a_second_process_loads_from_the_cache(tmp_path):
         "assert u.compiled, u.reason\n"
         "print(len(seen.buffer))\n"
     )
-    env = {**os.environ, "MBSIM_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    env = {**os.environ, "MBSIM_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGES)}
 
     def run():
         done = subprocess.run(

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from decks import MINIMAL, TETRAHEDRON, added, deck, read
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mbsim
+from helpers.minimal_deck import MINIMAL, TETRAHEDRON, added, deck, read
 from mbsim.errors import ModelError
 from mbsim.model.elements import Model
 from mbsim.model.frames import rotation_313

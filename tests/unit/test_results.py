@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from decks import added
-from fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system, fake_system_of
 
+from helpers.fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system, fake_system_of
+from helpers.folders import PACKAGES, TESTS
+from helpers.minimal_deck import added
 from mbsim.arrays import scene as a
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
@@ -23,7 +24,6 @@ from mbsim.results.recorder import Recorder
 from mbsim.results.store import Store
 from mbsim.results.watch import Watch
 
-FAKE = Path(__file__).with_name("fake_run.py")
 STATS = {"steps": 12, "wall_s": 0.5}
 
 
@@ -39,12 +39,9 @@ def recorded(folder: Path, rows: int = 10, status: str = "finished") -> Results:
 
 def run_fake(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the fake in a process of its own."""
-    import mbsim
-
-    root = str(Path(mbsim.__file__).parent.parent)
-    path = os.pathsep.join([root, str(FAKE.parent)])
+    path = os.pathsep.join([str(PACKAGES), str(TESTS)])
     return subprocess.run(
-        [sys.executable, str(FAKE), *arguments],
+        [sys.executable, "-m", "helpers.fake_run", *arguments],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": path},

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.compile_model.build import build
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.expressions.jets import run, value

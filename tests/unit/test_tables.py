@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from decks import added
-from decks import read as read_xml
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
+from helpers.minimal_deck import added
+from helpers.minimal_deck import read as read_xml
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit

@@ -1,8 +1,9 @@
 """Joints and reactions against Adams' own output: curves of 15 models over 5 s.
 
-The curves (`../shared/data/adams`, from Project Chrono's tests) carry 6 or 7 digits. Frames, as
-an independent integration (`mechanics`) shows: angular velocity and acceleration in global axes;
-quaternion of the cg marker; reaction on the I marker, about its origin, in global axes.
+The curves (from Project Chrono's tests; 4 models' in `tests/data/adams`, all in the shared folder)
+carry 6 or 7 digits. Frames, as an independent integration (`mechanics`) shows: angular velocity
+and acceleration in global axes; quaternion of the cg marker; reaction on the I marker, about its
+origin, in global axes.
 
 An accurate solution does not reach all of them: the curves of Spherical_Case01 and
 Universal_Case01 lose 8e-3 J of 19.6 J in 5 s, those of Distance_Case02 and RotSpring_Case01 are
@@ -17,28 +18,20 @@ last digit; those are put into the decks here, and the decks as they are held ag
 from __future__ import annotations
 
 import functools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from decks_io import ROOT
-
 import mbsim
+from helpers import mechanics as mech
+from helpers.folders import data_file
 
-DATA = ROOT.parent / "shared/data/adams"
 G = (0.0, 0.0, -9.80665)
 BAR = (0.04, 0.1, 0.1)  # inertia of the pendulum [kg m^2]; its mass is 1 kg
 EYE = np.eye(3)
 DOWN = mech.euler313(180, 90, 180)  # marker axes of the revolute and prismatic cases
 HOOKE = mech.euler313(0, 90, 0)
 DEGREE = 180.0 / np.pi
-
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no Adams curves at {DATA}")
 
 
 def body(R=EYE, p=(2, 0, 0), inertia=BAR, v=(0, 0, 0)):
@@ -164,7 +157,7 @@ XML = {
 
 def curve(case, channel):
     """Return time and columns of a curve."""
-    values = np.loadtxt(DATA / f"{case}_ADAMS_{channel}.txt", skiprows=3)
+    values = np.loadtxt(data_file(f"adams/{case}_ADAMS_{channel}.txt"), skiprows=3)
     return values[:, 0], values[:, 1:]
 
 
@@ -172,7 +165,7 @@ def curve(case, channel):
 def digits(case):
     """Return how many significant digits the files of a case carry."""
     most = 0
-    for path in DATA.glob(f"{case}_ADAMS_*.txt"):
+    for path in data_file(f"adams/{case}_ADAMS_Pos.txt").parent.glob(f"{case}_ADAMS_*.txt"):
         for line in path.read_text(encoding="utf-8").splitlines()[3:]:
             for word in line.split()[1:]:
                 mantissa = word.upper().split("E")[0].lstrip("+-").replace(".", "")
@@ -263,14 +256,14 @@ def deck(case, folder):
         return path
     if case in EDITS:
         name, *changes = EDITS[case]
-        text = (DATA / name).read_text(encoding="utf-8")
+        text = data_file(f"adams/{name}").read_text(encoding="utf-8")
         for old, new in changes:
             assert old in text
             text = text.replace(old, new)
         path = folder / name
         path.write_text(text, encoding="utf-8")
         return path
-    return DATA / f"test_{case}.adm"
+    return data_file(f"adams/test_{case}.adm")
 
 
 def run(path, tol=None):
@@ -339,9 +332,9 @@ def test_an_independent_integration_finds_the_curves(case):
 @pytest.mark.parametrize("tol", [None, 1e-9], ids=["default", "tight"])
 @pytest.mark.parametrize("case", CASES)
 def test_curves(case, tol, tmp_path):
+    truth = exact(case)
     results = run(deck(case, tmp_path), tol)
     found = channels_of(case, results)
-    truth = exact(case)
     apart = {name: excess(case, name, ours, truth[name]) for name, ours in found.items()}
     assert max(apart.values()) < 1.0, apart
     adams = {name: excess(case, name, ours, curve(case, name)[1]) for name, ours in found.items()}
@@ -378,7 +371,7 @@ def test_constraints_hold_throughout(case, tmp_path):
     ],
 )
 def test_decks_as_they_are_against_an_independent_integration(name, mechanism):
-    results = run(DATA / name, 1e-9)
+    results = run(data_file(f"adams/{name}"), 1e-9)
     solution = mechanism().solve(results["time"])
     for request, first, ours in (
         (1, 1, solution.position(1)),

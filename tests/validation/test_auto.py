@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS
-
 import mbsim
+from helpers.folders import MODELS
 from mbsim.errors import ModelError
 
 STIFF = MODELS / "stiff"

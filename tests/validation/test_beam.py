@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
 import mbsim
+from helpers import free_bodies as free
 from mbsim.errors import DeckError
 from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Marker

@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck, run_model, sphere
-from models.reference import drop_height
-
-# IMPACT at 1 m/s, m = 1 kg, k = 1e5, e = 1.5, dmax = 1e-3, no gravity (rtol 1e-12)
-RESTITUTION = [(50.0, 0.4813434809, 0.0357468168, 0.0080820827),
-               (200.0, 0.1078059064, 0.0551703767, 0.0043920515)]  # fmt: skip
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, run_model, sphere
+from helpers.reference import RESTITUTION, drop_height
 
 
 @pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-8, 1e-5)])

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, USERFUNCS, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import USERFUNCS
 from mbsim.cli.main import main
 from mbsim.errors import DeckError, PluginError
 

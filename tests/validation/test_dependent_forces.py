@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanism_decks as decks
-from decks_io import GROUND, run_deck, write_deck
-from decks_io import sphere as free_sphere
-from mechanics import Body
-
 import mbsim
+from helpers import mechanism_decks as decks
+from helpers.decks import GROUND, run_deck, write_deck
+from helpers.decks import sphere as free_sphere
+from helpers.mechanics import Body
 from mbsim.errors import DeckError, SolverError
 
 G = 9.81

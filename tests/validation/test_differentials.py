@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, run_deck, sphere, write_deck
 from mbsim.errors import DeckError, ModelError
 
 ONLY_GROUND = '<Body_Rigid id="1" isground="TRUE"/>'

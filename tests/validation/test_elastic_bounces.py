@@ -7,14 +7,10 @@ repeat that, so that errors of one sign add up: in 1e4 bounces to 1e4 times that
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, run_deck, sphere
+from helpers.decks import GROUND, run_deck, sphere
 
 G, RADIUS = 9.81, 0.1
 

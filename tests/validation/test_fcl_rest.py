@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, contact, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, write_deck
 
 pytest.importorskip("fcl", reason="python-fcl is not there")
 

@@ -2,38 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck
-
-EDGE = 0.2
-INERTIA = EDGE**2 / 6.0  # of a cube of 1 kg
-FLOATING = '<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>'
-
-
-def cube(body, p, angles=(0.0, 0.0, 0.0), v=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0)):
-    """Return a cube of 1 kg."""
-    flags = "".join(
-        f'{kind}_ic_{axis}="{float(number)!r}" {kind}_ic_{axis}_flag="TRUE" '
-        for kind, given in (("v", v), ("w", w))
-        for axis, number in zip("xyz", given, strict=True)
-    )
-    place = " ".join(f'pos_{a}="{float(x)!r}"' for a, x in zip("xyz", p, strict=True))
-    turn = " ".join(
-        f'{name}="{float(angle)!r}"'
-        for name, angle in zip(("psi", "theta", "phi"), angles, strict=True)
-    )
-    return f"""<Body_Rigid id="{body}" cg_id="{10 * body}" mass="1" inertia_xx="{INERTIA!r}"
-      inertia_yy="{INERTIA!r}" inertia_zz="{INERTIA!r}" {flags}/>
-    <Reference_Marker id="{10 * body}" body_id="{body}" {place} {turn}/>
-    <Post_Graphic id="{100 * body}" type="BoxDefinedFromCenter" center_marker_id="{10 * body}"
-      length_x="{EDGE}" length_y="{EDGE}" length_z="{EDGE}"/>"""
+from helpers.decks import COULOMB, FLOATING, GRAVITY, GROUND, INERTIA, contact, cube, run_deck
 
 
 def table(x):

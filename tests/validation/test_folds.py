@@ -4,17 +4,12 @@ A parallelogram has all its links on one line twice a turn, a slider-crank with 
 its slider above the shaft: there the constraints lose rank for an instant.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from mechanism_decks import Joint, Scene
+from helpers import mechanics as mech
+from helpers.mechanism_decks import Joint, Scene
 
 G = 9.81
 

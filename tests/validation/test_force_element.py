@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 import random
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import USERFUNCS, run_deck, run_in_pieces, write_deck
-from models.reference import jenkins_block
-
 import mbsim
+from helpers.decks import run_deck, run_in_pieces, write_deck
+from helpers.folders import USERFUNCS
+from helpers.reference import jenkins_block
 from mbsim.errors import DeckError, Interrupted, ModelError, PluginError, SolverError
-from mbsim.run import simulation
+from mbsim.run import loop
 
 DRY = USERFUNCS / "dry_friction_element.py"
 
@@ -450,8 +446,8 @@ def test_friction_about_an_axis_stops_a_spin(tmp_path):
 
 
 def test_a_run_goes_on_with_the_script_with_which_it_began(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-6)
-    monkeypatch.setattr(simulation, "FIRST_BUDGET", 7)
+    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     script = tmp_path / "mine.py"
     script.write_text(DRY.read_text("utf-8"), encoding="utf-8")
     text = GROUND + body(2, 1.0, v=1.0) + spring(4.0) + element("dry_friction", "1, 0.02", script)

@@ -7,16 +7,11 @@ an integration of its own of each contact.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere
 
 METHODS = ("RADAU5", "GALPHA", "AUTO")
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanism_decks as decks
-from mechanics import Body
-
+from helpers import mechanism_decks as decks
+from helpers.mechanics import Body
 from mbsim.errors import SolverError
 
 G = 9.81

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from mechanism_decks import Joint, Scene
-
+from helpers import mechanics as mech
+from helpers.mechanism_decks import Joint, Scene
 from mbsim.errors import DeckError, SolverError
 
 Z_TO_X = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import run_deck
-
 import mbsim
+from helpers.decks import run_deck
 from mbsim.errors import SolverError
 
 ALONG_X = 'psi="1.5707963267948966" theta="1.5707963267948966"'

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, MODELS, USERFUNCS, contact, run_deck, sphere, write_deck
-from libraries import compiled, example
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import MODELS, USERFUNCS
+from helpers.libraries import compiled, example
 from mbsim.cli.main import main
 from mbsim.errors import Interrupted, ModelError, PluginError
 from mbsim.plugins import load_friction
@@ -202,8 +198,8 @@ def test_a_run_goes_on_with_its_library(tmp_path, monkeypatch):
             raise Interrupted("enough")
 
     with monkeypatch.context() as often:
-        often.setattr("mbsim.run.simulation.RETURN_SECONDS", 1e-5)
-        often.setattr("mbsim.run.simulation.FIRST_BUDGET", 5)
+        often.setattr("mbsim.run.loop.RETURN_SECONDS", 1e-5)
+        often.setattr("mbsim.run.loop.FIRST_BUDGET", 5)
         with pytest.raises(Interrupted):
             mbsim.simulate(model, plugins=[library], output=tmp_path / "out", progress=stop)
     with mbsim.simulate(model, plugins=[library], output=tmp_path / "out", resume=True) as resumed:

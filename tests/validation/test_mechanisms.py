@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import sys
-from itertools import pairwise
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-import squeezer
-from decks_io import run_deck
-from mechanism_decks import Joint, Scene, apart, residual, states
-
-EYE = np.eye(3)
-X_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # z of a marker along x
-Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # z of a marker along y
+from helpers import mechanics as mech
+from helpers import squeezer
+from helpers.decks import run_deck
+from helpers.known_mechanisms import (
+    EYE,
+    X_UP,
+    Y_UP,
+    bricard,
+    four_bars,
+    heavy_top,
+    passive,
+    pendulum,
+)
+from helpers.mechanism_decks import Joint, Scene, apart, residual, states
 
 
 def balance(results, driven=True):
@@ -31,23 +31,7 @@ def balance(results, driven=True):
     return total - total[0]
 
 
-def passive(results):
-    """Return the change of kinetic and potential energy (nothing drives, nothing damps)."""
-    total = results["energy/kinetic"] + results["energy/potential"]
-    return total - total[0]
-
-
 # --- published problems ---
-
-
-def pendulum(kind):
-    """A01 of the IFToMM benchmark: 1 kg on 1 m, from the horizontal, in the xy-plane."""
-    bob = mech.Body(1.0, (1e-9,) * 3, (-1, 0, 0))
-    if kind == "DISTANCE":
-        joint = Joint(kind, 1, 0, (-1, 0, 0), p_j=(0, 0, 0), rows=mech.distance(1.0))
-    else:
-        joint = Joint(kind, 1, 0)
-    return Scene([bob], [joint], (0, -9.81, 0))
 
 
 @pytest.mark.parametrize("kind", ["REVOLUTE", "SPHERICAL", "DISTANCE"])
@@ -89,13 +73,6 @@ def test_errors_fall_by_decades_with_tol(tmp_path):
     assert errors[2] < errors[1] / 10
 
 
-def heavy_top():
-    """A top of 15 kg on its tip; start x = (0, 1, 0), spin 150 rad/s (Exudyn's heavyTop)."""
-    w = (0.0, 150.0, -4.61538)
-    top = mech.Body(15.0, (0.234375, 0.46875, 0.234375), (0, 1, 0), v=np.cross(w, (0, 1, 0)), w=w)
-    return Scene([top], [Joint("SPHERICAL", 1, 0)])
-
-
 def test_heavy_top(tmp_path):
     scene = heavy_top()
     results = scene.run(tmp_path, 2.0, 0.5, 1e-10)
@@ -108,22 +85,6 @@ def test_heavy_top(tmp_path):
         np.testing.assert_allclose(results["bodies/2/position"][row], place, rtol=0, atol=2e-6)
     assert np.abs(passive(results)).max() < 1e-6 * results["energy/kinetic"][0]
     assert residual(results, scene.mechanism())[0] < 1e-9
-
-
-def four_bars(n):
-    """A02 of the IFToMM benchmark: n windows of links of 1 m, 1 kg, in the xy-plane."""
-    bodies, joints = [], []
-    rod = 1.0 / 12.0
-    for k in range(n + 1):
-        inertia = (rod, 1e-4 + 0 * rod, rod)
-        v = (0.5, 0.0, 0.0)
-        bodies.append(mech.Body(1.0, inertia, (k, 0.5, 0), v=v, w=(0, 0, -1)))
-        joints.append(Joint("REVOLUTE", k + 1, 0, (k, 0, 0)))
-    for k in range(n):
-        bodies.append(mech.Body(1.0, (1e-4, rod, rod), (k + 0.5, 1, 0), v=(1, 0, 0)))
-        joints.append(Joint("REVOLUTE", n + 2 + k, k + 1, (k, 1, 0)))
-        joints.append(Joint("REVOLUTE", n + 2 + k, k + 2, (k + 1, 1, 0)))
-    return Scene(bodies, joints, (0, -9.81, 0))
 
 
 def test_four_bars(tmp_path):
@@ -166,23 +127,6 @@ def test_errors_of_four_bars_fall_with_tol(tmp_path):
     assert errors[1] < errors[0] / 10
     assert errors[2] < errors[1] / 2
     assert errors[2] < 1e-7
-
-
-def bricard():
-    """A04 of the IFToMM benchmark: five rods of 1 m, 1 kg, six hinges; one degree of freedom."""
-    points = np.array(
-        [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float
-    )
-    long, cross = 1 / 600, (1 + 0.01) / 12  # square section of 0.1 m
-    bodies, joints = [], []
-    for start, end in pairwise(points):
-        along = np.abs(end - start) > 0.5
-        inertia = np.where(along, long, cross)
-        bodies.append(mech.Body(1.0, inertia, (start + end) / 2))
-    axes = {"X": X_UP, "Y": Y_UP, "Z": EYE}
-    for n, (point, axis) in enumerate(zip(points, "YZXYZX", strict=True)):
-        joints.append(Joint("REVOLUTE", n + 1 if n < 5 else 0, n, point, axes[axis]))
-    return Scene(bodies, joints, (0, -9.81, 0))
 
 
 def test_bricard(tmp_path):

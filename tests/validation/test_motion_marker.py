@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit"))
-
-import free_bodies as free
-from decks import added, read
-
+from helpers import free_bodies as free
+from helpers.minimal_deck import added, read
 from mbsim.errors import DeckError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Motion

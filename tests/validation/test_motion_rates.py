@@ -6,21 +6,16 @@ They hold neither positions (nor, of accelerations, velocities), which follow by
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import carray
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import write_deck
-from mechanics import Body
-from mechanism_decks import Joint, Scene
 from scipy.spatial.transform import Rotation
 
 import mbsim
+from helpers.decks import write_deck
+from helpers.mechanics import Body
+from helpers.mechanism_decks import Joint, Scene
 from mbsim.arrays import scene as arrays
 from mbsim.core.address import view
 from mbsim.dynamics.pipeline import hooks

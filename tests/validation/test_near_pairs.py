@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from crowd_decks import SHAPES, balls, block, pile, random_axes, sets, shape_graphic, solid, surface
-from decks_io import COULOMB, GRAVITY, GROUND, run_deck, write_deck
-
 import mbsim
+from helpers.crowd_decks import (
+    SHAPES,
+    balls,
+    block,
+    pile,
+    random_axes,
+    sets,
+    shape_graphic,
+    solid,
+    surface,
+)
+from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
 from mbsim.arrays.scene import FREE, LISTINGS, LIVE, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact import broadphase as crowd
 from mbsim.errors import Interrupted, ModelError, SolverError
-from mbsim.run import simulation
+from mbsim.run import loop
 
 LAW = {"stiffness": 1e5, "exponent": 1.5, "damping": 100.0, "dmax": 1e-4}
 MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" inertia_yy="1"
@@ -257,7 +261,7 @@ def test_falling_apart_needs_no_narrowphase(tmp_path, all_crowds):
 
 @pytest.mark.parametrize("method", ["DOPRI5", "VERLET"])
 def test_resume_in_a_crowd_is_bit_identical(tmp_path, all_crowds, monkeypatch, method):
-    monkeypatch.setattr(simulation, "RETURN_SECONDS", 1e-4)
+    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-4)
     path = write_deck(tmp_path, pile(HEAP, v=VELOCITY, **LAW, **COULOMB) + GRAVITY, end_time=0.3)
     model = mbsim.read_model(path)
     settings = {"integrator": method, "tol": 1e-4}

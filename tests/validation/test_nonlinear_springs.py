@@ -5,16 +5,11 @@ The folder of Adams curves has no nonlinear one; an independent integration (`me
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from decks_io import run_deck
+from helpers import mechanics as mech
+from helpers.decks import run_deck
 
 G = (0.0, 0.0, -9.80665)
 BAR = (0.04, 0.1, 0.1)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere
 
 SPEEDS = [0.1, 1.0, 5.0]
 TOLERANCES = pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-6)])

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, MODELS, USERFUNCS, contact, run_deck, sphere, write_deck
-from libraries import need
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import MODELS, USERFUNCS
+from helpers.libraries import need
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, PluginError
 from mbsim.plugins import octave

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, contact, run_deck, run_in_pieces, sphere, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, run_in_pieces, sphere, write_deck
 from mbsim.errors import SolverError
 
 METHODS = ["DOPRI5", "DOP853", "RADAU5", "GALPHA", "AUTO"]

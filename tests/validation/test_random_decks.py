@@ -7,17 +7,12 @@ what went wrong.
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import random_decks
-
 import mbsim
+from helpers import random_decks
 
 #: Seeds that together have each shape, a tree with and without contact, each system of units.
 QUICK = (5, 7, 12, 17, 18, 19, 21, 26, 30, 36)

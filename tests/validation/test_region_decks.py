@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, run_deck, write_deck
-from libraries import compiled
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, run_deck, write_deck
+from helpers.libraries import compiled
 from mbsim.errors import DeckError, Interrupted, ModelError
 from mbsim.run.replay import request
 

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, contact, run_deck
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck
 
 G = 9.81
 BOX_GROUND = """<Body_Rigid id="1" isground="TRUE"/>

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import COULOMB, GRAVITY, GROUND, MODELS, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import MODELS
 from mbsim.compile_model.groups import find_groups, natural_speed
 from mbsim.model.placement import place
 

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
 from mbsim.errors import DeckError
 
 G = 9.81
@@ -159,16 +154,16 @@ def test_a_run_resumed_after_a_sensor_is_the_same_to_the_last_bit(tmp_path, monk
     whole = mbsim.simulate(model, output=tmp_path / "whole")
 
     from mbsim.errors import Interrupted
-    from mbsim.run import simulation
+    from mbsim.run import loop
 
-    sense = simulation.Runner._sense
+    sense = loop.Runner._sense
 
     def stopping(runner, end, start=False):
         goes_on = sense(runner, end, start)
         runner.interrupted = True
         return goes_on
 
-    monkeypatch.setattr(simulation.Runner, "_sense", stopping)
+    monkeypatch.setattr(loop.Runner, "_sense", stopping)
     with pytest.raises(Interrupted, match=r"time 0\.105"):
         mbsim.simulate(model, output=tmp_path / "cut")
     monkeypatch.undo()

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import free_bodies as free
-
+from helpers import free_bodies as free
 from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper, Variable

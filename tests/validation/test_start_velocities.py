@@ -1,17 +1,12 @@
 """Initial velocities: what the deck gives is kept, the rest follows, what cannot be is named."""
 
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-import mechanics as mech
-from mechanism_decks import Joint, Scene
-
 import mbsim
+from helpers import mechanics as mech
+from helpers.mechanism_decks import Joint, Scene
 
 
 def double_pendulum():

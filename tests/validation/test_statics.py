@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, sphere
-
 import mbsim
+from helpers.decks import GROUND, sphere
 from mbsim.errors import SolverError
 
 G = 9.81

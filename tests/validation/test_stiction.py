@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import GROUND, MODELS, run_deck, sphere
-
 import mbsim
+from helpers.decks import GROUND, run_deck, sphere
+from helpers.folders import MODELS
 from mbsim.errors import DeckError
 
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS, USERFUNCS, contact, run_deck, run_in_pieces, sphere, write_deck
-
 import mbsim
+from helpers.decks import contact, run_deck, run_in_pieces, sphere, write_deck
+from helpers.folders import MODELS, USERFUNCS
 from mbsim.errors import DeckError, ModelError
 from mbsim.run.replay import request
 

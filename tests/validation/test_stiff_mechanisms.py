@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from decks_io import MODELS
-
 import mbsim
+from helpers.folders import MODELS
 from mbsim.bench import ours, stiff
 from mbsim.errors import SolverError
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from crowd_decks import balls, block, sets, shape_graphic, solid
-from decks_io import COULOMB, GRAVITY, GROUND, MODELS, contact, run_deck, sphere, write_deck
-
 import mbsim
+from helpers.crowd_decks import balls, block, sets, shape_graphic, solid
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import MODELS
 
 SPRING = {"stiffness": 1e4, "exponent": 1.0}
 OMEGA = 100.0

@@ -1,0 +1,392 @@
+"""The loop of a run: read this first, then `dynamics/pipeline/evaluate.py`.
+
+A model has become a `System`, the system a `Problem`; compiled code advances it and comes back
+to Python only with rows to keep, after a bounded number of evaluations, or to say why not.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.errors import Interrupted, ModelError
+from mbsim.run import checkpoint, statistics
+from mbsim.run.divergence import Pace
+from mbsim.run.failures import fail, give_up
+from mbsim.run.hook_calls import HookCalls
+from mbsim.run.settings import Settings, Stage, output_times
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.compile_model.changes import Parameters
+    from mbsim.compile_model.timetable import Timetable
+    from mbsim.results.audit import Audit
+    from mbsim.run.dumping import ContactProblems
+
+#: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
+#: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
+RETURN_SECONDS = 0.1
+FIRST_BUDGET = 200
+
+
+def next_budget(budget: int, done: int, elapsed: float) -> int:
+    """Return for how many evaluations to call next, after one that did so many in `elapsed` [s].
+
+    At most four times as many as before: the first calls also compile or load code.
+    """
+    wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
+    return int(min(max(wanted, 1.0), 4.0 * budget))
+
+
+Progress = Callable[[float, float, float], None]
+Notify = Callable[[str], None]
+
+
+class Runner:
+    """One run: a system, its integrator, its recorder."""
+
+    def __init__(
+        self,
+        system: System,
+        settings: Settings,
+        recorder: Any,
+        log: Any,
+        tell: Notify,
+        changes: list[Parameters] | None = None,
+    ) -> None:
+        from mbsim.arrays.scene import AUDIT_TOL
+        from mbsim.compile_model.timetable import follows_time
+        from mbsim.core import jit
+        from mbsim.integrators import driver, scheme
+        from mbsim.run.methods import Methods
+        from mbsim.run.sensing import Sensing
+
+        self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
+        self.tell = tell
+        self.detector = self._open_fcl_door()
+        system.scene.audit.plan[AUDIT_TOL] = settings.tol
+        start = settings.stages[0].simulation.start_time
+        self.methods = Methods(system, settings.integrator, start, follows_time(system.scene))
+        self.timetable: Timetable
+        self.method, self.problem = self.methods.arrays, self.methods.problem
+        self.hooks = HookCalls(system, self.problem)
+        self.method.counts[scheme.NEXT_WATCH] = 0
+        self._advance = jit.function(driver.advance)
+        self.changes = changes or []  # parameters of every Simulate, where some differ
+        self.stage = 0  # which Simulate
+        self.pace = Pace(start, start)  # of that one
+        self.sensing = Sensing(system, self.method, log, tell)
+        self.loop_seconds = 0.0
+        self.interrupted = False
+        self.dump: ContactProblems | None = None
+
+    def _open_fcl_door(self) -> Any:
+        """Put FCL behind the scene's door where a pair may need it."""
+        if not self.system.needs_fcl:
+            return None
+        from mbsim.arrays.scene import FCL_DOOR
+        from mbsim.geometry.fcl_detector import FclDetector
+
+        graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
+        detector = FclDetector(self.system.scene, graphics)
+        self.system.scene.world.doors[FCL_DOOR] = detector.address
+        return detector
+
+    def start(self, allow_overlap: bool) -> None:
+        """Assemble the model and begin with the incidents that exist."""
+        from mbsim.run.start import assemble_model, settle_contacts
+
+        t, method, log = self._first_time(), self.method, self.log.line
+        assemble_model(self.system, self.hooks, t, method.y, log, self.tell)
+        settle_contacts(
+            self.system,
+            self.hooks,
+            self.settings,
+            self.detector,
+            method.y,
+            method.k[0],
+            allow_overlap,
+            log,
+            self.tell,
+        )
+
+    def _first_time(self) -> float:
+        """Return when the first Simulate begins."""
+        return self.settings.stages[0].simulation.start_time
+
+    def _say(self, line: str) -> None:
+        """Tell something in the log and to the user."""
+        self.log.line(line)
+        self.tell(line)
+
+    def _change(self) -> None:
+        """Let the elements be as the commands before this stage leave them, and say so once."""
+        if not self.changes:
+            return
+        from mbsim.compile_model.changes import apply
+
+        apply(self.system.scene, self.changes[self.stage])
+        if self.system.reader is not None:
+            self.system.reader.open(self.system.scene)
+        before = self.settings.stages[self.stage - 1].simulation.changes if self.stage else ()
+        simulation = self.settings.stages[self.stage].simulation
+        for change in simulation.changes[len(before) :]:
+            self.log.line(f"from time {simulation.start_time:.9g} on {change.text}")
+
+    def _keeps_end(self) -> bool:
+        """Return whether the row at the end is this stage's: the last's, or one rest of several."""
+        rest = [stage.is_static for stage in self.settings.stages[self.stage : self.stage + 2]]
+        return len(rest) == 1 or all(rest)
+
+    def _interrupts(self, stage: int) -> bool:
+        """Return whether motions may not go on as they were: after a rest, and when changed.
+
+        A model is assembled as it is written, before what changes it ahead of its first Simulate.
+        """
+        before = self.settings.stages[max(0, stage - 1) : stage]
+        known = sum(len(one.simulation.changes) for one in before)
+        fresh = self.settings.stages[stage].simulation.changes[known:]
+        rested = any(one.is_static for one in before)
+        return rested or any(c.table in ("motions", "variables") for c in fresh)
+
+    def dump_every(self, every: int, resumed: bool) -> None:
+        """Write the contact problem of every so many steps from here on."""
+        from mbsim.arrays.scene import ACCELERATE
+        from mbsim.integrators import scheme
+        from mbsim.run.dumping import ContactProblems
+
+        folder = self.recorder.directory
+        if folder is None:
+            raise ModelError("dump_fclib needs an output folder")
+        idle = np.zeros(len(self.method.y))
+
+        def evaluate(t: float, y: Any) -> float:
+            return self.hooks.call(self.problem.rhs, t, 0.0, y, idle)
+
+        def accelerate(t: float, y: Any, dy: Any) -> None:
+            self.hooks.ask_joints(ACCELERATE, t, y, dy)
+
+        self.dump = ContactProblems(
+            self.system, every, folder / "fclib", evaluate, accelerate, resumed
+        )
+        self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
+
+    def _dump(self) -> None:
+        """Write the contact problem of the step taken last, where its turn has come."""
+        from mbsim.integrators import scheme
+
+        memory = self.method.memory
+        t, h = float(memory[scheme.TIME]), float(memory[scheme.LAST_STEP])
+        if self.dump is not None:
+            self.dump.watch(int(self.method.counts[scheme.STEPS]), t, h, self.method.y)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Return everything a run needs to go on: state, log, method, and where it is."""
+        arrays = checkpoint.save(self.system.scene, self.method)
+        arrays["stage"] = np.array(self.stage)
+        arrays["time"] = np.array(self.method.memory[0])
+        return arrays | self.methods.saved() | self.sensing.saved() | self.pace.saved()
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go back to a checkpoint."""
+        checkpoint.restore(self.system.scene, self.method, saved)
+        self.methods.restore(saved)
+        self.stage = int(saved["stage"])
+        self.sensing.restore(saved)
+        self.pace = self._pace()
+        self.pace.restore(saved)
+
+    def _pace(self) -> Pace:
+        """Return what looks whether the current Simulate gets anywhere."""
+        simulation = self.settings.stages[self.stage].simulation
+        return Pace(simulation.start_time, simulation.end_time)
+
+    def run(self, progress: Progress | None, resumed: bool) -> None:
+        """Run all Simulate statements from the current stage on."""
+        first = self.stage
+        for stage in range(first, len(self.settings.stages)):
+            fresh = not (resumed and stage == first)
+            self.stage = stage
+            self._run_stage(self.settings.stages[stage], fresh, progress)
+            if self.sensing.halted_by:
+                return
+
+    def _sense(self, end: float, start: bool = False) -> bool:
+        """Do what sensors that became true ask for; return whether the Simulate goes on."""
+        from mbsim.integrators import scheme
+        from mbsim.run.sensing import GO_ON
+
+        t, y, error = float(self.method.memory[scheme.TIME]), self.method.y, self.method.error
+        last = self.stage == len(self.settings.stages) - 1
+        follows, row = self.sensing.act(t, end, last)
+        # the first row of a Simulate is there anyway
+        if row and not start:
+            code = self.hooks.call(self.problem.output, t, 0.0, y, error)
+            if code < 0.0:
+                fail(self.system, self.detector, int(-code), t)
+            self.recorder.take()
+        return follows == GO_ON
+
+    def _begin_stage(self, stage: Stage) -> bool:
+        """Begin one Simulate statement with its first row; return whether it goes on."""
+        from mbsim.integrators import scheme
+        from mbsim.run.start import assemble_again
+        from mbsim.run.statics import balance_bodies
+
+        method, simulation = self.method, stage.simulation
+        if self.stage > 0:
+            # a sensor may have ended the one before early
+            now = float(method.memory[scheme.TIME])
+            simulation = replace(simulation, start_time=now)
+        self.sensing.begin(output_times(simulation, self._keeps_end()), stage.h_max)
+        # the statement may have changed what acts: f and the step begin anew
+        method.memory[scheme.HAVE_F] = 0.0
+        method.memory[scheme.STEP] = 0.0
+        method.memory[scheme.FIRST_MAX] = stage.h0_max
+        method.memory[scheme.LAST_STEP] = 0.0
+        method.counts[scheme.NEXT_OUTPUT] = 1
+        t, goes_on = simulation.start_time, True
+        if simulation.analysis_type == "STATIC":
+            balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self._say)
+            goes_on = False
+        elif self._interrupts(self.stage):
+            assemble_again(self.system, self.hooks, t, method.y)
+        if (
+            goes_on
+            and self.problem.arrive
+            and self.hooks.call(self.problem.arrive, t, 0.0, method.y, method.error)
+        ):
+            goes_on = self._sense(simulation.end_time, start=True)
+        if len(self.sensing.times):
+            code = self.hooks.call(self.problem.output, t, 0.0, method.y, method.error)
+            if code < 0.0:
+                fail(self.system, self.detector, int(-code), t)
+        self.recorder.take()
+        return goes_on
+
+    def _look_ahead(self, stage: Stage, fresh: bool) -> None:
+        """Find out what of this Simulate follows from the time alone."""
+        from mbsim.compile_model.timetable import Timetable
+        from mbsim.integrators import scheme
+
+        method, methods = self.method, self.methods
+        schemes = [methods.explicit] + ([methods.other] if methods.other else [])
+        samples = max(each.samples for each in schemes)
+        estimates = methods.explicit.order > 0.0
+        span = stage.simulation.end_time - stage.simulation.start_time
+        self.timetable = Timetable(self.system, stage.tol, span, estimates, samples)
+        if fresh:
+            memory = method.memory
+            memory[scheme.ROW_ENDS] = -np.inf if self.timetable.timed else np.inf
+            memory[scheme.REACH] = np.inf
+            method.counts[scheme.ROW] = len(method.timetable)
+
+    def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
+        """Run one Simulate statement."""
+        from mbsim.arrays.scene import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
+        from mbsim.core import problem
+        from mbsim.integrators import scheme
+
+        method, scene, simulation = self.method, self.system.scene, stage.simulation
+        # the last change so far holds; a resumed run may have missed an earlier one
+        for passed in self.settings.stages[: self.stage + 1]:
+            if passed.simulation.gravity is not None:
+                pull = self.system.pull(passed.simulation.gravity)
+                scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
+        scene.world.scale[TOLERANCE] = stage.tol
+        self._change()
+        plan = scene.audit.plan
+        plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time
+        budget = FIRST_BUDGET if self.dump is None else 1
+        if fresh:
+            self.pace = self._pace()
+        if fresh or stage.is_static:
+            if self.stage > 0:
+                # the statement may have changed what acts
+                scene.audit.tally[ANEW] = 1.0
+            if not self._begin_stage(stage):
+                return
+        elif not self.system.model.sensors:
+            last = self.stage == len(self.settings.stages) - 1
+            self.sensing.begin(output_times(simulation, last), stage.h_max)
+        self._look_ahead(stage, fresh)
+        while True:
+            began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
+            outcome = self._advance(
+                self.methods.steps,
+                simulation.end_time,
+                stage.tol,
+                min(self.sensing.h_max, self.timetable.longest),
+                stage.h_min,
+                self.sensing.times,
+                budget,
+            )
+            elapsed = time.perf_counter() - began
+            self.loop_seconds += elapsed
+            done = int(method.counts[scheme.EVALUATIONS]) - before
+            budget = next_budget(budget, done, elapsed)
+            self.recorder.take()
+            if self.dump is not None and outcome != problem.FAILED:
+                # after every step
+                budget = 1
+                self._dump()
+            if outcome == problem.DONE:
+                return
+            if outcome == problem.HAPPENED and not self._sense(simulation.end_time):
+                return
+            self._answer(outcome, simulation.end_time)
+            if self.interrupted:
+                raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
+            if self.recorder.due():
+                self.recorder.flush(self.checkpoint())
+            if progress is not None:
+                h = float(method.memory[scheme.STEP])
+                progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
+
+    def _answer(self, outcome: int, end: float) -> None:
+        """Do what a return from compiled code asks for, or raise why the run cannot go on."""
+        from mbsim.core import problem
+        from mbsim.integrators import scheme
+
+        memory, counts = self.method.memory, self.method.counts
+        if outcome == problem.FAILED:
+            fail(
+                self.system,
+                self.detector,
+                int(counts[scheme.CODE]),
+                memory[scheme.TIME],
+            )
+        now, steps = float(memory[scheme.TIME]), int(counts[scheme.STEPS])
+        if outcome == problem.WATCH_DUE:
+            self.pace.watch(self.system, self.method.y, now, steps)
+        if outcome == problem.TABLE_OVER:
+            self.timetable.write(self.method.timetable, now, end)
+            counts[scheme.ROW] = 0
+        if outcome == problem.CHANGES_OVER:
+            self.log.line(self.methods.change_over())
+        if outcome == problem.STEP_TOO_SMALL and self.methods.retreat():
+            self.log.line(
+                f"time {now:.9g}: the implicit step became too small: explicit from here on"
+            )
+        elif outcome == problem.STEP_TOO_SMALL:
+            give_up(self.system, self.settings, self.method)
+
+    def audit(self) -> Audit | None:
+        """Return what the run found out about itself, None where it took no step."""
+        from mbsim.integrators import scheme
+        from mbsim.results.audit import audit_of
+
+        memory = self.method.memory
+        left, when = float(memory[scheme.LEFT_OVER]), float(memory[scheme.LEFT_TIME])
+        return audit_of(self.system, left, when)
+
+    def stats(self, wall: float, compiled: float) -> dict[str, float]:
+        """Return the counters of the run; seconds in all, and of these for compiling."""
+        found = statistics.counters(self.system.scene, self.method, self.methods.changes)
+        halted = self.sensing.halted_by
+        seconds = {"loop_s": self.loop_seconds, "wall_s": wall, "compile_s": compiled}
+        return {**found, **seconds, **({"halted_by_sensor": halted} if halted else {})}

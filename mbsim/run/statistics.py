@@ -1,0 +1,35 @@
+"""The counters of a run, under the names that results give them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbsim.arrays.scene import Scene
+
+
+def counters(scene: Scene, method: Any, changes: int) -> dict[str, float]:
+    """Return what was counted; `method` is what the integrator keeps, `changes` those of AUTO."""
+    from mbsim.arrays import scene as a
+    from mbsim.integrators import scheme
+
+    counts, memory = method.counts, method.memory
+    counters = scene.log.counters
+    return {
+        "steps": int(counts[scheme.STEPS]),
+        "rejected": int(counts[scheme.REJECTED]),
+        "rhs_evaluations": int(counts[scheme.EVALUATIONS]),
+        "output_evaluations": int(counts[scheme.OUTPUTS]),
+        "jacobians": int(counts[scheme.JACOBIANS]),
+        "factorizations": int(counts[scheme.FACTORIZATIONS]),
+        "method_changes": changes,
+        "narrowphase_pairs": int(counters[a.NARROWPHASE]),
+        "skipped_pairs": int(counters[a.SKIPPED]),
+        "pair_listings": int(counters[a.LISTINGS]),
+        "fcl_calls": int(counters[a.FCL_CALLS]),
+        "normal_calls": int(counters[a.NORMAL_CALLS]),
+        "friction_calls": int(counters[a.FRICTION_CALLS]),
+        "python_calls": int(counters[a.PYTHON_CALLS]),
+        "h_smallest": float(memory[scheme.H_SMALLEST]),
+        "h_largest": float(memory[scheme.H_LARGEST]),
+    }

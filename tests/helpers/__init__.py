@@ -1,0 +1,1 @@
+"""What tests share: decks, independent solutions, folders. On the path by pyproject.toml."""
