@@ -26,24 +26,23 @@ LIVE, FREE, FIXED, WANTED = range(4)
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 
-# entries of `Applied.kind`
+# entries of `Applied.kind`, in no order
 (
     LINE_FORCE,
     AXIS_FORCE,
     AXIS_TORQUE,
-    VECTOR_FORCE,  # the kinds up to SLIDE_LIMIT are those of forces.wrenches
+    VECTOR_FORCE,
     MARKER_FORCE,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
     SLIDE_LIMIT,
     TURN_LIMIT,
     DRY_SLIDE,  # Force_DryFriction along an axis, then about one: forces.dry_friction
     DRY_TURN,
-    SLIDE_FRICTION,  # the kinds from here on are frictions in joints
+    SLIDE_FRICTION,  # in joints, as the next three
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
 ) = range(14)
-LATE = 16  # is added to the kind of forces that need reactions, see forces.reaction_forces
 
 # entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)

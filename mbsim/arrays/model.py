@@ -203,6 +203,9 @@ class Applied(NamedTuple):
     """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
 
     kind: I1  # (nf,) see forces.applied
+    # 1 where it is settled with the reactions: friction in joints, and what looks at reactions
+    # (forces.reaction_forces)
+    with_reactions: I1  # (nf,)
     i: I1  # (nf,) markers
     j: I1  # (nf,)
     par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;

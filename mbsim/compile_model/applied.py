@@ -49,6 +49,7 @@ def applied_forces(
     found = [_law(element) if laws else (0, np.zeros(0)) for _, element in given]
     made = a.Applied(
         kind=np.zeros(n, dtype=np.int64),
+        with_reactions=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
         j=np.zeros(n, dtype=np.int64),
         par=np.zeros((n, 8 if model.marker_forces else 4)),
@@ -195,6 +196,7 @@ def _add_friction(
     made.kind[k] = _FRICTIONS[model.joints[friction.joint_id].type]
     radius = friction.pin_radius or friction.ball_radius or 0.0
     made.par[k, :4] = radius, friction.preload, friction.bending_reaction_arm, 0.0
+    made.with_reactions[k] = 1
     # joints are the first connections, in the order of the model
     made.connection[k] = list(model.joints).index(friction.joint_id)
 

@@ -45,7 +45,7 @@ def in_order(
 ) -> tuple[a.Applied, list[tuple[str, int]]]:
     """Return the applied forces and their elements in an order in which each can be evaluated.
 
-    Late ones have their kind raised by `arrays.LATE`, and are listed in `Applied.late`.
+    Late ones are marked in `Applied.with_reactions`, and listed in `Applied.late`.
 
     Raises
     ------
@@ -59,10 +59,9 @@ def in_order(
     late = np.zeros(len(elements), dtype=bool)
     for row in order:
         late[row] = needs.reaction[row] or any(late[k] for k in needs.rows[row])
-    kind = applied.kind + a.LATE * late
     at = np.array(order, dtype=np.int64)
     rows = {name: array[at] for name, array in applied._asdict().items() if name != "late"}
-    rows["kind"] = kind[at]
+    rows["with_reactions"] = np.maximum(applied.with_reactions, late)[at]
     made = applied._replace(**rows)
     return made._replace(late=_late(made)), [elements[k] for k in order]
 
@@ -153,7 +152,7 @@ def check_states(
         rows, reaction = _needed(
             [int(program)], applied, elements, connections, connection_ids, programs
         )
-        if reaction or any(applied.kind[k] >= a.LATE for k in rows):
+        if reaction or any(applied.with_reactions[k] == 1 for k in rows):
             source = state.source
             name = element_name(source.file, "Control_Diff", state.id)
             why = (
@@ -203,7 +202,7 @@ def _late(applied: a.Applied) -> np.ndarray[Any, Any]:
     """Return the unknowns that are settled together: row, component and program of each."""
     found = []
     for row in range(len(applied.kind)):
-        if applied.kind[row] >= a.LATE:
+        if applied.with_reactions[row] == 1:
             if applied.program[row] >= 0:
                 found.append((row, a.SCALAR, int(applied.program[row])))
             components = enumerate(applied.components[row])

@@ -157,7 +157,7 @@ def _forces(scene: a.Scene, tol_v: float, tol_l: float) -> Iterator[tuple[int, i
         ends = (int(applied.i[f]), int(applied.j[f]))
         whole = int(applied.program[f])
         if whole >= 0:
-            turning = applied.kind[f] % a.LATE == a.AXIS_TORQUE
+            turning = applied.kind[f] == a.AXIS_TORQUE
             yield whole, 0, sum(_lever(scene, m, tol_v, tol_l, turning) for m in ends)
         for c, program in enumerate(applied.components[f]):
             if program >= 0:

@@ -421,6 +421,24 @@ def test_a_bushing_to_ground(ends, tmp_path):
     check(of(two("REVOLUTE", extra=text + "/>"), tmp_path))
 
 
+#: Across from marker 511, along whose x-axis the beam is.
+END = marker(
+    513, 2, PLACE + 0.41 * np.array(rotation((0, 1, 3), 0.6))[:, 0], rotation((0, 1, 3), 0.61)
+)
+BEAM = (
+    '<Force_Beam id="1" i_marker_id="513" j_marker_id="511" length="0.4" E="1e6" G="4e5" '
+    'area="4e-4" ixx="3e-5" iyy="2e-6" izz="3e-6" ASY="1.2" ASZ="1.1" cratio="0.01" '
+    'preload_x="3" preload_y="-4" preload_tz="0.3"/>'
+)
+
+
+@pytest.mark.parametrize("move", [1e-4, 0.1])
+@pytest.mark.parametrize("hold", ["SPHERICAL", None])
+def test_a_beam(hold, move, tmp_path):
+    # 2e-6 where c1 is near an eigenvalue
+    check(of(two("FREE", hold, extra=MARKERS + END + BEAM), tmp_path), 1e-5, move=move)
+
+
 LIMIT = 'cnf_type="IMPACT" stiffness="900" exponent="1.5" damping="20" dmax="0.02"/>'
 
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import mbsim
+from mbsim.arrays import scene
 from mbsim.forces.catalog import FORCES, Motion
 
 #: Half of the difference of displacements and velocities, and rounding over it.
@@ -135,3 +139,17 @@ def test_kinds_have_names_of_their_own():
         assert len(known) == len(set(known))
         for words in kind.adams.words.values() if kind.adams else ():
             assert set(words) <= set(known)
+
+
+def test_the_numbers_of_kinds_have_no_order():
+    names = "|".join(
+        (
+            *("LINE_FORCE", "AXIS_FORCE", "AXIS_TORQUE", "VECTOR_FORCE", "MARKER_FORCE"),
+            *("RESIDUAL", "SLIDE_LIMIT", "TURN_LIMIT", "DRY_SLIDE", "DRY_TURN"),
+            *("SLIDE_FRICTION", "TURN_FRICTION", "SCREW_FRICTION", "BALL_FRICTION"),
+        )
+    )
+    assert all(hasattr(scene, name) for name in names.split("|"))
+    ordered = re.compile(rf"[<>]=?\s*(a\.)?({names})\b|\b({names})\s*([<>+\-%]|\.\.)")
+    for file in Path(mbsim.__file__).parent.rglob("*.py"):
+        assert not ordered.search(file.read_text(encoding="utf-8")), file

@@ -9,7 +9,7 @@ are what follows from velocities: bodies' own are taken as zero. A vector's jet 
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import LATE, VECTOR_FORCE
+from mbsim.arrays.scene import VECTOR_FORCE
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import nearest_turn
@@ -286,7 +286,7 @@ def on_i(scene, applied, row):
 @jitable
 def floats(scene, applied, row):
     """Return whether a row's J marker is a floating one, which is wherever I is."""
-    return applied == 1 and scene.applied.kind[row] % LATE == VECTOR_FORCE
+    return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
 
 
 @jitable

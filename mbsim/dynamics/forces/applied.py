@@ -29,7 +29,8 @@ from mbsim.arrays.scene import (
     AXIS_TORQUE,
     LINE_FORCE,
     LOST_POWER,
-    SLIDE_FRICTION,
+    MARKER_FORCE,
+    RESIDUAL,
     SLIDE_LIMIT,
     STORED_ENERGY,
     TURN_LIMIT,
@@ -106,7 +107,8 @@ def at_limit(scene, f, x, rate):
 def strength(scene, t, y, f, x, rate):
     """Return F, stored energy and lost power of applied force f at displacement x."""
     par, program = scene.applied.par[f], scene.applied.program[f]
-    if scene.applied.kind[f] >= SLIDE_LIMIT:
+    kind = scene.applied.kind[f]
+    if kind == SLIDE_LIMIT or kind == TURN_LIMIT:
         return at_limit(scene, f, x, rate)
     if program >= 0:
         size = value(scene, t, y, program)
@@ -124,11 +126,11 @@ def add_applied(scene, t, y, dy):
     none = (0.0, 0.0, 0.0)
     for f in range(len(applied.kind)):
         i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
-        if kind >= SLIDE_FRICTION:
+        if applied.with_reactions[f] == 1:
             for k in range(len(work.applied[f])):
                 work.applied[f, k] = 0.0
             continue
-        if VECTOR_FORCE <= kind < SLIDE_LIMIT:
+        if kind == VECTOR_FORCE or kind == MARKER_FORCE or kind == RESIDUAL:
             code = wrench(scene, t, y, f)
             if code != 0:
                 return code

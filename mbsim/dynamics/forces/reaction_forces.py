@@ -20,7 +20,6 @@ from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
-    LATE,
     LINE_FORCE,
     LOST_POWER,
     RUBBING,
@@ -61,7 +60,7 @@ TOO_LARGE = 1e9
 def fill_direction(scene, y, f):
     """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
     applied, row = scene.applied, scene.work.rub[f]
-    i, j, kind = applied.i[f], applied.j[f], applied.kind[f] - LATE
+    i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
     n, rate = (0.0, 0.0, 0.0), 0.0
     if kind == LINE_FORCE:
         n, _, rate = along_line(scene, y, f)
@@ -174,7 +173,7 @@ def measure_misses(scene, t, y):
 def unit(scene, u):
     """Return what makes a force of unknown u: the length for torques, else 1."""
     f, c = scene.applied.late[u, 0], scene.applied.late[u, 1]
-    turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE + LATE
+    turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE
     return scene.world.scale[0] if turns else 1.0
 
 

@@ -86,6 +86,5 @@ def add_rub_slopes(scene, T, t, y, f):
 def add_rubs_slopes(scene, T, t, y):
     """Add what friction in joints does."""
     for f in range(len(scene.applied.kind)):
-        kind = scene.applied.kind[f]
-        if SLIDE_FRICTION <= kind <= BALL_FRICTION and scene.applied.law[f] != 0:
+        if scene.applied.connection[f] >= 0 and scene.applied.law[f] != 0:
             add_rub_slopes(scene, T, t, y, f)

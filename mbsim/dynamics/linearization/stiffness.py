@@ -21,11 +21,9 @@ from mbsim.arrays.scene import (
     AXIS_TORQUE,
     BODY_SIZE,
     DRY_TURN,
-    LATE,
     LINE_FORCE,
     MARKER_FORCE,
     RESIDUAL,
-    SLIDE_FRICTION,
     SLIDE_LIMIT,
     TURN_LIMIT,
     VECTOR_FORCE,
@@ -392,13 +390,6 @@ def sides_of(scene, f):
 
 
 @jitable
-def base_kind(scene, f):
-    """Return the kind of applied force f, whether it is settled with reactions or not."""
-    kind = scene.applied.kind[f]
-    return kind - LATE if kind >= LATE else kind
-
-
-@jitable
 def depends_on(scene, T, f, k):
     """Return program k (0 to 6) of applied force f, -1 for none."""
     return scene.applied.program[f] if k == 6 else scene.applied.components[f, k]
@@ -413,7 +404,9 @@ def couple_applied(scene, P, T):
         if i < nb and j < nb and i != j and not couple(P, i, j):
             return False
         # whose axes a force is along
-        axes = scene.applied.axes[f] if base_kind(scene, f) == VECTOR_FORCE else scene.applied.j[f]
+        axes = (
+            scene.applied.axes[f] if scene.applied.kind[f] == VECTOR_FORCE else scene.applied.j[f]
+        )
         along = scene.markers.body[axes]
         for a in (i, j):
             if a < nb and along < nb and a != along and not couple(P, a, along):
@@ -725,7 +718,7 @@ def limit_slopes(scene, f, x, rate):
 @jitable
 def add_scalar_slopes(scene, T, t, y, f):
     """Add a force along a line, along an axis or about one."""
-    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), base_kind(scene, f)
+    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
     bi, bj = sides_of(scene, f)
     none, x, rate = (0.0, 0.0, 0.0), 0.0, 0.0
     if kind == LINE_FORCE:
@@ -787,12 +780,12 @@ def add_dry_slopes(scene, T, y, f):
 def add_applied_slopes(scene, T, t, y):
     """Add what forces between markers do, but for marker forces and friction in joints."""
     for f in range(len(scene.applied.kind)):
-        kind = base_kind(scene, f)
+        kind = scene.applied.kind[f]
         if kind == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
         elif is_dry(kind):
             add_dry_slopes(scene, T, y, f)
-        elif kind != MARKER_FORCE and kind != RESIDUAL and kind < SLIDE_FRICTION:
+        elif kind != MARKER_FORCE and kind != RESIDUAL and scene.applied.connection[f] < 0:
             add_scalar_slopes(scene, T, t, y, f)
     return 0
 

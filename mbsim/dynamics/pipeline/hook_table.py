@@ -24,12 +24,10 @@ from numba import types
 
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import (
-    BALL_FRICTION,
     DRY_SLIDE,
     DRY_TURN,
     MARKER_FORCE,
     RESIDUAL,
-    SLIDE_FRICTION,
     VECTOR_FORCE,
     Scene,
 )
@@ -138,8 +136,8 @@ def _joints(scene: Scene) -> Callable[..., Any]:
     """Return what joints do; a tree alone compiles no equations."""
     from mbsim.dynamics.pipeline.joint_hooks import serve_joints, serve_tree
 
-    rubs = bool((scene.applied.kind >= SLIDE_FRICTION).any())
-    return serve_joints if len(scene.equations.program) > 0 or rubs else serve_tree
+    settles = bool(scene.applied.with_reactions.any())
+    return serve_joints if len(scene.equations.program) > 0 or settles else serve_tree
 
 
 def _has_held(scene: Scene, method: Method) -> bool:
@@ -206,7 +204,7 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
         return residual_slopes
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
-    rubs = bool(kinds & set(range(SLIDE_FRICTION, BALL_FRICTION + 1)))
+    rubs = bool((scene.applied.connection >= 0).any())
     if MARKER_FORCE in kinds:
         return of.slopes_with_both if rubs else of.slopes_with_marker_forces
     return of.slopes_with_rubs if rubs else of.slopes
