@@ -21,7 +21,7 @@ NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS, LIS
 COUNTERS = 7
 
 # entries of `Pairs.count`
-LIVE, FREE, FIXED, WANTED = range(4)
+ACTIVE, FREE, FIXED, WANTED = range(4)
 
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
@@ -48,7 +48,7 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
-SCALAR, RUBBING = 6, 7
+SCALAR, JOINT_FRICTION = 6, 7
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -155,10 +155,10 @@ EXCESS, ON, SHOWN, NEXT, FIRED = range(5)
 SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 
 # columns of `State.sides`: see events.switching
-SIDE, HEAT = range(2)
-#: What is hotter changes at nearly every step, as the sign of what is at rest does: then steps are
-#: not cut there.
-HOT = 4.0
+SIDE, CHATTERING = range(2)
+#: What chatters more changes at nearly every step, as the sign of what is at rest does: then
+#: steps are not cut there.
+CHATTERS = 4.0
 
 # entries of `World.past`
 NOW, WITHIN, AGAIN = range(3)
@@ -196,6 +196,7 @@ EVENT_TIME, EVENT_KIND, EVENT_ELEMENT, EVENT_SLOT = range(4)
 #: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
 CONE_ROWS = 12
 SLOT_COLUMNS = 28
-#: What `crowd.put_aside` keeps of a slot, and twice the memory: frames, mode, point, `Work.slot`.
+#: What `contact_set.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
+#: `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS
 CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area

@@ -41,7 +41,7 @@ class Hook(IntEnum):
 class Joints(IntEnum):
     """What joints are asked for; the last four are for assembly, in Python."""
 
-    SEAT = 0  # bring a trial point onto the equations, near a fold
+    PROJECT_TREE = 0  # bring a trial point onto the equations, near a fold
     ACCELERATE = 1  # replace accelerations by those that constraints leave
     PROJECT = 2  # bring y onto the equations
     ALONG = 3  # the same of displacements a time

@@ -25,11 +25,11 @@ class Graphics(NamedTuple):
     p: F2  # (ng, 3) centre, in the body's cg axes
     R: F3  # (ng, 3, 3) shape axes to cg axes
     size: F2  # (ng, 3) see geometry.catalog
-    reach: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
+    radius: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
     half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
     thin: F1  # (ng,) half of the thinnest side; inf for a plane
-    shape: I1  # (ng,) class of shape, see `Crowds.kind`
+    shape: I1  # (ng,) class of shape, see `Broadphase.kind`
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)
 
@@ -137,7 +137,7 @@ class Sensors(NamedTuple):
 
 
 @tags.constant
-class Kinks(NamedTuple):
+class Switching(NamedTuple):
     """What may change its branch within a step, which then ends there: compile_model.switching."""
 
     program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
@@ -298,7 +298,9 @@ class World(NamedTuple):
     fixed_step: I1  # (1,) 1 for a method without error estimate
     # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
     past: tags.Scratch[I1]
-    ledger: I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
+    accumulators: (
+        I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere
+    )
 
 
 @tags.constant

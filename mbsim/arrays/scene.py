@@ -2,7 +2,7 @@
 
 Counts: nb moving bodies (row nb of a body array is ground), ng graphics, nk kinds, np places
 for pairs, nc contacts, ns slots. A *slot* is a place for one incident: a pair owns a range of
-slots. A contact of few graphics lists all its pairs for good; one of many, a *crowd*, lists
+slots. A contact of few graphics lists all its pairs for good; one of many, a *large contact*, lists
 those that are near, and the list follows the motion (contact.broadphase). Everything is in model
 units, global frame unless said otherwise.
 
@@ -10,8 +10,8 @@ The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then, slot by
 slot, X (3) where the law uses it and the law's memory where that is integrated; then the user's own
 states, one number each; then the work of motions and what applied forces dissipated, where there
-are any (`World.ledger`); last the energy that each contact has dissipated so far (one number where
-there is no contact, so that y is never empty).
+are any (`World.accumulators`); last the energy that each contact has dissipated so far (one number
+where there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from mbsim.arrays.model import (
     Equations,
     Graphics,
     Kinds,
-    Kinks,
     Markers,
     Programs,
     Residuals,
@@ -36,12 +35,13 @@ from mbsim.arrays.model import (
     Sensors,
     Slots,
     States,
+    Switching,
     Tree,
     Users,
     World,
 )
 from mbsim.arrays.scratch import Rows, Sweep, Work
-from mbsim.arrays.state import Audit, Crowds, Log, Pairs, State
+from mbsim.arrays.state import Audit, Broadphase, Log, Pairs, State
 from mbsim.core.layout import BODY_SIZE as BODY_SIZE
 
 
@@ -52,7 +52,7 @@ class Scene(NamedTuple):
     graphics: Graphics
     kinds: Kinds
     pairs: Pairs
-    crowds: Crowds
+    broadphase: Broadphase
     contacts: Contacts
     slots: Slots
     markers: Markers
@@ -60,7 +60,7 @@ class Scene(NamedTuple):
     programs: Programs
     states: States
     sensors: Sensors
-    kinks: Kinks
+    switching: Switching
     users: Users
     residuals: Residuals
     applied: Applied

@@ -19,7 +19,7 @@ class Work(NamedTuple):
     torque: F2  # (nb + 1, 3) about the cg
     noise: F2  # (nb + 1, 2) force and torque that the detector's noise may be wrong by
     frames: F2  # (ng, 12)
-    way: F1  # (ng,) how far any point may have moved since the committed state
+    travel: F1  # (ng,) how far any point may have moved since the committed state
     speed: F2  # (ng, 2) of its fastest point, and acceleration of its centre
     points: F2  # (ns, POINT) candidates of geometry.catalog
     touching: I1  # (ns,)

@@ -20,24 +20,32 @@ class Pairs(NamedTuple):
     touches: I1  # (np,) slots that touched at the committed state
     gap: F1  # (np,) distance that the pair kept when last measured
     left: F1  # (np,) what the motion since has left of it for certain
-    live: I1  # (np,) places in use, ascending; those of crowds behind all others
+    active: I1  # (np,) places in use, ascending; those of large contacts behind all others
     free: I1  # (np,) places not in use, the next one last
     count: I1  # (4,) live, free, live for good, places that a listing lacked
 
 
 @tags.state
-class Crowds(NamedTuple):
+class Broadphase(NamedTuple):
     """Contacts of many graphics, whose near pairs are found as they move."""
 
-    contact: tags.Constant[I1]  # (crowds,)
-    same: tags.Constant[I1]  # (crowds,) 1 where I and J are one set: each pair once, no body's own
-    first: tags.Constant[I2]  # (crowds, 4) begin and end of I in `member`, begin and end of J
+    contact: tags.Constant[I1]  # (large contacts,)
+    same: tags.Constant[
+        I1
+    ]  # (large contacts,) 1 where I and J are one set: each pair once, no body's own
+    first: tags.Constant[
+        I2
+    ]  # (large contacts, 4) begin and end of I in `member`, begin and end of J
     member: tags.Constant[I1]  # graphics
-    kind: tags.Constant[I2]  # (crowds, shapes^2) kind by shape class of I and of J, -1 for none
-    swap: tags.Constant[I2]  # (crowds, shapes^2) 1 where the kernel wants the other order
+    kind: tags.Constant[
+        I2
+    ]  # (large contacts, shapes^2) kind by shape class of I and of J, -1 for none
+    swap: tags.Constant[I2]  # (large contacts, shapes^2) 1 where the kernel wants the other order
     size: F1  # (2,) a pair is near if its boxes are nearer than the first; a usual reach
     reference: F2  # (ng, 7) centre and quaternion of the body when pairs were last listed
-    room: F1  # (ng,) how far any point may still move before that; inf for who is in no crowd
+    room: (
+        F1  # (ng,) how far any point may still move before that; inf for who is in no large contact
+    )
     box: tags.Scratch[F2]  # (ng, 6) lower and upper corner when pairs are listed
     cell: tags.Scratch[I1]  # (ng,) of the grid
     order: tags.Scratch[I1]  # (ng,) members cell by cell
@@ -69,13 +77,13 @@ class State(NamedTuple):
     mode: F1  # (ns,) branch of a friction law with memory: see laws.catalog
     hit: I1  # (ns + 1,) slots that touched, their number last
     sensed: F2  # (sensors, 5) see codes
-    sides: F2  # (kinks, 2) side at the committed state, how often it changed of late
+    sides: F2  # (switches, 2) side at the committed state, how often it changed of late
     frozen: I1  # (1,) 1 where friction keeps its modes within a step, which ends where one changes
     dry: F2  # (nf, 4) of dry friction, see codes
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
     fastest: F1  # (n,) what the largest speed so far of a group counts: pipeline.scales
-    heat: F1  # (2,) of contacts whose friction is rigid: heat as of sides, 1 where one asked for
+    chattering: F1  # (2,) of contacts whose friction is rigid: as of sides, 1 where one asked for
     # another mode since the committed state: see events.switching
 
 

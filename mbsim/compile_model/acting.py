@@ -11,10 +11,10 @@ from mbsim.compile_model.applied import applied_forces
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
 from mbsim.compile_model.markers import MarkerTable
-from mbsim.compile_model.mechanism import Grip, Mechanism, constrain
+from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
-from mbsim.compile_model.switching import kinks_table
+from mbsim.compile_model.switching import switching_table
 from mbsim.model.elements import Model, Subroutine
 from mbsim.model.placement import place
 
@@ -83,7 +83,7 @@ class Acting:
     mechanism: Mechanism
     states: a.States
     sensors: a.Sensors
-    kinks: a.Kinks
+    switching: a.Switching
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
@@ -98,8 +98,8 @@ def _link_dry(
     Theirs are the last but for those of contacts.
     """
     rigid = [id for id, friction in model.dry_frictions.items() if friction.dx == 0.0]
-    grips = int((mechanism.equations.slot >= 0).sum())
-    first = len(mechanism.equations.program) - grips - len(rigid)
+    rigid_slots = int((mechanism.equations.slot >= 0).sum())
+    first = len(mechanism.equations.program) - rigid_slots - len(rigid)
     for k, id in enumerate(rigid):
         row = applied_ids.index(("DRYFRICTION", id))
         applied.equation[row], mechanism.equations.dry[first + k] = first + k, row
@@ -113,13 +113,13 @@ def acting(
     looks: bool,
     runs: bool = True,
     residuals: Mapping[int, UserResidual] | None = None,
-    grips: Sequence[Grip] = (),
+    rigid_slots: Sequence[RigidSlot] = (),
 ) -> Acting:
     """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
 
     `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
     look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.
-    `grips`: slots whose friction is rigid.
+    `rigid_slots`: slots whose friction is rigid.
     """
     programs = ProgramTable(
         table,
@@ -133,7 +133,7 @@ def acting(
     elements = [("FORCEELEMENT", id) for id in model.force_elements]
     programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)
-    mechanism = constrain(model, table, programs, grips)
+    mechanism = constrain(model, table, programs, rigid_slots)
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )
@@ -154,7 +154,7 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
-        kinks_table(model, programs, applied, modes),
+        switching_table(model, programs, applied, modes),
         _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
         _values(model, programs, residuals),  # the last of all

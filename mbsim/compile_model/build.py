@@ -20,8 +20,8 @@ from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.acting import acting
 from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import (
+    broadphase_table,
     contacts_table,
-    crowds_table,
     graphics_table,
     kinds_table,
     pairs_table,
@@ -31,7 +31,7 @@ from mbsim.compile_model.groups import Groups, find_groups, natural_speed
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.mechanism import sweep
 from mbsim.compile_model.pairing import Plans, plan_pairs, shape_class
-from mbsim.compile_model.rigid_slots import grips
+from mbsim.compile_model.rigid_slots import rigid_slots
 from mbsim.compile_model.scratch import empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes
 from mbsim.core.layout import AT_Q, AT_V, AT_W
@@ -152,7 +152,7 @@ def _scales(groups: Groups, length: float, speed: float) -> np.ndarray[Any, Any]
     return np.array([length, speed, max(groups.mass) * speed * speed, 0.0])
 
 
-def _ledger(works: bool, damps: bool, at: int) -> np.ndarray[Any, Any]:
+def _accumulators(works: bool, damps: bool, at: int) -> np.ndarray[Any, Any]:
     """Return where in y, from `at` on, the work of motions and the damped energy stand."""
     return np.array([at if works else -1, at + int(works) if damps else -1], dtype=np.int64)
 
@@ -338,7 +338,7 @@ def build(
     row = {body.id: nb for body in model.bodies.values()}
     row.update({body_id: k for k, body_id in enumerate(body_ids)})
     listed = [g for plan in plans.pairs for g in (plan.graphic_i, plan.graphic_j)]
-    crowded = [g for crowd in plans.crowds for g in (*crowd.i, *crowd.j)]
+    crowded = [g for contact_set in plans.broadphase for g in (*contact_set.i, *contact_set.j)]
     graphic_ids = list(dict.fromkeys([*listed, *crowded]))
     shapes = sorted({shape_class(model.graphics[g]) for g in graphic_ids})
     contact_list = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
@@ -362,9 +362,9 @@ def build(
         # of one region the first row alone is an incident
         end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
         wide[pairs.slot[k] : end] = each[contact_row[plan.kind.contact]]
-    for crowd in plans.crowds:
+    for contact_set in plans.broadphase:
         places = wide[pairs.slot[len(plans.pairs)] :]
-        places[...] = np.maximum(places, each[contact_row[crowd.contact]])
+        places[...] = np.maximum(places, each[contact_row[contact_set.contact]])
     begins = a.BODY_SIZE * nb + np.concatenate([[0], np.cumsum(wide.ravel())])
     carried = int(begins[-1]) - a.BODY_SIZE * nb
     x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
@@ -373,14 +373,16 @@ def build(
     first_state = a.BODY_SIZE * nb + carried
     rubs = any(law.looks for law in (*user.values(), *normal.values()))
     looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
-    held = grips(model, plans, pairs, graphics, table)
-    rows = acting(model, table, first_state, subroutines, looks, residuals=residuals, grips=held)
+    held = rigid_slots(model, plans, pairs, graphics, table)
+    rows = acting(
+        model, table, first_state, subroutines, looks, residuals=residuals, rigid_slots=held
+    )
     mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
     nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
     nu = len(rows.applied.late)
     damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
-    ledger = _ledger(bool(model.motions), damps, first_state + nz)
-    kept = int(np.count_nonzero(ledger >= 0)) + max(1, len(contact_ids))
+    accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
+    kept = int(np.count_nonzero(accumulators >= 0)) + max(1, len(contact_ids))
     y0 = _initial_y(placement, carried + nz + kept)
     y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
     held = rows.residuals or _no_residuals()
@@ -401,7 +403,7 @@ def build(
         graphics=graphics,
         kinds=kinds_table(kinds, contact_row),
         pairs=pairs,
-        crowds=crowds_table(
+        broadphase=broadphase_table(
             plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot), ns, most
         ),
         contacts=contacts,
@@ -411,7 +413,7 @@ def build(
         programs=instructions,
         states=states,
         sensors=rows.sensors,
-        kinks=rows.kinks,
+        switching=rows.switching,
         users=_users(subroutines, len(y0) if rubs else 0, model, residuals),
         residuals=held,
         applied=rows.applied,
@@ -425,7 +427,7 @@ def build(
             np.zeros(len(Hook), dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
-            ledger,
+            accumulators,
         ),
         scales=a.Scales(
             np.array(groups.of_body, dtype=np.int64),
@@ -441,7 +443,7 @@ def build(
             ns,
             table.start_angles(),
             len(rows.sensors.id),
-            len(rows.kinks.program),
+            len(rows.switching.program),
             most,
             nf,
             (len(held.id), 2, len(held.given)),

@@ -15,7 +15,7 @@ from mbsim.compile_model.pairing import (
     Plans,
     half_extent,
     kernel_size,
-    reach,
+    radius,
     shape_class,
     thinnest,
 )
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
     from mbsim.plugins.types import UserNormal
 
-#: Places for near pairs of a crowd, for each of its graphics.
+#: Places for near pairs of a large contact, for each of its graphics.
 NEAR_EACH = 24
 #: Most cells of the grid that finds them, for each graphic.
 CELLS_EACH = 4
@@ -77,7 +77,7 @@ def graphics_table(
         p=np.zeros((n, 3)),
         R=np.zeros((n, 3, 3)),
         size=np.zeros((n, 3)),
-        reach=np.zeros(n),
+        radius=np.zeros(n),
         half=np.zeros((n, 3)),
         turns=np.ones(n, dtype=np.int64),
         thin=np.zeros(n),
@@ -92,7 +92,7 @@ def graphics_table(
         made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
         made.R[g] = marker.R_B
         made.size[g] = kernel_size(graphic)
-        made.reach[g] = reach(graphic)
+        made.radius[g] = radius(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
         made.thin[g] = thinnest(graphic)
@@ -117,46 +117,49 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
     )
 
 
-def _crowd_places(plans: Plans) -> tuple[int, int]:
-    """Return how many pairs of crowds can be near at once, and the slots of one such place."""
-    if not plans.crowds:
+def _broadphase_rows(plans: Plans) -> tuple[int, int]:
+    """Return how many pairs of large contacts can be near at once, and the slots of one."""
+    if not plans.broadphase:
         return 0, 0
-    places = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.crowds)
-    return places, max(kind.slots for crowd in plans.crowds for kind in crowd.kinds.values())
+    places = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.broadphase)
+    return places, max(
+        kind.slots for contact_set in plans.broadphase for kind in contact_set.kinds.values()
+    )
 
 
 def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[a.Pairs, int]:
     """Return the places for pairs and the number of their slots; `rows`: graphic row by id.
 
-    Listed pairs come first and stay; the places of crowds have slots for any of their kinds.
+    Listed pairs come first and stay; the places of large contacts have slots for any of their
+    kinds.
     """
     fixed = len(plans.pairs)
-    places, wide = _crowd_places(plans)
+    places, wide = _broadphase_rows(plans)
     n = fixed + places
     row_of = {kind: k for k, kind in enumerate(kinds)}
     listed = np.array([plan.kind.slots for plan in plans.pairs], dtype=np.int64)
     ends = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(listed)])
-    crowd_slots = ends[-1] + wide * np.arange(places + 1)
+    broadphase_slots = ends[-1] + wide * np.arange(places + 1)
     made = a.Pairs(
         kind=np.zeros(n, dtype=np.int64),
         graphic_i=np.zeros(n, dtype=np.int64),
         graphic_j=np.zeros(n, dtype=np.int64),
-        slot=np.concatenate([ends[:-1], crowd_slots[:-1]]),
-        last=np.concatenate([ends[1:], crowd_slots[1:]]),
+        slot=np.concatenate([ends[:-1], broadphase_slots[:-1]]),
+        last=np.concatenate([ends[1:], broadphase_slots[1:]]),
         touches=np.zeros(n, dtype=np.int64),
         gap=np.zeros(n),
         left=np.zeros(n),
-        live=np.arange(n),
+        active=np.arange(n),
         free=np.arange(n)[::-1].copy(),
         count=np.array([fixed, places, fixed, 0], dtype=np.int64),
     )
     for k, plan in enumerate(plans.pairs):
         made.kind[k] = row_of[plan.kind]
         made.graphic_i[k], made.graphic_j[k] = rows[plan.graphic_i], rows[plan.graphic_j]
-    return made, int(crowd_slots[-1])
+    return made, int(broadphase_slots[-1])
 
 
-def crowds_table(
+def broadphase_table(
     plans: Plans,
     kinds: list[Kind],
     rows: dict[int, int],
@@ -166,15 +169,17 @@ def crowds_table(
     places: int,
     slots: int,
     memory: int,
-) -> a.Crowds:
+) -> a.Broadphase:
     """Return the contacts whose near pairs are found as they move."""
-    n, ng = len(plans.crowds), len(graphics.body)
+    n, ng = len(plans.broadphase), len(graphics.body)
     row_of = {kind: k for k, kind in enumerate(kinds)}
-    made = a.Crowds(
-        contact=np.array([contacts[crowd.contact] for crowd in plans.crowds], dtype=np.int64),
-        same=np.array([crowd.same for crowd in plans.crowds], dtype=np.int64),
+    made = a.Broadphase(
+        contact=np.array(
+            [contacts[contact_set.contact] for contact_set in plans.broadphase], dtype=np.int64
+        ),
+        same=np.array([contact_set.same for contact_set in plans.broadphase], dtype=np.int64),
         first=np.zeros((n, 4), dtype=np.int64),
-        member=np.array([rows[g] for c in plans.crowds for g in (*c.i, *c.j)], dtype=np.int64),
+        member=np.array([rows[g] for c in plans.broadphase for g in (*c.i, *c.j)], dtype=np.int64),
         kind=np.full((n, len(shapes) ** 2), -1, dtype=np.int64),
         swap=np.zeros((n, len(shapes) ** 2), dtype=np.int64),
         size=np.zeros(2),
@@ -190,18 +195,18 @@ def crowds_table(
         spare=np.zeros((slots if n else 0, a.SPARE + 2 * memory)),
     )
     at = 0
-    for k, crowd in enumerate(plans.crowds):
-        middle, end = at + len(crowd.i), at + len(crowd.i) + len(crowd.j)
+    for k, contact_set in enumerate(plans.broadphase):
+        middle, end = at + len(contact_set.i), at + len(contact_set.i) + len(contact_set.j)
         made.first[k] = at, middle, middle, end
         at = end
-        for (shape_i, shape_j), kind in crowd.kinds.items():
+        for (shape_i, shape_j), kind in contact_set.kinds.items():
             i, j = shapes.index(shape_i), shapes.index(shape_j)
-            both = [(i, j, 0), (j, i, 1)] if crowd.same and i != j else [(i, j, 0)]
+            both = [(i, j, 0), (j, i, 1)] if contact_set.same and i != j else [(i, j, 0)]
             for p, q, other in both:
                 made.kind[k, p * len(shapes) + q] = row_of[kind]
                 made.swap[k, p * len(shapes) + q] = int(kind.swapped) ^ other
     if n:
-        sizes = graphics.reach[made.member]
+        sizes = graphics.radius[made.member]
         usual = float(np.median(sizes[np.isfinite(sizes)]))
         made.size[:] = SKIN * usual, usual
     return made

@@ -114,8 +114,8 @@ def _needed(
                 reaction |= any(pair in ends for pair in pairs)
                 rows |= _between(given[0], given[1], applied)
     # friction in joints is pressed by reactions
-    rubbing = {k for k in rows if applied.connection[k] >= 0}
-    return rows - rubbing, reaction or bool(rubbing)
+    joint_friction = {k for k in rows if applied.connection[k] >= 0}
+    return rows - joint_friction, reaction or bool(joint_friction)
 
 
 def _between(i: int, j: int, applied: a.Applied) -> set[int]:
@@ -208,6 +208,6 @@ def _late(applied: a.Applied) -> np.ndarray[Any, Any]:
             components = enumerate(applied.components[row])
             found += [(row, c, int(program)) for c, program in components if program >= 0]
     if found:
-        rubbing = np.flatnonzero(applied.connection >= 0)
-        found += [(int(row), a.RUBBING, -1) for row in rubbing]
+        joint_friction = np.flatnonzero(applied.connection >= 0)
+        found += [(int(row), a.JOINT_FRICTION, -1) for row in joint_friction]
     return np.array(found, dtype=np.int64).reshape(-1, 3)

@@ -18,7 +18,7 @@ from mbsim.arrays import scene as a
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
-from mbsim.compile_model.tree import AXES, Limb, empty_tree, is_plain, limb_of, nearest_flip
+from mbsim.compile_model.tree import AXES, TreeJoint, empty_tree, is_plain, limb_of, nearest_flip
 from mbsim.errors import DeckError, Fault
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Coupler, DryFriction, GeneralConstraint, Joint, Model, Motion
@@ -33,7 +33,8 @@ _KINDS = {
     "distance": a.DISTANCE,
     "twist": a.TWIST,
 }
-#: A joint that holds less than this is cheaper as equations than as a limb of the tree.
+#: A joint that holds less than this is cheaper as equations than as a joint of the tree of the
+#: tree.
 _LEAST_ROWS = 3
 #: Sine of an angle below which axes are parallel.
 _PARALLEL = 1e-6
@@ -67,7 +68,7 @@ class Mechanism:
     names: list[str]
 
 
-class Grip(NamedTuple):
+class RigidSlot(NamedTuple):
     """A slot whose friction is rigid."""
 
     contact: int  # id
@@ -77,7 +78,7 @@ class Grip(NamedTuple):
 
 
 class _Builder:
-    """Collects connections, limbs and equations of one model."""
+    """Collects connections, joints of the tree and equations of one model."""
 
     def __init__(self, model: Model, markers: MarkerTable, programs: ProgramTable) -> None:
         self.model, self.markers, self.programs = model, markers, programs
@@ -85,7 +86,7 @@ class _Builder:
         self.sums = Sums()
         self.elements: list[tuple[str, int]] = []
         self.pairs: list[tuple[int, int]] = []
-        self.limbs: dict[int, Limb] = {}
+        self.tree_joints: dict[int, TreeJoint] = {}
         self.joints: dict[int, Joint] = {}
 
     def row_value(self, row: Row, i: int, j: int) -> float:
@@ -155,26 +156,26 @@ class _Builder:
         self.sums.close(connection, _describe(rows), constant, self.unit(rows))
 
     def add_joint(self, statement: str, joint: Joint) -> None:
-        """Add a joint; what it may be as a limb is noted, its other equations are added."""
+        """Add a joint: note what it may be in the tree, add its other equations."""
         i, j = self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
         connection = self.connect(statement, joint.id, i, j)
         self.joints[connection] = joint
-        limb = limb_of(connection, i, j, JOINTS[joint.type].equations)
-        if limb is not None and limb.turn == a.TURN_CROSS:
-            self.check_cross(statement, joint, limb)
-        if limb is not None and limb.held >= _LEAST_ROWS:
-            self.limbs[connection] = limb
+        tree_joint = limb_of(connection, i, j, JOINTS[joint.type].equations)
+        if tree_joint is not None and tree_joint.turn == a.TURN_CROSS:
+            self.check_cross(statement, joint, tree_joint)
+        if tree_joint is not None and tree_joint.held >= _LEAST_ROWS:
+            self.tree_joints[connection] = tree_joint
 
-    def check_cross(self, statement: str, joint: Joint, limb: Limb) -> None:
+    def check_cross(self, statement: str, joint: Joint, tree_joint: TreeJoint) -> None:
         """Refuse a cross whose arms start parallel: which way they are to turn is not said."""
-        arm_i = self.markers.frame(limb.i)[1][:, limb.axis_i]
-        arm_j = self.markers.frame(limb.j)[1][:, limb.axis_j]
+        arm_i = self.markers.frame(tree_joint.i)[1][:, tree_joint.axis_i]
+        arm_j = self.markers.frame(tree_joint.j)[1][:, tree_joint.axis_j]
         if float(np.linalg.norm(np.cross(arm_i, arm_j))) < _PARALLEL:
             name = f"Constraint_J{'oint' if statement == 'JOINT' else 'prim'}[{joint.id}]"
             message = (
-                f"{AXES[limb.axis_i]} of marker {joint.i_marker_id} (I) and {AXES[limb.axis_j]} "
-                f"of marker {joint.j_marker_id} (J) are parallel; must be at right angles "
-                f"({joint.type})"
+                f"{AXES[tree_joint.axis_i]} of marker {joint.i_marker_id} (I) and "
+                f"{AXES[tree_joint.axis_j]} of marker {joint.j_marker_id} (J) are parallel; "
+                f"must be at right angles ({joint.type})"
             )
             raise DeckError([Fault(joint.source.file, joint.source.line, name, message)])
 
@@ -250,7 +251,7 @@ class _Builder:
         self.add_term(row, i, j, 1.0)
         self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
 
-    def add_grip(self, grip: Grip) -> None:
+    def add_rigid_slot(self, grip: RigidSlot) -> None:
         """Add the two velocities that rigid friction of a slot holds while it sticks."""
         for way in range(2):
             self.sums.terms.append((a.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
@@ -266,32 +267,32 @@ class _Builder:
         for i, j in self.pairs:
             yield from (self.markers.frames[row][0] for row in (i, j))
 
-    def grow(self, others: list[int]) -> dict[int, tuple[int, Limb | None, bool]]:
-        """Return for each body its parent, the limb it hangs on, and whether I is on the parent.
+    def grow(self, others: list[int]) -> dict[int, tuple[int, TreeJoint | None, bool]]:
+        """Return for each body its parent, its tree joint, and whether I is on the parent.
 
-        From ground, and then from each body that is not reached, the limb that holds most is
-        taken first; of equals the one nearest to the root.
+        From ground, and then from each body that is not reached, the joint of the tree that holds
+        most is taken first; of equals the one nearest to the root.
         """
         ground = self.markers.ground
         held = {*self.bodies_in_equations(), *(self._body(row) for row in others)} - {ground}
-        hung: dict[int, tuple[int, Limb | None, bool]] = {}
+        hung: dict[int, tuple[int, TreeJoint | None, bool]] = {}
         depth = {ground: 0}
         waiting = sorted(held)
         while True:
             options = []
-            for limb in self.limbs.values():
-                body_i, body_j = self._body(limb.i), self._body(limb.j)
+            for tree_joint in self.tree_joints.values():
+                body_i, body_j = self._body(tree_joint.i), self._body(tree_joint.j)
                 if body_j in depth and body_i not in depth:
-                    options.append((-limb.held, depth[body_j], limb.connection, False))
-                elif body_i in depth and body_j not in depth and limb.both_ways:
-                    options.append((-limb.held, depth[body_i], limb.connection, True))
+                    options.append((-tree_joint.held, depth[body_j], tree_joint.connection, False))
+                elif body_i in depth and body_j not in depth and tree_joint.both_ways:
+                    options.append((-tree_joint.held, depth[body_i], tree_joint.connection, True))
             if options:
                 _, level, connection, flip = min(options)
-                limb = self.limbs[connection]
-                child, parent = self._body(limb.i), self._body(limb.j)
+                tree_joint = self.tree_joints[connection]
+                child, parent = self._body(tree_joint.i), self._body(tree_joint.j)
                 if flip:
                     child, parent = parent, child
-                hung[child], depth[child] = (parent, limb, flip), level + 1
+                hung[child], depth[child] = (parent, tree_joint, flip), level + 1
                 continue
             root = next((body for body in waiting if body not in depth), None)
             if root is None:
@@ -306,8 +307,8 @@ class _Builder:
         ground = self.markers.ground
         hung = self.grow(others)
         children: dict[int, list[int]] = {}
-        for child, (parent, limb, _) in hung.items():
-            children.setdefault(-1 if limb is None else parent, []).append(child)
+        for child, (parent, tree_joint, _) in hung.items():
+            children.setdefault(-1 if tree_joint is None else parent, []).append(child)
         order: list[int] = []
         root_of: dict[int, int] = {}
         for top in [*children.get(ground, []), *children.get(-1, [])]:
@@ -322,25 +323,29 @@ class _Builder:
         made = empty_tree(ground, n)
         of_connection: dict[int, tuple[int, bool]] = {}
         for k, body in enumerate(order):
-            parent, limb, flip = hung[body]
+            parent, tree_joint, flip = hung[body]
             made.body[k], made.of_body[body] = body, k
-            made.parent[k] = place[parent] if limb is not None and parent != ground else -1
+            made.parent[k] = place[parent] if tree_joint is not None and parent != ground else -1
             made.root[k] = place[root_of[body]]
             made.end[made.root[k]] = k + 1
-            if limb is None:
+            if tree_joint is None:
                 made.turn[k], made.free[k] = a.TURN_ROOT, 6
                 continue
-            of_connection[limb.connection] = (k, flip)
-            child_row, parent_row = (limb.j, limb.i) if flip else (limb.i, limb.j)
-            made.turn[k], made.slide[k] = limb.turn, limb.slide
-            made.free[k] = 6 - limb.held
-            axes = (limb.axis_i, limb.axis_j)
+            of_connection[tree_joint.connection] = (k, flip)
+            child_row, parent_row = (
+                (tree_joint.j, tree_joint.i) if flip else (tree_joint.i, tree_joint.j)
+            )
+            made.turn[k], made.slide[k] = tree_joint.turn, tree_joint.slide
+            made.free[k] = 6 - tree_joint.held
+            axes = (tree_joint.axis_i, tree_joint.axis_j)
             made.axis[k] = axes[::-1] if flip else axes
             made.child_p[k] = self.markers.frames[child_row][1]
             made.parent_p[k] = self.markers.frames[parent_row][1]
             made.parent_R[k] = self.markers.frames[parent_row][2]
             relative = self.markers.frame(parent_row)[1].T @ self.markers.frame(child_row)[1]
-            made.child_R[k] = self.markers.frames[child_row][2] @ nearest_flip(limb.turn, relative)
+            made.child_R[k] = self.markers.frames[child_row][2] @ nearest_flip(
+                tree_joint.turn, relative
+            )
         made.end[:] = made.end[made.root]
         return made, of_connection
 
@@ -359,7 +364,10 @@ def _describe(rows: tuple[Row, ...]) -> str:
 
 
 def constrain(
-    model: Model, markers: MarkerTable, programs: ProgramTable, grips: Sequence[Grip] = ()
+    model: Model,
+    markers: MarkerTable,
+    programs: ProgramTable,
+    rigid_slots: Sequence[RigidSlot] = (),
 ) -> Mechanism:
     """Return the constraints of a model."""
     builder = _Builder(model, markers, programs)
@@ -377,13 +385,13 @@ def constrain(
     rigid = [friction for friction in model.dry_frictions.values() if friction.dx == 0.0]
     held = [marker for f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
     others = [markers.row(marker) for marker in held]
-    others += [marker for grip in grips for marker in (grip.i, grip.j)]
+    others += [marker for grip in rigid_slots for marker in (grip.i, grip.j)]
     tree, places = builder.tree(others)
     builder.add_joint_equations(set(places))
     for friction in rigid:
         builder.add_dry(friction)
-    for grip in grips:
-        builder.add_grip(grip)
+    for grip in rigid_slots:
+        builder.add_rigid_slot(grip)
     n = len(builder.pairs)
     pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
     connections = a.Connections(

@@ -1,9 +1,9 @@
 """Which graphics may touch, and what detects them: a closed form or FCL.
 
 A contact tests every I graphic with every J graphic. Up to `MOST_LISTED` pairs are listed for
-good; the pairs of a larger contact, a *crowd*, are too many to look at and are found as
-they come near (`contact.broadphase`). A crowd whose I and J are the same graphics is a set in
-contact with itself: each pair once, none on one body.
+good; the pairs of a larger contact, a *large contact*, are too many to look at and are found as
+they come near (`contact.broadphase`). A large contact whose I and J are the same graphics is a set
+in contact with itself: each pair once, none on one body.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ FCL_SLOTS = 8
 _ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
 #: Points on which a round end rests in a closed form, and a face of a box on one.
 _UNDER_AN_END, _UNDER_A_FACE = 3, 4
-#: Contacts with more pairs than this are crowds. Every pair listed for good costs some 5 ns an
-#: evaluation: in a heap a crowd is cheaper from 30 pairs on, by a sixth at 300. But steps end
-#: where its list does: bodies in free flight take twice as long at 300 pairs
+#: Contacts with more pairs than this are large contacts. Every pair listed for good costs some 5 ns
+#: an evaluation: in a heap a large contact is cheaper from 30 pairs on, by a sixth at 300. But
+#: steps end where its list does: bodies in free flight take twice as long at 300 pairs
 #: (tests/bench/test_crowd.py).
 MOST_LISTED = 300
 
@@ -77,7 +77,7 @@ class PairPlan:
 
 
 @dataclass(frozen=True)
-class CrowdPlan:
+class BroadphasePlan:
     """A contact of many graphics (ids), with its kinds by shape class of the contact's I and J."""
 
     contact: int
@@ -95,16 +95,16 @@ class CrowdPlan:
 
 @dataclass(frozen=True)
 class Plans:
-    """All pairs of a model: listed one by one, or as crowds."""
+    """All pairs of a model: listed one by one, or as large contacts."""
 
     pairs: tuple[PairPlan, ...]
-    crowds: tuple[CrowdPlan, ...]
+    broadphase: tuple[BroadphasePlan, ...]
 
     @property
     def kinds(self) -> list[Kind]:
         """Return every kind once, listed pairs' first."""
         listed = [plan.kind for plan in self.pairs]
-        crowded = [kind for crowd in self.crowds for kind in crowd.kinds.values()]
+        crowded = [kind for contact_set in self.broadphase for kind in contact_set.kinds.values()]
         return list(dict.fromkeys([*listed, *crowded]))
 
 
@@ -196,9 +196,9 @@ def _two_planes(model: Model, contact: Contact, i: int, j: int) -> Fault:
     )
 
 
-def _crowd(
+def _contact_set(
     model: Model, contact: Contact, same: bool, detector: str
-) -> tuple[CrowdPlan, list[Fault]]:
+) -> tuple[BroadphasePlan, list[Fault]]:
     """Return a contact of many graphics, and what is wrong with it."""
     kinds: dict[tuple[str, str], Kind] = {}
     faults = []
@@ -217,7 +217,7 @@ def _crowd(
                 a, b = model.graphics[i], model.graphics[j]
                 kind = _kind(contact.id, a, b, detector)
                 kinds[shape_i, shape_j] = _one_region(model, contact, a, b, kind, faults)
-    return CrowdPlan(contact.id, i_ids, j_ids, same, kinds), faults
+    return BroadphasePlan(contact.id, i_ids, j_ids, same, kinds), faults
 
 
 def plan_pairs(model: Model, detector: str = "auto") -> Plans:
@@ -235,14 +235,14 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
         If two shapes cannot be tested against each other (two planes), or have no area that is
         known where the contact asks for it.
     """
-    pairs, crowds, faults = [], [], []
+    pairs, broadphase, faults = [], [], []
     for contact in model.contacts.values():
         i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
         same = contact.with_itself
         many = len(i_ids) * (len(i_ids) - 1) // 2 if same else len(i_ids) * len(j_ids)
         if many > MOST_LISTED:
-            crowd, wrong = _crowd(model, contact, same, detector)
-            crowds.append(crowd)
+            contact_set, wrong = _contact_set(model, contact, same, detector)
+            broadphase.append(contact_set)
             faults += wrong
             continue
         for place, i in enumerate(i_ids):
@@ -261,7 +261,7 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
                 pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
     if faults:
         raise DeckError(faults)
-    return Plans(tuple(pairs), tuple(crowds))
+    return Plans(tuple(pairs), tuple(broadphase))
 
 
 def thinnest(graphic: Graphic) -> float:
@@ -290,7 +290,7 @@ def half_extent(graphic: Graphic) -> tuple[float, float, float]:
     return (float(x), float(y), float(z))
 
 
-def reach(graphic: Graphic) -> float:
+def radius(graphic: Graphic) -> float:
     """Return the radius of the ball around the shape's centre that holds it."""
     if graphic.shape == "SPHERE":
         return graphic.size[0]

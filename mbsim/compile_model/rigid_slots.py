@@ -6,7 +6,7 @@ import numpy as np
 
 from mbsim.arrays import scene as a
 from mbsim.compile_model.markers import MarkerTable
-from mbsim.compile_model.mechanism import Grip
+from mbsim.compile_model.mechanism import RigidSlot
 from mbsim.compile_model.pairing import MOST_LISTED, Plans
 from mbsim.errors import DeckError, Fault
 from mbsim.model.elements import Contact, Model
@@ -26,9 +26,9 @@ def _refuse(model: Model, contact: Contact, why: str) -> DeckError:
     return DeckError([Fault(contact.source.file, contact.source.line, name, message)])
 
 
-def grips(
+def rigid_slots(
     model: Model, plans: Plans, pairs: a.Pairs, graphics: a.Graphics, table: MarkerTable
-) -> list[Grip]:
+) -> list[RigidSlot]:
     """Return the slots of rigid contacts, each with markers on its bodies.
 
     Raises
@@ -36,10 +36,10 @@ def grips(
     DeckError
         Where pairs come and go, points are not found in closed form, or there are too many.
     """
-    for crowd in plans.crowds:
-        contact = model.contacts[crowd.contact]
+    for contact_set in plans.broadphase:
+        contact = model.contacts[contact_set.contact]
         if contact.rigid:
-            why = f"{crowd.pairs} pairs of graphics, more than {MOST_LISTED}"
+            why = f"{contact_set.pairs} pairs of graphics, more than {MOST_LISTED}"
             raise _refuse(model, contact, why)
     markers: dict[int, int] = {}
     found = []
@@ -56,7 +56,7 @@ def grips(
                 markers[g] = table.add(int(graphics.body[g]), np.zeros(3), np.eye(3))
         i, j = reversed(sides) if plan.kind.swapped else sides
         slots = range(int(pairs.slot[k]), int(pairs.last[k]))
-        found += [Grip(contact.id, slot, markers[i], markers[j]) for slot in slots]
+        found += [RigidSlot(contact.id, slot, markers[i], markers[j]) for slot in slots]
         if len(found) > MOST_SLOTS:
             why = f"its shapes may touch at more than {MOST_SLOTS} points"
             raise _refuse(model, contact, why)

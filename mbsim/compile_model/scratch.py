@@ -21,7 +21,7 @@ def start_state(
     ns: int,
     angle: np.ndarray[Any, Any],
     sensors: int = 0,
-    kinks: int = 0,
+    switching: int = 0,
     memory: int = 0,
     forces: int = 0,
     residual: tuple[int, int, int] = (0, 2, 0),
@@ -53,13 +53,13 @@ def start_state(
         mode=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
-        sides=np.zeros((kinks, 2)),
+        sides=np.zeros((switching, 2)),
         frozen=np.zeros(1, dtype=np.int64),
         dry=dry,
         # no time: nothing is remembered yet
         residual=np.full(residual, np.nan),
         fastest=np.zeros(groups),
-        heat=np.zeros(2),
+        chattering=np.zeros(2),
     )
 
 
@@ -84,7 +84,7 @@ def place_fixed(work: a.Work, graphics: a.Graphics) -> None:
     work.frames[fixed] = np.hstack([graphics.p, graphics.R.reshape(-1, 9)])[fixed]
     # nobody turns a sphere
     work.frames[graphics.turns == 0, 3:] = np.eye(3).ravel()
-    work.way[fixed] = 0.0
+    work.travel[fixed] = 0.0
     work.speed[fixed] = 0.0
 
 
@@ -117,7 +117,7 @@ def scratch(
         torque=np.full((nb + 1, 3), np.nan),
         noise=np.zeros((nb + 1, 2)),
         frames=np.full((ng, 12), np.nan),
-        way=np.full(ng, np.nan),
+        travel=np.full(ng, np.nan),
         speed=np.full((ng, 2), np.nan),
         points=np.zeros((ns, POINT)),
         touching=np.zeros(ns, dtype=np.int64),

@@ -1,4 +1,4 @@
-"""Where forces by expressions have kinks: on which sides of their switches they are, as numbers.
+"""Where forces by expressions have switches: on which sides of their switches they are, as numbers.
 
 A switch is a function that is 0 where an expression goes from one branch to another. Of each
 expression one more program is made, the sum of 2^k over the switches k that are above 0, so that it
@@ -134,9 +134,9 @@ def has_modes(model: Model) -> bool:
     return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
 
 
-def kinks_table(
+def switching_table(
     model: Model, programs: ProgramTable, applied: a.Applied, modes: Sequence[int] = ()
-) -> a.Kinks:
+) -> a.Switching:
     """Return what is watched: a program for each expression, limits, dry friction, modes.
 
     `modes` are programs that tell the modes of users' elements.
@@ -158,7 +158,7 @@ def kinks_table(
     watched = (a.SLIDE_LIMIT, a.TURN_LIMIT, a.DRY_SLIDE, a.DRY_TURN)
     limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
     last = [-1] if has_modes(model) else []
-    return a.Kinks(
+    return a.Switching(
         np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),
         np.array([*(-1 for _ in rows), *limits, *last], dtype=np.int64),
     )

@@ -10,7 +10,7 @@ alone) by halving until it holds no more in a cell than samples there show:
 * a cell is good where the first two are small against the range of samples in and near it, or where
   as much in every cell could not change the motion by more than PART tol: of a force over a time T,
   d T / m against V and d w T / m against L;
-* a cell with a kink, at which a slope jumps, is no larger than a step whose error is PART tol;
+* a cell with a switch, at which a slope jumps, is no larger than a step whose error is PART tol;
 * where a value jumps the halving goes on to rounding: the step ends just before that, and the run
   goes on just behind it.
 

@@ -24,7 +24,7 @@ _TURNS = {
 
 
 @dataclass(frozen=True)
-class Limb:
+class TreeJoint:
     """A joint that can hang a body on another: what it leaves free; bodies and markers by rows."""
 
     connection: int
@@ -60,21 +60,23 @@ def nearest_flip(turn: int, relative: Array) -> Array:
 
 
 def is_plain(rows: tuple[Row, ...]) -> bool:
-    """Return whether an equation is one offset or one cosine, which a limb can hold."""
+    """Return whether an equation is one offset or one cosine, which a tree joint can hold."""
     return len(rows) == 1 and rows[0].kind in ("offset", "perp")
 
 
-def limb_of(connection: int, i: int, j: int, equations: tuple[tuple[Row, ...], ...]) -> Limb | None:
-    """Return what a joint is as a limb, None where it cannot be one."""
+def limb_of(
+    connection: int, i: int, j: int, equations: tuple[tuple[Row, ...], ...]
+) -> TreeJoint | None:
+    """Return what a joint is as a joint of the tree, None where it cannot be one."""
     plain = [rows[0] for rows in equations if is_plain(rows)]
     held = {row.j for row in plain if row.kind == "offset"}
     cosines = [(row.i, row.j) for row in plain if row.kind == "perp"]
     slide = (int("x" not in held), int("y" not in held), int("z" not in held))
     if len(cosines) == 1:
         axis_i, axis_j = (AXES.index(axis) for axis in cosines[0])
-        return Limb(connection, i, j, a.TURN_CROSS, slide, axis_i, axis_j)
+        return TreeJoint(connection, i, j, a.TURN_CROSS, slide, axis_i, axis_j)
     turn = _TURNS.get(frozenset(cosines))
-    return None if turn is None else Limb(connection, i, j, turn, slide)
+    return None if turn is None else TreeJoint(connection, i, j, turn, slide)
 
 
 def empty_tree(ground: int, n: int) -> a.Tree:

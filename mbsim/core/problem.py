@@ -26,7 +26,7 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | in the step, t being its length                            |
 | check   | y new, -               | 1, or the part of the step to take instead                 |
 | inner   | -, -                   | part of the step (0..1) worth a look, or < 0               |
-| kinks   | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
+| switches   | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
 |         |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
 |         |                        | a step that was taken: 1 if one changed in it; LOAD: 1     |
 |         |                        | if friction holds something, the largest force by which it |

@@ -133,7 +133,7 @@ class FclDetector:
         """Return the collision object of one side, and the size of its stand-in box or 0."""
         flat = 0.0
         if self._graphics[g].shape == "PLANE" and self._graphics[other].shape == "BOX":
-            flat = float(self._scene.graphics.reach[other])
+            flat = float(self._scene.graphics.radius[other])
         # a stand-in belongs to its pair, everything else is shared by all pairs of the graphic
         key = (g, pair if flat else -1)
         if key not in self._objects:

@@ -140,7 +140,7 @@ def is_calm(p, m, steps, t_end):
         gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, TRY_EVERY)
     m.memory[BEGUN] = t
     m.memory[BEGUN_WORK] = m.counts[EVALUATIONS] + m.counts[JACOBIANS]
-    # a short step, as after a change or a kink, is good for either method: one that is shorter
+    # a short step, as after a change or a switch, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
     m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain * (SHORT_TELLS if short else 1.0))

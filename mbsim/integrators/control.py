@@ -18,7 +18,7 @@ def next_factor(error, before, order, memory, rejected):
 
     PI control with exponents (1 - 3 b/4)/k and b/k, k = order of the error's step power, b =
     `memory` (0 to 0.4): the memory of the last error keeps the step from thrashing at a
-    stability limit, and slows its growth after a kink.
+    stability limit, and slows its growth after a switch.
     Source: K. Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533; E. Hairer, G. Wanner, Solving
     ODEs II (1996), section IV.2.
     """
@@ -32,11 +32,11 @@ def next_factor(error, before, order, memory, rejected):
 
 
 @jitable
-def foretold_factor(error, before, order, ratio):
+def extrapolated_factor(error, before, order, ratio):
     """Return the factor from this step of an implicit method to the next.
 
-    The error is foretold from this and the last one, `ratio` being this step over the last, 0 if
-    there was none. A step that would grow by less than HOLD is kept: its factors are.
+    The error is extrapolated from this and the last one, `ratio` being this step over the last, 0
+    if there was none. A step that would grow by less than HOLD is kept: its factors are.
     Source: K. Gustafsson, ACM Trans. Math. Softw. 20 (1994) 496; E. Hairer, G. Wanner, Solving
     ODEs II (1996), section IV.8.
     """

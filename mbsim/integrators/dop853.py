@@ -24,8 +24,8 @@ from mbsim.integrators.scheme import (
     TOL,
     Scheme,
     combine,
+    in_workspace,
     interpolate,
-    on_bench,
     project,
 )
 
@@ -254,13 +254,13 @@ def fit_dense(p, m, t, h):
 
 def _attempt(context, t, h, a, b):
     """One step, tried."""
-    problem, method = on_bench(context)
+    problem, method = in_workspace(context)
     return attempt(problem, method, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
-    problem, method = on_bench(context)
+    problem, method = in_workspace(context)
     return fit_dense(problem, method, t, h)
 
 

@@ -20,7 +20,7 @@ from mbsim.integrators.scheme import (
     TOL,
     WATCH,
     Scheme,
-    on_bench,
+    in_workspace,
     project,
 )
 
@@ -145,13 +145,13 @@ def fit_dense(m, h):
 
 def _attempt(context, t, h, a, b):
     """One step, tried."""
-    problem, method = on_bench(context)
+    problem, method = in_workspace(context)
     return attempt(problem, method, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
-    _, method = on_bench(context)
+    _, method = in_workspace(context)
     fit_dense(method, h)
     return 0
 

@@ -40,7 +40,7 @@ from mbsim.core.problem import (
 from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
     HOLD,
-    foretold_factor,
+    extrapolated_factor,
     next_factor,
     quantised,
     smallest_step,
@@ -64,6 +64,7 @@ from mbsim.integrators.scheme import (
     H_SMALLEST,
     HAVE_F,
     HAVE_JACOBIAN,
+    HORIZON,
     KINK_CUT,
     LAST_ERROR,
     LAST_REASON,
@@ -75,7 +76,6 @@ from mbsim.integrators.scheme import (
     NEXT_WATCH,
     OUTPUTS,
     OWN_TIME,
-    REACH,
     REJECTED,
     REST,
     RETRY,
@@ -93,9 +93,9 @@ from mbsim.integrators.scheme import (
     WATCH,
     answer_of,
     failure_or,
+    in_workspace,
     interpolate,
     note_failure,
-    on_bench,
     project,
 )
 
@@ -110,18 +110,19 @@ LOOKS_FOR_HIDDEN = 16
 #: So often at most a step is taken again to end at its first event.
 MOST_RETAKES = 40
 
-#: Kinks so near to an end of a step, as a part of it, are as good as at the end: what a kink makes
-#: wrong grows with the square of what is left of the step behind it, a jump's with that itself.
-NEAR_KINK = 1e-4
+#: Switches so near to an end of a step, as a part of it, are as good as at the end: what a switch
+#: makes wrong grows with the square of what is left of the step behind it, a jump's with that
+#: itself.
+NEAR_SWITCH = 1e-4
 #: The same where what goes on is another motion, which begins there: friction that sticks or slips.
 NEAR_CHANGE = 1e-9
-#: So much farther behind a kink ends a step after two that were cut there in vain, up to the whole
-#: of it: bodies do not move at all in a very short one, for positions have no more digits, and then
-#: no side changes.
+#: So much farther behind a switch ends a step after two that were cut there in vain, up to the
+#: whole of it: bodies do not move at all in a very short one, for positions have no more digits,
+#: and then no side changes.
 FARTHER = 10.0
 #: The same over the smallest step: one that ends there may be rejected and tried shorter.
 NEAR_FLOORS = 100.0
-#: So often at most a step is taken again to end at a kink.
+#: So often at most a step is taken again to end at a switch.
 MOST_CUTS = 3
 #: Where steps are cut one after another, whole ones grow so much at most.
 CUT_GROW = 2.0
@@ -172,8 +173,8 @@ def bound_is_due(m):
 
 @jitable
 def ask_kinks(p, m, t, what, y, b):
-    """Return what the hook `kinks` answers; 0 where it failed, which is noted."""
-    return answer_of(m, call_int(p.kinks, (p.context, t, what, y, b)))
+    """Return what the hook `switching` answers; 0 where it failed, which is noted."""
+    return answer_of(m, call_int(p.switching, (p.context, t, what, y, b)))
 
 
 @jitable
@@ -191,7 +192,7 @@ def begin(p, m, steps, t, t_end, h_max):
         if code != 0:
             return code
         m.memory[HAVE_F] = 1.0
-        if p.kinks != 0:
+        if p.switching != 0:
             ask_kinks(p, m, t, SETTLE, m.y, m.error)
         m.memory[FRESH] = 1.0
         m.memory[HAVE_JACOBIAN] = 0.0
@@ -269,7 +270,7 @@ def look_up(m, t):
     m.counts[ROW] = row
     if row == len(table):
         return False
-    m.memory[ROW_ENDS], m.memory[REACH] = table[row, 0], table[row, 1]
+    m.memory[ROW_ENDS], m.memory[HORIZON] = table[row, 0], table[row, 1]
     return True
 
 
@@ -277,7 +278,7 @@ def look_up(m, t):
 def arrive_at(m, t, h, bounded, t_end):
     """Note the time at which a step from t ends; one that was bounded ends there exactly."""
     if bounded:
-        m.memory[TIME] = m.memory[REACH]
+        m.memory[TIME] = m.memory[HORIZON]
     # a switch at the end is not gone behind
     if t + h >= t_end or t_end - m.memory[TIME] <= smallest_step(t_end, m.memory[OWN_TIME], 0.0):
         m.memory[TIME] = t_end
@@ -343,18 +344,18 @@ def side_at(p, m, t, h, s, what):
     """
     interpolate(m, s, m.error)
     differs = ask_kinks(p, m, t + s * h, what, m.error, m.error)
-    return differs > (0 if s >= NEAR_KINK else 1)
+    return differs > (0 if s >= NEAR_SWITCH else 1)
 
 
 @jitable
-def first_kink(p, m, t, h, whole, behind):
-    """Return the length of the fitted step up to its first kink that matters, h for none.
+def first_switch(p, m, t, h, whole, behind):
+    """Return the length of the fitted step up to its first switch that matters, h for none.
 
     `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
     at which a side differs. The problem is left evaluated at the trial point.
     """
     farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
-    low, high, near = NEAR_KINK, behind, NEAR_KINK * farther
+    low, high, near = NEAR_SWITCH, behind, NEAR_SWITCH * farther
     if near >= behind:
         return h
     side_at(p, m, t, h, low, SETTLE)
@@ -411,7 +412,7 @@ def load_at(p, m, t, h, s):
 
 
 @jitable
-def reach_of(p, m, t, h, begin):
+def horizon_of(p, m, t, h, begin):
     """Return the part of the fitted step over which the load of what holds is known, 1 for all.
 
     What holds does not move, so that the method's error says nothing of its load: that is to go
@@ -465,7 +466,8 @@ def hidden_side(p, m, t, h):
 def attempt(p, m, steps, t, h, times):
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
-    And a part of it at which a force is on another branch, 0 for none, and what `reach_of` allows.
+    And a part of it at which a force is on another branch, 0 for none, and what `horizon_of`
+    allows.
 
     A step that fails is not checked. The dense output of one that will be taken is fitted
     before the problem is committed, while its hooks still know the step's begin. Single impacts
@@ -482,7 +484,7 @@ def attempt(p, m, steps, t, h, times):
         if part < 1.0:
             return 0, part, -1.0, 0.0, 1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-    if p.kinks != 0:
+    if p.switching != 0:
         differs = ask_kinks(p, m, t + h, ASK, m.trial, m.error)
         kinked = 1.0 if differs > 0 else 0.0
         if kinked == 0.0:
@@ -496,7 +498,7 @@ def attempt(p, m, steps, t, h, times):
     if asked >= 0.0 or shown or looks or p.happens != 0:
         code = call_int(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
     if begin >= 0.0 and code == 0:
-        reach = reach_of(p, m, t, h, begin)
+        reach = horizon_of(p, m, t, h, begin)
     if hides and code == 0:
         kinked = hidden_side(p, m, t, h)
     if bends and code == 0 and kinked == 0.0:
@@ -510,7 +512,7 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
 
     And the error of the step before it was made shorter.
 
-    A step with a kink ends just behind it, so that none has one in its midst.
+    A step with a switch ends just behind it, so that none has one in its midst.
     A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
     the state there is no interpolated one; where that ends before the event after all, it is
     tried a little longer.
@@ -530,7 +532,7 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
         m.memory[STIFFNESS] = stiffness
         if kinked > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
-            cut = first_kink(p, m, t, h, whole, kinked)
+            cut = first_switch(p, m, t, h, whole, kinked)
             if floor < cut < h:
                 h = cut
                 continue
@@ -578,7 +580,7 @@ def look_inside(p, m, asked):
 def accept(p, m, steps, t, h, asked):
     """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
     word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
-    if p.kinks != 0:
+    if p.switching != 0:
         changed = ask_kinks(p, m, t + h, PASS, m.trial, m.error) > 0
         in_vain = m.memory[KINK_CUT] == 1.0 and not changed
         m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
@@ -619,10 +621,10 @@ def choose_next(m, steps, h, h_max):
         return
     error = m.memory[LAST_ERROR]
     if steps.implicit:
-        # nothing is foretold from a step that was cut, for an event or a contact
+        # nothing is extrapolated from a step that was cut, for an event or a contact
         cut = h < 0.5 * m.memory[STEP]
         ratio = 0.0 if cut or m.memory[FRESH] == 1.0 else h / m.memory[LAST_STEP]
-        factor = foretold_factor(error, m.memory[ERROR_BEFORE], steps.order, ratio)
+        factor = extrapolated_factor(error, m.memory[ERROR_BEFORE], steps.order, ratio)
         if m.memory[GROWTH] < factor:
             factor = m.memory[GROWTH] if m.memory[GROWTH] > HOLD else 1.0
     else:
@@ -636,7 +638,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
     """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
 
     `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
-    and method are taken from the bench: a group is one word wherever it is handed on.
+    and method are taken from the workspace: a group is one word wherever it is handed on.
 
     `m.timetable` bounds steps by time alone: in the row of t none goes beyond its reach. It bounds
     nothing while memory[ROW_ENDS] and memory[REACH] are infinite.
@@ -644,7 +646,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
     When it stops, and how often, changes nothing of the run: all that follows from a step is
     decided behind it, and kept where the caller has to be told of something else first.
     """
-    p, m = on_bench(steps.context)
+    p, m = in_workspace(steps.context)
     m.memory[TOL] = tol
     # rows of the last step that found the table full
     if m.memory[LAST_STEP] > 0.0:
@@ -668,7 +670,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         if m.memory[TIME] >= m.memory[ROW_ENDS]:
             if not look_up(m, m.memory[TIME]):
                 return TABLE_OVER
-            if m.memory[REACH] < m.memory[TIME]:
+            if m.memory[HORIZON] < m.memory[TIME]:
                 # behind the switch all is known anew
                 m.memory[TIME] = min(m.memory[ROW_ENDS], t_end)
                 m.memory[HAVE_F] = 0.0
@@ -684,7 +686,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
             m.memory[STEP] = stable(p, m, t, h_max)
             m.memory[STALE] = 0.0
         whole = length(p, m, steps, t, t_end, h_max, floor)
-        most = min(whole, max(m.memory[REACH] - t, floor))
+        most = min(whole, max(m.memory[HORIZON] - t, floor))
 
         # try
         code, part, asked, h, uncut = attempt_to_event(p, m, steps, t, most, times, floor)
@@ -711,8 +713,8 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
                 return STEP_TOO_SMALL
             continue
         if part < 1.0:
-            # one that was cut at a kink is as long again behind it: what is behind kinks is told
-            # from what lies before them by steps of some length, shorter ones are all rounding
+            # one that was cut at a switch is as long again behind it: what is behind switches is
+            # told from what lies before them by steps of some length, shorter ones are all rounding
             cut_from = max(whole, m.memory[CUT_FROM]) if h < most else m.memory[CUT_FROM]
             reject(p, m, t, max(part * h, floor), BY_CHECK, cut_from)
             if h <= floor:
@@ -734,7 +736,7 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
         m.memory[CUT_FROM] = 0.0
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
-        arrive_at(m, t, h, h < whole and h == m.memory[REACH] - t, t_end)
+        arrive_at(m, t, h, h < whole and h == m.memory[HORIZON] - t, t_end)
         forgive(m)
         if word < 0:
             m.counts[CODE] = -word

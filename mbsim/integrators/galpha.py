@@ -18,7 +18,7 @@ The error of a step in positions is that of the formulas, the second derivative 
 times h^3 and a constant. In velocities it is by how much they are off the trapezoidal rule over v'
 at begin and end, and the error of that rule, h^3 v''' / 12: so it holds as well where a does not
 follow v', behind a force that jumped. There a short step after a long one meets a v'' that nothing
-foretold, and the difference counts in full, not as a part of the long step.
+extrapolated, and the difference counts in full, not as a part of the long step.
 Source: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371; M. Arnold, O. Bruls, Multibody
 Syst. Dyn. 18 (2007) 185; O. Bruls, A. Cardona, M. Arnold, Mech. Mach. Theory 48 (2012) 121;
 damping of Newton's iteration: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
@@ -72,7 +72,7 @@ from mbsim.integrators.scheme import (
     RETRY,
     TOL,
     Scheme,
-    on_bench,
+    in_workspace,
     project,
 )
 
@@ -254,13 +254,13 @@ def fit_dense(m, h):
 
 def _attempt(context, t, h, a, b):
     """One step, tried."""
-    p, m = on_bench(context)
+    p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
-    _, m = on_bench(context)
+    _, m = in_workspace(context)
     fit_dense(m, h)
     return 0
 

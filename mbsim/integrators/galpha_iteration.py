@@ -58,7 +58,7 @@ KEEP = 0.2
 #: A turn across an angular velocity, over that, which is none but for rounding.
 SWUNG = 1e-14
 
-# rows of k: f at the iterate, residual, correction, the one that a line search foretells, a at
+# rows of k: f at the iterate, residual, correction, the one that a line search extrapolates, a at
 # begin and end, a before a line search, f at the trial point
 F, R, D, D_NEXT, A0, A1, A_BEFORE, LAST = range(1, 9)
 # rows of `kept`: a and v' at the end of the last step, and the mean v'' of that step
@@ -225,7 +225,7 @@ def solve_step(p, m, t, h):
     good = m.memory[HAVE_JACOBIAN] == 1.0 and m.memory[RATE] <= KEEP
     code = -1
     for level in range(0 if good else 1, 3):
-        foretell(m, h)
+        extrapolate(m, h)
         code = iterate_damped(p, m, t, h) if level == 2 else iterate(p, m, t, h, level == 1)
         if code == 0:
             code = arrive(p, m, t, h)
@@ -252,7 +252,7 @@ def factor(p, m, t, h):
 
 
 @jitable
-def foretell(m, h):
+def extrapolate(m, h):
     """Write a at the begin for a step of length h, and as it is at the end if v'' stays."""
     before = step_before(m)
     for i in range(len(m.y)):

@@ -57,8 +57,8 @@ from mbsim.integrators.scheme import (
     TOL,
     WHERE,
     Scheme,
+    in_workspace,
     note_failure,
-    on_bench,
     project,
 )
 
@@ -112,7 +112,7 @@ KEEP = 0.01
 SECOND = 10.0
 #: The step grows as far as the iteration would still converge at this rate.
 GOOD_RATE = 0.2
-#: A step is foretold from the last one up to so many times its length.
+#: A step is extrapolated from the last one up to so many times its length.
 FARTHEST = 1e5
 
 # rows of k: f at the begin, the stages' f, stages less y, the same transformed, right-hand sides
@@ -152,7 +152,7 @@ def is_short(m, h):
 
 
 @jitable
-def foretell(m, h):
+def extrapolate(m, h):
     """Write the stages as the last step's polynomial, carried on, has them."""
     fresh = m.memory[FRESH] == 1.0 or is_short(m, h)
     for j in range(3):
@@ -252,14 +252,14 @@ def iterate(p, m, t, h, anew):
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution.
 
     It begins where the last step's polynomial has them, `anew` where they are. The second
-    correction may be larger than the first, which the foretold stages made small: it holds what
+    correction may be larger than the first, which the extrapolated stages made small: it holds what
     projections undid of the first. The third shows whether the iteration converges.
     """
     begin(m)
     if anew:
         m.memory[REST] = 1.0
     else:
-        foretell(m, h)
+        extrapolate(m, h)
         for j in range(3):
             for i in range(len(m.y)):
                 m.error[i] = 0.0
@@ -475,13 +475,13 @@ def fit_dense(m):
 
 def _attempt(context, t, h, a, b):
     """One step, tried."""
-    p, m = on_bench(context)
+    p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """Dense output of the step tried last."""
-    _, m = on_bench(context)
+    _, m = in_workspace(context)
     fit_dense(m)
     return 0
 

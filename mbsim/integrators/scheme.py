@@ -20,7 +20,7 @@ estimate: the step is what the problem's hook `stable` says, at most h_max, and 
 STABLE_EVERY steps; the guards of single impacts are left out.
 
 An implicit method solves with the problem's linearisation (`core.problem`) and says so:
-the driver then foretells steps as it does for such methods, and keeps one that is good as it is.
+the driver then extrapolates steps as it does for such methods, and keeps one that is good as it is.
 What a method needs of the step before is in `kept`, where the driver puts what `attempt` left in
 `ahead` once the step is taken; memory[FRESH] says that there is none, as at the start and
 after an event.
@@ -66,23 +66,23 @@ OWN_TIME = 38
 # the most that Newton's iteration left of a step that was taken, in the norm of the error, and when
 LEFT_OVER, LEFT_TIME = range(39, 41)
 # of the timetable: where the row ends that holds now, and how far a step may go until then
-ROW_ENDS, REACH = range(41, 43)
+ROW_ENDS, HORIZON = range(41, 43)
 # of AUTO: steps a time when the explicit method was last found to take too many, inf before that
 COSTLY = 43
-# how long the step was meant to be that was cut at a kink or event and rejected then; else 0
+# how long the step was meant to be that was cut at a switch or event and rejected then; else 0
 CUT_FROM = 44
-# 1 where the last step that was taken was cut at a kink or event
+# 1 where the last step that was taken was cut at a switch or event
 WAS_CUT = 45
 # 1 where a row of results lies within the step that is tried
 SHOWN = 46
 # of AUTO: length of the step that was found stiff last
 STIFF_STEP = 47
-# how many steps in a row were cut at a kink and changed no side after all
+# how many steps in a row were cut at a switch and changed no side after all
 VAIN = 48
 # of AUTO: evaluations when its last window of steps began; how many times as much as at first has
 # to speak for leaving the implicit method
 BEGUN_WORK, RELUCTANCE = range(49, 51)
-# 1 where the step that was tried last was cut at a kink
+# 1 where the step that was tried last was cut at a switch
 KINK_CUT = 51
 MEMORY = 52
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
@@ -127,7 +127,7 @@ class Method(NamedTuple):
 
 
 @tags.constant
-class Bench(NamedTuple):
+class Workspace(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
     problem: I1  # (20,) the fields of `Problem`
@@ -158,7 +158,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
-    memory[ROW_ENDS] = memory[REACH] = memory[COSTLY] = math.inf
+    memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
     counts = np.zeros(COUNTS, dtype=np.int64)
     counts[NEXT_WATCH] = np.iinfo(np.int64).max  # nobody watches
     return Method(
@@ -193,25 +193,25 @@ def bind(
 
     if scheme.implicit and problem.linearise == 0:
         raise ValueError("this problem has no linearisation, which an implicit method needs")
-    bench = Bench(np.array(problem, dtype=np.int64), method)
-    table = pack(bench)
+    workspace = Workspace(np.array(problem, dtype=np.int64), method)
+    table = pack(workspace)
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
     numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
     probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
     steps = Steps(context, attempt, fit_dense, *numbers, probes)
-    return steps, (table, bench)
+    return steps, (table, workspace)
 
 
 @jitable
-def on_bench(context):
+def in_workspace(context):
     """Return the problem and the method that stand behind `context`."""
-    bench = view(context, Bench)
-    w = bench.problem
+    workspace = view(context, Workspace)
+    w = workspace.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
     problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19])
-    return problem, bench.method
+    return problem, workspace.method
 
 
 @jitable

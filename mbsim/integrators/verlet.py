@@ -16,7 +16,7 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.integrators.rotation import turn
-from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, on_bench, project
+from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, in_workspace, project
 
 
 @jitable
@@ -64,13 +64,13 @@ def fit_dense(p, m, t, h):
 
 def _attempt(context, t, h, a, b):
     """One step."""
-    p, m = on_bench(context)
+    p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
 def _fit_dense(context, t, h, a, b):
     """The step as a polynomial."""
-    p, m = on_bench(context)
+    p, m = in_workspace(context)
     return fit_dense(p, m, t, h)
 
 

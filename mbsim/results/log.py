@@ -174,14 +174,14 @@ def pair_texts(plans: Plans, contact_id: int) -> Iterator[str]:
         if plan.kind.contact == contact_id:
             names = f"Post_Graphic[{plan.graphic_i}] Post_Graphic[{plan.graphic_j}]"
             yield f"{names}: {plan.kind.detector}"
-    for crowd in plans.crowds:
-        if crowd.contact == contact_id:
-            if crowd.same:
-                what = f"{len(crowd.i)} graphics with each other"
+    for contact_set in plans.broadphase:
+        if contact_set.contact == contact_id:
+            if contact_set.same:
+                what = f"{len(contact_set.i)} graphics with each other"
             else:
-                what = f"{len(crowd.i)} with {len(crowd.j)} graphics"
-            yield f"{what}, {crowd.pairs} pairs: near ones are found by a grid"
-            for (shape_i, shape_j), kind in crowd.kinds.items():
+                what = f"{len(contact_set.i)} with {len(contact_set.j)} graphics"
+            yield f"{what}, {contact_set.pairs} pairs: near ones are found by a grid"
+            for (shape_i, shape_j), kind in contact_set.kinds.items():
                 yield f"{shape_i} {shape_j}: {kind.detector}"
 
 

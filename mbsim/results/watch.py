@@ -21,7 +21,7 @@ ENERGIES = ("kinetic", "potential", "dissipated", "work_of_motions")
 
 def energies(system: System) -> tuple[str, ...]:
     """Return which energies a system has: the work of motions only where something drives it."""
-    driven = system.model.motions or system.scene.world.ledger[0] >= 0
+    driven = system.model.motions or system.scene.world.accumulators[0] >= 0
     return ENERGIES if driven else ENERGIES[:3]
 
 

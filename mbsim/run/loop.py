@@ -282,7 +282,7 @@ class Runner:
         if fresh:
             memory = method.memory
             memory[scheme.ROW_ENDS] = -np.inf if self.timetable.timed else np.inf
-            memory[scheme.REACH] = np.inf
+            memory[scheme.HORIZON] = np.inf
             method.counts[scheme.ROW] = len(method.timetable)
 
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:

@@ -85,7 +85,7 @@ class Methods:
 
     def bind(self) -> None:
         """Bind the method that memory names."""
-        self.problem, self._tangent, (self.steps, self._bench) = jit.planned(self._bound)
+        self.problem, self._tangent, (self.steps, self._workspace) = jit.planned(self._bound)
 
     def _bound(self) -> tuple[Problem, Any, tuple[scheme.Steps, Any]]:
         """Return the problem, what its linearisation lives in, and the method bound to it."""

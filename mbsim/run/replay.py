@@ -89,7 +89,7 @@ def _lines(text: Any) -> list[str]:
     return str(text).split("\n") if str(text) else []
 
 
-class Again:
+class Replay:
     """The model of a result file, built again.
 
     Raises
@@ -146,7 +146,7 @@ class Again:
         from mbsim.core.address import pack
         from mbsim.core.problem import HOOK
         from mbsim.dynamics.pipeline.hook_table import fill
-        from mbsim.dynamics.pipeline.replay import again_hook
+        from mbsim.dynamics.pipeline.replay import replay_hook
 
         scene = self.system.scene
         # a user's law may ask for expressions
@@ -157,7 +157,7 @@ class Again:
         pointer = ctypes.c_void_p
         self._hook = ctypes.CFUNCTYPE(
             ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
-        )(jit.address(again_hook, HOOK))
+        )(jit.address(replay_hook, HOOK))
 
     def rows(self) -> Iterator[Row]:
         """Yield all rows of the result file."""
@@ -332,7 +332,7 @@ def request(results: Results, names: Sequence[str]) -> tuple[Array, dict[str, li
     ModelError
         If a name does not exist, or the model is not that of the run any more.
     """
-    again = Again(results)
+    again = Replay(results)
     wanted = [_wanted(name, again.system.contact_ids) for name in names]
     rows = list(again.rows())
     columns: dict[str, list[Value]] = {}

@@ -84,7 +84,7 @@ def settle_contacts(
     # what begins to stick or slip is told by it
     scene.world.scale[TOLERANCE] = settings.stages[0].tol
     hooks.must(problem.rhs, t, y, f)
-    if system.plans.crowds:
+    if system.plans.broadphase:
         # nothing is listed yet: list what is near, then look again
         hooks.must(problem.commit, t, y, f)
         hooks.must(problem.rhs, t, y, f)
@@ -96,13 +96,13 @@ def settle_contacts(
 
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     """Report shapes that overlap at the start; return a line for each that is too deep."""
-    from mbsim.arrays.scene import LIVE
+    from mbsim.arrays.scene import ACTIVE
 
     scene, model = system.scene, system.model
     faults = []
     pairs = scene.pairs
-    live = pairs.live[: pairs.count[LIVE]]
-    slots = [s for pair in live for s in range(pairs.slot[pair], pairs.last[pair])]
+    active = pairs.active[: pairs.count[ACTIVE]]
+    slots = [s for pair in active for s in range(pairs.slot[pair], pairs.last[pair])]
     for s in slots:
         # those that are ignored for their depth overlap too
         depth = float(scene.work.points[s, 0])

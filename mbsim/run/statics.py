@@ -158,6 +158,6 @@ def balance_bodies(
     scene.state.angle[...] = turns
     at[...] = y
     for _ in range(2):
-        # near pairs of crowds are listed first, then looked at
+        # near pairs of large contacts are listed first, then looked at
         hooks.must(problem.rhs, t, at, f)
         hooks.must(problem.commit, t, at, f)

@@ -64,13 +64,13 @@ def _pin():
     return mechanism_decks.Scene([body], [joint], extra=rubs).xml()
 
 
-def _crowd():
+def _contact_set():
     return crowd_decks.pile(crowd_decks.block(4, 0.25))
 
 
 def model_of(deck, folder):
     """Return the model of a deck of `models/`, or of one above."""
-    made = {"pin": _pin, "crowd": _crowd}
+    made = {"pin": _pin, "crowd": _contact_set}
     path = write_deck(folder, made[deck]()) if deck in made else MODELS / f"{deck}.xml"
     return mbsim.read_model(path)
 
@@ -97,7 +97,7 @@ class Failure:
         own = form(address)
 
         def serve(*given):
-            if self.request is Joints.SEAT:
+            if self.request is Joints.PROJECT_TREE:
                 scene.sweep.quality[NEAR_FOLD] = 1.0
             if self.request is not None and given[1] != self.request:
                 return own(*given)

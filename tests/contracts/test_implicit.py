@@ -619,12 +619,12 @@ def test_newtons_iteration_goes_on_while_it_is_worth_it():
 
 
 def test_the_step_of_an_implicit_method_is_kept_where_it_would_hardly_grow():
-    assert control.foretold_factor(0.5, 0.5, 4.0, 0.0) == 1.0
-    assert control.foretold_factor(1e-20, 1.0, 4.0, 0.0) == control.GROW
-    assert control.foretold_factor(0.1, 0.1, 4.0, 1.0) == pytest.approx(0.9 * 10**0.25)
+    assert control.extrapolated_factor(0.5, 0.5, 4.0, 0.0) == 1.0
+    assert control.extrapolated_factor(1e-20, 1.0, 4.0, 0.0) == control.GROW
+    assert control.extrapolated_factor(0.1, 0.1, 4.0, 1.0) == pytest.approx(0.9 * 10**0.25)
     # the error grew by ten though the step did not: it will again
-    assert control.foretold_factor(0.1, 0.01, 4.0, 1.0) == pytest.approx(0.9)
-    assert control.foretold_factor(0.9, 0.1, 4.0, 1.0) < 0.6
+    assert control.extrapolated_factor(0.1, 0.01, 4.0, 1.0) == pytest.approx(0.9)
+    assert control.extrapolated_factor(0.9, 0.1, 4.0, 1.0) < 0.6
 
 
 MOVING = {

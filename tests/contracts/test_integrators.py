@@ -400,7 +400,7 @@ def test_error_of_dop853_joins_both_estimates():
 
 def _verlet(context, t, h, a, b):
     # velocity Verlet of (x, v): one evaluation a step, no error estimate
-    p, m = scheme.on_bench(context)
+    p, m = scheme.in_workspace(context)
     m.counts[scheme.EVALUATIONS] += 1
     m.trial[0] = m.y[0] + h * (m.y[1] + 0.5 * h * m.k[0, 1])
     m.trial[1] = m.y[1]
@@ -411,7 +411,7 @@ def _verlet(context, t, h, a, b):
 
 
 def _cubic(context, t, h, a, b):
-    _, m = scheme.on_bench(context)
+    _, m = scheme.in_workspace(context)
     for i in range(2):
         rise = m.trial[i] - m.y[i]
         m.dense[0, i], m.dense[1, i] = m.y[i], rise

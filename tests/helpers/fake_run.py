@@ -89,7 +89,7 @@ def fake_system_of(model: Model) -> Any:
         graphics=a.Graphics(*[np.zeros(0)] * len(a.Graphics._fields)),
         contacts=contacts,
         world=SimpleNamespace(
-            gravity=np.array(model.gravity.g), scale=np.ones(2), ledger=np.full(2, -1)
+            gravity=np.array(model.gravity.g), scale=np.ones(2), accumulators=np.full(2, -1)
         ),
         markers=table.arrays()[0],
         connections=of_connections,

@@ -15,7 +15,7 @@ import mbsim
 from helpers.folders import MODELS, USERFUNCS
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
-from mbsim.run.replay import Again, request
+from mbsim.run.replay import Replay, request
 
 SLIP = 'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
 USER = 'cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="law.py"'
@@ -74,7 +74,7 @@ def run(folder, friction, script=None, deck=None, **settings):
 
 def same(results):
     """Compare forces evaluated again with those of the run, bit for bit; return the rows."""
-    rows = list(Again(results).rows())
+    rows = list(Replay(results).rows())
     assert len(rows) == len(results["time"]) > 10
     for name in ("force", "torque", "penetration", "slip_speed", "incidents"):
         again = [row.contacts[301][name] for row in rows]
@@ -126,7 +126,7 @@ def test_and_those_of_decks_in_models(tmp_path, name):
     model = mbsim.read_model(MODELS / f"{name}.xml")
     contact = next(iter(model.contacts))
     with mbsim.simulate(model, output=tmp_path, end_time=0.6, print_interval=0.02) as results:
-        rows = list(Again(results).rows())
+        rows = list(Replay(results).rows())
         again = np.array([row.contacts[contact]["force"] for row in rows])
         np.testing.assert_array_equal(again, results[f"contacts/{contact}/force"])
         assert np.abs(again).max() > 0.0

@@ -174,7 +174,7 @@ def test_no_motion_no_work_of_motions(tmp_path: Path) -> None:
         assert "energy/work_of_motions" not in results
         assert "motions" not in {name.split("/")[0] for name in results.keys()}
     # something else may drive the system too: then the rows say where they keep its work
-    system.scene.world.ledger[0] = 26
+    system.scene.world.accumulators[0] = 26
     add_rows(system, 0, 2)
     with run(system) as results:
         assert "energy/work_of_motions" in results

@@ -64,7 +64,7 @@ def extra():
     return Extra(np.ones(2), np.full((2, 3), 5.0), np.array([4, 7]), np.full(2, 9.0))
 
 
-@pytest.mark.parametrize("group", [Scene, Tangent, scheme.Bench, Wider])
+@pytest.mark.parametrize("group", [Scene, Tangent, scheme.Workspace, Wider])
 def test_every_array_has_one_tag(group):
     found = [tags.layout(group, tag) for tag in tags.Tag]
     assert sum(map(len, found)) == len({name for each in found for name in each})

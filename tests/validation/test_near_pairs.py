@@ -19,10 +19,10 @@ from helpers.crowd_decks import (
     surface,
 )
 from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
-from mbsim.arrays.scene import FREE, LISTINGS, LIVE, WANTED
+from mbsim.arrays.scene import ACTIVE, FREE, LISTINGS, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
-from mbsim.dynamics.contact import broadphase as crowd
+from mbsim.dynamics.contact import broadphase as contact_set
 from mbsim.errors import Interrupted, ModelError, SolverError
 from mbsim.run import loop
 
@@ -62,7 +62,7 @@ def listed(folder, model):
     system = build.build(mbsim.read_model(write_deck(folder, model)))
     place_bodies(system.scene, system.y0)
     place_graphics(system.scene, system.y0)
-    crowd.list_pairs(system.scene, system.y0)
+    contact_set.list_pairs(system.scene, system.y0)
     return system
 
 
@@ -70,7 +70,7 @@ def listed_pairs(system):
     """Return the live pairs as (contact, graphic, graphic), graphic ids ascending."""
     pairs, kinds = system.scene.pairs, system.scene.kinds
     found = []
-    for pair in pairs.live[: pairs.count[LIVE]]:
+    for pair in pairs.live[: pairs.count[ACTIVE]]:
         i, j = (system.graphic_ids[g[pair]] for g in (pairs.graphic_i, pairs.graphic_j))
         found.append((system.contact_ids[kinds.contact[pairs.kind[pair]]], min(i, j), max(i, j)))
     return found
@@ -103,7 +103,7 @@ def check_against_brute_force(system, random, wanted):
     found, near = listed_pairs(system), 0
     assert len(found) == len(set(found))
     apart = distances(system, random)
-    skin = float(system.scene.crowds.size[0])
+    skin = float(system.scene.broadphase.size[0])
     for contact, i, j in wanted:
         if apart[min(i, j), max(i, j)] < skin:
             near += 1
@@ -169,10 +169,10 @@ def test_near_pairs_stay_right_while_shapes_wander(tmp_path, all_crowds):
             y[13 * b + 3 : 13 * b + 7] = q / np.linalg.norm(q)
         place_bodies(scene, y)
         assert not place_graphics(scene, y)
-        crowd.follow(scene, y)
+        contact_set.follow(scene, y)
         assert place_graphics(scene, y) or scene.state.centre.any() == 0
         check_against_brute_force(system, random, wanted)
-        places = [*scene.pairs.live[: scene.pairs.count[LIVE]]]
+        places = [*scene.pairs.live[: scene.pairs.count[ACTIVE]]]
         places += [*scene.pairs.free[: scene.pairs.count[FREE]]]
         assert sorted(places) == list(range(len(scene.pairs.live)))
     assert before - set(listed_pairs(system))
@@ -184,13 +184,13 @@ def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
     text, ids = mixed(random, ("SPHERE",), 40, 0.6)
     model = GROUND + text + sets(ids, ids, **LAW)
     system = listed(tmp_path, model)
-    many, skin = len(listed_pairs(system)), float(system.scene.crowds.size[0])
+    many, skin = len(listed_pairs(system)), float(system.scene.broadphase.size[0])
     monkeypatch.setattr(
-        contacts, "_crowd_places", lambda plans: (many - 3, plans.crowds[0].kinds and 1)
+        contacts, "_crowd_places", lambda plans: (many - 3, plans.broadphase[0].kinds and 1)
     )
     tight = listed(tmp_path, model)
     assert tight.scene.pairs.count[WANTED] == 0
-    assert tight.scene.crowds.size[0] in [skin * 0.5**k for k in range(1, 15)]
+    assert tight.scene.broadphase.size[0] in [skin * 0.5**k for k in range(1, 15)]
     wanted = [(301, i, j) for k, i in enumerate(ids) for j in ids[k + 1 :]]
     check_against_brute_force(tight, random, wanted)
     # what touches cannot be left out

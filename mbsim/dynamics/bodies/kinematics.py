@@ -70,19 +70,19 @@ def place_graphics(scene, y):
         if b == len(scene.bodies.mass):
             continue
         place_graphic(scene, y, g)
-        way = math.inf
-        if graphics.reach[g] < math.inf:
+        travel = math.inf
+        if graphics.radius[g] < math.inf:
             frame, centre = work.frames[g], state.centre[g]
             dx, dy, dz = frame[0] - centre[0], frame[1] - centre[1], frame[2] - centre[2]
-            way = math.sqrt(dx * dx + dy * dy + dz * dz)
+            travel = math.sqrt(dx * dx + dy * dy + dz * dz)
             if graphics.turns[g] == 1:
                 at, before = BODY_SIZE * b + AT_Q, state.q[b]
                 d, qq = 0.0, 0.0
                 for k in range(4):
                     d += y[at + k] * before[k]
                     qq += y[at + k] * y[at + k]
-                way += 2.0 * graphics.reach[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
-        work.way[g] = way
-        if way > scene.crowds.room[g]:
+                travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
+        work.travel[g] = travel
+        if travel > scene.broadphase.room[g]:
             listed = False
     return listed

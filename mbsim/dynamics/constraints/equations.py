@@ -35,7 +35,7 @@ from mbsim.arrays.scene import (
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector
-from mbsim.dynamics.constraints.folding import SAMPLED, is_held, near_fold, passes_fold
+from mbsim.dynamics.constraints.folding import SAMPLED, is_sticking, near_fold, passes_fold
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.constraints.terms import (
     angle_term,
@@ -211,7 +211,7 @@ def factor_matrix(scene, t):
     for i in range(n):
         e = scene.equations.active[i]
         size = scene.sweep.size[e] ** 2
-        released = passing and not is_held(scene, e, t)
+        released = passing and not is_sticking(scene, e, t)
         for j in range(first[i], i + 1):
             total = A[i, j]
             for k in range(max(first[i], first[j]), j):

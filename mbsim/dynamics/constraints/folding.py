@@ -62,7 +62,7 @@ def passes_fold(scene, t):
 
 
 @jitable
-def is_held(scene, e, t):
+def is_sticking(scene, e, t):
     """Return whether equation e holds at t: what is released does not while a fold is passed."""
     return scene.sweep.released[e] == 0 or not passes_fold(scene, t)
 

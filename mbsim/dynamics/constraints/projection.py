@@ -19,12 +19,12 @@ from mbsim.dynamics.constraints.equations import (
     fill_matrix,
     solve_matrix,
 )
-from mbsim.dynamics.constraints.folding import is_held, near_fold
+from mbsim.dynamics.constraints.folding import is_sticking, near_fold
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import prepare, respond
 from mbsim.dynamics.constraints.tree_projection import (
     carry_all,
-    seat_all,
+    project_tree,
     set_spin,
     set_velocity,
     turn_body,
@@ -107,7 +107,7 @@ def largest_residual(scene, level, column, t):
     largest = 0.0
     for r in range(active_count(scene)):
         e = scene.equations.active[r]
-        if scene.equations.level[e] >= level and is_held(scene, e, t):
+        if scene.equations.level[e] >= level and is_sticking(scene, e, t):
             largest = max(largest, abs(scene.sweep.rate[e, column]) / scene.equations.unit[e])
     return largest
 
@@ -135,7 +135,7 @@ def note_gap(scene, t):
     for r in range(active_count(scene)):
         e = scene.equations.active[r]
         gap = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
-        held = scene.equations.level[e] >= 2 and is_held(scene, e, t)
+        held = scene.equations.level[e] >= 2 and is_sticking(scene, e, t)
         if held and gap > max(SMALL, worst):
             worst = gap
             if asked <= SMALL:
@@ -169,7 +169,7 @@ def close_loops(scene, t, y):
             return
         correct(scene, 2, RESIDUAL)
         displace(scene, y)
-        seat_all(scene, y)
+        project_tree(scene, y)
         if size <= SMALL:
             return
         prepare_equations(scene, t, y)
@@ -187,7 +187,7 @@ def project(scene, t, y, level):
     """
     scene.sweep.quality[DRIFT] = 0.0
     place_bodies(scene, y)
-    seat_all(scene, y)
+    project_tree(scene, y)
     if active_count(scene) > 0:
         close_loops(scene, t, y)
     carry_all(scene, y)

@@ -3,7 +3,7 @@
 The matrix A of all equations, each divided by what it would be if the bodies were free, is
 factored with the largest pivot first; what has no pivot left is implied. The choice is kept while
 its least pivot holds up: off the manifold implied equations differ from what implies them, so a
-choice that changed within a step would be a kink.
+choice that changed within a step would be a switch.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from mbsim.dynamics.constraints.folding import leave_fold, near_fold, watch_fold
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
 from mbsim.laws.catalog import STICK
 
-#: What `keep_choice` returns where a fold was left behind.
+#: What `keep_selection` returns where a fold was left behind.
 LEFT = -1
 #: What at most is left of an equation that others imply, as part of its size for free bodies.
 IMPLIED = 1e-12
@@ -233,7 +233,7 @@ def choose_better(scene, t, y, least):
 
 
 @jitable
-def keep_choice(scene, t, y):
+def keep_selection(scene, t, y):
     """Choose anew where the choice has worn; return 0, or a code if implied equations fail.
 
     Or LEFT where a fold was left behind: what was released does not hold exactly then.

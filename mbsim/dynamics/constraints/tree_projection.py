@@ -97,7 +97,7 @@ def joint_arms(scene, y, k):
 
 
 @jitable
-def seat(scene, y, k):
+def project_child(scene, y, k):
     """Put the child of place k where its joint has it."""
     tree = scene.tree
     body = tree.body[k]
@@ -113,11 +113,11 @@ def seat(scene, y, k):
 
 
 @jitable
-def seat_all(scene, y):
+def project_tree(scene, y):
     """Put all bodies of the trees where their joints have them, parents first."""
     for k in range(len(scene.tree.body)):
         if scene.tree.turn[k] != TURN_ROOT:
-            seat(scene, y, k)
+            project_child(scene, y, k)
 
 
 @jitable

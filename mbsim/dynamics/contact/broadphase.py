@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import BODY_SIZE, FIXED, FREE, LISTINGS, LIVE, WANTED
+from mbsim.arrays.scene import ACTIVE, BODY_SIZE, FIXED, FREE, LISTINGS, WANTED
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.dynamics.contact.detection import measure_pair
@@ -26,9 +26,9 @@ MOST_HALVINGS = 20
 @jitable
 def fill_box(scene, g, skin):
     """Write the box of graphic g, grown by half the skin."""
-    graphics, frame, box = scene.graphics, scene.work.frames[g], scene.crowds.box[g]
+    graphics, frame, box = scene.graphics, scene.work.frames[g], scene.broadphase.box[g]
     for r in range(3):
-        half = graphics.reach[g]
+        half = graphics.radius[g]
         if graphics.turns[g] == 1 and half < math.inf:
             half = 0.0
             for k in range(3):
@@ -41,7 +41,7 @@ def fill_box(scene, g, skin):
 @jitable
 def boxes_meet(scene, i, j):
     """Return whether the boxes of two graphics overlap."""
-    a, b = scene.crowds.box[i], scene.crowds.box[j]
+    a, b = scene.broadphase.box[i], scene.broadphase.box[j]
     for k in range(3):
         if a[k] > b[3 + k] or b[k] > a[3 + k]:
             return False
@@ -53,7 +53,7 @@ def balls_meet(scene, i, j, skin):
     """Return whether the balls around two graphics are nearer than the skin."""
     a, b = scene.work.frames[i], scene.work.frames[j]
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    together = scene.graphics.reach[i] + scene.graphics.reach[j] + skin
+    together = scene.graphics.radius[i] + scene.graphics.radius[j] + skin
     return dx * dx + dy * dy + dz * dz < together * together
 
 
@@ -63,15 +63,15 @@ def above_plane(scene, plane, g, skin):
     frame = scene.work.frames[plane]
     d = sub(vector(scene.work.frames[g]), vector(frame))
     height = d[0] * frame[5] + d[1] * frame[8] + d[2] * frame[11]
-    return height > scene.graphics.reach[g] + skin
+    return height > scene.graphics.radius[g] + skin
 
 
 @jitable
 def near(scene, i, j, skin):
     """Return whether two graphics are to be listed."""
-    reach, ground = scene.graphics.reach, len(scene.bodies.mass)
+    radius, ground = scene.graphics.radius, len(scene.bodies.mass)
     for plane, other in ((i, j), (j, i)):
-        if math.isinf(reach[plane]):
+        if math.isinf(radius[plane]):
             # where a plane that moves will be is not followed
             moves = scene.graphics.body[plane] != ground
             return moves or not above_plane(scene, plane, other, skin)
@@ -81,37 +81,37 @@ def near(scene, i, j, skin):
 @jitable
 def place_of(scene, kind, i, j):
     """Return the place of a listed pair, -1 if there is none."""
-    pairs, at = scene.pairs, scene.crowds.head[i]
+    pairs, at = scene.pairs, scene.broadphase.head[i]
     while at >= 0:
         if pairs.graphic_j[at] == j and pairs.kind[at] == kind:
             return at
-        at = scene.crowds.next[at]
+        at = scene.broadphase.next[at]
     return at
 
 
 @jitable
 def hold(scene, pair):
     """Keep a place in the list."""
-    pairs, crowds = scene.pairs, scene.crowds
-    pairs.live[pairs.count[LIVE]] = pair
-    pairs.count[LIVE] += 1
+    pairs, broadphase = scene.pairs, scene.broadphase
+    pairs.active[pairs.count[ACTIVE]] = pair
+    pairs.count[ACTIVE] += 1
     i = pairs.graphic_i[pair]
-    crowds.next[pair] = crowds.head[i]
-    crowds.head[i] = pair
+    broadphase.next[pair] = broadphase.head[i]
+    broadphase.head[i] = pair
 
 
 @jitable
-def add_pair(scene, crowd, i, j):
-    """List the I graphic i with the J graphic j of a crowd unless they are listed."""
-    graphics, pairs, crowds = scene.graphics, scene.pairs, scene.crowds
+def add_pair(scene, contact_set, i, j):
+    """List the I graphic i with the J graphic j of a large contact unless they are listed."""
+    graphics, pairs, broadphase = scene.graphics, scene.pairs, scene.broadphase
     if graphics.body[i] == graphics.body[j]:
         return
-    shapes = round(math.sqrt(crowds.kind.shape[1]))
+    shapes = round(math.sqrt(broadphase.kind.shape[1]))
     match = graphics.shape[i] * shapes + graphics.shape[j]
-    kind = crowds.kind[crowd, match]
+    kind = broadphase.kind[contact_set, match]
     if kind < 0:
         return
-    if crowds.swap[crowd, match] == 1:
+    if broadphase.swap[contact_set, match] == 1:
         i, j = j, i
     if place_of(scene, kind, i, j) >= 0:
         return
@@ -128,49 +128,54 @@ def add_pair(scene, crowd, i, j):
 
 
 @jitable
-def against_all(scene, crowd, i, others, skin):
-    """List graphic i of a crowd with those of the other side that are near; 0: it is their J."""
-    crowds = scene.crowds
-    first, last = crowds.first[crowd, 2 * others], crowds.first[crowd, 2 * others + 1]
+def against_all(scene, contact_set, i, others, skin):
+    """List graphic i with those of the contact's other side that are near; 0: it is their J."""
+    broadphase = scene.broadphase
+    first, last = (
+        broadphase.first[contact_set, 2 * others],
+        broadphase.first[contact_set, 2 * others + 1],
+    )
     for k in range(first, last):
-        j = crowds.member[k]
-        if j == i or (crowds.same[crowd] == 1 and j > i and not usual_size(scene, j)):
+        j = broadphase.member[k]
+        if j == i or (broadphase.same[contact_set] == 1 and j > i and not usual_size(scene, j)):
             # a set's pairs of giants come twice
             continue
         if near(scene, i, j, skin):
             if others == 1:
-                add_pair(scene, crowd, i, j)
+                add_pair(scene, contact_set, i, j)
             else:
-                add_pair(scene, crowd, j, i)
+                add_pair(scene, contact_set, j, i)
 
 
 @jitable
 def usual_size(scene, g):
     """Return whether a graphic belongs into the grid."""
-    return scene.graphics.reach[g] <= GIANT * scene.crowds.size[1]
+    return scene.graphics.radius[g] <= GIANT * scene.broadphase.size[1]
 
 
 @jitable
-def cell_range(scene, crowd):
+def cell_range(scene, contact_set):
     """Return lowest corner, width and numbers of the cells that hold the J members' centres."""
-    crowds, frames = scene.crowds, scene.work.frames
+    broadphase, frames = scene.broadphase, scene.work.frames
     low = (math.inf, math.inf, math.inf)
     high = (-math.inf, -math.inf, -math.inf)
     width = 0.0
     for side in range(2):
-        for k in range(crowds.first[crowd, 2 * side], crowds.first[crowd, 2 * side + 1]):
-            g = crowds.member[k]
+        for k in range(
+            broadphase.first[contact_set, 2 * side], broadphase.first[contact_set, 2 * side + 1]
+        ):
+            g = broadphase.member[k]
             if not usual_size(scene, g):
                 continue
             for r in range(3):
-                width = max(width, crowds.box[g, 3 + r] - crowds.box[g, r])
+                width = max(width, broadphase.box[g, 3 + r] - broadphase.box[g, r])
             if side == 1:
                 x, y, z = frames[g, 0], frames[g, 1], frames[g, 2]
                 low = (min(low[0], x), min(low[1], y), min(low[2], z))
                 high = (max(high[0], x), max(high[1], y), max(high[2], z))
     if not low[0] <= high[0]:
         return (0.0, 0.0, 0.0), 1.0, 0, 0, 0
-    most = len(crowds.start) - 1
+    most = len(broadphase.start) - 1
     while True:
         nx = math.floor((high[0] - low[0]) / width) + 1.0
         ny = math.floor((high[1] - low[1]) / width) + 1.0
@@ -188,45 +193,45 @@ def cell_at(scene, g, low, width, r, n):
 
 
 @jitable
-def search(scene, crowd, skin):
-    """List all near pairs of a crowd."""
-    crowds = scene.crowds
-    first_i, last_i = crowds.first[crowd, 0], crowds.first[crowd, 1]
-    first_j, last_j = crowds.first[crowd, 2], crowds.first[crowd, 3]
-    low, width, nx, ny, nz = cell_range(scene, crowd)
-    start, order, cells = crowds.start, crowds.order, nx * ny * nz
+def search(scene, contact_set, skin):
+    """List all near pairs of a large contact."""
+    broadphase = scene.broadphase
+    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
+    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
+    low, width, nx, ny, nz = cell_range(scene, contact_set)
+    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
 
     # J members cell by cell; planes and giants at once against every I
     for cell in range(cells + 1):
         start[cell] = 0
     for k in range(first_j, last_j):
-        j = crowds.member[k]
+        j = broadphase.member[k]
         if not usual_size(scene, j):
-            against_all(scene, crowd, j, 0, skin)
+            against_all(scene, contact_set, j, 0, skin)
             continue
         x = cell_at(scene, j, low, width, 0, nx)
         y = cell_at(scene, j, low, width, 1, ny)
         z = cell_at(scene, j, low, width, 2, nz)
-        crowds.cell[j] = (z * ny + y) * nx + x
-        start[crowds.cell[j] + 1] += 1
+        broadphase.cell[j] = (z * ny + y) * nx + x
+        start[broadphase.cell[j] + 1] += 1
     for cell in range(cells):
         start[cell + 1] += start[cell]
     for k in range(last_j - 1, first_j - 1, -1):
-        j = crowds.member[k]
+        j = broadphase.member[k]
         if usual_size(scene, j):
             # the end of a cell's range moves down to its begin
-            start[crowds.cell[j] + 1] -= 1
-            order[start[crowds.cell[j] + 1]] = j
+            start[broadphase.cell[j] + 1] -= 1
+            order[start[broadphase.cell[j] + 1]] = j
 
     # start[c + 1] is now where cell c begins; the next cell's begin is its end
     usual = 0
     for k in range(first_j, last_j):
-        usual += 1 if usual_size(scene, crowds.member[k]) else 0
+        usual += 1 if usual_size(scene, broadphase.member[k]) else 0
     for k in range(first_i, last_i):
-        i = crowds.member[k]
+        i = broadphase.member[k]
         if not usual_size(scene, i):
-            if crowds.same[crowd] == 0:
-                against_all(scene, crowd, i, 1, skin)
+            if broadphase.same[contact_set] == 0:
+                against_all(scene, contact_set, i, 1, skin)
             continue
         x = cell_at(scene, i, low, width, 0, nx)
         y = cell_at(scene, i, low, width, 1, ny)
@@ -241,22 +246,22 @@ def search(scene, crowd, skin):
                 end = start[row + right + 2] if row + right + 1 < cells else usual
                 for m in range(begin, end):
                     j = order[m]
-                    if crowds.same[crowd] == 1 and j <= i:
+                    if broadphase.same[contact_set] == 1 and j <= i:
                         continue
                     if boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin):
-                        add_pair(scene, crowd, i, j)
+                        add_pair(scene, contact_set, i, j)
 
 
 @jitable
 def keep_near(scene, skin):
-    """Begin the list with the crowds' pairs that still are near or touch; free the others."""
-    pairs, crowds = scene.pairs, scene.crowds
-    for g in range(len(crowds.head)):
-        crowds.head[g] = -1
-    listed = pairs.count[LIVE]
-    pairs.count[LIVE] = pairs.count[FIXED]
+    """Begin the list with the pairs that still are near or touch; free the others."""
+    pairs, broadphase = scene.pairs, scene.broadphase
+    for g in range(len(broadphase.head)):
+        broadphase.head[g] = -1
+    listed = pairs.count[ACTIVE]
+    pairs.count[ACTIVE] = pairs.count[FIXED]
     for k in range(pairs.count[FIXED], listed):
-        pair = pairs.live[k]
+        pair = pairs.active[k]
         i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
         if pairs.touches[pair] > 0 or near(scene, i, j, skin):
             hold(scene, pair)
@@ -267,15 +272,15 @@ def keep_near(scene, skin):
 
 @jitable
 def order_by_graphic(scene):
-    """Put the crowds' pairs into the order of their I graphics, near each other in memory."""
-    pairs, crowds = scene.pairs, scene.crowds
+    """Put pairs into the order of their I graphics, near each other in memory."""
+    pairs, broadphase = scene.pairs, scene.broadphase
     at = pairs.count[FIXED]
-    for g in range(len(crowds.head)):
-        pair = crowds.head[g]
+    for g in range(len(broadphase.head)):
+        pair = broadphase.head[g]
         while pair >= 0:
-            pairs.live[at] = pair
+            pairs.active[at] = pair
             at += 1
-            pair = crowds.next[pair]
+            pair = broadphase.next[pair]
 
 
 @jitable
@@ -319,43 +324,43 @@ def put_aside(scene, k, s, row):
 
 @jitable
 def close_ranks(scene):
-    """Move the crowds' pairs to places in the order of the list, with their slots that touch.
+    """Move pairs to places in the order of the list, with their slots that touch.
 
     An evaluation then walks through memory from front to back; pairs that come and go would
     scatter them. Where a law carries X or integrates memory its places in y stay, so nothing is
     moved.
     """
-    pairs, crowds, state, work = scene.pairs, scene.crowds, scene.state, scene.work
-    fixed, live, last = pairs.count[FIXED], pairs.count[LIVE], len(state.hit) - 1
+    pairs, broadphase, state, work = scene.pairs, scene.broadphase, scene.state, scene.work
+    fixed, active, last = pairs.count[FIXED], pairs.count[ACTIVE], len(state.hit) - 1
     if scene.slots.x[pairs.slot[fixed]] >= 0 or scene.slots.z[pairs.slot[fixed]] >= 0:
         return
-    for k in range(fixed, live):
-        pair, row = pairs.live[k], crowds.moved[k]
-        crowds.moved[pair, 0] = k
+    for k in range(fixed, active):
+        pair, row = pairs.active[k], broadphase.moved[k]
+        broadphase.moved[pair, 0] = k
         row[1], row[2], row[3] = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
         row[4] = pairs.touches[pair]
-        crowds.spare[k, 0], crowds.spare[k, 1] = pairs.gap[pair], pairs.left[pair]
-    for k in range(fixed, live):
-        row = crowds.moved[k]
+        broadphase.spare[k, 0], broadphase.spare[k, 1] = pairs.gap[pair], pairs.left[pair]
+    for k in range(fixed, active):
+        row = broadphase.moved[k]
         pairs.kind[k], pairs.graphic_i[k], pairs.graphic_j[k] = row[1], row[2], row[3]
         pairs.touches[k] = row[4]
-        pairs.gap[k], pairs.left[k] = crowds.spare[k, 0], crowds.spare[k, 1]
-        pairs.live[k] = k
-    places = len(pairs.live)
-    pairs.count[FREE] = places - live
-    for k in range(places - live):
+        pairs.gap[k], pairs.left[k] = broadphase.spare[k, 0], broadphase.spare[k, 1]
+        pairs.active[k] = k
+    places = len(pairs.active)
+    pairs.count[FREE] = places - active
+    for k in range(places - active):
         pairs.free[k] = places - 1 - k
 
     for h in range(state.hit[last]):
         s = state.hit[h]
-        put_aside(scene, 0, s, crowds.spare[h])
+        put_aside(scene, 0, s, broadphase.spare[h])
         state.touching[s] = work.touching[s] = 0
     for h in range(state.hit[last]):
         s = state.hit[h]
         pair = scene.slots.pair[s]
         if pair >= fixed:
-            s += pairs.slot[crowds.moved[pair, 0]] - pairs.slot[pair]
-        put_aside(scene, 1, s, crowds.spare[h])
+            s += pairs.slot[broadphase.moved[pair, 0]] - pairs.slot[pair]
+        put_aside(scene, 1, s, broadphase.spare[h])
         state.touching[s] = work.touching[s] = 1
         state.hit[h] = work.hit[h] = s
     for h in range(state.hit[last]):
@@ -367,59 +372,59 @@ def close_ranks(scene):
 
 @jitable
 def list_pairs(scene, y):
-    """List the near pairs of all crowds at the committed state, and how long that holds."""
-    crowds, pairs = scene.crowds, scene.pairs
+    """List the near pairs of all large contacts at the committed state, and how long that holds."""
+    broadphase, pairs = scene.broadphase, scene.pairs
     ground = len(scene.bodies.mass)
     scene.log.counters[LISTINGS] += 1
-    skin = crowds.size[0]
+    skin = broadphase.size[0]
     for _ in range(MOST_HALVINGS):
-        for k in range(len(crowds.member)):
-            fill_box(scene, crowds.member[k], skin)
+        for k in range(len(broadphase.member)):
+            fill_box(scene, broadphase.member[k], skin)
         pairs.count[WANTED] = 0
         keep_near(scene, skin)
-        for crowd in range(len(crowds.contact)):
-            search(scene, crowd, skin)
+        for contact_set in range(len(broadphase.contact)):
+            search(scene, contact_set, skin)
         if pairs.count[WANTED] == 0:
             break
         # more than there are places for: look less far
         skin *= 0.5
-        crowds.size[0] = skin
+        broadphase.size[0] = skin
     order_by_graphic(scene)
     close_ranks(scene)
-    for k in range(len(crowds.member)):
-        g = crowds.member[k]
+    for k in range(len(broadphase.member)):
+        g = broadphase.member[k]
         b = scene.graphics.body[g]
-        if b < ground and not math.isinf(scene.graphics.reach[g]):
-            crowds.room[g] = 0.5 * skin
+        if b < ground and not math.isinf(scene.graphics.radius[g]):
+            broadphase.room[g] = 0.5 * skin
             for j in range(3):
-                crowds.reference[g, j] = scene.work.frames[g, j]
+                broadphase.reference[g, j] = scene.work.frames[g, j]
             for j in range(4):
-                crowds.reference[g, 3 + j] = y[BODY_SIZE * b + 3 + j]
+                broadphase.reference[g, 3 + j] = y[BODY_SIZE * b + 3 + j]
 
 
 @jitable
 def follow(scene, y):
     """Find out how far each member may still move; list the pairs anew where half of it is gone."""
-    crowds, graphics = scene.crowds, scene.graphics
-    half = 0.5 * crowds.size[0]
+    broadphase, graphics = scene.broadphase, scene.graphics
+    half = 0.5 * broadphase.size[0]
     anew = False
     for g in range(len(graphics.body)):
         b = graphics.body[g]
         if b == len(scene.bodies.mass):
             continue
-        if math.isinf(crowds.room[g]):
+        if math.isinf(broadphase.room[g]):
             # nobody's member, or never listed
             anew = anew or scene.log.counters[LISTINGS] == 0
             continue
-        reference = crowds.reference[g]
-        way = norm(sub(vector(scene.work.frames[g]), vector(reference)))
+        reference = broadphase.reference[g]
+        travel = norm(sub(vector(scene.work.frames[g]), vector(reference)))
         if graphics.turns[g] == 1:
             at, d = BODY_SIZE * b + 3, 0.0
             for k in range(4):
                 d += y[at + k] * reference[3 + k]
-            way += 2.0 * graphics.reach[g] * math.sqrt(max(0.0, 1.0 - d * d))
-        crowds.room[g] = half - way
-        if way > 0.5 * half:
+            travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d))
+        broadphase.room[g] = half - travel
+        if travel > 0.5 * half:
             anew = True
     if anew:
         list_pairs(scene, y)

@@ -8,7 +8,7 @@ skipping a pair never changes a result; it only saves the kernel.
 from __future__ import annotations
 
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import FCL_CALLS, LIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.scene import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
@@ -72,9 +72,12 @@ def find_contacts(scene, y):
         return Code.CROWDED
 
     waiting, measured = 0, 0
-    for k in range(pairs.count[LIVE]):
-        pair = pairs.live[k]
-        if work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]] < pairs.left[pair]:
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
+        if (
+            work.travel[pairs.graphic_i[pair]] + work.travel[pairs.graphic_j[pair]]
+            < pairs.left[pair]
+        ):
             continue
         measured += 1
         if measure_pair(scene, pair):
@@ -84,7 +87,7 @@ def find_contacts(scene, y):
             waiting += 1
 
     log.counters[NARROWPHASE] += measured
-    log.counters[SKIPPED] += pairs.count[LIVE] - measured
+    log.counters[SKIPPED] += pairs.count[ACTIVE] - measured
 
     # one visit to Python for all pairs that need it
     if waiting > 0:

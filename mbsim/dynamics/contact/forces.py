@@ -167,7 +167,7 @@ def contact_of(scene, s):
 
 
 @jitable
-def whole_of(scene, s):
+def face_weight_of(scene, s):
     """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
     return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
 
@@ -175,7 +175,7 @@ def whole_of(scene, s):
 @jitable
 def patch(scene, s):
     """Return the area of contact of slot s, 0 for a point."""
-    return scene.work.slot[s, PATCH] if whole_of(scene, s) > 0.0 else 0.0
+    return scene.work.slot[s, PATCH] if face_weight_of(scene, s) > 0.0 else 0.0
 
 
 @jitable
@@ -346,7 +346,7 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
     force has at their mean distance, for none of them pulls.
     """
     work, out, none = scene.work, scene.work.law_out, (0.0, 0.0, 0.0)
-    numbers, row, whole = work.points[s + 1], work.slot[s], whole_of(scene, s)
+    numbers, row, whole = work.points[s + 1], work.slot[s], face_weight_of(scene, s)
     xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
     row[TILTING] = 0.0
     x, y_axis = plane_axes(at[3])
@@ -392,7 +392,7 @@ def add_contact(scene, t, h, y, dy, s):
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
 
-    row, whole = work.slot[s], whole_of(scene, s)
+    row, whole = work.slot[s], face_weight_of(scene, s)
     if whole > 0.0:
         row[PATCH] = work.points[s + 1, AREA]
 

@@ -10,6 +10,7 @@ import math
 
 from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
 from mbsim.arrays.scene import (
+    ACTIVE,
     APPROACH,
     BODY_SIZE,
     ENERGY_LOST,
@@ -20,7 +21,6 @@ from mbsim.arrays.scene import (
     FIRST_TOUCH,
     HELD_OTHERWISE,
     LEAVE,
-    LIVE,
     PEAK_DEPTH,
     PEAK_FORCE,
     PEAK_FORCE_TIME,
@@ -249,13 +249,13 @@ def bounding_gap(scene, pair):
         frame, half = work.frames[other], graphics.half[other]
         d = sub(vector(work.frames[g]), vector(frame))
         if math.isinf(half[2]):
-            best = max(best, dot(d, axis(frame, 2)) - graphics.reach[g])
+            best = max(best, dot(d, axis(frame, 2)) - graphics.radius[g])
             continue
         square = 0.0
         for k in range(3):
             out = max(0.0, abs(dot(d, axis(frame, k))) - half[k])
             square += out * out
-        best = max(best, math.sqrt(square) - graphics.reach[g])
+        best = max(best, math.sqrt(square) - graphics.radius[g])
     return best
 
 
@@ -283,7 +283,7 @@ def another_point(scene, y, h, s):
     graphics = scene.graphics
     speed = norm(velocity_at(scene, y, graphics.body[gi], p))
     speed += norm(velocity_at(scene, y, graphics.body[gj], p))
-    size = min(graphics.reach[gi], graphics.reach[gj])
+    size = min(graphics.radius[gi], graphics.radius[gj])
     # the point of touch may run ahead of both surfaces; a hundredth of the shape is near
     return norm(sub(p, vector(before))) > 2.0 * h * speed + 0.01 * size
 
@@ -379,16 +379,16 @@ def commit_incidents(scene, t, h, y):
 def commit_gaps(scene):
     """Take what the shapes moved from the distance of every pair; measure where half is gone."""
     pairs, work = scene.pairs, scene.work
-    for k in range(pairs.count[LIVE]):
-        pair = pairs.live[k]
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
         if pairs.touches[pair] > 0:
             pairs.gap[pair] = pairs.left[pair] = 0.0
             continue
-        way = work.way[pairs.graphic_i[pair]] + work.way[pairs.graphic_j[pair]]
-        if not way < pairs.left[pair]:
+        travel = work.travel[pairs.graphic_i[pair]] + work.travel[pairs.graphic_j[pair]]
+        if not travel < pairs.left[pair]:
             measure_gap(scene, pair, True)
-        elif way > 0.0:
-            pairs.left[pair] -= way
+        elif travel > 0.0:
+            pairs.left[pair] -= travel
             if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
                 measure_gap(scene, pair, False)
 
@@ -421,6 +421,6 @@ def commit(scene, t, h, y):
                 state.centre[g, k] = scene.work.frames[g, k]
     if scene.world.hooks[Hook.ANGLES] != 0:
         note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene,)))
-    if len(scene.crowds.contact) > 0:
+    if len(scene.broadphase.contact) > 0:
         note_failure(scene, call_int(scene.world.hooks[Hook.NEAR], (scene, y)))
     return changed

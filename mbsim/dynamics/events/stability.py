@@ -19,13 +19,13 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import (
+    ACTIVE,
     AXIS_TORQUE,
     BOUND_DAMPING,
     BOUND_FORCE,
     BOUND_STIFFNESS,
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
-    LIVE,
     MARKER_FORCE,
     REST,
     SCALE_LENGTH,
@@ -37,9 +37,9 @@ from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, 
 from mbsim.dynamics.bodies.kinematics import place_bodies, position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point
 from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.forces import contact_of, sides, whole_of
+from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides
 from mbsim.dynamics.contact.points import deepest_of_impact
-from mbsim.dynamics.events.step_limits import longest_way
+from mbsim.dynamics.events.step_limits import longest_travel
 from mbsim.geometry.catalog import REGION_ROWS
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
@@ -84,7 +84,7 @@ def turning(scene, g):
     and 2 together; products of inertia are left out.
     """
     graphics, b = scene.graphics, scene.graphics.body[g]
-    if b == len(scene.bodies.mass) or math.isinf(graphics.reach[g]):
+    if b == len(scene.bodies.mass) or math.isinf(graphics.radius[g]):
         return 0.0
     R, p, inverse = graphics.R[g], graphics.p[g], scene.bodies.inverse[b]
     is_round = graphics.turns[g] == 0
@@ -169,7 +169,7 @@ def add_touching(scene, y, s, out):
     for b in (bi, bj):
         if b == ground:
             continue
-        if whole_of(scene, s) > 0.0:
+        if face_weight_of(scene, s) > 0.0:
             add_points(scene, y, s, b, both * k / share, both * damping / share)
             continue
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
@@ -321,7 +321,7 @@ def stable_step(scene, tol, y, f):
     place_bodies(scene, y)
     if find_contacts(scene, y) != 0:
         return math.inf
-    longest = min(longest_way(scene, y, f, 0.0), turning_step(scene, tol))
+    longest = min(longest_travel(scene, y, f, 0.0), turning_step(scene, tol))
     for b in range(len(bodies.mass)):
         for k in range(20):
             work.block[b, k] = 0.0
@@ -340,8 +340,8 @@ def stable_step(scene, tol, y, f):
         bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
         bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
     best[0] = -1.0
-    for k in range(pairs.count[LIVE]):
-        if pairs.touches[pairs.live[k]] == 0 and fast_pair(scene, pairs.live[k], best):
+    for k in range(pairs.count[ACTIVE]):
+        if pairs.touches[pairs.active[k]] == 0 and fast_pair(scene, pairs.active[k], best):
             add_meeting(scene, best, work.law_out, bound)
 
     # the limit of the method is (h w)^2 / 4 + h c = 1 (w frequency, c rate of damping), so h =

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import AUDIT_TOL, BODY_SIZE, LIVE, SCALE_LENGTH
+from mbsim.arrays.scene import ACTIVE, AUDIT_TOL, BODY_SIZE, SCALE_LENGTH
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W
@@ -21,7 +21,7 @@ from mbsim.dynamics.contact.points import deepest_of_impact, effective_mass
 #: Halvings of the way out in which a force is looked for, and of where it ends.
 SHALLOWEST = 12
 #: How long before a touch a step ends, over the next one, which meets it, and the same over tol: a
-#: kink in the midst of a step makes wrong what its error hardly shows.
+#: switch in the midst of a step makes wrong what its error hardly shows.
 BEFORE, BEFORE_OVER_TOL = 1e-4, 100.0
 #: A step that begins or ends where a force d^e does is wrong by this part of force times step, at
 #: most, where e is no whole number: what the weights and nodes of DOPRI5 and RADAU5 make of t^e,
@@ -173,11 +173,11 @@ def step_to_ramp(scene, f, s, h):
     state, dmax = scene.state, scene.contacts.dmax[contact_of(scene, s)]
     if dmax == 0.0:
         return h
-    way, rate, bend = dmax - state.depth[s], state.rate[s], depth_bend(scene, f, s)
-    square = rate * rate + 2.0 * bend * way
-    if not way * rate > 0.0 or square < 0.0:
+    travel, rate, bend = dmax - state.depth[s], state.rate[s], depth_bend(scene, f, s)
+    square = rate * rate + 2.0 * bend * travel
+    if not travel * rate > 0.0 or square < 0.0:
         return h
-    t = 2.0 * way / (rate + math.copysign(math.sqrt(square), rate))
+    t = 2.0 * travel / (rate + math.copysign(math.sqrt(square), rate))
     return t if AT_BEGIN * h < t < h else h
 
 
@@ -194,11 +194,11 @@ def longest_touching(scene, f, h):
 
 
 @jitable
-def time_for(way, speed, push):
-    """Return the time in which a shape can come `way` far: way = speed h + push h^2 / 2."""
+def time_for(travel, speed, push):
+    """Return the time in which a shape can come `travel` far: way = speed h + push h^2 / 2."""
     if speed == 0.0 and push == 0.0:
         return math.inf
-    return 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * push * way))
+    return 2.0 * travel / (speed + math.sqrt(speed * speed + 2.0 * push * travel))
 
 
 @jitable
@@ -264,7 +264,7 @@ def step_to_touch(scene, y, f, pair, h):
 
 @jitable
 def longest_stay(scene, y, f):
-    """Return a step in which no shape of a crowd leaves where the list of near pairs holds.
+    """Return a step in which no shape of a large contact leaves where the list of near pairs holds.
 
     Speed and acceleration of all shapes are left in `work.speed`.
     """
@@ -273,30 +273,30 @@ def longest_stay(scene, y, f):
     for g in range(len(graphics.body)):
         b = graphics.body[g]
         if b < len(scene.bodies.mass):
-            reach = graphics.reach[g] + norm(vector(graphics.p[g]))
+            radius = graphics.radius[g] + norm(vector(graphics.p[g]))
             at = BODY_SIZE * b
             turning = norm((y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2]))
             speed = norm((y[at + AT_V], y[at + AT_V + 1], y[at + AT_V + 2]))
             # a plane, which has no reach, is never passed through
-            speed += turning * reach if reach < math.inf else 0.0
+            speed += turning * radius if radius < math.inf else 0.0
             push = norm((f[at + AT_V], f[at + AT_V + 1], f[at + AT_V + 2]))
             work.speed[g, 0], work.speed[g, 1] = speed, push
-            room = scene.crowds.room[g]
+            room = scene.broadphase.room[g]
             if room < math.inf:
                 longest = min(longest, time_for(0.9 * room, speed, push))
     return longest
 
 
 @jitable
-def longest_way(scene, y, f, h):
+def longest_travel(scene, y, f, h):
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
 
     A step of length h, the one intended, ends where a pair begins to touch.
     """
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     longest = longest_stay(scene, y, f)
-    for k in range(pairs.count[LIVE]):
-        pair = pairs.live[k]
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
         i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
         # in touch the stages feel the force, and sliding along is no approach
         if pairs.touches[pair] > 0:
@@ -317,4 +317,4 @@ def longest_way(scene, y, f, h):
 @jitable
 def longest_step(scene, y, f, h):
     """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
-    return min(longest_touching(scene, f, h), longest_way(scene, y, f, h))
+    return min(longest_touching(scene, f, h), longest_travel(scene, y, f, h))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
-from mbsim.arrays.scene import AUDIT_TOL, HEAT, HOT, SIDE, SLIDE_LIMIT, SLIDES, Scene
+from mbsim.arrays.scene import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES, Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
@@ -42,11 +42,11 @@ from mbsim.dynamics.forces.dry_friction import STATIC, holding_force, is_dry, si
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
 
-#: Each change of side heats by 1, each step takes a tenth of the heat.
+#: Each change of side adds 1 to chattering, each step takes a tenth of it.
 COOLING = 0.9
 #: Modes of contacts are many: four points of a block come to rest and slip again one by one. With a
-#: change in every step heat rises to 10.
-HOT_MODES = 8.0
+#: change in every step chattering rises to 10.
+CHATTERS_MODES = 8.0
 #: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
 #: time in which it would be left.
 AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
@@ -128,13 +128,13 @@ def decide(scene, context, t, y):
 
 @jitable
 def side(scene, t, y, k):
-    """Return on which side row k of `Kinks` is; the bodies have been placed."""
-    program = scene.kinks.program[k]
+    """Return on which side row k of `Switching` is; the bodies have been placed."""
+    program = scene.switching.program[k]
     if program >= 0:
         return value(scene, t, y, program)
-    if scene.kinks.limit[k] < 0:
+    if scene.switching.limit[k] < 0:
         return modes(scene)
-    f = scene.kinks.limit[k]
+    f = scene.switching.limit[k]
     return side_of_dry(scene, y, f) if is_dry(scene.applied.kind[f]) else side_of_limit(scene, y, f)
 
 
@@ -142,18 +142,18 @@ def side(scene, t, y, k):
 def watch_held(scene, t, y, what):
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
-    Of a step that was taken: 1 if it was cut for that. Such a step heats by 1, whether a mode
-    changed then or not; one that was not leaves half of the heat. So where cuts follow each other
-    a whole step is taken now and then.
+    Of a step that was taken: 1 if it was cut for that. Such a step adds 1, whether a mode
+    changed then or not; one that was not leaves half of the chattering. So where cuts follow each
+    other a whole step is taken now and then.
     """
-    heat, differs = scene.state.heat, 0
+    chattering, differs = scene.state.chattering, 0
     if what == PASS:
-        differs = 1 if heat[1] == 1.0 else 0
-        heat[0] = heat[0] + 1.0 if heat[1] == 1.0 else 0.5 * heat[0]
-        heat[1] = 0.0
-    elif heat[0] <= HOT:
+        differs = 1 if chattering[1] == 1.0 else 0
+        chattering[0] = chattering[0] + 1.0 if chattering[1] == 1.0 else 0.5 * chattering[0]
+        chattering[1] = 0.0
+    elif chattering[0] <= CHATTERS:
         if answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.ASK, t, y))) == 1:
-            heat[1], differs = 1.0, 2
+            chattering[1], differs = 1.0, 2
     return differs
 
 
@@ -187,39 +187,43 @@ def watch(scene, context, t, y, what):
 
     Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
-    sides, differs, last = scene.state.sides, 0, len(scene.kinks.program) - 1
-    if scene.kinks.program[last] < 0 and scene.kinks.limit[last] < 0:
+    sides, differs, last = scene.state.sides, 0, len(scene.switching.program) - 1
+    if scene.switching.program[last] < 0 and scene.switching.limit[last] < 0:
         # what friction does follows from all the rest
         look_at(scene, context, t, y, scene.work.idle)
         if what == ASK and len(scene.work.ahead) > 0:
             decide(scene, context, t, y)
     else:
         place_bodies(scene, y)
-    for k in range(len(scene.kinks.program)):
+    for k in range(len(scene.switching.program)):
         now = side(scene, t, y, k)
         other = now != sides[k, SIDE]
-        f = scene.kinks.limit[k]
+        f = scene.switching.limit[k]
         dry = f >= 0 and is_dry(scene.applied.kind[f])
         # friction with a memory of its own is on the side that it keeps
-        exact = dry or (k == last and f < 0 and scene.kinks.program[k] < 0 and leaves_branch(scene))
+        exact = dry or (
+            k == last and f < 0 and scene.switching.program[k] < 0 and leaves_branch(scene)
+        )
         leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
         if what == PASS:
             differs = 1 if other else differs
-        elif leaves and sides[k, HEAT] <= (HOT if k < last or f >= 0 else HOT_MODES):
+        elif leaves and sides[k, CHATTERING] <= (
+            CHATTERS if k < last or f >= 0 else CHATTERS_MODES
+        ):
             differs = max(differs, 2 if exact else 1)
         if what == PASS:
-            sides[k, HEAT] = COOLING * sides[k, HEAT] + (1.0 if other else 0.0)
+            sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
     if scene.world.hooks[Hook.HELD] != 0:
         differs = max(differs, watch_held(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
-    hot = sides[last, HEAT] > HOT_MODES
+    chatters = sides[last, CHATTERING] > CHATTERS_MODES
     for k in range(last):
-        f = scene.kinks.limit[k]
+        f = scene.switching.limit[k]
         if f >= 0 and is_dry(scene.applied.kind[f]):
-            hot = hot or sides[k, HEAT] > HOT
-    scene.state.frozen[0] = 0 if hot else 1
+            chatters = chatters or sides[k, CHATTERING] > CHATTERS
+    scene.state.frozen[0] = 0 if chatters else 1
     return differs
 
 
@@ -321,7 +325,7 @@ def follow_halves(scene, context, t, y):
 
 @jitable
 def serve_kinks(scene, context, t, what, a, b):
-    """Do what the hook `kinks` is asked for; return its answer."""
+    """Do what the hook `switching` is asked for; return its answer."""
     n = scene.rows.y.shape[1]
     if what == LOAD:
         b[0] = load(scene, context, t, vector_at(a, n))
@@ -341,7 +345,7 @@ def serve_kinks(scene, context, t, what, a, b):
     return watch(scene, context, t, vector_at(a, n), what)
 
 
-def kinks_hook(context, t, h, a, b):
+def switching_hook(context, t, h, a, b):
     """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
     scene = view(context, Scene)
     answer = serve_kinks(scene, context, t, h, a, b)

@@ -46,20 +46,20 @@ from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, con
 
 
 @jitable
-def displacement(scene, y, code, body, way):
+def displacement(scene, y, code, body, direction):
     """Return the jet of a displacement measure."""
     op = code[0]
     if op == DISTANCE:
-        return distance(scene, y, code[1], code[2], body, way)
+        return distance(scene, y, code[1], code[2], body, direction)
     if op == OFFSET:
-        return offset(scene, y, code[1], code[2], code[3], code[4], body, way)
+        return offset(scene, y, code[1], code[2], code[3], code[4], body, direction)
     if op == ANGLE:
-        return angle(scene, code[1], body, way)
+        return angle(scene, code[1], body, direction)
     if op == TURN:
-        return euler_angle(scene, code[1], code[2], code[3], body, way)
+        return euler_angle(scene, code[1], code[2], code[3], body, direction)
     if op == INCLUDED:
-        return included_angle(scene, y, code[1], code[2], code[3], body, way)
-    return euler_parameter(scene, code[1], code[2], code[3], body, way)
+        return included_angle(scene, y, code[1], code[2], code[3], body, direction)
+    return euler_parameter(scene, code[1], code[2], code[3], body, direction)
 
 
 @jitable
@@ -93,8 +93,8 @@ def rate_or_force(scene, y, code):
 
 
 @jitable
-def interpret(scene, t, y, program, body, way):
-    """Leave the jet of a program in the first row of the stack; `body`, `way`: see measures."""
+def interpret(scene, t, y, program, body, direction):
+    """Leave the jet of a program in the first row of the stack; see measures for both."""
     programs = scene.programs
     stack, top = programs.stack, 0
     for at in range(programs.start[program], programs.start[program + 1]):
@@ -109,14 +109,14 @@ def interpret(scene, t, y, program, body, way):
         elif op < FIRST_MEASURE:
             top = apply(op, code[1], stack, top)
         elif op <= INCLUDED:
-            put(stack, top, displacement(scene, y, code, body, way))
+            put(stack, top, displacement(scene, y, code, body, direction))
             top += 1
         elif op == SPLINE:
             top -= 1
             x, z = get(stack, top - 1), get(stack, top)
             put(stack, top - 1, spline(programs, code[1], code[2], code[3], x, z))
         else:
-            rise = slope(scene, y, code, body, way)
+            rise = slope(scene, y, code, body, direction)
             put(stack, top, (rate_or_force(scene, y, code), rise, 0.0))
             top += 1
     return 0

@@ -18,17 +18,17 @@ from mbsim.dynamics.expressions.measures import AS_THEY_ARE
 from mbsim.dynamics.expressions.values import evaluate_program
 
 
-def run(scene, t, y, program, body, way):
+def run(scene, t, y, program, body, direction):
     """Leave the jet of a program in the first row of the stack."""
-    return interpret(scene, t, y, program, body, way)
+    return interpret(scene, t, y, program, body, direction)
 
 
 @overload(run)
-def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
+def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, direction: Any) -> Any:
     """Give compiled code its form of `run`: a call of the hook."""
 
-    def compiled(scene: Any, t: Any, y: Any, program: Any, body: Any, way: Any) -> Any:
-        code = call_int(scene.world.hooks[Hook.JET], (scene, t, y, program, body, way))
+    def compiled(scene: Any, t: Any, y: Any, program: Any, body: Any, direction: Any) -> Any:
+        code = call_int(scene.world.hooks[Hook.JET], (scene, t, y, program, body, direction))
         note_failure(scene, code)
         return code
 
@@ -68,9 +68,9 @@ def gradient(scene, t, y, program, body, out):
 
     `out` (6,): d rate / d (v, w), both in global axes.
     """
-    for way in range(6):
-        run(scene, t, y, program, body, way)
-        out[way] = scene.programs.stack[0, 1]
+    for direction in range(6):
+        run(scene, t, y, program, body, direction)
+        out[direction] = scene.programs.stack[0, 1]
 
 
 @jitable

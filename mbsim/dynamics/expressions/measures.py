@@ -1,7 +1,7 @@
 """What expressions measure of markers: displacements as jets, velocities and forces as numbers.
 
 Velocities for a jet come from `body`: all as they are (`AS_THEY_ARE`), none (`AT_REST`), or that
-body alone by a unit twist number `way` (velocity of the cg along global x, y, z, angular
+body alone by a unit twist number `direction` (velocity of the cg along global x, y, z, angular
 velocity about them), which makes the first derivative a column of the Jacobian. Accelerations
 are what follows from velocities: bodies' own are taken as zero. A vector's jet is a
 3-tuple of vectors.
@@ -22,48 +22,48 @@ AT_REST, AS_THEY_ARE = -2, -1
 
 
 @jitable
-def unit(way):
+def unit(direction):
     """Return the unit vector 0, 1 or 2; the zero vector for other numbers."""
     return (
-        1.0 if way == 0 else 0.0,
-        1.0 if way == 1 else 0.0,
-        1.0 if way == 2 else 0.0,
+        1.0 if direction == 0 else 0.0,
+        1.0 if direction == 1 else 0.0,
+        1.0 if direction == 2 else 0.0,
     )
 
 
 @jitable
-def twist(scene, b, body, way):
+def twist(scene, b, body, direction):
     """Return velocity of the cg and angular velocity of body b."""
     if body == AS_THEY_ARE:
         return vector(scene.work.v[b]), vector(scene.work.w[b])
     if body == b:
-        return unit(way), unit(way - 3)
+        return unit(direction), unit(direction - 3)
     return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @jitable
-def point_jet(scene, y, m, body, way):
+def point_jet(scene, y, m, body, direction):
     """Return the origin of marker m, v + w x r, and w x (w x r)."""
     b = scene.markers.body[m]
     arm = marker_arm(scene, m)
-    v, w = twist(scene, b, body, way)
+    v, w = twist(scene, b, body, direction)
     turn = cross(w, arm)
     return add(position(scene, y, b), arm), add(v, turn), cross(w, turn)
 
 
 @jitable
-def axis_jet(scene, m, k, body, way):
+def axis_jet(scene, m, k, body, direction):
     """Return axis k of marker m, w x e, and w x (w x e)."""
     e = marker_axis(scene, m, k)
-    w = twist(scene, scene.markers.body[m], body, way)[1]
+    w = twist(scene, scene.markers.body[m], body, direction)[1]
     turn = cross(w, e)
     return e, turn, cross(w, turn)
 
 
 @jitable
-def between(scene, y, i, j, body, way):
+def between(scene, y, i, j, body, direction):
     """Return the jet of P_i - P_j."""
-    p, q = point_jet(scene, y, i, body, way), point_jet(scene, y, j, body, way)
+    p, q = point_jet(scene, y, i, body, direction), point_jet(scene, y, j, body, direction)
     return sub(p[0], q[0]), sub(p[1], q[1]), sub(p[2], q[2])
 
 
@@ -78,23 +78,25 @@ def dot_jet(a, b):
 
 
 @jitable
-def distance(scene, y, i, j, body, way):
+def distance(scene, y, i, j, body, direction):
     """Return DM: d = |r|, d' = r.r'/d, d'' = (r'.r' + r.r'' - d'^2)/d; 0 where d is 0."""
-    r = between(scene, y, i, j, body, way)
+    r = between(scene, y, i, j, body, direction)
     return root(dot_jet(r, r))
 
 
 @jitable
-def offset(scene, y, i, j, k, axis, body, way):
+def offset(scene, y, i, j, k, axis, body, direction):
     """Return (P_i - P_j) along an axis of k."""
-    return dot_jet(between(scene, y, i, j, body, way), axis_jet(scene, k, axis, body, way))
+    return dot_jet(
+        between(scene, y, i, j, body, direction), axis_jet(scene, k, axis, body, direction)
+    )
 
 
 @jitable
-def included_angle(scene, y, i, j, k, body, way):
+def included_angle(scene, y, i, j, k, body, direction):
     """Return INCANG: the angle between P_i - P_j and P_k - P_j, atan2(|a x b|, a . b)."""
-    a = between(scene, y, i, j, body, way)
-    b = between(scene, y, k, j, body, way)
+    a = between(scene, y, i, j, body, direction)
+    b = between(scene, y, k, j, body, direction)
     twice = scale(2.0, cross(a[1], b[1]))
     turn = (
         cross(a[0], b[0]),
@@ -105,53 +107,64 @@ def included_angle(scene, y, i, j, k, body, way):
 
 
 @jitable
-def cosine(scene, i, axis_i, j, axis_j, body, way):
+def cosine(scene, i, axis_i, j, axis_j, body, direction):
     """Return the cosine between an axis of i and one of j."""
-    return dot_jet(axis_jet(scene, i, axis_i, body, way), axis_jet(scene, j, axis_j, body, way))
+    return dot_jet(
+        axis_jet(scene, i, axis_i, body, direction), axis_jet(scene, j, axis_j, body, direction)
+    )
 
 
 @jitable
-def angle(scene, row, body, way):
+def angle(scene, row, body, direction):
     """Return a followed angle: of I's x about J's z from J's x."""
     i, j = scene.angles.i[row], scene.angles.j[row]
-    s = cosine(scene, i, 0, j, 1, body, way)
-    a = arc_tangent2(s, cosine(scene, i, 0, j, 0, body, way))
+    s = cosine(scene, i, 0, j, 1, body, direction)
+    a = arc_tangent2(s, cosine(scene, i, 0, j, 0, body, direction))
     return (nearest_turn(a[0], scene.state.angle[row]), a[1], a[2])
 
 
 @jitable
-def euler_angle(scene, i, j, which, body, way):
+def euler_angle(scene, i, j, which, body, direction):
     """Return PSI, THETA, PHI or YAW, PITCH, ROLL of i in j.
 
     The turns Rz(psi) Rx(theta) Rz(phi), and Rz(yaw) Ry(pitch) Rx(roll), are R_j' R_i. Where the
     first and the last are about one line, PSI has all and PHI is 0.
     """
     if which < 3:
-        a = cosine(scene, i, 2, j, 0, body, way)
-        b = scale(-1.0, cosine(scene, i, 2, j, 1, body, way))
+        a = cosine(scene, i, 2, j, 0, body, direction)
+        b = scale(-1.0, cosine(scene, i, 2, j, 1, body, direction))
         flat = a[0] * a[0] + b[0] * b[0] < 1e-24
         if which == 1:
             side = root(add(times(a, a), times(b, b)))
-            return arc_tangent2(side, cosine(scene, i, 2, j, 2, body, way))
+            return arc_tangent2(side, cosine(scene, i, 2, j, 2, body, direction))
         if which == 2:
             if flat:
                 return constant(0.0)
-            a, b = cosine(scene, i, 0, j, 2, body, way), cosine(scene, i, 1, j, 2, body, way)
+            a, b = (
+                cosine(scene, i, 0, j, 2, body, direction),
+                cosine(scene, i, 1, j, 2, body, direction),
+            )
         elif flat:
-            a, b = cosine(scene, i, 0, j, 1, body, way), cosine(scene, i, 0, j, 0, body, way)
+            a, b = (
+                cosine(scene, i, 0, j, 1, body, direction),
+                cosine(scene, i, 0, j, 0, body, direction),
+            )
         return arc_tangent2(a, b)
     if which == 5:
-        a, b = cosine(scene, i, 1, j, 2, body, way), cosine(scene, i, 2, j, 2, body, way)
+        a, b = (
+            cosine(scene, i, 1, j, 2, body, direction),
+            cosine(scene, i, 2, j, 2, body, direction),
+        )
         return arc_tangent2(a, b)
-    a, b = cosine(scene, i, 0, j, 1, body, way), cosine(scene, i, 0, j, 0, body, way)
+    a, b = cosine(scene, i, 0, j, 1, body, direction), cosine(scene, i, 0, j, 0, body, direction)
     if which == 3:
         return arc_tangent2(a, b)
-    down = scale(-1.0, cosine(scene, i, 0, j, 2, body, way))
+    down = scale(-1.0, cosine(scene, i, 0, j, 2, body, direction))
     return arc_tangent2(down, root(add(times(a, a), times(b, b))))
 
 
 @jitable
-def parameter_product(scene, i, j, a, b, body, way):
+def parameter_product(scene, i, j, a, b, body, direction):
     """Return 4 e_a e_b of the Euler parameters of i in j, from the cosines m_rc of its axes.
 
     4 e0^2 = 1 + trace, 4 e1^2 = 1 + 2 m00 - trace, 4 e0 e1 = m21 - m12, 4 e1 e2 = m01 + m10, and
@@ -161,21 +174,23 @@ def parameter_product(scene, i, j, a, b, body, way):
         a, b = b, a
     if a != b and a > 0:
         return add(
-            cosine(scene, i, a - 1, j, b - 1, body, way),
-            cosine(scene, i, b - 1, j, a - 1, body, way),
+            cosine(scene, i, a - 1, j, b - 1, body, direction),
+            cosine(scene, i, b - 1, j, a - 1, body, direction),
         )
     if a != b:
         r, c = (b + 1) % 3, b % 3
-        return sub(cosine(scene, i, c, j, r, body, way), cosine(scene, i, r, j, c, body, way))
+        return sub(
+            cosine(scene, i, c, j, r, body, direction), cosine(scene, i, r, j, c, body, direction)
+        )
     total = constant(1.0)
     for k in range(3):
         sign = 1.0 if a == 0 or a == k + 1 else -1.0
-        total = add(total, scale(sign, cosine(scene, i, k, j, k, body, way)))
+        total = add(total, scale(sign, cosine(scene, i, k, j, k, body, direction)))
     return total
 
 
 @jitable
-def euler_parameter(scene, i, j, which, body, way):
+def euler_parameter(scene, i, j, which, body, direction):
     """Return Euler parameter e0, e1, e2 or e3 of i in j, e0 being at least 0."""
     largest, most = 0, -1.0
     for k in range(4):
@@ -183,12 +198,12 @@ def euler_parameter(scene, i, j, which, body, way):
         if square > most:
             largest, most = k, square
     # e_n = e_k e_n / e_k with the largest e_k
-    e = scale(0.5, root(parameter_product(scene, i, j, largest, largest, body, way)))
+    e = scale(0.5, root(parameter_product(scene, i, j, largest, largest, body, direction)))
     if parameter_product(scene, i, j, 0, largest, AT_REST, 0)[0] < 0.0:
         e = scale(-1.0, e)
     if which == largest:
         return e
-    return over(scale(0.25, parameter_product(scene, i, j, largest, which, body, way)), e)
+    return over(scale(0.25, parameter_product(scene, i, j, largest, which, body, direction)), e)
 
 
 @jitable

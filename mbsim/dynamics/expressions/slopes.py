@@ -1,9 +1,9 @@
 """How velocity measures of markers and states change with one number of the state.
 
-`body`, `way`: a body and a direction. Ways 0 to 5 displace it by a unit twist (cg along global x,
-y, z; turn about them), velocities staying as they are; ways 6 to 11 add a unit velocity of the cg
-or a unit angular velocity, global. `A_STATE` for `body` is the number of y that stands at `way`.
-With arm r of marker m on the body, theta the turn and dv, dw the added velocities:
+`body`, `direction`: a body and a direction. Ways 0 to 5 displace it by a unit twist (cg along
+global x, y, z; turn about them), velocities staying as they are; ways 6 to 11 add a unit velocity
+of the cg or a unit angular velocity, global. `A_STATE` for `body` is the number of y that stands at
+`direction`. With arm r of marker m on the body, theta the turn and dv, dw the added velocities:
 
     d r = theta x r      d v_m = dv + dw x r + w x (theta x r)      d e = theta x e
 """
@@ -25,35 +25,37 @@ from mbsim.dynamics.expressions.measures import (
 #: Instead of a body: the way is a place in y.
 A_STATE = -3
 #: Ways of a body that displace it, and all.
-POSES, WAYS = 6, 12
+POSES, DIRECTIONS = 6, 12
 
 
 @jitable
-def velocity_rise(scene, m, body, way):
+def velocity_rise(scene, m, body, direction):
     """Return the change of the velocity of marker m's origin."""
     b = scene.markers.body[m]
     if b != body:
         return 0.0, 0.0, 0.0
     arm = marker_arm(scene, m)
-    if way < POSES:
-        return cross(vector(scene.work.w[b]), cross(unit(way - 3), arm))
-    return add(unit(way - 6), cross(unit(way - 9), arm))
+    if direction < POSES:
+        return cross(vector(scene.work.w[b]), cross(unit(direction - 3), arm))
+    return add(unit(direction - 6), cross(unit(direction - 9), arm))
 
 
 @jitable
-def spin_rise(scene, m, body, way):
+def spin_rise(scene, m, body, direction):
     """Return the change of the angular velocity of marker m."""
-    if scene.markers.body[m] != body or way < POSES:
+    if scene.markers.body[m] != body or direction < POSES:
         return 0.0, 0.0, 0.0
-    return unit(way - 9)
+    return unit(direction - 9)
 
 
 @jitable
-def between_rise(scene, y, i, j, body, way):
+def between_rise(scene, y, i, j, body, direction):
     """Return the change of P_i - P_j."""
-    if way >= POSES:
+    if direction >= POSES:
         return 0.0, 0.0, 0.0
-    return sub(point_jet(scene, y, i, body, way)[1], point_jet(scene, y, j, body, way)[1])
+    return sub(
+        point_jet(scene, y, i, body, direction)[1], point_jet(scene, y, j, body, direction)[1]
+    )
 
 
 @jitable
@@ -64,55 +66,57 @@ def along_unit(u, rise):
 
 
 @jitable
-def relative_rise(scene, y, i, j, k, body, way):
+def relative_rise(scene, y, i, j, k, body, direction):
     """Return the change of the velocity of i against j as seen from k's body."""
     apart = sub(marker_point(scene, y, i), marker_point(scene, y, j))
-    rise = sub(velocity_rise(scene, i, body, way), velocity_rise(scene, j, body, way))
-    turned = cross(spin_rise(scene, k, body, way), apart)
+    rise = sub(velocity_rise(scene, i, body, direction), velocity_rise(scene, j, body, direction))
+    turned = cross(spin_rise(scene, k, body, direction), apart)
     w = vector(scene.work.w[scene.markers.body[k]])
-    return sub(rise, add(turned, cross(w, between_rise(scene, y, i, j, body, way))))
+    return sub(rise, add(turned, cross(w, between_rise(scene, y, i, j, body, direction))))
 
 
 @jitable
-def closing_rise(scene, y, i, j, body, way):
+def closing_rise(scene, y, i, j, body, direction):
     """Return the change of VR = r.v/d: (dr.v + r.dv - VR dd)/d, dd = r.dr/d."""
     r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     d = norm(r)
     if d == 0.0:
         return 0.0
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
-    dr = between_rise(scene, y, i, j, body, way)
-    dv = sub(velocity_rise(scene, i, body, way), velocity_rise(scene, j, body, way))
+    dr = between_rise(scene, y, i, j, body, direction)
+    dv = sub(velocity_rise(scene, i, body, direction), velocity_rise(scene, j, body, direction))
     return (dot(dr, v) + dot(r, dv) - dot(r, v) * dot(r, dr) / (d * d)) / d
 
 
 @jitable
-def slope(scene, y, code, body, way):
+def slope(scene, y, code, body, direction):
     """Return how a velocity measure or a state changes; 0 for what is not one of these.
 
     Accelerations and forces of other elements count as they are.
     """
     op = code[0]
     if op == STATE:
-        return 1.0 if body == A_STATE and code[1] == way else 0.0
+        return 1.0 if body == A_STATE and code[1] == direction else 0.0
     if body < 0:
         return 0.0
     if op == SPEED:
         u = relative_velocity(scene, y, code[1], code[2], code[3])
-        return along_unit(u, relative_rise(scene, y, code[1], code[2], code[3], body, way))
+        return along_unit(u, relative_rise(scene, y, code[1], code[2], code[3], body, direction))
     if op == CLOSING:
-        return closing_rise(scene, y, code[1], code[2], body, way)
+        return closing_rise(scene, y, code[1], code[2], body, direction)
     if op == VELOCITY:
-        e = axis_jet(scene, code[3], code[5], body, way)
+        e = axis_jet(scene, code[3], code[5], body, direction)
         v = relative_velocity(scene, y, code[1], code[2], code[4])
-        return dot(relative_rise(scene, y, code[1], code[2], code[4], body, way), e[0]) + dot(
+        return dot(relative_rise(scene, y, code[1], code[2], code[4], body, direction), e[0]) + dot(
             v, e[1]
         )
     if op == TURNING or op == SPIN:
         w = relative_spin(scene, code[1], code[2])
-        rise = sub(spin_rise(scene, code[1], body, way), spin_rise(scene, code[2], body, way))
+        rise = sub(
+            spin_rise(scene, code[1], body, direction), spin_rise(scene, code[2], body, direction)
+        )
         if op == TURNING:
             return along_unit(w, rise)
-        e = axis_jet(scene, code[3], code[4], body, way)
+        e = axis_jet(scene, code[3], code[4], body, direction)
         return dot(rise, e[0]) + dot(w, e[1])
     return 0.0

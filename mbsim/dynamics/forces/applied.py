@@ -167,6 +167,6 @@ def add_applied(scene, t, y, dy):
         lost += power
         if not math.isfinite(size):
             return Code.NOT_FINITE
-    if scene.world.ledger[1] >= 0:
-        dy[scene.world.ledger[1]] = lost
+    if scene.world.accumulators[1] >= 0:
+        dy[scene.world.accumulators[1]] = lost
     return 0

@@ -127,7 +127,7 @@ def holding_force(scene, f):
 
 
 @jitable
-def show_held(scene):
+def show_sticking(scene):
     """Fill `Work.applied` of rigid dry frictions that are held; multipliers have been found."""
     active = scene.equations.active
     for r in range(active[len(active) - 1]):
@@ -186,8 +186,8 @@ def commit_dry(scene, t, y):
         )
         kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], before
         kept[SLIDER], kept[SLIDES] = slider, slides
-        if scene.world.ledger[1] >= 0:
-            y[scene.world.ledger[1]] += 0.5 * (stored * stored - force * force) / k
+        if scene.world.accumulators[1] >= 0:
+            y[scene.world.accumulators[1]] += 0.5 * (stored * stored - force * force) / k
         if slides != before:
             record_dry(scene, t, STICK if slides == 0.0 else SLIP, f)
     return 0

@@ -16,7 +16,7 @@ law (J. C. Simo, T. J. R. Hughes, Computational Inelasticity, 1998, ch. 1), whic
 the integrator differentiates. Of a law that looks at time itself it is backward Euler.
 
 r = 0 is solved by Newton's method with differences; where that fails, one unknown is bracketed,
-several go on with shortened steps. A residual is to be continuous, kinks do no harm.
+several go on with shortened steps. A residual is to be continuous, switches do no harm.
 """
 
 from __future__ import annotations
@@ -325,7 +325,7 @@ def largest(R, nu):
 def newton(scene, e, h):
     """Find z by Newton's method from where it is; return 0, -1 where it fails, or a code.
 
-    -2: corrections are small, but the residual is not: differences reach over a kink.
+    -2: corrections are small, but the residual is not: differences reach over a switch.
     """
     R, nu = scene.residuals, unknowns_of(scene, e)
     code = ask_at(scene, e, h)

@@ -21,5 +21,5 @@ def add_weight(scene, t, y, dy):
         for b in range(len(bodies.mass)):
             work.force[b, k] += bodies.mass[b] * g
             lost -= bodies.mass[b] * g * work.v[b, k]
-    dy[scene.world.ledger[1]] += lost
+    dy[scene.world.accumulators[1]] += lost
     return 0

@@ -199,5 +199,5 @@ def add_friction(scene, t, y, dy):
             work.applied[f, k] = force * work.rub[f, k]
         work.applied[f, LOST_POWER] = -force * work.rub[f, SPEED]
         lost += work.applied[f, LOST_POWER]
-    dy[scene.world.ledger[1]] += lost
+    dy[scene.world.accumulators[1]] += lost
     return 0

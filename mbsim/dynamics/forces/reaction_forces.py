@@ -20,9 +20,9 @@ from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import (
     AXIS_FORCE,
     AXIS_TORQUE,
+    JOINT_FRICTION,
     LINE_FORCE,
     LOST_POWER,
-    RUBBING,
     SCALAR,
 )
 from mbsim.core.codes import Code
@@ -108,7 +108,7 @@ def add_to_all(scene, y):
     for u in range(len(late)):
         f, c, size = late[u, 0], late[u, 1], work[u, STEP]
         work[u, SIZE] += size
-        if c == RUBBING:
+        if c == JOINT_FRICTION:
             add_force(scene, f, size)
         elif c == SCALAR:
             push_scalar(scene, f, size)
@@ -155,7 +155,7 @@ def measure_misses(scene, t, y):
         reaction = max(reaction, abs(work.reaction[k]) / (1.0 if k % 6 < 3 else length))
     for u in range(len(late)):
         f, row = late[u, 0], work.late[u]
-        if late[u, 1] == RUBBING:
+        if late[u, 1] == JOINT_FRICTION:
             asked = ask_law(scene, t, f)
         else:
             asked = value(scene, t, y, late[u, 2])
@@ -227,7 +227,7 @@ def begin(scene, y):
     late, work = scene.applied.late, scene.work
     for u in range(len(late)):
         f = late[u, 0]
-        if late[u, 1] == RUBBING:
+        if late[u, 1] == JOINT_FRICTION:
             fill_slip(scene, f)
         elif late[u, 1] == SCALAR:
             fill_direction(scene, y, f)
@@ -264,7 +264,7 @@ def settle(scene, t, y, stresses):
         next_step(scene)
         add_to_all(scene, y)
         hold_again(scene, t)
-    return Code.JAMMED if scene.applied.late[at, 1] == RUBBING else Code.UNSETTLED
+    return Code.JAMMED if scene.applied.late[at, 1] == JOINT_FRICTION else Code.UNSETTLED
 
 
 @jitable
@@ -301,6 +301,6 @@ def add_late(scene, t, y, dy):
         power = lost_power(scene, y, u)
         work.applied[late[u, 0], LOST_POWER] += power
         lost += power
-    dy[scene.world.ledger[1]] += lost
+    dy[scene.world.accumulators[1]] += lost
     # bodies that no joint holds may be pushed too
     return 0 if math.isfinite(accelerate(scene, y, dy)) else Code.NOT_FINITE

@@ -23,7 +23,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
 from mbsim.dynamics.constraints.equations import fill_equation, side_place
-from mbsim.dynamics.constraints.folding import is_held
+from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import child_axis, origin, parent_axis
 from mbsim.dynamics.linearization.blocks import (
@@ -218,7 +218,7 @@ def fill_rows(scene, L, t):
     eq = scene.equations
     for row in range(active_count(scene)):
         e = eq.active[row]
-        L.released[row] = 0 if is_held(scene, e, t) else 1
+        L.released[row] = 0 if is_sticking(scene, e, t) else 1
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):
                 k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
@@ -231,7 +231,7 @@ def fill_rows(scene, L, t):
 
 
 @jitable
-def take_bend(scene, L, y, e, term, origins, size, way):
+def take_bend(scene, L, y, e, term, origins, size, direction):
     """Add what one displacement made of a term's gradient, over its size, to a table by column.
 
     Rows 0 to 5 of `L.law` are the wrench on I's body, columns 0 to 5 the ways, 6 to 11 J's body.
@@ -246,8 +246,8 @@ def take_bend(scene, L, y, e, term, origins, size, way):
             # O may have moved with its root
             moment = add(moment, cross(sub(origin(scene, y, k), origins[side]), force))
         for i in range(3):
-            L.law[i, 6 * side + way] += size * moment[i]
-            L.law[3 + i, 6 * side + way] += size * force[i]
+            L.law[i, 6 * side + direction] += size * moment[i]
+            L.law[3 + i, 6 * side + direction] += size * force[i]
 
 
 @jitable
@@ -267,13 +267,13 @@ def bend_by(scene, T, t, y, row, e, term, b):
     for i in range(6):
         for j in range(12):
             L.law[i, j] = 0.0
-    for way in range(6):
-        scale_of_way = scene.world.scale[0] if way < 3 else 1.0
+    for direction in range(6):
+        scale_of_direction = scene.world.scale[0] if direction < 3 else 1.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
-            pushed(scene, y, b, way, sign * _PUSH * scale_of_way)
+            pushed(scene, y, b, direction, sign * _PUSH * scale_of_direction)
             fill_equation(scene, t, y, e)
-            take_bend(scene, L, y, e, term, origins, sign * size / scale_of_way, way)
+            take_bend(scene, L, y, e, term, origins, sign * size / scale_of_direction, direction)
             for k in range(7):
                 y[at + k] = kept[k]
             place_body(scene, y, b)

@@ -137,9 +137,9 @@ def fill(scene, T, y):
         K.carries[count, i] = place_of(scene, s, i) if i < n else -1
     for side in range(2):
         K.body[count, side] = scene.graphics.body[gi if side == 0 else gj]
-        for way in range(6):
+        for direction in range(6):
             for i in range(6):
-                K.lever[count, side, way, i] = L.basis[side, way, i]
+                K.lever[count, side, direction, i] = L.basis[side, direction, i]
     K.held[len(K.held) - 1] = count + 1
     return 0
 
@@ -214,15 +214,15 @@ def add_to_matrix(scene, T, M):
             E, turned = M.work[2], M.work[3]
             times_rate(T.linear, M, b, E)
             # rows of `turned`: what slip, spin and N follow of xi
-            for way in range(6):
-                lever = K.lever[k, by, (way + 1) % 6]
+            for direction in range(6):
+                lever = K.lever[k, by, (direction + 1) % 6]
                 for q in range(6):
                     rate = 0.0 * E[0, 0]
                     for i in range(6):
                         rate += lever[i] * E[i, q]
-                    if way == 5:
+                    if direction == 5:
                         rate = -K.press[k, 0] * lever[q] - K.press[k, 1] * rate
-                    turned[way, q] = rate
+                    turned[direction, q] = rate
             # E is free from here on
             part, by_move = E[0], E[1]
             for row in range(5):
@@ -262,17 +262,17 @@ def drive(scene, T, M, r, k, e, with_moves):
             for i in range(6):
                 for q in range(6):
                     rates[i] += E[i, q] * M.g[b, q]
-        for way in range(6):
-            lever = K.lever[k, by, (way + 1) % 6]
+        for direction in range(6):
+            lever = K.lever[k, by, (direction + 1) % 6]
             move, rate = 0.0 * M.c[0, 0], 0.0 * M.c[0, 0]
             for i in range(6):
                 rate += lever[i] * rates[i]
                 if with_moves:
                     move += lever[i] * M.g[b, i]
-            if way == 5:
+            if direction == 5:
                 rate = -K.press[k, 0] * move - K.press[k, 1] * rate
             for i in range(n):
-                e[i] += sign * K.table[k, 5 + i, way] * rate
+                e[i] += sign * K.table[k, 5 + i, direction] * rate
 
 
 @jitable

@@ -13,7 +13,7 @@ from mbsim.dynamics.bodies.kinematics import place_body, position
 from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, side_place
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import origin
-from mbsim.dynamics.expressions.slopes import POSES, WAYS
+from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
 from mbsim.dynamics.linearization.stiffness import keep_spin, pushed
 
 #: Differences of poses [part of the length, rad] and of velocities (likewise, a time).
@@ -55,16 +55,16 @@ def drive_by(scene, L, t, y, row, e, b):
     at, rise = BODY_SIZE * b, L.rise
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
     speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
-    for way in range(WAYS):
-        size = _PUSH * (1.0 if way % POSES >= 3 else scene.world.scale[0])
-        if way >= POSES:
+    for direction in range(DIRECTIONS):
+        size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+        if direction >= POSES:
             size *= scene.world.scale[1] / scene.world.scale[0]
         change = 0.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
-            if 3 <= way < POSES:
-                keep_spin(scene, y, b, way - 3, sign * size)
-            pushed(scene, y, b, way, sign * size)
+            if 3 <= direction < POSES:
+                keep_spin(scene, y, b, direction - 3, sign * size)
+            pushed(scene, y, b, direction, sign * size)
             change += sign * held_value(scene, L, t, y, e)
             for k in range(7):
                 y[at + k] = kept[k]
@@ -72,7 +72,7 @@ def drive_by(scene, L, t, y, row, e, b):
                 y[at + 7 + k] = speed[k]
             place_body(scene, y, b)
         # (linear, angular) to (angular, linear)
-        rise[(way // POSES) * POSES + (way % POSES + 3) % POSES] = change / (2.0 * size)
+        rise[(direction // POSES) * POSES + (direction % POSES + 3) % POSES] = change / (2.0 * size)
     r = vector(L.r[b])
     for part in range(2):
         first = part * POSES

@@ -40,16 +40,16 @@ from mbsim.dynamics.contact.forces import (
     NORMAL,
     TILTING,
     contact_of,
+    face_weight_of,
     friction,
     in_marker,
     patch,
     sides,
     velocity_at,
-    whole_of,
 )
 from mbsim.dynamics.expressions.jets import run, value
 from mbsim.dynamics.expressions.measures import unit
-from mbsim.dynamics.expressions.slopes import A_STATE, POSES, WAYS
+from mbsim.dynamics.expressions.slopes import A_STATE, DIRECTIONS, POSES
 from mbsim.dynamics.expressions.subroutines import user_result
 from mbsim.dynamics.forces.applied import along_axis, along_line, along_slide, at_limit
 from mbsim.dynamics.forces.dry_friction import STIFFNESS, dry_motion, dry_now, is_dry
@@ -208,7 +208,7 @@ def add_region_stiffness(scene, T, y, s, force, by_depth):
     """
     P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
-    depth, whole, none = rows[s, 0], whole_of(scene, s), (0.0, 0.0, 0.0)
+    depth, whole, none = rows[s, 0], face_weight_of(scene, s), (0.0, 0.0, 0.0)
     one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
     every[:] = press[:] = 0.0
     weight, moment = 0.0, 0.0
@@ -304,7 +304,7 @@ def add_contact_slopes(scene, T, t, h, y, s):
         return code
 
     # depth and its rate are -n . of displacement and velocity
-    normal, region = L.basis, whole_of(scene, s) > 0.0
+    normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
         slope = by_depth / share
         by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
@@ -424,13 +424,13 @@ def couple_applied(scene, P, T):
 
 
 @jitable
-def pushed(scene, y, body, way, size):
-    """Change one number of pose or velocity of a body in y, where `way` is as in slopes."""
+def pushed(scene, y, body, direction, size):
+    """Change one number of pose or velocity of a body in y, where `direction` is as in slopes."""
     at = BODY_SIZE * body
-    axis = way % 3
-    if way < 3:
+    axis = direction % 3
+    if direction < 3:
         y[at + axis] += size
-    elif way < POSES:
+    elif direction < POSES:
         # half a turn of the quaternion, global: q + (0, e) q size/2
         w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
         half = 0.5 * size
@@ -442,7 +442,7 @@ def pushed(scene, y, body, way, size):
             rise = (-z, -yy, x, w)
         for k in range(4):
             y[at + 3 + k] += half * rise[k]
-    elif way < 9:
+    elif direction < 9:
         y[at + 7 + axis] += size
     else:
         R = scene.work.R[body]
@@ -480,17 +480,17 @@ def program_rise(scene, T, t, y, program, body, row):
     Both as spatial vectors about O of the body: angular, linear.
     """
     at = BODY_SIZE * body
-    for way in range(WAYS):
+    for direction in range(DIRECTIONS):
         if T.depends.user[program] == 1:
-            size = _PUSH * (1.0 if way % POSES >= 3 else scene.world.scale[0])
-            if way >= POSES:
+            size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+            if direction >= POSES:
                 size *= scene.world.scale[1] / scene.world.scale[0]
             before = value_anew(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
-            if 3 <= way < POSES:
-                keep_spin(scene, y, body, way - 3, size)
-            pushed(scene, y, body, way, size)
+            if 3 <= direction < POSES:
+                keep_spin(scene, y, body, direction - 3, size)
+            pushed(scene, y, body, direction, size)
             rise = (value_anew(scene, t, y, program) - before) / size
             for k in range(7):
                 y[at + k] = kept[k]
@@ -498,10 +498,10 @@ def program_rise(scene, T, t, y, program, body, row):
                 y[at + 7 + k] = speed[k]
             place_body(scene, y, body)
         else:
-            run(scene, t, y, program, body, way)
+            run(scene, t, y, program, body, direction)
             rise = scene.programs.stack[0, 1]
         # (linear, angular) to (angular, linear)
-        row[(way // POSES) * POSES + (way % POSES + 3) % POSES] = rise
+        row[(direction // POSES) * POSES + (direction % POSES + 3) % POSES] = rise
     r = vector(T.linear.r[body])
     for part in range(2):
         first = part * POSES

@@ -60,7 +60,7 @@ from mbsim.arrays.scene import (
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
-from mbsim.dynamics.constraints.folding import is_held
+from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
 from mbsim.dynamics.pipeline.output import fill_energy
@@ -226,7 +226,7 @@ def examine_equations(scene, t):
         if is_friction(scene, e):
             note(scene, HELD_SLIP, rate, allowed, t, e)
             continue
-        if not is_held(scene, e, t):
+        if not is_sticking(scene, e, t):
             continue
         if eq.level[e] == 2:
             note(scene, POSITION, abs(sweep.rate[e, RESIDUAL]) / eq.unit[e], allowed, t, e)

@@ -21,10 +21,10 @@ from mbsim.dynamics.constraints.projection import (
     speed_up,
 )
 from mbsim.dynamics.constraints.reactions import fill_reactions
-from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_choice, use_all
+from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import prepare, write_accelerations
-from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
-from mbsim.dynamics.forces.dry_friction import show_held
+from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
+from mbsim.dynamics.forces.dry_friction import show_sticking
 
 
 @jitable
@@ -37,13 +37,13 @@ def constrain(scene, t, y, dy):
         code = call_int(scene.world.hooks[Hook.LATE], (scene, t, y, dy))
         if code != 0:
             return code
-    show_held(scene)
+    show_sticking(scene)
     total = write_accelerations(scene, dy)
-    ledger = scene.world.ledger[0]
-    if ledger >= 0:
+    accumulators = scene.world.accumulators[0]
+    if accumulators >= 0:
         passing = passes_fold(scene, t)
         power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
-        dy[ledger] = power
+        dy[accumulators] = power
     return 0 if math.isfinite(total) else Code.NOT_FINITE
 
 
@@ -85,7 +85,7 @@ def serve(scene, what, t, y, dy):
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
-    if what == Joints.SEAT:
+    if what == Joints.PROJECT_TREE:
         quality = scene.sweep.quality
         drift, drifter = quality[DRIFT], quality[DRIFTER]
         project(scene, t, y, 1)
@@ -97,7 +97,7 @@ def serve(scene, what, t, y, dy):
             hold_all(scene, t, y)
         fill_reactions(scene, t, y)
     elif what == Joints.KEEP:
-        code = keep_choice(scene, t, y)
+        code = keep_selection(scene, t, y)
         if code == LEFT:
             return_to_equations(scene, t, y)
             return 0
@@ -114,7 +114,7 @@ def serve(scene, what, t, y, dy):
     elif what == Joints.DISPLACE:
         push(scene)
         displace(scene, y)
-        seat_all(scene, y)
+        project_tree(scene, y)
     elif what == Joints.SPEED_UP:
         push(scene)
         speed_up(scene, y)

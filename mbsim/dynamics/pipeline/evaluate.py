@@ -48,7 +48,7 @@ def evaluate(scene, t, h, y, dy):
     place_bodies(scene, y)
     if scene.sweep.quality[NEAR_FOLD] == 1.0:
         # near a position in which a loop can fold, equations are sound only where they hold
-        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.SEAT, t, y, dy))
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.PROJECT_TREE, t, y, dy))
         if code != 0:
             return code
 

@@ -18,7 +18,7 @@ from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_late
 from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
-from mbsim.dynamics.stiction.rigid_contact import serve_held
+from mbsim.dynamics.stiction.rigid_contact import serve_sticking
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
 
@@ -77,10 +77,10 @@ def settle(context, t, y, dy):
     return add_late(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
-def express(context, t, y, program, body, way):
+def express(context, t, y, program, body, direction):
     """The jet of an expression."""
     scene = view(context, Scene)
-    return interpret(scene, t, vector_at(y, scene.rows.y.shape[1]), program, body, way)
+    return interpret(scene, t, vector_at(y, scene.rows.y.shape[1]), program, body, direction)
 
 
 def evaluate_expression(context, t, y, program):
@@ -115,7 +115,7 @@ def serve_rigid_alone(context, what, t, y):
 def serve_held_contacts(context, what, t, y):
     """What contacts do whose friction is rigid."""
     scene = view(context, Scene)
-    return serve_held(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
+    return serve_sticking(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def limit_turn(context, t, h, a, b):

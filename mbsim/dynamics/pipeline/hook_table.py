@@ -162,7 +162,7 @@ def _late(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_kinks(scene: Scene, method: Method) -> bool:
-    return len(scene.kinks.program) > 0 and scene.world.fixed_step[0] == 0
+    return len(scene.switching.program) > 0 and scene.world.fixed_step[0] == 0
 
 
 def _evaluate(scene: Scene) -> Callable[..., Any]:
@@ -247,7 +247,7 @@ def _angles(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_crowds(scene: Scene, method: Method) -> bool:
-    return len(scene.crowds.contact) > 0
+    return len(scene.broadphase.contact) > 0
 
 
 def _near(scene: Scene) -> Callable[..., Any]:

@@ -35,7 +35,7 @@ from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.hook_table import fill
 from mbsim.dynamics.pipeline.output import (
-    blame,
+    find_fault,
     friction_left,
     impact_left,
     no_room,
@@ -171,7 +171,7 @@ def _reject(context, t, h, a, b):
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
-    contact = scene.work.trouble[1] if reason == BY_CHECK else blame(scene)
+    contact = scene.work.trouble[1] if reason == BY_CHECK else find_fault(scene)
     row = contact if contact >= 0 else len(scene.contacts.id)
     scene.work.trouble[1] = contact
     scene.log.rejections[row, reason] += 1
@@ -226,10 +226,10 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         if scene.sensors.located.any():
             # where none is located, steps need not be looked into
             hooks["happens"] = happens_hook
-    if len(scene.kinks.program) > 0 and not fixed_step:
-        from mbsim.dynamics.events.switching import kinks_hook
+    if len(scene.switching.program) > 0 and not fixed_step:
+        from mbsim.dynamics.events.switching import switching_hook
 
-        hooks["kinks"] = kinks_hook
+        hooks["kinks"] = switching_hook
     problem = Problem(int(table.ctypes.data), **addresses(hooks))
     fill(scene)
     if "kinks" in hooks:

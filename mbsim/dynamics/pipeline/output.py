@@ -6,6 +6,7 @@ import math
 
 from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import (
+    ACTIVE,
     BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
@@ -26,7 +27,6 @@ from mbsim.arrays.scene import (
     INC_TANGENT,
     INC_TOUCHES,
     INC_X,
-    LIVE,
     STORED_ENERGY,
 )
 from mbsim.core.address import call_int
@@ -47,9 +47,9 @@ from mbsim.dynamics.contact.forces import (
     TORQUE,
     UNIT,
     contact_of,
+    face_weight_of,
     patch,
     sides,
-    whole_of,
 )
 from mbsim.dynamics.contact.points import effective_mass
 from mbsim.dynamics.pipeline.scales import fill_squares
@@ -81,7 +81,7 @@ def fill_energy(scene, y, row):
         dissipated += y[len(y) - len(scene.contacts.id) + c]
     for f in range(len(scene.applied.kind)):
         potential += scene.work.applied[f, STORED_ENERGY]
-    work, damped = scene.world.ledger[0], scene.world.ledger[1]
+    work, damped = scene.world.accumulators[0], scene.world.accumulators[1]
     if damped >= 0:
         dissipated += y[damped]
     row[0], row[1], row[2] = kinetic, potential, dissipated
@@ -143,7 +143,7 @@ def fill_incidents(scene, h, y):
             at = len(row) - INC_REGION
             for j in range(INC_REGION):
                 row[at + j] = 0.0
-            if whole_of(scene, s) > 0.0:
+            if face_weight_of(scene, s) > 0.0:
                 numbers = work.points[s + 1]
                 row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
                 row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
@@ -195,8 +195,8 @@ def no_room(scene):
     room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
     if room >= 2 * len(scene.slots.pair):
         return False
-    for k in range(pairs.count[LIVE]):
-        slots += pairs.last[pairs.live[k]] - pairs.slot[pairs.live[k]]
+    for k in range(pairs.count[ACTIVE]):
+        slots += pairs.last[pairs.active[k]] - pairs.slot[pairs.active[k]]
     return room < 2 * slots
 
 
@@ -355,7 +355,7 @@ def scaled_error(scene, h, e, y):
         largest = max(largest, (e[first + c] / (scales.mass[g] * squares[g])) ** 2)
     for g in range(len(squares)):
         most = max(most, scales.mass[g] * squares[g])
-    for kept in scene.world.ledger:
+    for kept in scene.world.accumulators:
         if kept >= 0:
             largest = max(largest, (e[kept] / most) ** 2)
     states = scene.states
@@ -372,7 +372,7 @@ def scaled_error(scene, h, e, y):
 
 
 @jitable
-def blame(scene):
+def find_fault(scene):
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
     worst, hardest, contact = scene.work.trouble[0], 0.0, -1
     hit = scene.work.hit

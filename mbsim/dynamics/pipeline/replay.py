@@ -64,7 +64,7 @@ def put_back(scene, row):
 
 
 @jitable
-def evaluate_again(scene, t, y, dy, contacts, table):
+def evaluate_replay(scene, t, y, dy, contacts, table):
     """Fill `contacts` as a row has them, `table` with inputs, outputs, `Work.slot` of each.
 
     The rows of incidents lie in `Rows.incidents`. Return 0 or a law's code.
@@ -92,7 +92,7 @@ def evaluate_again(scene, t, y, dy, contacts, table):
     return code
 
 
-def again_hook(context, t, h, a, b):
+def replay_hook(context, t, h, a, b):
     """Forces of a row once more: `a` is its y, `b` room for y', contacts and the table."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -101,5 +101,5 @@ def again_hook(context, t, h, a, b):
     count = scene.rows.used[1]
     room = vector_at(b, n + size + count * wide)
     table = room[n + size :].reshape(count, wide)
-    found = evaluate_again(scene, t, vector_at(a, n), room[:n], room[n : n + size], table)
+    found = evaluate_replay(scene, t, vector_at(a, n), room[:n], room[n : n + size], table)
     return failure_or(scene, found)

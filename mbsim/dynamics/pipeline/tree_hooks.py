@@ -9,12 +9,12 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
-from mbsim.dynamics.constraints.tree_projection import carry_all, seat_all
+from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
 
 
 @jitable
-def serve_limbs(scene, what, t, y, dy):
+def serve_tree_joints(scene, what, t, y, dy):
     """Do what `constraints.serve` does, for a scene without equations."""
     if what == Joints.ACCELERATE:
         prepare(scene, y)
@@ -31,6 +31,6 @@ def serve_limbs(scene, what, t, y, dy):
         prepare(scene, y)
     elif what == Joints.PROJECT or what == Joints.ALONG:
         place_bodies(scene, y)
-        seat_all(scene, y)
+        project_tree(scene, y)
         carry_all(scene, y)
     return 0

@@ -185,7 +185,7 @@ def came_to_rest(scene, pair):
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
         if scene.slots.pair[s] == pair and scene.state.memory[s, KEPT_MODE] == STICK:
-            if not was_held(scene, s):
+            if not was_sticking(scene, s):
                 return True
     return False
 
@@ -207,7 +207,7 @@ def begin_held(scene, y):
             changed = max(changed, begin_slot(scene, y, s))
         mode = state.memory[s, KEPT_MODE]
         held = max(held, 1 if mode == STICK else 0)
-        if (mode == STICK) != was_held(scene, s):
+        if (mode == STICK) != was_sticking(scene, s):
             changed = 1
     # what begins to touch beside what sticks may be held by that
     if changed == 0 and (held == 0 or begun == 0):
@@ -224,7 +224,7 @@ def begin_held(scene, y):
 
 
 @jitable
-def was_held(scene, s):
+def was_sticking(scene, s):
     """Return whether slot s has been held so far."""
     return scene.state.before[s, KEPT_MODE] == STICK
 
@@ -346,14 +346,14 @@ def changed_held(scene):
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
-        within = was_held(scene, s) and state.touching[s] == 1
+        within = was_sticking(scene, s) and state.touching[s] == 1
         if within != (state.memory[s, KEPT_MODE] == STICK):
             return 1
     return 0
 
 
 @jitable
-def serve_held(scene, what, t, y):
+def serve_sticking(scene, what, t, y):
     """Do what contacts with rigid friction are asked for (`Held`); return an answer or 0."""
     if what == Held.PLACE:
         place_held(scene, t, y)

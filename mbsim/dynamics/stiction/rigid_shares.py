@@ -149,11 +149,11 @@ def share_held(scene, t, y):
         spread(scene, t, y, most)
     for e in range(first, len(slot), 2):
         if sticks(scene, e) and scene.work.touching[slot[e]] == 1:
-            show_held(scene, slot[e])
+            show_sticking(scene, slot[e])
 
 
 @jitable
-def show_held(scene, s):
+def show_sticking(scene, s):
     """Write the force on slot s with what holds it."""
     row, held = scene.work.slot[s], scene.work.held[s]
     point = scene.work.points[s]
