@@ -28,6 +28,7 @@ from mbsim.dynamics.expressions.jets import jet, value
 from mbsim.dynamics.pipeline.hook_table import put
 from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
+from mbsim.forces.catalog import FORCES as KINDS
 from mbsim.model import elements as el
 
 POINTS = 1000
@@ -374,11 +375,23 @@ def test_derivatives_of_displacements(name):
 
 # --- forces -----------------------------------------------------------------------------------
 
+
+def needed(kind):
+    """Return what must be given of a kind of forces between markers."""
+    return {each.name: 1.0 for each in kind.parameters if each.default is None}
+
+
+#: One of every kind of forces between markers that has a function.
+MARKER_FORCES = [
+    free.force(kind.name, 40 + k, 21, 31, **needed(kind))
+    for k, kind in enumerate(KINDS[name] for name in KINDS)
+    if kind.function
+]
 PUSHES = {
+    **{(force.kind, force.id): (21, 31) for force in MARKER_FORCES},
     ("SPRINGDAMPER", 2): (31, 21),
     ("SFORCE", 1): (21, 31),
     ("SFORCE", 3): (21, 11),  # alone: nothing acts on J
-    ("BUSHING", 4): (21, 31),
     ("VECTORFORCE", 5): (21, 32),  # J floats: it is where I is
     ("JOINT", 6): (32, 22),
     ("JPRIM", 7): (22, 31),
@@ -391,7 +404,7 @@ FORCES = {
         el.ScalarForce(3, "TRANSLATIONAL", parse("5"), "", 21, 11, action_only=True),
     ],
     "spring_dampers": [el.SpringDamper(2, "ROTATIONAL", "", 31, 21)],
-    "marker_forces": [free.bushing(4, 21, 31)],
+    "marker_forces": MARKER_FORCES,
     "vector_forces": [
         el.VectorForce(5, exprs=(parse("1"),) * 6, i_marker_id=21, j_floating_marker_id=32)
     ],
