@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from mbsim.laws.rubbing import Conditions, Sample
+    from mbsim.laws.slip_test import Conditions, Sample
 
 #: What parameters are unless --set says otherwise: a curve that shows what the law does.
 USUAL = {
@@ -65,7 +65,7 @@ def command(
     one the force through x = amplitude sin(w t), which is fastest at x = 0, with `speed`.
     """
     from mbsim.cli.messages import print_json, warn
-    from mbsim.laws.rubbing import Conditions, described
+    from mbsim.laws.slip_test import Conditions, described
     from mbsim.results.drawing import check_target, draw, need_matplotlib, save
     from mbsim.results.law_curves import law_picture
 
@@ -139,7 +139,7 @@ def _sample(
     """Return a law by its name; what it takes of `values`, or has by itself, goes to `used`."""
     from mbsim.errors import ModelError
     from mbsim.laws.catalog import FRICTION_LAWS
-    from mbsim.laws.rubbing import sample_of
+    from mbsim.laws.slip_test import sample_of
 
     if name.upper() in FRICTION_LAWS:
         law = FRICTION_LAWS[name.upper()]
@@ -174,7 +174,7 @@ def _users(name: str, par: list[float], plugins: Sequence[Path]) -> Sample:
     """Return a user's friction function, interpreted."""
     from mbsim.errors import ModelError, PluginError
     from mbsim.laws.catalog import FrictionInput
-    from mbsim.laws.rubbing import Sample
+    from mbsim.laws.slip_test import Sample
     from mbsim.model.elements import Contact, Subroutine
     from mbsim.plugins import host, load_friction
     from mbsim.plugins.helpers import StopRun

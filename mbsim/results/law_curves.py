@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbsim.laws.joint_friction import Conditions, Sample, cycle, samples, steady
+from mbsim.laws.slip_test import Conditions, Sample, cycle, samples, steady
 from mbsim.results.curves import Curve, Panel, Picture
 from mbsim.results.quantities import Quantity
 

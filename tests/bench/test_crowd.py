@@ -15,7 +15,7 @@ from numba import njit
 import mbsim
 from helpers.crowd_decks import LAW, block, pile, random_axes, sets, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, write_deck
-from mbsim.arrays.scene import LIVE, Scene
+from mbsim.arrays.scene import ACTIVE, Scene
 from mbsim.compile_model import pairing
 from mbsim.compile_model.build import build
 from mbsim.core import jit
@@ -101,13 +101,13 @@ def test_cost_of_a_listing(tmp_path, monkeypatch, edge):
     context = int(table.ctypes.data)
     call(context, system.y0)
     grid = best(lambda: call(context, system.y0))
-    listed = int(scene.pairs.count[LIVE])
+    listed = int(scene.pairs.count[ACTIVE])
     rows = [system.graphic_ids.index(100 * (2 + k)) for k in range(len(centres))]
-    box = np.ascontiguousarray(scene.crowds.box[rows])
+    box = np.ascontiguousarray(scene.broadphase.box[rows])
     room = np.zeros((2, 60 * len(centres)), dtype=np.int64)
     swept_pairs = sort_and_sweep(box, *room)
     swept = best(lambda: sort_and_sweep(box, *room))
-    skin = float(scene.crowds.size[0])
+    skin = float(scene.broadphase.size[0])
     (moved, updated, collided), tree_pairs = tree_times(centres, 0.1 + 0.5 * skin)
     print(
         f"\n{len(centres)} spheres: grid {1e3 * grid:.3f} ms ({listed} pairs near, with ground), "

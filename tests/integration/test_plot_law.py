@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from mbsim.laws.joint_friction import Conditions, cycle, sample_of, steady
 
 from helpers.folders import USERFUNCS
 from mbsim.cli.main import main
 from mbsim.cli.plot_law import USUAL
 from mbsim.errors import PluginError
 from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.slip_test import Conditions, cycle, sample_of, steady
 
 pytest.importorskip("matplotlib")
 WITH_STATE = USERFUNCS / "stiction_with_state.py"

@@ -11,7 +11,7 @@ from helpers import free_bodies as free
 from mbsim.compile_model.build import build
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.expressions.jets import run, value
-from mbsim.dynamics.expressions.slopes import A_STATE, WAYS
+from mbsim.dynamics.expressions.slopes import A_STATE, DIRECTIONS
 from mbsim.expressions.parse import parse
 from mbsim.model.elements import Differential, Marker, Request
 
@@ -53,17 +53,17 @@ def matrix(q):
     return np.eye(3) + 2 * w * K + 2 * K @ K
 
 
-def moved(y, body, way, by):
+def moved(y, body, direction, by):
     """Return y with one number of a body's pose or velocity changed, global axes."""
     y, at = y.copy(), 13 * body
-    q, unit = y[at + 3 : at + 7].copy(), np.eye(3)[way % 3]
-    if way < 3:
+    q, unit = y[at + 3 : at + 7].copy(), np.eye(3)[direction % 3]
+    if direction < 3:
         y[at : at + 3] += by * unit
-    elif way < 6:
+    elif direction < 6:
         w = matrix(q) @ y[at + 10 : at + 13]
         y[at + 3 : at + 7] = turned(q, by * unit)
         y[at + 10 : at + 13] = matrix(y[at + 3 : at + 7]).T @ w
-    elif way < 9:
+    elif direction < 9:
         y[at + 7 : at + 10] += by * unit
     else:
         y[at + 10 : at + 13] += matrix(q).T @ (by * unit)
@@ -104,16 +104,16 @@ def test_slope_is_the_limit_of_differences(text, seed):
             rows = [(4**k * b - a) / (4**k - 1) for a, b in itertools.pairwise(rows)]
         return rows[0]
 
-    def exact(body, way):
+    def exact(body, direction):
         place_bodies(scene, y)
-        run(scene, 0.3, y, program, body, way)
+        run(scene, 0.3, y, program, body, direction)
         return scene.programs.stack[0, 1]
 
-    found = [exact(b, way) for b in range(2) for way in range(WAYS)]
+    found = [exact(b, direction) for b in range(2) for direction in range(DIRECTIONS)]
     asked = [
-        difference(lambda h, b=b, way=way: moved(y, b, way, h))
+        difference(lambda h, b=b, direction=direction: moved(y, b, direction, h))
         for b in range(2)
-        for way in range(WAYS)
+        for direction in range(DIRECTIONS)
     ]
     np.testing.assert_allclose(found, asked, rtol=1e-8, atol=1e-8 * (1 + np.abs(asked).max()))
     place = scene.states.place[0]

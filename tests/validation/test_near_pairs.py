@@ -70,7 +70,7 @@ def listed_pairs(system):
     """Return the live pairs as (contact, graphic, graphic), graphic ids ascending."""
     pairs, kinds = system.scene.pairs, system.scene.kinds
     found = []
-    for pair in pairs.live[: pairs.count[ACTIVE]]:
+    for pair in pairs.active[: pairs.count[ACTIVE]]:
         i, j = (system.graphic_ids[g[pair]] for g in (pairs.graphic_i, pairs.graphic_j))
         found.append((system.contact_ids[kinds.contact[pairs.kind[pair]]], min(i, j), max(i, j)))
     return found
@@ -172,9 +172,9 @@ def test_near_pairs_stay_right_while_shapes_wander(tmp_path, all_crowds):
         contact_set.follow(scene, y)
         assert place_graphics(scene, y) or scene.state.centre.any() == 0
         check_against_brute_force(system, random, wanted)
-        places = [*scene.pairs.live[: scene.pairs.count[ACTIVE]]]
+        places = [*scene.pairs.active[: scene.pairs.count[ACTIVE]]]
         places += [*scene.pairs.free[: scene.pairs.count[FREE]]]
-        assert sorted(places) == list(range(len(scene.pairs.live)))
+        assert sorted(places) == list(range(len(scene.pairs.active)))
     assert before - set(listed_pairs(system))
     assert scene.log.counters[LISTINGS] == 7
 
