@@ -347,8 +347,12 @@ def solve(d: int, analysis: Analysis, factors: Factors, x: Vector) -> None:
 
 
 @jitable
-def solve_many(d: int, begin: int, analysis: Analysis, factors: Factors, x: Vector) -> None:
+def solve_many(  # noqa: C901
+    d: int, begin: int, analysis: Analysis, factors: Factors, x: Vector
+) -> None:
     """Overwrite the right sides, columns of x (d * nodes, k), from front `begin` on.
+
+    Many branches because both sweeps go over the same fronts with the same scratch.
 
     Right sides must be zero at nodes of earlier fronts, and solutions there are not computed.
     """

@@ -634,7 +634,7 @@ def choose_next(m, steps, h, h_max):
     m.memory[AFTER_REJECTION] = 0.0
 
 
-def advance(steps, t_end, tol, h_max, h_min, times, budget):
+def advance(steps, t_end, tol, h_max, h_min, times, budget):  # noqa: C901
     """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
 
     `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
@@ -645,6 +645,8 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):
 
     When it stops, and how often, changes nothing of the run: all that follows from a step is
     decided behind it, and kept where the caller has to be told of something else first.
+
+    Long and of many branches because it is the loop: each is one thing that may happen to a step.
     """
     p, m = in_workspace(steps.context)
     m.memory[TOL] = tol
