@@ -26,10 +26,10 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | in the step, t being its length                            |
 | check   | y new, -               | 1, or the part of the step to take instead                 |
 | inner   | -, -                   | part of the step (0..1) worth a look, or < 0               |
-| switches   | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
-|         |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
-|         |                        | a step that was taken: 1 if one changed in it; LOAD: 1     |
-|         |                        | if friction holds something, the largest force by which it |
+| switch- | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
+| ing     |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
+|         |                        | a step that was taken: 1 if one changed in it; LOAD: 1 if  |
+|         |                        | friction holds something, the largest force by which it    |
 |         |                        | does over what it can in out[0]; BENDS (b: y committed): 1 |
 |         |                        | if HALF, at the step's middle, then HALVES, at its end,    |
 |         |                        | are to be asked: the error of a way followed in one, in    |
@@ -99,7 +99,7 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
-    kinks: int = 0  # only for problems whose forces change their branch
+    switching: int = 0  # only for problems whose forces change their branch
     linearise: int = 0  # this and the rest only for implicit methods
     factor: int = 0
     solve: int = 0
@@ -146,8 +146,8 @@ TABLE_OVER = 8
 #: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.
 WATCH_EVERY = 5000
 
-# what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads; and
-# of friction that follows a way in closed form: whether that bends, then two halves of the step;
+# what `switching` is asked: whether sides differ, to keep them too, that a step was taken, loads;
+# and of friction that follows a way in closed form: whether that bends, then two halves of a step;
 # whether a side may have changed twice
 ASK, SETTLE, PASS, LOAD, BENDS, HALF, HALVES, HIDES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 

@@ -65,7 +65,6 @@ from mbsim.integrators.scheme import (
     HAVE_F,
     HAVE_JACOBIAN,
     HORIZON,
-    KINK_CUT,
     LAST_ERROR,
     LAST_REASON,
     LAST_STEP,
@@ -86,6 +85,7 @@ from mbsim.integrators.scheme import (
     STEP,
     STEPS,
     STIFFNESS,
+    SWITCH_CUT,
     TIME,
     TOL,
     VAIN,
@@ -172,7 +172,7 @@ def bound_is_due(m):
 
 
 @jitable
-def ask_kinks(p, m, t, what, y, b):
+def ask_switching(p, m, t, what, y, b):
     """Return what the hook `switching` answers; 0 where it failed, which is noted."""
     return answer_of(m, call_int(p.switching, (p.context, t, what, y, b)))
 
@@ -180,7 +180,7 @@ def ask_kinks(p, m, t, what, y, b):
 @jitable
 def load_of(p, m, t, y):
     """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
-    return m.error[0] if ask_kinks(p, m, t, LOAD, y, m.error) == 1 else -1.0
+    return m.error[0] if ask_switching(p, m, t, LOAD, y, m.error) == 1 else -1.0
 
 
 @jitable
@@ -193,7 +193,7 @@ def begin(p, m, steps, t, t_end, h_max):
             return code
         m.memory[HAVE_F] = 1.0
         if p.switching != 0:
-            ask_kinks(p, m, t, SETTLE, m.y, m.error)
+            ask_switching(p, m, t, SETTLE, m.y, m.error)
         m.memory[FRESH] = 1.0
         m.memory[HAVE_JACOBIAN] = 0.0
     if m.memory[STEP] == 0.0:
@@ -343,7 +343,7 @@ def side_at(p, m, t, h, s, what):
     Sides are those just behind the step's begin: before that only what is found exactly counts.
     """
     interpolate(m, s, m.error)
-    differs = ask_kinks(p, m, t + s * h, what, m.error, m.error)
+    differs = ask_switching(p, m, t + s * h, what, m.error, m.error)
     return differs > (0 if s >= NEAR_SWITCH else 1)
 
 
@@ -361,9 +361,9 @@ def first_switch(p, m, t, h, whole, behind):
     side_at(p, m, t, h, low, SETTLE)
     if behind < 1.0:
         interpolate(m, behind, m.error)
-        differs = ask_kinks(p, m, t + behind * h, ASK, m.error, m.error)
+        differs = ask_switching(p, m, t + behind * h, ASK, m.error, m.error)
     else:
-        differs = ask_kinks(p, m, t + h, ASK, m.trial, m.error)
+        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
     if differs > 1:
         # it is told from what was committed, however near that is
         # a part of the whole step: where it lies at the very begin, as behind another, a step
@@ -376,7 +376,7 @@ def first_switch(p, m, t, h, whole, behind):
                 high = middle
             else:
                 low = middle
-    ask_kinks(p, m, t + h, ASK, m.trial, m.error)
+    ask_switching(p, m, t + h, ASK, m.trial, m.error)
     # a little more, so that the step after it begins on the other side
     return h if high > 1.0 - near else (high + 0.5 * near) * h
 
@@ -443,8 +443,8 @@ def way_error(p, m, t, h):
     stages tells how far that is off: two halves of the step do. What they make of it is kept.
     """
     interpolate(m, 0.5, m.error)
-    ask_kinks(p, m, t + 0.5 * h, HALF, m.error, m.error)
-    ask_kinks(p, m, t + h, HALVES, m.trial, m.error)
+    ask_switching(p, m, t + 0.5 * h, HALF, m.error, m.error)
+    ask_switching(p, m, t + h, HALVES, m.trial, m.error)
     return m.error[0] / m.memory[TOL]
 
 
@@ -458,7 +458,7 @@ def hidden_side(p, m, t, h):
     for k in range(1, LOOKS_FOR_HIDDEN):
         if part == 0.0 and side_at(p, m, t, h, k / LOOKS_FOR_HIDDEN, ASK):
             part = k / LOOKS_FOR_HIDDEN
-    ask_kinks(p, m, t + h, ASK, m.trial, m.error)
+    ask_switching(p, m, t + h, ASK, m.trial, m.error)
     return part
 
 
@@ -476,7 +476,7 @@ def attempt(p, m, steps, t, h, times):
     code = failure_or(m, call_int(steps.attempt, (steps.context, t, h, m.y, m.trial)))
     if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
         return code, 1.0, -1.0, 0.0, 1.0
-    asked, kinked, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
+    asked, switched, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
     # one that ends before a switch at the end is taken for the end
     until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
@@ -485,13 +485,13 @@ def attempt(p, m, steps, t, h, times):
             return 0, part, -1.0, 0.0, 1.0
         asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if p.switching != 0:
-        differs = ask_kinks(p, m, t + h, ASK, m.trial, m.error)
-        kinked = 1.0 if differs > 0 else 0.0
-        if kinked == 0.0:
-            hides = ask_kinks(p, m, t + h, HIDES, m.trial, m.y) > 0
-            bends = ask_kinks(p, m, t + h, BENDS, m.trial, m.y) > 0
+        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
+        switched = 1.0 if differs > 0 else 0.0
+        if switched == 0.0:
+            hides = ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0
+            bends = ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0
             begin = load_of(p, m, t, m.y)
-    looks = kinked > 0.0 or hides or bends or begin >= 0.0
+    looks = switched > 0.0 or hides or bends or begin >= 0.0
     # a peak is looked for in every step of what trembles at its bound of stability: not shown
     shown = output_within(m, times, until)
     m.memory[SHOWN] = 1.0 if shown else 0.0
@@ -500,10 +500,10 @@ def attempt(p, m, steps, t, h, times):
     if begin >= 0.0 and code == 0:
         reach = horizon_of(p, m, t, h, begin)
     if hides and code == 0:
-        kinked = hidden_side(p, m, t, h)
-    if bends and code == 0 and kinked == 0.0:
+        switched = hidden_side(p, m, t, h)
+    if bends and code == 0 and switched == 0.0:
         m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
-    return code, 1.0, asked, kinked, reach
+    return code, 1.0, asked, switched, reach
 
 
 @jitable
@@ -524,15 +524,15 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
     uncut, stiffness = -1.0, 0.0
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
-        code, part, asked, kinked, reach = attempt(p, m, steps, t, h, times)
+        code, part, asked, switched, reach = attempt(p, m, steps, t, h, times)
         failed = code != 0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
         if uncut < 0.0:
             uncut, stiffness = m.memory[LAST_ERROR], m.memory[STIFFNESS]
         # whether stability bounds a step is asked of what it would be without the event
         m.memory[STIFFNESS] = stiffness
-        if kinked > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
+        if switched > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
-            cut = first_switch(p, m, t, h, whole, kinked)
+            cut = first_switch(p, m, t, h, whole, switched)
             if floor < cut < h:
                 h = cut
                 continue
@@ -541,7 +541,7 @@ def attempt_to_event(p, m, steps, t, h, times, floor):
             if reach * h > floor:
                 h *= reach
                 continue
-        m.memory[KINK_CUT] = 1.0 if cuts > 0 else 0.0
+        m.memory[SWITCH_CUT] = 1.0 if cuts > 0 else 0.0
         if p.happens == 0 or failed:
             return failure_or(m, code), part, asked, h, uncut
         cut = first_event(p, m, t, h, times)
@@ -581,8 +581,8 @@ def accept(p, m, steps, t, h, asked):
     """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
     word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
     if p.switching != 0:
-        changed = ask_kinks(p, m, t + h, PASS, m.trial, m.error) > 0
-        in_vain = m.memory[KINK_CUT] == 1.0 and not changed
+        changed = ask_switching(p, m, t + h, PASS, m.trial, m.error) > 0
+        in_vain = m.memory[SWITCH_CUT] == 1.0 and not changed
         m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]

@@ -83,7 +83,7 @@ VAIN = 48
 # to speak for leaving the implicit method
 BEGUN_WORK, RELUCTANCE = range(49, 51)
 # 1 where the step that was tried last was cut at a switch
-KINK_CUT = 51
+SWITCH_CUT = 51
 MEMORY = 52
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable

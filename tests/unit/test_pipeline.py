@@ -50,7 +50,7 @@ def test_work_filled_with_nan_changes_nothing(name):
             array[...] = np.nan
             if field in ("R", "v", "w"):
                 array[ground] = before[ground]
-            if field in ("frames", "way", "speed"):
+            if field in ("frames", "travel", "speed"):
                 array[on_ground] = before[on_ground]
             if field == "frames":
                 # nobody turns a sphere

@@ -324,7 +324,7 @@ def follow_halves(scene, context, t, y):
 
 
 @jitable
-def serve_kinks(scene, context, t, what, a, b):
+def serve_switching(scene, context, t, what, a, b):
     """Do what the hook `switching` is asked for; return its answer."""
     n = scene.rows.y.shape[1]
     if what == LOAD:
@@ -348,6 +348,6 @@ def serve_kinks(scene, context, t, what, a, b):
 def switching_hook(context, t, h, a, b):
     """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
     scene = view(context, Scene)
-    answer = serve_kinks(scene, context, t, h, a, b)
+    answer = serve_switching(scene, context, t, h, a, b)
     code = failure_or(scene, 0)
     return answer if code == 0 else -code

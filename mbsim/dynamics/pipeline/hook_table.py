@@ -161,7 +161,7 @@ def _late(scene: Scene) -> Callable[..., Any]:
     return settle if len(scene.applied.late) > 0 else rub
 
 
-def _has_kinks(scene: Scene, method: Method) -> bool:
+def _has_switching(scene: Scene, method: Method) -> bool:
     return len(scene.switching.program) > 0 and scene.world.fixed_step[0] == 0
 
 
@@ -246,7 +246,7 @@ def _angles(scene: Scene) -> Callable[..., Any]:
     return commit_turns
 
 
-def _has_crowds(scene: Scene, method: Method) -> bool:
+def _has_broadphase(scene: Scene, method: Method) -> bool:
     return len(scene.broadphase.contact) > 0
 
 
@@ -336,7 +336,7 @@ TABLE = (
     Row(
         Hook.EVALUATE,
         HOOK,
-        _has_kinks,
+        _has_switching,
         _evaluate,
         "evaluates y' at a point that is no step's, to see what branch forces are on there",
     ),
@@ -388,7 +388,7 @@ TABLE = (
     Row(
         Hook.NEAR,
         _INT(_INT, _PTR),  # context, y
-        _has_crowds,
+        _has_broadphase,
         _near,
         "lists near pairs anew where shapes have moved far enough",
     ),
