@@ -99,7 +99,7 @@ class Problem(NamedTuple):
     stable: int = 0  # only for methods without error estimate
     happens: int = 0  # this and the next only for problems with events
     arrive: int = 0
-    kinks: int = 0  # only for problems whose forces change their branch
+    switching: int = 0  # only for problems whose forces change their branch
     linearise: int = 0  # this and the rest only for implicit methods
     factor: int = 0
     solve: int = 0
@@ -146,9 +146,9 @@ TABLE_OVER = 8
 #: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.
 WATCH_EVERY = 5000
 
-# what `kinks` is asked: whether sides differ, to keep them too, that a step was taken, loads; and
-# of friction that follows a way in closed form: whether that bends, then two halves of the step;
-# whether a side may have changed twice
+# what `switching` is asked: whether sides differ, to keep them too, that a step was taken, loads;
+# and of friction that follows a way in closed form: whether that bends, then two halves of the
+# step; whether a side may have changed twice
 ASK, SETTLE, PASS, LOAD, BENDS, HALF, HALVES, HIDES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 
 # reasons given to `reject`

@@ -444,7 +444,7 @@ def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
 ACT, ANSWER = (
     ("rhs", "project", "look", "reject"),
     (
-        "kinks",
+        "switching",
         "happens",
         "commit",
         "arrive",

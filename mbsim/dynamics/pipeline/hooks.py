@@ -229,9 +229,9 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     if len(scene.switching.program) > 0 and not fixed_step:
         from mbsim.dynamics.events.switching import switching_hook
 
-        hooks["kinks"] = switching_hook
+        hooks["switching"] = switching_hook
     problem = Problem(int(table.ctypes.data), **addresses(hooks))
     fill(scene)
-    if "kinks" in hooks:
+    if "switching" in hooks:
         scene.state.frozen[0] = int(len(scene.work.idle) > 0)
     return problem, table
