@@ -10,7 +10,7 @@ from mbsim.arrays import scene as a
 from mbsim.compile_model.applied import applied_forces
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
-from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
@@ -165,7 +165,6 @@ def acting(
 def check_expressions(model: Model) -> None:
     """Raise what is wrong with expressions where they stand, as `build` would."""
     placement = place(model)
-    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
-    rows.update({id: k for k, id in enumerate(placement.bodies)})
     users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
-    acting(model, MarkerTable(placement, rows), 0, users, looks=False, runs=False)
+    table = MarkerTable(placement, body_rows(model, placement))
+    acting(model, table, 0, users, looks=False, runs=False)

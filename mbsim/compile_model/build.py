@@ -7,7 +7,6 @@ without friction no friction law, a law that does not look at X no X.
 from __future__ import annotations
 
 import math
-import typing
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,25 +16,19 @@ import numpy as np
 
 from mbsim.arrays import scene as a
 from mbsim.arrays.hooks import Hook
-from mbsim.compile_model.acting import acting
+from mbsim.compile_model.acting import Acting, acting
 from mbsim.compile_model.audit import audit
-from mbsim.compile_model.contacts import (
-    broadphase_table,
-    contacts_table,
-    graphics_table,
-    kinds_table,
-    pairs_table,
-)
+from mbsim.compile_model.contacts import ContactTables, contact_tables, kinds_table
 from mbsim.compile_model.gravity import Pull
 from mbsim.compile_model.groups import Groups, find_groups, natural_speed
-from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.mechanism import sweep
-from mbsim.compile_model.pairing import Plans, plan_pairs, shape_class
+from mbsim.compile_model.pairing import Plans, plan_pairs
 from mbsim.compile_model.rigid_slots import rigid_slots
-from mbsim.compile_model.scratch import empty_log, empty_rows, scratch, start_state
+from mbsim.compile_model.scratch import Sizes, empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes
+from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
 from mbsim.core.layout import AT_Q, AT_V, AT_W
-from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
@@ -44,7 +37,6 @@ if TYPE_CHECKING:
     from mbsim.compile_model.subroutines import StateReader
     from mbsim.plugins import UserFriction
     from mbsim.plugins.contact_post import ContactPost
-    from mbsim.plugins.source.script import Script
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.plugins.types import UserNormal, UserResidual
 
@@ -170,133 +162,187 @@ def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
     return y
 
 
-def _load_user_friction(
-    model: Model,
-    plugins: Sequence[Path],
-    interpret: bool,
-    log: Callable[[str], None] | None,
-    scripts: dict[Path, Script],
-) -> dict[int, UserFriction]:
-    """Load the users' CFFSUBs; scenes without one do not import what that needs."""
-    wanted = [c for c in model.contacts.values() if c.asks_user]
-    if not wanted:
-        return {}
-    from mbsim.plugins import failure, host, load_friction
-    from mbsim.plugins.subroutine import end_run
+@dataclass(frozen=True)
+class _Judged:
+    """By what errors, speeds and forces are judged."""
 
-    end_run()  # an earlier one that failed while it was built
-    failure.clear()
-    host.forget()
-    if log is not None:
-        host.log = log
-    return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
+    groups: Groups
+    length: float
+    speed: float
+    load: float  # a usual force
 
 
-def _load_user_normal(
-    model: Model,
-    plugins: Sequence[Path],
-    interpret: bool,
-    log: Callable[[str], None] | None,
-    scripts: dict[Path, Script],
-) -> dict[int, UserNormal]:
-    """Load the users' CNFSUBs."""
-    wanted = [c for c in model.contacts.values() if c.cnf_type == "USERCNF"]
-    if not wanted:
-        return {}
-    from mbsim.plugins.normal import load_normal
-    from mbsim.plugins.subroutine import begin_run, end_run
-
-    if all(c.cff_type != "USERCFF" for c in model.contacts.values()):
-        end_run()
-    begin_run(log)
-    return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
+def _judged(model: Model, placement: Placement) -> _Judged:
+    """Return by what a model's errors, speeds and forces are judged."""
+    groups = find_groups(model, placement)
+    length, speed = max(groups.length), _speed_scale(model, groups)
+    return _Judged(groups, length, speed, _usual_load(placement, length, speed))
 
 
-def _load_posts(
-    model: Model,
-    plugins: Sequence[Path],
-    log: Callable[[str], None] | None,
-    scripts: dict[Path, Script],
-) -> list[ContactPost]:
-    """Load the users' CONTACTPOSTs."""
-    wanted = [c for c in model.contacts.values() if c.cpost is not None]
-    if not wanted:
-        return []
-    from mbsim.plugins.contact_post import load_post
-    from mbsim.plugins.subroutine import begin_run
-
-    begin_run(log)
-    return [load_post(c, plugins, scripts) for c in wanted]
+def _varies(pulls: Sequence[Pull]) -> bool:
+    """Return whether a gravity is given by expressions."""
+    return any((pull.program >= 0).any() for pull in pulls)
 
 
-def _load_subroutines(
-    model: Model,
-    plugins: Sequence[Path],
-    log: Callable[[str], None] | None,
-    scripts: dict[Path, Script],
-) -> dict[tuple[str, int], UserSubroutine]:
-    """Load the users' subroutines of forces and variables."""
-    elements = (
-        *model.scalar_forces.values(),
-        *model.variables.values(),
-        *model.vector_forces.values(),
-        *model.body_forces.values(),
-    )
-    if all(element.user is None for element in elements):
-        return {}
-    from mbsim.compile_model.subroutines import load
-    from mbsim.plugins.subroutine import begin_run
+def _start(
+    model: Model, placement: Placement, carried: int, acts: Acting, judged: _Judged
+) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], a.Residuals]:
+    """Return y at the start, where in it work and damped energy stand, and the residuals.
 
-    begin_run(log)
-    return load(model, plugins, scripts)
-
-
-def _no_residuals() -> a.Residuals:
-    """Return the rows of a model without elements of users' residuals."""
-    kinds = typing.get_type_hints(a.Residuals, include_extras=True).values()
-    return a.Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
-
-
-def _load_residuals(
-    model: Model,
-    plugins: Sequence[Path],
-    interpret: bool,
-    log: Callable[[str], None] | None,
-    scripts: dict[Path, Script],
-) -> dict[int, UserResidual]:
-    """Load the users' residuals."""
-    if not model.force_elements:
-        return {}
-    from mbsim.plugins.residual import load_residual
-    from mbsim.plugins.subroutine import begin_run
-
-    begin_run(log)
-    return {
-        id: load_residual(element, plugins, interpret, scripts, log)
-        for id, element in model.force_elements.items()
-    }
-
-
-def _users(
-    users: dict[tuple[str, int], UserSubroutine], seen: int, model: Model, made: Any
-) -> a.Users:
-    """Return the rows of user subroutines and of residuals behind them.
-
-    `seen`: how much of y friction subroutines look at; `made`: the residuals by id.
+    Behind the bodies are the numbers `carried` by laws of contacts, the states, the accumulators.
     """
-    counts = [user.count for user in users.values()]
-    if made:
-        from mbsim.compile_model.force_elements import results_of
+    states, first_state = acts.states, a.BODY_SIZE * len(placement.bodies) + carried
+    nz, damps = len(states.program), len(acts.applied_ids) > 0 or _varies(acts.pulls)
+    accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
+    kept = int(np.count_nonzero(accumulators >= 0)) + max(1, len(model.contacts))
+    y0 = _initial_y(placement, carried + nz + kept)
+    y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
+    residuals = acts.residuals
+    if residuals is None:
+        return y0, accumulators, no_residuals()
+    from mbsim.compile_model.force_elements import fill_scales
 
-        counts += [results_of(model.force_elements[id], user) for id, user in made.items()]
-    addresses = [user.address for user in users.values()]
-    return a.Users(
-        np.array([*addresses, *(0 for _ in made)], dtype=np.int64),
-        np.array([*(-1 for _ in users), *range(len(made))], dtype=np.int64),
-        np.zeros((len(counts), max(counts, default=1))),
-        np.zeros(1, dtype=np.int64),
-        np.zeros(seen),
+    fill_scales(residuals, states, judged.load, judged.length)
+    y0[residuals.place[residuals.place >= 0]] = residuals.initial[residuals.place >= 0]
+    return y0, accumulators, residuals
+
+
+def _sizes(
+    model: Model,
+    plans: Plans,
+    contacts: ContactTables,
+    acts: Acting,
+    y: int,
+    bodies: int,
+    groups: int,
+) -> Sizes:
+    """Return the sizes of what is empty when a run begins; `y`: numbers of the ODE vector."""
+    pairs, looked = contacts.pairs, y if has_modes(model) else 0
+    return Sizes(
+        y=y,
+        bodies=bodies,
+        pairs=len(pairs.slot),
+        slots=len(contacts.slots.pair),
+        contacts=len(contacts.listed),
+        connections=len(acts.mechanism.elements),
+        forces=len(acts.applied_ids),
+        late=len(acts.applied.late),
+        sensors=len(acts.sensors.id),
+        dry_frictions=len(model.dry_frictions),
+        switching=len(acts.switching.program),
+        values=len(acts.values),
+        memory=contacts.memory,
+        looked=looked,
+        ahead=y if looked and contacts.laws.carried.any() else 0,
+        points=int((pairs.last - pairs.slot).max(initial=0)),
+        groups=groups,
+        region=a.INC_REGION if any(kind.region for kind in plans.kinds) else 0,
     )
+
+
+def _world(acts: Acting, judged: _Judged, accumulators: np.ndarray[Any, Any]) -> a.World:
+    """Return what holds for the whole model."""
+    pulls = acts.pulls
+    return a.World(
+        pulls[0].constant.copy(),
+        np.array([pulls[0].program, *(pull.program for pull in pulls)]),
+        _scales(judged.groups, judged.length, judged.speed),
+        np.zeros(len(Hook), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+        accumulators,
+    )
+
+
+def _group_scales(groups: Groups) -> a.Scales:
+    """Return by what errors of each group of connected bodies are judged."""
+    return a.Scales(
+        np.array(groups.of_body, dtype=np.int64),
+        np.array(groups.length),
+        np.array(groups.speed),
+        np.array(groups.mass),
+        np.array(groups.of_contact, dtype=np.int64),
+        np.array(groups.gyration, dtype=np.float64),
+    )
+
+
+def _programs(model: Model, acts: Acting, contact_ids: list[int]) -> a.Programs:
+    """Return the programs of all expressions."""
+    made = acts.programs.arrays(acts.mechanism.elements, acts.applied_ids, contact_ids)
+    if any(s.analysis_type == "STATIC" for s in model.simulations):
+        # the last number is TIME where it stands still
+        made = made._replace(number=np.append(made.number, 0.0))
+    return made
+
+
+def _rows(n: Sizes, one_at_a_time: bool) -> a.Rows:
+    """Return the tables of output rows.
+
+    One row at a time: CONTACTPOST sees which graphics a slot serves at that time.
+    """
+    rows = empty_rows(n)
+    return rows._replace(time=np.zeros(1)) if one_at_a_time else rows
+
+
+def _scene(
+    model: Model,
+    placement: Placement,
+    plans: Plans,
+    code: UserCode,
+    contacts: ContactTables,
+    judged: _Judged,
+    table: MarkerTable,
+    acts: Acting,
+) -> tuple[a.Scene, np.ndarray[Any, Any]]:
+    """Return all arrays of a model, and y at the start."""
+    y0, accumulators, residuals = _start(model, placement, contacts.carried, acts, judged)
+    markers, angles = table.arrays()
+    mechanism, contact_ids = acts.mechanism, list(contacts.contact_row)
+    n = _sizes(
+        model,
+        plans,
+        contacts,
+        acts,
+        len(y0),
+        len(placement.bodies),
+        len(judged.groups.length),
+    )
+    scene = a.Scene(
+        bodies=_bodies(placement),
+        graphics=contacts.graphics,
+        kinds=kinds_table(plans.kinds, contacts.contact_row),
+        pairs=contacts.pairs,
+        broadphase=contacts.broadphase,
+        contacts=contacts.laws,
+        slots=contacts.slots,
+        markers=markers,
+        angles=angles,
+        programs=_programs(model, acts, contact_ids),
+        states=acts.states,
+        sensors=acts.sensors,
+        switching=acts.switching,
+        users=users_table(code, model, n.y),
+        residuals=residuals,
+        applied=acts.applied,
+        tree=mechanism.tree,
+        equations=mechanism.equations,
+        connections=mechanism.connections,
+        world=_world(acts, judged, accumulators),
+        scales=_group_scales(judged.groups),
+        state=start_state(n, contacts.graphics, table.start_angles(), residuals),
+        log=empty_log(n.contacts),
+        audit=audit(
+            contacts.listed,
+            set(code.friction),
+            np.array(judged.groups.of_body, dtype=np.int64),
+            (mechanism.connections, mechanism.equations, acts.applied, markers),
+            _varies(acts.pulls),
+        ),
+        work=scratch(n, contacts.graphics),
+        sweep=sweep(mechanism),
+        rows=_rows(n, one_at_a_time=bool(code.posts)),
+    )
+    return scene, y0
 
 
 def build(
@@ -326,193 +372,45 @@ def build(
     """
     placement = place(model)
     plans = plan_pairs(model, detector)
-    kinds = plans.kinds
-    scripts: dict[Path, Script] = {}
-    user = _load_user_friction(model, plugins, interpret, log, scripts)
-    normal = _load_user_normal(model, plugins, interpret, log, scripts)
-    posts = _load_posts(model, plugins, log, scripts)
-    subroutines = _load_subroutines(model, plugins, log, scripts)
-    residuals = _load_residuals(model, plugins, interpret, log, scripts)
-    body_ids = list(placement.bodies)
-    nb = len(body_ids)
-    row = {body.id: nb for body in model.bodies.values()}
-    row.update({body_id: k for k, body_id in enumerate(body_ids)})
-    listed = [g for plan in plans.pairs for g in (plan.graphic_i, plan.graphic_j)]
-    crowded = [g for contact_set in plans.broadphase for g in (*contact_set.i, *contact_set.j)]
-    graphic_ids = list(dict.fromkeys([*listed, *crowded]))
-    shapes = sorted({shape_class(model.graphics[g]) for g in graphic_ids})
-    contact_list = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
-    contact_ids = [contact.id for contact in contact_list]
-    contact_row = {contact_id: k for k, contact_id in enumerate(contact_ids)}
-
-    graphics = graphics_table(model, placement, graphic_ids, row, shapes)
-    graphic_row = {graphic_id: k for k, graphic_id in enumerate(graphic_ids)}
-    pairs, ns = pairs_table(plans, kinds, graphic_row)
-    groups = find_groups(model, placement)
-    length, speed = max(groups.length), _speed_scale(model, groups)
-    load = _usual_load(placement, length, speed)
-    contacts, uses_x = contacts_table(contact_list, user, normal)
-    most = int(contacts.memory.max(initial=0))
-
-    # X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them
-    slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
-    wide = np.zeros((ns, 2), dtype=np.int64)
-    each = np.column_stack([3 * uses_x, contacts.carried])
-    for k, plan in enumerate(plans.pairs):
-        # of one region the first row alone is an incident
-        end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
-        wide[pairs.slot[k] : end] = each[contact_row[plan.kind.contact]]
-    for contact_set in plans.broadphase:
-        places = wide[pairs.slot[len(plans.pairs)] :]
-        places[...] = np.maximum(places, each[contact_row[contact_set.contact]])
-    begins = a.BODY_SIZE * nb + np.concatenate([[0], np.cumsum(wide.ravel())])
-    carried = int(begins[-1]) - a.BODY_SIZE * nb
-    x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
-
-    table = MarkerTable(placement, row, length)
-    first_state = a.BODY_SIZE * nb + carried
-    rubs = any(law.looks for law in (*user.values(), *normal.values()))
-    looks = rubs or any(subroutine.looks for subroutine in subroutines.values())
-    held = rigid_slots(model, plans, pairs, graphics, table)
-    rows = acting(
-        model, table, first_state, subroutines, looks, residuals=residuals, rigid_slots=held
+    code = load_user_code(model, plugins, interpret, log)
+    rows = body_rows(model, placement)
+    contacts = contact_tables(model, placement, plans, rows, code.friction, code.normal)
+    judged = _judged(model, placement)
+    table = MarkerTable(placement, rows, judged.length)
+    rigid = rigid_slots(model, plans, contacts.pairs, contacts.graphics, table)
+    acts = acting(
+        model,
+        table,
+        a.BODY_SIZE * len(placement.bodies) + contacts.carried,
+        code.subroutines,
+        code.looks,
+        residuals=code.residuals,
+        rigid_slots=rigid,
     )
-    mechanism, states, pulled = rows.mechanism, rows.states, rows.pulls
-    nj, nf, nz = len(mechanism.elements), len(rows.applied_ids), len(states.program)
-    nu = len(rows.applied.late)
-    damps = nf > 0 or any((pull.program >= 0).any() for pull in pulled)
-    accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
-    kept = int(np.count_nonzero(accumulators >= 0)) + max(1, len(contact_ids))
-    y0 = _initial_y(placement, carried + nz + kept)
-    y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
-    held = rows.residuals or _no_residuals()
-    if residuals:
-        from mbsim.compile_model.force_elements import fill_scales
-
-        fill_scales(held, states, load, length)
-        y0[held.place[held.place >= 0]] = held.initial[held.place >= 0]
-    markers, angles = table.arrays()
-    instructions = rows.programs.arrays(mechanism.elements, rows.applied_ids, contact_ids)
-    if any(s.analysis_type == "STATIC" for s in model.simulations):
-        # the last number is TIME where it stands still
-        instructions = instructions._replace(number=np.append(instructions.number, 0.0))
-
-    looked = len(y0) if has_modes(model) else 0
-    scene = a.Scene(
-        bodies=_bodies(placement),
-        graphics=graphics,
-        kinds=kinds_table(kinds, contact_row),
-        pairs=pairs,
-        broadphase=broadphase_table(
-            plans, kinds, graphic_row, graphics, shapes, contact_row, len(pairs.slot), ns, most
-        ),
-        contacts=contacts,
-        slots=a.Slots(slot_pair, x, z),
-        markers=markers,
-        angles=angles,
-        programs=instructions,
-        states=states,
-        sensors=rows.sensors,
-        switching=rows.switching,
-        users=_users(subroutines, len(y0) if rubs else 0, model, residuals),
-        residuals=held,
-        applied=rows.applied,
-        tree=mechanism.tree,
-        equations=mechanism.equations,
-        connections=mechanism.connections,
-        world=a.World(
-            pulled[0].constant.copy(),
-            np.array([pulled[0].program, *(pull.program for pull in pulled)]),
-            _scales(groups, length, speed),
-            np.zeros(len(Hook), dtype=np.int64),
-            np.zeros(1, dtype=np.int64),
-            np.zeros(1, dtype=np.int64),
-            accumulators,
-        ),
-        scales=a.Scales(
-            np.array(groups.of_body, dtype=np.int64),
-            np.array(groups.length),
-            np.array(groups.speed),
-            np.array(groups.mass),
-            np.array(groups.of_contact, dtype=np.int64),
-            np.array(groups.gyration, dtype=np.float64),
-        ),
-        state=start_state(
-            nb,
-            len(graphic_ids),
-            ns,
-            table.start_angles(),
-            len(rows.sensors.id),
-            len(rows.switching.program),
-            most,
-            nf,
-            (len(held.id), 2, len(held.given)),
-            len(groups.length),
-        ),
-        log=empty_log(len(contact_ids)),
-        audit=audit(
-            contact_list,
-            set(user),
-            np.array(groups.of_body, dtype=np.int64),
-            (mechanism.connections, mechanism.equations, rows.applied, markers),
-            any((pull.program >= 0).any() for pull in pulled),
-        ),
-        work=scratch(
-            nb,
-            graphics,
-            len(pairs.slot),
-            ns,
-            len(contact_ids),
-            nf,
-            nj,
-            nu,
-            most,
-            looked,
-            len(y0) if looked and contacts.carried.any() else 0,
-            int((pairs.last - pairs.slot).max(initial=0)) if held else 0,
-            len(groups.length),
-        ),
-        sweep=sweep(mechanism),
-        rows=empty_rows(
-            len(y0),
-            nb,
-            len(contact_ids),
-            ns,
-            nj,
-            nf,
-            len(rows.values),
-            len(rows.sensors.id) + len(model.dry_frictions),
-            most,
-            region=a.INC_REGION if any(kind.region for kind in kinds) else 0,
-        ),
-    )
-    if posts:
-        # one row at a time: CONTACTPOST sees which graphics a slot serves at that time
-        scene = scene._replace(rows=scene.rows._replace(time=np.zeros(1)))
-    if rows.reader is not None:
-        rows.reader.open(scene)
-    needs_fcl = any(not kind.closed_form for kind in kinds)
+    scene, y0 = _scene(model, placement, plans, code, contacts, judged, table, acts)
+    if acts.reader is not None:
+        acts.reader.open(scene)
     return System(
         model,
         placement,
         scene,
         y0,
-        body_ids,
-        graphic_ids,
-        contact_ids,
+        list(placement.bodies),
+        list(contacts.graphic_row),
+        list(contacts.contact_row),
         plans,
-        user,
-        needs_fcl,
-        mechanism.elements,
-        rows.applied_ids,
+        code.friction,
+        any(not kind.closed_form for kind in plans.kinds),
+        acts.mechanism.elements,
+        acts.applied_ids,
         table.rows,
-        rows.values,
-        mechanism.names,
-        subroutines,
-        pulled,
-        rows.reader,
-        normal,
-        posts,
-        load=load,
-        residuals=residuals,
+        acts.values,
+        acts.mechanism.names,
+        code.subroutines,
+        acts.pulls,
+        acts.reader,
+        code.normal,
+        code.posts,
+        load=judged.load,
+        residuals=code.residuals,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
+from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement
 
@@ -297,3 +299,88 @@ def contacts_table(
         rigid=np.array([c.rigid for c in contacts], dtype=np.int64),
     )
     return made, uses_x
+
+
+def slots_table(
+    plans: Plans,
+    pairs: a.Pairs,
+    laws: a.Contacts,
+    uses_x: np.ndarray[Any, Any],
+    rows: dict[int, int],
+    first: int,
+) -> tuple[a.Slots, int]:
+    """Return the slots, and how many numbers of y their laws carry, from `first` on.
+
+    X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them;
+    `rows` is the contact row by id.
+    """
+    ns = int(pairs.last[-1]) if len(pairs.last) else 0
+    wide = np.zeros((ns, 2), dtype=np.int64)
+    each = np.column_stack([3 * uses_x, laws.carried])
+    for k, plan in enumerate(plans.pairs):
+        # of one region the first row alone is an incident
+        end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
+        wide[pairs.slot[k] : end] = each[rows[plan.kind.contact]]
+    for contact_set in plans.broadphase:
+        places = wide[pairs.slot[len(plans.pairs)] :]
+        places[...] = np.maximum(places, each[rows[contact_set.contact]])
+    begins = first + np.concatenate([[0], np.cumsum(wide.ravel())])
+    x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
+    slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
+    return a.Slots(slot_pair, x, z), int(begins[-1]) - first
+
+
+@dataclass(frozen=True)
+class ContactTables:
+    """Contacts as tables, but for how pairs are tested, which is compiled."""
+
+    listed: list[Contact]  # with their radii
+    graphic_row: dict[int, int]  # by id, of those that are in a contact
+    contact_row: dict[int, int]  # by id
+    graphics: a.Graphics
+    pairs: a.Pairs
+    broadphase: a.Broadphase
+    laws: a.Contacts
+    slots: a.Slots
+    carried: int  # numbers of y that laws carry, behind the bodies
+
+    @property
+    def memory(self) -> int:
+        """Most numbers that a law remembers."""
+        return int(self.laws.memory.max(initial=0))
+
+
+def contact_tables(
+    model: Model,
+    placement: Placement,
+    plans: Plans,
+    body_row: dict[int, int],
+    user: dict[int, UserFriction],
+    user_normal: Mapping[int, UserNormal],
+) -> ContactTables:
+    """Return contacts, their graphics and pairs as tables."""
+    listed = [g for plan in plans.pairs for g in (plan.graphic_i, plan.graphic_j)]
+    crowded = [g for contact_set in plans.broadphase for g in (*contact_set.i, *contact_set.j)]
+    graphic_row = {id: k for k, id in enumerate(dict.fromkeys([*listed, *crowded]))}
+    shapes = sorted({shape_class(model.graphics[g]) for g in graphic_row})
+    contacts = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
+    contact_row = {contact.id: k for k, contact in enumerate(contacts)}
+    graphics = graphics_table(model, placement, list(graphic_row), body_row, shapes)
+    pairs, ns = pairs_table(plans, plans.kinds, graphic_row)
+    laws, uses_x = contacts_table(contacts, user, user_normal)
+    first = a.BODY_SIZE * len(placement.bodies)
+    slots, carried = slots_table(plans, pairs, laws, uses_x, contact_row, first)
+    broadphase = broadphase_table(
+        plans,
+        plans.kinds,
+        graphic_row,
+        graphics,
+        shapes,
+        contact_row,
+        len(pairs.slot),
+        ns,
+        int(laws.memory.max(initial=0)),
+    )
+    return ContactTables(
+        contacts, graphic_row, contact_row, graphics, pairs, broadphase, laws, slots, carried
+    )

@@ -8,8 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbsim.arrays import scene as a
-from mbsim.model.elements import Array
+from mbsim.model.elements import Array, Model
 from mbsim.model.placement import Placement
+
+
+def body_rows(model: Model, placement: Placement) -> dict[int, int]:
+    """Return the row of every body by id, that of ground being the number of moving bodies."""
+    rows = {body.id: len(placement.bodies) for body in model.bodies.values()}
+    rows.update({id: k for k, id in enumerate(placement.bodies)})
+    return rows
 
 
 @dataclass

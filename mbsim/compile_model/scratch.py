@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,23 +16,39 @@ EVENTS = 1024
 INCIDENTS = 100_000
 
 
+@dataclass(frozen=True)
+class Sizes:
+    """How many there are of what tables hold."""
+
+    y: int
+    bodies: int  # moving ones
+    pairs: int
+    slots: int
+    contacts: int
+    connections: int
+    forces: int
+    late: int  # forces that depend on reactions
+    sensors: int
+    dry_frictions: int
+    switching: int  # programs with branches
+    values: int  # columns of requests
+    memory: int  # most numbers that a law of a contact remembers
+    looked: int  # numbers of y where modes are told apart, else 0
+    ahead: int  # numbers of y where rates of normal forces are looked for, else 0
+    points: int  # most candidates of a pair where friction of contacts is rigid, else 0
+    groups: int  # of connected bodies
+    region: int  # columns of an incident for many points
+
+
 def start_state(
-    nb: int,
-    ng: int,
-    ns: int,
-    angle: np.ndarray[Any, Any],
-    sensors: int = 0,
-    switching: int = 0,
-    memory: int = 0,
-    forces: int = 0,
-    residual: tuple[int, int, int] = (0, 2, 0),
-    groups: int = 1,
+    n: Sizes, graphics: a.Graphics, angle: np.ndarray[Any, Any], residuals: a.Residuals
 ) -> a.State:
     """Return the incident table before anything touched."""
-    dry = np.zeros((forces, 4))
+    nb, ng, ns, memory = n.bodies, len(graphics.body), n.slots, n.memory
+    dry = np.zeros((n.forces, 4))
     # dry friction begins without force where the first committed state is
     dry[:, [a.SLIDER, a.SLIDER_BEFORE]] = np.nan
-    sensed = np.zeros((sensors, 5))
+    sensed = np.zeros((n.sensors, 5))
     sensed[:, a.EXCESS] = np.nan
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
@@ -53,12 +70,12 @@ def start_state(
         mode=np.zeros(ns),
         hit=np.zeros(ns + 1, dtype=np.int64),
         sensed=sensed,
-        sides=np.zeros((switching, 2)),
+        sides=np.zeros((n.switching, 2)),
         frozen=np.zeros(1, dtype=np.int64),
         dry=dry,
         # no time: nothing is remembered yet
-        residual=np.full(residual, np.nan),
-        fastest=np.zeros(groups),
+        residual=np.full((len(residuals.id), 2, len(residuals.given)), np.nan),
+        fastest=np.zeros(n.groups),
         chattering=np.zeros(2),
     )
 
@@ -88,26 +105,9 @@ def place_fixed(work: a.Work, graphics: a.Graphics) -> None:
     work.speed[fixed] = 0.0
 
 
-def scratch(
-    nb: int,
-    graphics: a.Graphics,
-    np_: int,
-    ns: int,
-    nc: int,
-    nf: int,
-    nj: int,
-    nu: int,
-    memory: int,
-    looked: int,
-    ahead: int,
-    points: int = 0,
-    groups: int = 1,
-) -> a.Work:
-    """Return scratch, with what stands still in its place.
-
-    `ahead`: numbers of y where rates of normal forces are looked for, else 0; `points`: most
-    candidates of a pair where friction of contacts is rigid, else 0.
-    """
+def scratch(n: Sizes, graphics: a.Graphics) -> a.Work:
+    """Return scratch, with what stands still in its place."""
+    nb, ns, nf, memory, points = n.bodies, n.slots, n.forces, n.memory, n.points
     ng = len(graphics.body)
     work = a.Work(
         R=np.full((nb + 1, 3, 3), np.nan),
@@ -125,15 +125,15 @@ def scratch(
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, a.SLOT_COLUMNS)),
         memory=np.zeros((ns, memory)),
-        kept=np.zeros((ns if ahead else 0, 3 + memory)),
+        kept=np.zeros((ns if n.ahead else 0, 3 + memory)),
         grip=np.zeros((ns, 4)),
-        fcl=np.zeros(max(1, np_), dtype=np.int64),
-        net=np.zeros((nc, 3)),
+        fcl=np.zeros(max(1, n.pairs), dtype=np.int64),
+        net=np.zeros((n.contacts, 3)),
         block=np.zeros((nb, 20)),
         bound=np.zeros(2),
         best=np.zeros(4),
-        idle=np.zeros(looked),
-        ahead=np.zeros((2 if ahead else 0, ahead)),
+        idle=np.zeros(n.looked),
+        ahead=np.zeros((2 if n.ahead else 0, n.ahead)),
         law_in=np.zeros(abi.FRICTION_INPUTS + memory),
         law_out=np.zeros(abi.MEMORY_OUT + 2 * memory),
         applied=np.zeros((nf, 8)),
@@ -141,10 +141,10 @@ def scratch(
         wrench=np.zeros(8),
         slopes=np.zeros((12, 6)),
         rub=np.zeros((nf, 9)),
-        late=np.zeros((nu, 5)),
-        secant=np.zeros((nu, nu)),
-        reaction=np.zeros(6 * nj),
-        squares=np.full(groups, np.nan),
+        late=np.zeros((n.late, 5)),
+        secant=np.zeros((n.late, n.late)),
+        reaction=np.zeros(6 * n.connections),
+        squares=np.full(n.groups, np.nan),
         trouble=np.full(2, -1, dtype=np.int64),
         hold=np.zeros((ns if points else 0, 15)),
         held=np.zeros((ns if points else 0, 2)),
@@ -154,30 +154,23 @@ def scratch(
     return work
 
 
-def empty_rows(
-    n: int,
-    nb: int,
-    nc: int,
-    ns: int,
-    nj: int,
-    nf: int,
-    values: int,
-    sensors: int = 0,
-    memory: int = 0,
-    region: int = 0,
-) -> a.Rows:
+def empty_rows(n: Sizes) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
+    ns = n.slots
+    events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.dry_frictions
     return a.Rows(
         time=np.zeros(ROWS),
-        y=np.zeros((ROWS, n)),
-        accel=np.zeros((ROWS, 6 * nb)),
-        contact=np.zeros((ROWS, a.CONTACT_COLUMNS * nc)),
+        y=np.zeros((ROWS, n.y)),
+        accel=np.zeros((ROWS, 6 * n.bodies)),
+        contact=np.zeros((ROWS, a.CONTACT_COLUMNS * n.contacts)),
         energy=np.zeros((ROWS, 4)),
-        joint=np.zeros((ROWS, 6 * nj)),
-        applied=np.zeros((ROWS, 6 * nf)),
-        value=np.zeros((ROWS, values)),
+        joint=np.zeros((ROWS, 6 * n.connections)),
+        applied=np.zeros((ROWS, 6 * n.forces)),
+        value=np.zeros((ROWS, n.values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
-        incidents=np.zeros((min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + memory + region)),
-        events=np.zeros((min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + sensors, 4)),
+        incidents=np.zeros(
+            (min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + n.memory + n.region)
+        ),
+        events=np.zeros((events, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

@@ -147,8 +147,8 @@ TABLE_OVER = 8
 WATCH_EVERY = 5000
 
 # what `switching` is asked: whether sides differ, to keep them too, that a step was taken, loads;
-# and of friction that follows a way in closed form: whether that bends, then two halves of a step;
-# whether a side may have changed twice
+# and of friction that follows a way in closed form: whether that bends, then two halves of the
+# step; whether a side may have changed twice
 ASK, SETTLE, PASS, LOAD, BENDS, HALF, HALVES, HIDES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 
 # reasons given to `reject`

@@ -12,8 +12,6 @@ from mbsim.core.address import call_float, call_int
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
-    ASK,
-    BENDS,
     BY_CHECK,
     BY_ERROR,
     BY_NEWTON,
@@ -21,11 +19,7 @@ from mbsim.core.problem import (
     CHANGES_OVER,
     DONE,
     FAILED,
-    HALF,
-    HALVES,
     HAPPENED,
-    HIDES,
-    LOAD,
     PASS,
     PAUSED,
     ROWS_FULL,
@@ -37,6 +31,8 @@ from mbsim.core.problem import (
     WATCH_EVERY,
     Taken,
 )
+from mbsim.integrators.attempt import LOCATED, attempt_to_event
+from mbsim.integrators.branches import ask_switching
 from mbsim.integrators.changing import changes_over
 from mbsim.integrators.control import (
     HOLD,
@@ -80,18 +76,14 @@ from mbsim.integrators.scheme import (
     RETRY,
     ROW,
     ROW_ENDS,
-    SHOWN,
     STALE,
     STEP,
     STEPS,
-    STIFFNESS,
-    SWITCH_CUT,
     TIME,
     TOL,
     VAIN,
     WAS_CUT,
     WATCH,
-    answer_of,
     failure_or,
     in_workspace,
     interpolate,
@@ -99,37 +91,8 @@ from mbsim.integrators.scheme import (
     project,
 )
 
-#: An event is located to so much of the problem's own time, or of the time where that is larger.
-LOCATED = 1e-11
-#: A step is looked into for events at so many points, and at one more for each row within it,
-#: up to so many.
-LOOKS, MOST_LOOKS = 4, 64
-#: At so many parts of a step for a side that is left and come back to: near the end of a touch what
-#: holds slips for a moment, a small part of a step of a high order.
-LOOKS_FOR_HIDDEN = 16
-#: So often at most a step is taken again to end at its first event.
-MOST_RETAKES = 40
-
-#: Switches so near to an end of a step, as a part of it, are as good as at the end: what a switch
-#: makes wrong grows with the square of what is left of the step behind it, a jump's with that
-#: itself.
-NEAR_SWITCH = 1e-4
-#: The same where what goes on is another motion, which begins there: friction that sticks or slips.
-NEAR_CHANGE = 1e-9
-#: So much farther behind a switch ends a step after two that were cut there in vain, up to the
-#: whole of it: bodies do not move at all in a very short one, for positions have no more digits,
-#: and then no side changes.
-FARTHER = 10.0
-#: The same over the smallest step: one that ends there may be rejected and tried shorter.
-NEAR_FLOORS = 100.0
-#: So often at most a step is taken again to end at a switch.
-MOST_CUTS = 3
 #: Where steps are cut one after another, whole ones grow so much at most.
 CUT_GROW = 2.0
-#: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol),
-#: and how often a step is shortened for that.
-BENT, MOST_SHORT = 2.0, 20
-
 #: A hook that fails is tried again at a tenth of the step, so many times; one whose numbers are
 #: not finite may be so for a trial far out of reach.
 MOST_FAILURES, MOST_NOT_FINITE = 5, 20
@@ -169,18 +132,6 @@ def stable(p, m, t, h_max):
 def bound_is_due(m):
     """Return whether the stability bound is to be found anew."""
     return m.counts[STEPS] % STABLE_EVERY == 0 or m.memory[STALE] == 1.0
-
-
-@jitable
-def ask_switching(p, m, t, what, y, b):
-    """Return what the hook `switching` answers; 0 where it failed, which is noted."""
-    return answer_of(m, call_int(p.switching, (p.context, t, what, y, b)))
-
-
-@jitable
-def load_of(p, m, t, y):
-    """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
-    return m.error[0] if ask_switching(p, m, t, LOAD, y, m.error) == 1 else -1.0
 
 
 @jitable
@@ -285,103 +236,6 @@ def arrive_at(m, t, h, bounded, t_end):
 
 
 @jitable
-def output_within(m, times, t):
-    """Return whether an output is due up to time t."""
-    return m.counts[NEXT_OUTPUT] < len(times) and times[m.counts[NEXT_OUTPUT]] <= t
-
-
-@jitable
-def looks_within(m, times, t):
-    """Return at how many points a step to time t is looked into for events."""
-    looks, row = LOOKS, m.counts[NEXT_OUTPUT]
-    while looks < MOST_LOOKS and row < len(times) and times[row] < t:
-        looks += 1
-        row += 1
-    return looks
-
-
-@jitable
-def happens_at(p, m, t, h, s):
-    """Return whether an event has happened by the part s of the step, its end being m.trial."""
-    if s == 1.0:
-        return answer_of(m, call_int(p.happens, (p.context, t + h, 0.0, m.trial, m.error))) == 1
-    interpolate(m, s, m.error)
-    return answer_of(m, call_int(p.happens, (p.context, t + s * h, 0.0, m.error, m.error))) == 1
-
-
-@jitable
-def first_event(p, m, t, h, times):
-    """Return the length of the fitted step up to just behind its first event, 2 h for none.
-
-    Bisection on whether it has happened, to the last digit of the time. The problem is left
-    evaluated at another point.
-    """
-    looks, low, high = looks_within(m, times, t + h), 0.0, 2.0
-    for k in range(1, looks + 1):
-        s = k / looks if k < looks else 1.0
-        if happens_at(p, m, t, h, s):
-            high = s
-            break
-        low = s
-    if high > 1.0:
-        return 2.0 * h
-    for _ in range(100):
-        middle = 0.5 * (low + high)
-        if t + middle * h <= t + low * h or t + middle * h >= t + high * h:
-            break
-        if happens_at(p, m, t, h, middle):
-            high = middle
-        else:
-            low = middle
-    return high * h
-
-
-@jitable
-def side_at(p, m, t, h, s, what):
-    """Return whether a force is on another branch at the part s of the fitted step.
-
-    Sides are those just behind the step's begin: before that only what is found exactly counts.
-    """
-    interpolate(m, s, m.error)
-    differs = ask_switching(p, m, t + s * h, what, m.error, m.error)
-    return differs > (0 if s >= NEAR_SWITCH else 1)
-
-
-@jitable
-def first_switch(p, m, t, h, whole, behind):
-    """Return the length of the fitted step up to its first switch that matters, h for none.
-
-    `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
-    at which a side differs. The problem is left evaluated at the trial point.
-    """
-    farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
-    low, high, near = NEAR_SWITCH, behind, NEAR_SWITCH * farther
-    if near >= behind:
-        return h
-    side_at(p, m, t, h, low, SETTLE)
-    if behind < 1.0:
-        interpolate(m, behind, m.error)
-        differs = ask_switching(p, m, t + behind * h, ASK, m.error, m.error)
-    else:
-        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
-    if differs > 1:
-        # it is told from what was committed, however near that is
-        # a part of the whole step: where it lies at the very begin, as behind another, a step
-        # that is cut again and again would get too short to reach it
-        low, near = 0.0, NEAR_CHANGE * whole / h * farther
-    if differs > 0:
-        while high - low > 0.1 * near:
-            middle = 0.5 * (low + high)
-            if side_at(p, m, t, h, middle, ASK):
-                high = middle
-            else:
-                low = middle
-    ask_switching(p, m, t + h, ASK, m.trial, m.error)
-    # a little more, so that the step after it begins on the other side
-    return h if high > 1.0 - near else (high + 0.5 * near) * h
-
-
-@jitable
 def outputs(p, m, steps, times):
     """Write a row for every output time within the last step; return 0, FULL, or less a code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
@@ -402,163 +256,6 @@ def outputs(p, m, steps, times):
         if code != 0 or full != 0:
             return -code if code != 0 else full
     return 0
-
-
-@jitable
-def load_at(p, m, t, h, s):
-    """Return the load of what holds at the part s of the fitted step."""
-    interpolate(m, s, m.error)
-    return load_of(p, m, t + s * h, m.error)
-
-
-@jitable
-def horizon_of(p, m, t, h, begin):
-    """Return the part of the fitted step over which the load of what holds is known, 1 for all.
-
-    What holds does not move, so that the method's error says nothing of its load: that is to go
-    straight from `begin` to the trial point but for BENT sqrt(tol) of the limit, so that it cannot
-    pass the limit and come back unseen. What passes it there is cut off. The problem is left
-    evaluated at the trial point.
-    """
-    end = load_of(p, m, t + h, m.trial)
-    bent, passed = 0.0, 1.0
-    for k in range(3, 0, -1):
-        s = 0.25 * k
-        load = load_at(p, m, t, h, s)
-        bent = max(bent, abs(load - (1.0 - s) * begin - s * end))
-        if load > 1.0:
-            passed = s
-    load_of(p, m, t + h, m.trial)
-    allowed = BENT * math.sqrt(m.memory[TOL])
-    if passed < 1.0 or bent <= allowed:
-        return passed
-    return max(0.1, 0.9 * math.sqrt(allowed / bent))
-
-
-@jitable
-def way_error(p, m, t, h):
-    """Return the error, over tol, of friction that follows the way of the fitted step in one.
-
-    Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
-    stages tells how far that is off: two halves of the step do. What they make of it is kept.
-    """
-    interpolate(m, 0.5, m.error)
-    ask_switching(p, m, t + 0.5 * h, HALF, m.error, m.error)
-    ask_switching(p, m, t + h, HALVES, m.trial, m.error)
-    return m.error[0] / m.memory[TOL]
-
-
-@jitable
-def hidden_side(p, m, t, h):
-    """Return a part of the fitted step at which a side differs that does not at its end, else 0.
-
-    The problem is left evaluated at the trial point.
-    """
-    part = 0.0
-    for k in range(1, LOOKS_FOR_HIDDEN):
-        if part == 0.0 and side_at(p, m, t, h, k / LOOKS_FOR_HIDDEN, ASK):
-            part = k / LOOKS_FOR_HIDDEN
-    ask_switching(p, m, t + h, ASK, m.trial, m.error)
-    return part
-
-
-@jitable
-def attempt(p, m, steps, t, h, times):
-    """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
-
-    And a part of it at which a force is on another branch, 0 for none, and what `horizon_of`
-    allows.
-
-    A step that fails is not checked. The dense output of one that will be taken is fitted
-    before the problem is committed, while its hooks still know the step's begin. Single impacts
-    are not guarded, nor their peaks looked for, by a method whose step is the problem's bound.
-    """
-    code = failure_or(m, call_int(steps.attempt, (steps.context, t, h, m.y, m.trial)))
-    if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code, 1.0, -1.0, 0.0, 1.0
-    asked, switched, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
-    # one that ends before a switch at the end is taken for the end
-    until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
-    if steps.order > 0.0:
-        part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
-        if part < 1.0:
-            return 0, part, -1.0, 0.0, 1.0
-        asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-    if p.switching != 0:
-        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
-        switched = 1.0 if differs > 0 else 0.0
-        if switched == 0.0:
-            hides = ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0
-            bends = ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0
-            begin = load_of(p, m, t, m.y)
-    looks = switched > 0.0 or hides or bends or begin >= 0.0
-    # a peak is looked for in every step of what trembles at its bound of stability: not shown
-    shown = output_within(m, times, until)
-    m.memory[SHOWN] = 1.0 if shown else 0.0
-    if asked >= 0.0 or shown or looks or p.happens != 0:
-        code = call_int(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
-    if begin >= 0.0 and code == 0:
-        reach = horizon_of(p, m, t, h, begin)
-    if hides and code == 0:
-        switched = hidden_side(p, m, t, h)
-    if bends and code == 0 and switched == 0.0:
-        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
-    return code, 1.0, asked, switched, reach
-
-
-@jitable
-def attempt_to_event(p, m, steps, t, h, times, floor):
-    """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
-
-    And the error of the step before it was made shorter.
-
-    A step with a switch ends just behind it, so that none has one in its midst.
-    A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
-    the state there is no interpolated one; where that ends before the event after all, it is
-    tried a little longer.
-    """
-    near = LOCATED * max(m.memory[OWN_TIME], abs(t))
-    nudge = 1e-3 * near
-    shortened, retakes, cuts, short = False, 0, 0, 0
-    whole = max(h, m.memory[CUT_FROM], NEAR_FLOORS / NEAR_CHANGE * floor)
-    uncut, stiffness = -1.0, 0.0
-    # `attempt` is named once: each place where it is called is compiled anew
-    while True:
-        code, part, asked, switched, reach = attempt(p, m, steps, t, h, times)
-        failed = code != 0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
-        if uncut < 0.0:
-            uncut, stiffness = m.memory[LAST_ERROR], m.memory[STIFFNESS]
-        # whether stability bounds a step is asked of what it would be without the event
-        m.memory[STIFFNESS] = stiffness
-        if switched > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
-            cuts += 1
-            cut = first_switch(p, m, t, h, whole, switched)
-            if floor < cut < h:
-                h = cut
-                continue
-        if reach < 1.0 and not failed and short < MOST_SHORT and not shortened:
-            short += 1
-            if reach * h > floor:
-                h *= reach
-                continue
-        m.memory[SWITCH_CUT] = 1.0 if cuts > 0 else 0.0
-        if p.happens == 0 or failed:
-            return failure_or(m, code), part, asked, h, uncut
-        cut = first_event(p, m, t, h, times)
-        before = cut > h
-        good = (not shortened or nudge > near) if before else (h - cut <= near or h <= floor)
-        if good or retakes == MOST_RETAKES:
-            break
-        retakes += 1
-        if before:
-            h += nudge
-            nudge *= 2.0
-        else:
-            h = max(cut, floor)
-            shortened = True
-    # the problem's hooks expect its last evaluation at the trial point
-    happens_at(p, m, t, h, 1.0)
-    return failure_or(m, code), part, asked, h, uncut
 
 
 @jitable

@@ -88,7 +88,7 @@ class Scene:
 
     def solve(self, h, base, start=0.0):
         """Return code, f and f' of the solution."""
-        from mbsim.dynamics.forces import force_element as residual
+        from mbsim.dynamics.forces import residual_solver as residual
 
         R, n = self.residuals, len(self.residuals.z)
         R.base[:], R.start[:] = base, start

@@ -1,7 +1,7 @@
 """How friction in joints changes with displacements and velocities: more of K and D.
 
-Apart from `stiffness`, so that only scenes that have them compile them. The reactions that press
-friction are taken as they are.
+Apart from `applied_slopes`, so that only scenes that have them compile them. The reactions that
+press friction are taken as they are.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velo
 from mbsim.dynamics.expressions.measures import unit
 from mbsim.dynamics.forces.joint_friction import FORCE, RADIUS, SPEED, ask_law
 from mbsim.dynamics.linearization.stiffness import (
+    PART,
+    PART_OF_SPEED,
     add_axis_rate,
     add_geometry,
     add_rate_by_pose,
@@ -21,15 +23,12 @@ from mbsim.dynamics.linearization.stiffness import (
     sides_of,
 )
 
-#: Differences of slip as parts of it and of the model's speed.
-_PART, _PART_OF_SPEED = 1e-6, 1e-8
-
 
 @jitable
 def rub_slopes(scene, t, f):
     """Return slip speed s, dF/ds and F/s of friction f in a joint, its normal force as it is."""
     row = scene.work.rub[f]
-    s, kept = row[SPEED], _PART * row[SPEED] + _PART_OF_SPEED * scene.world.scale[1]
+    s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[1]
     low, high = max(s - kept, 0.0), s + kept
     row[SPEED] = low
     before = ask_law(scene, t, f)

@@ -13,11 +13,9 @@ from __future__ import annotations
 from mbsim.arrays.scene import RESIDUAL
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
-from mbsim.dynamics.forces.force_element import (
-    BEFORE,
-    NOW,
+from mbsim.dynamics.forces.force_element import BEFORE, NOW, SHORT, find_unknowns, step_of, switches
+from mbsim.dynamics.forces.residual_solver import (
     PART,
-    SHORT,
     ask,
     axes_of,
     back,
@@ -25,10 +23,7 @@ from mbsim.dynamics.forces.force_element import (
     factor,
     fill_matrix,
     find_slopes,
-    find_unknowns,
     own_time,
-    step_of,
-    switches,
     unknowns_of,
 )
 from mbsim.dynamics.linearization.stiffness import add_geometry, add_two_sided, lever, sides_of

@@ -1,7 +1,8 @@
 """How marker forces change with displacements and velocities: more of K and D.
 
-Apart from `stiffness`, so that only scenes that have them compile them. A kind's own slopes are by
-what I does as seen from J, along J's axes (`forces.catalog`); that these axes turn is added here.
+Apart from `applied_slopes`, so that only scenes that have them compile them. A kind's own slopes
+are by what I does as seen from J, along J's axes (`forces.catalog`); that these axes turn is added
+here.
 """
 
 from __future__ import annotations

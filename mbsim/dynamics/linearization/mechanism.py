@@ -26,6 +26,7 @@ from mbsim.dynamics.constraints.equations import fill_equation, side_place
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import child_axis, origin, parent_axis
+from mbsim.dynamics.linearization.applied_slopes import couple_applied
 from mbsim.dynamics.linearization.blocks import (
     COUPLINGS,
     STALE,
@@ -34,12 +35,8 @@ from mbsim.dynamics.linearization.blocks import (
     find_order,
     forget_pattern,
 )
-from mbsim.dynamics.linearization.stiffness import (
-    add_contacts_slopes,
-    couple_applied,
-    couple_contacts,
-    pushed,
-)
+from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
+from mbsim.dynamics.linearization.expression_slopes import pushed
 
 #: Differences for the gradients of equations.
 _PUSH = 1e-7

@@ -3,7 +3,7 @@
 What the integrator carries for a slot, zeta = (X, memory), follows from u = (slip, spin) and N, and
 the force of friction from all three:
 
-    d zeta' = A zeta + B (du, dN)          dF = C d zeta + (what `stiffness` adds of du and dN)
+    d zeta' = A zeta + B (du, dN)          dF = C d zeta + (what `contact_slopes` adds of du and dN)
 
 The methods ask for c3 d zeta - d zeta' = r, so that with Z = (c3 - A)^-1
 
@@ -22,8 +22,8 @@ from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub
 from mbsim.dynamics.contact.forces import contact_of, in_marker, sides
+from mbsim.dynamics.linearization.contact_slopes import ask_friction
 from mbsim.dynamics.linearization.newton_matrix import times_rate
-from mbsim.dynamics.linearization.stiffness import ask_friction
 from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT
 
 #: Differences of X, as a part of the model's length, and of memory, as a part of its size.

@@ -14,7 +14,7 @@ from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, sid
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
-from mbsim.dynamics.linearization.stiffness import keep_spin, pushed
+from mbsim.dynamics.linearization.expression_slopes import keep_spin, pushed
 
 #: Differences of poses [part of the length, rad] and of velocities (likewise, a time).
 _PUSH = 1e-7

@@ -8,10 +8,11 @@ from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
+from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
 from mbsim.dynamics.linearization.element_slopes import add_all_residual_slopes
+from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
-from mbsim.dynamics.linearization.stiffness import add_applied_slopes, fill_state_slopes
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
 

@@ -16,12 +16,13 @@ from mbsim.compile_model.program_dependence import find_depends
 from mbsim.compile_model.tangent import Tangent, make_tangent
 from mbsim.core.address import pack, vector_at, view
 from mbsim.core.problem import Problem, addresses
+from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
-from mbsim.dynamics.linearization.stiffness import add_applied_slopes, fill_state_slopes
 from mbsim.dynamics.pipeline.hook_table import Method, fill
 
 

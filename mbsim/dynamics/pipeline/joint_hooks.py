@@ -1,4 +1,4 @@
-"""The hook of joints, and what they do where the tree holds all of them, without equations."""
+"""The hook of joints; where the tree holds all of them there are no equations to compile."""
 
 from __future__ import annotations
 

@@ -1,0 +1,322 @@
+"""How contacts change with displacements and velocities: more of K and D.
+
+Incidents are frozen: contact point, normal and tangents stay where they are on the bodies, and X
+and memory as they are. Laws are asked at neighbouring arguments.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.hooks import Hook, Memory
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import add, cross, dot, scale, sub, vector
+from mbsim.dynamics.contact.forces import (
+    FORCE,
+    NORMAL,
+    TILTING,
+    contact_of,
+    face_weight_of,
+    friction,
+    in_marker,
+    patch,
+    sides,
+    velocity_at,
+)
+from mbsim.dynamics.linearization.blocks import couple
+from mbsim.dynamics.linearization.stiffness import PART, PART_OF_SPEED, add_two_sided, lever
+from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
+from mbsim.laws.abi import DFLAG
+from mbsim.laws.catalog import SLIP
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
+from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
+
+#: Row of `basis` with how the force of one incident for many points changes.
+PRESS = 6
+#: Slip, over the model's speed, below which directions of rigid friction converge only as far as
+#: slip does that is so fast: its part across may be as large as there.
+SLOW = 1e-3
+#: Least difference of slip over the usual one: what is slower is at rest.
+AT_REST = 1e-4
+#: Differences of slip that is rigid, as a part of what it was at the committed state.
+_PART_OF_SLIP = 1e-3
+
+
+@jitable
+def contact_bodies(scene, s):
+    """Return the bodies of a slot."""
+    gi, gj = sides(scene, s)
+    return scene.graphics.body[gi], scene.graphics.body[gj]
+
+
+@jitable
+def couple_contacts(scene, P):
+    """Couple the bodies that touch; return whether there is room."""
+    nb, hit = len(scene.bodies.mass), scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        i, j = contact_bodies(scene, hit[k])
+        if i < nb and j < nb and i != j and not couple(P, i, j):
+            return False
+    return True
+
+
+@jitable
+def ask_friction(scene, t, h, y, s, c, around, given):
+    """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
+    loci, locj = around
+    slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
+    scene.work.law_in[DFLAG] = 1.0
+    code = friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
+    scene.work.law_in[DFLAG] = 0.0
+    return code
+
+
+@jitable
+def rigid_slip(scene, s, c):
+    """Return over which slip the friction of slot s turns if it is rigid and slips, else 0."""
+    kept = scene.state.memory[s]
+    if scene.contacts.rigid[c] == 0 or kept[KEPT_MODE] != SLIP:
+        return 0.0
+    return kept[KEPT_SPEED] + math.hypot(kept[KEPT_X], kept[KEPT_Y])
+
+
+@jitable
+def friction_slopes(scene, t, h, y, s, c, around, given, table):
+    """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
+    out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[1]
+    base, code, speed = table[:, 6:11], 0, rigid_slip(scene, s, c)
+    if speed > 0.0:
+        # it turns over a way in velocities as short as itself
+        least = min(least, max(_PART_OF_SLIP * speed, AT_REST * least))
+    for column in range(6):
+        size = PART * abs(given[column])
+        if column < 5:
+            size += least if column < 2 else least / scene.world.scale[0]
+        elif size == 0.0:
+            size = PART
+        kept = given[column]
+        for side in range(2):
+            given[column] = kept + (size if side == 0 else -size)
+            code = ask_friction(scene, t, h, y, s, c, around, given)
+            if code != 0:
+                return code
+            for r in range(5):
+                if side == 0:
+                    base[column, r] = out[r]
+                else:
+                    table[r, column] = (base[column, r] - out[r]) / (2.0 * size)
+        given[column] = kept
+    return 0
+
+
+@jitable
+def damp_tilting(scene, T, y, s):
+    """Add the couple against tilting of `contact.tilting`."""
+    P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
+    i, j = contact_bodies(scene, s)
+    point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
+    numbers = scene.work.points[s + 1]
+    p, (ax, ay) = vector(point[1:4]), plane_axes(vector(point[4:7]))
+    for side in range(2):
+        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
+        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
+    u, v = L.basis[:, 2], L.basis[:, 3]
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], u, v)
+    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], v, u)
+    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
+
+
+@jitable
+def add_region_stiffness(scene, T, y, s, force, by_depth):
+    """Add how the force of one incident for many points changes with depth and tilt.
+
+    With the energy S U(d), d^2 = sum w_i d_i^2 / S of `geometry.region` and g_i the displacement
+    into the other body at point i, its second derivative is
+    F/d sum w_i g_i g_i' + (F' - F/d) / (S d^2) g g' with g = sum w_i d_i g_i. `force` is F,
+    `by_depth` F'; return how the whole force changes where all depths change alike. How it changes
+    with displacements is left in row PRESS of `basis`.
+    """
+    P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    depth, whole, none = rows[s, 0], face_weight_of(scene, s), (0.0, 0.0, 0.0)
+    one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
+    every[:] = press[:] = 0.0
+    weight, moment = 0.0, 0.0
+    first = s + REGION_ROWS
+    for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+        if rows[k, 0] > 0.0:
+            p, n, w = vector(rows[k, 1:4]), vector(rows[k, 4:7]), rows[k, 7]
+            for side in range(2):
+                lever(scene, L, y, i if side == 0 else j, p, n, none, one[side])
+            add_two_sided(P, L.K, nb, i, j, -w * force / depth, one, one)
+            weight += w
+            moment += w * rows[k, 0]
+            for side in range(2):
+                for c in range(6):
+                    every[side, c] += w * rows[k, 0] * one[side, c]
+                    press[side, c] += w * force / depth * one[side, c]
+    rest = (by_depth - force / depth) / (whole * depth * depth)
+    add_two_sided(P, L.K, nb, i, j, -rest, every, every)
+    for side in range(2):
+        for c in range(6):
+            press[side, c] += rest * moment * every[side, c]
+    damp_tilting(scene, T, y, s)
+    return force / depth * weight + rest * moment * moment
+
+
+@jitable
+def add_moves_of_place(scene, T, y, s, by_rate):
+    """Add that friction acts elsewhere, and at another slip, where tilting moves the place.
+
+    The place is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
+    w_i (p_i - p) / sum w_i d_i. Rows 1 to 5 of `basis` are those of friction, `law` its slopes.
+    """
+    P, L, work, nb = T.pattern, T.linear, scene.work, len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
+    p, n, tx = vector(point[1:4]), vector(point[4:7]), vector(work.t[s])
+    ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
+    rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
+    one, moved, first = L.basis[:, 7], L.basis[:, 8], s + REGION_ROWS
+    last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
+    for k in range(first, last):
+        weight += max(0.0, work.points[k, 0]) * work.points[k, 7]
+    for k in range(first, last):
+        row = work.points[k]
+        if row[0] <= 0.0:
+            continue
+        q = sub(vector(row[1:4]), p)
+        faster = cross(w_rel, q)
+        slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
+        torque = cross(q, rub)
+        for side in range(2):
+            b = i if side == 0 else j
+            lever(scene, L, y, b, vector(row[1:4]), vector(row[4:7]), none, one[side])
+            lever(scene, L, y, b, p, scale(by_rate * rate, n), torque, moved[side])
+            for r in range(5):
+                rise = L.law[r, 0] * slip_x + L.law[r, 1] * slip_y + L.law[r, 5] * by_rate * rate
+                for c in range(6):
+                    moved[side, c] += rise * L.basis[side, 1 + r, c]
+        add_two_sided(P, L.K, nb, i, j, -row[7] / weight, moved, one)
+
+
+@jitable
+def normal_slopes(scene, s, c, depth, rate):
+    """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
+    contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, 7]
+    user = contacts.user_normal[c]
+    if user != 0:
+        place = floats_at(user, PLACE)
+        place[MODE], place[AREA] = SLOPES, patch(scene, s)
+    step = PART * depth
+    call = (depth + step, rate, contacts.normal_par[c], out)
+    code = call_int(contacts.normal_law[c], call)
+    upper = out[0]
+    code += call_int(contacts.normal_law[c], (depth - step, rate, contacts.normal_par[c], out))
+    by_depth = share * (upper - out[0]) / (2.0 * step)
+    step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[1]
+    code += call_int(contacts.normal_law[c], (depth, rate + step, contacts.normal_par[c], out))
+    upper = out[0]
+    code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
+    by_rate = share * (upper - out[0]) / (2.0 * step)
+    if user != 0:
+        floats_at(user, PLACE)[MODE] = EXPLORE
+    return code, by_depth, by_rate
+
+
+@jitable
+def add_contact_slopes(scene, T, t, h, y, s):
+    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
+    P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
+    nb, c = len(scene.bodies.mass), contact_of(scene, s)
+    gi, gj = sides(scene, s)
+    i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+    point = work.points[s]
+    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    share, none = point[7], (0.0, 0.0, 0.0)
+    rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
+
+    code, by_depth, by_rate = normal_slopes(scene, s, c, depth, rate)
+    if code != 0:
+        return code
+
+    # depth and its rate are -n . of displacement and velocity
+    normal, region = L.basis, face_weight_of(scene, s) > 0.0
+    if region:
+        slope = by_depth / share
+        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
+    for side in range(2):
+        lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
+    u, v = normal[:, 0], normal[:, 0]
+    if not region:
+        add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
+    add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
+    if contacts.friction_law[c] == 0:
+        return 0
+
+    tx = vector(work.t[s])
+    ty = cross(n, tx)
+    v_rel = sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p))
+    w_rel = sub(vector(work.w[i]), vector(work.w[j]))
+    given = L.rise[0:6]
+    given[0], given[1] = dot(v_rel, tx), dot(v_rel, ty)
+    given[2], given[3], given[4] = dot(w_rel, tx), dot(w_rel, ty), dot(w_rel, n)
+    given[5] = max(work.slot[s, 2], 0.0)
+    around = (none, none)
+    if contacts.framed[c] == 1:
+        half = scale(0.5 * depth, n)
+        around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
+    code = friction_slopes(scene, t, h, y, s, c, around, given, L.law)
+    if code != 0:
+        return code
+    # of rigid friction slopes grow as slip gets slow, and tell nothing where it begins. But errors
+    # of its direction, whichever way, take from what rubs along the slip: what nearly rests creeps
+    counts = 1.0
+    if contacts.rigid[c] == 1:
+        slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
+        counts = min(1.0, slow / (SLOW * scene.world.scale[1]))
+    for k in range(4):
+        work.grip[s, k] = counts * L.law[k // 2, k % 2] / given[5] if given[5] > 0.0 else 0.0
+    for side in range(2):
+        b = i if side == 0 else j
+        rows = L.basis[side]
+        lever(scene, L, y, b, p, tx, none, rows[1])
+        lever(scene, L, y, b, p, ty, none, rows[2])
+        lever(scene, L, y, b, p, none, tx, rows[3])
+        lever(scene, L, y, b, p, none, ty, rows[4])
+        lever(scene, L, y, b, p, none, n, rows[5])
+    for r in range(5):
+        u = L.basis[:, 1 + r]
+        for column in range(5):
+            if L.law[r, column] != 0.0:
+                add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, 1 + column])
+        by_normal = L.law[r, 5]
+        if by_normal != 0.0:
+            if region:
+                add_two_sided(P, L.K, nb, i, j, -by_normal, u, L.basis[:, PRESS])
+            else:
+                add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
+            add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
+    if region:
+        add_moves_of_place(scene, T, y, s, by_rate)
+    if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
+        K = T.keeps
+        count = K.held[len(K.held) - 1]
+        K.held[count], K.press[count, 0], K.press[count, 1] = s, by_depth, by_rate
+        return call_int(scene.world.hooks[Hook.MEMORY], (scene, Memory.FILL, y, y))
+    return 0
+
+
+@jitable
+def add_contacts_slopes(scene, T, t, h, y):
+    """Add what all incidents do; return a code."""
+    hit = scene.work.hit
+    T.keeps.held[len(T.keeps.held) - 1] = 0
+    for k in range(hit[len(hit) - 1]):
+        code = add_contact_slopes(scene, T, t, h, y, hit[k])
+        if code != 0:
+            return code
+    return 0

@@ -1,0 +1,160 @@
+"""How expressions change with bodies and states: exact, or by differences of user subroutines."""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import BODY_SIZE
+from mbsim.compile_model.instructions import USER
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, vector
+from mbsim.dynamics.bodies.kinematics import place_body
+from mbsim.dynamics.expressions.jets import run, value
+from mbsim.dynamics.expressions.slopes import A_STATE, DIRECTIONS, POSES
+from mbsim.dynamics.expressions.subroutines import user_result
+from mbsim.dynamics.linearization.stiffness import PUSH, add_product, sides_of
+
+
+@jitable
+def pushed(scene, y, body, direction, size):
+    """Change one number of pose or velocity of a body in y, where `direction` is as in slopes."""
+    at = BODY_SIZE * body
+    axis = direction % 3
+    if direction < 3:
+        y[at + axis] += size
+    elif direction < POSES:
+        # half a turn of the quaternion, global: q + (0, e) q size/2
+        w, x, yy, z = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
+        half = 0.5 * size
+        if axis == 0:
+            rise = (-x, w, -z, yy)
+        elif axis == 1:
+            rise = (-yy, z, w, -x)
+        else:
+            rise = (-z, -yy, x, w)
+        for k in range(4):
+            y[at + 3 + k] += half * rise[k]
+    elif direction < 9:
+        y[at + 7 + axis] += size
+    else:
+        R = scene.work.R[body]
+        for k in range(3):
+            y[at + 10 + k] += size * R[axis, k]
+    place_body(scene, y, body)
+
+
+@jitable
+def keep_spin(scene, y, body, axis, size):
+    """Change the angular velocity in body axes so that a turn of the body leaves it as it is."""
+    R, at = scene.work.R[body], BODY_SIZE * body + 10
+    w = (y[at], y[at + 1], y[at + 2])
+    change = cross((R[axis, 0], R[axis, 1], R[axis, 2]), w)
+    for k in range(3):
+        y[at + k] -= size * change[k]
+
+
+@jitable
+def value_anew(scene, t, y, program):
+    """Return the value of a program, where a subroutine is called for each of its results."""
+    programs = scene.programs
+    for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
+        code = programs.quick[at]
+        if code[0] == USER and code[2] > 0:
+            # which only reads what a call for the first result has left
+            user_result(scene, t, y, code[1], 0, 0)
+    return value(scene, t, y, program)
+
+
+@jitable
+def program_rise(scene, T, t, y, program, body, row):
+    """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
+
+    Both as spatial vectors about O of the body: angular, linear.
+    """
+    at = BODY_SIZE * body
+    for direction in range(DIRECTIONS):
+        if T.depends.user[program] == 1:
+            size = PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+            if direction >= POSES:
+                size *= scene.world.scale[1] / scene.world.scale[0]
+            before = value_anew(scene, t, y, program)
+            kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
+            speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
+            if 3 <= direction < POSES:
+                keep_spin(scene, y, body, direction - 3, size)
+            pushed(scene, y, body, direction, size)
+            rise = (value_anew(scene, t, y, program) - before) / size
+            for k in range(7):
+                y[at + k] = kept[k]
+            for k in range(6):
+                y[at + 7 + k] = speed[k]
+            place_body(scene, y, body)
+        else:
+            run(scene, t, y, program, body, direction)
+            rise = scene.programs.stack[0, 1]
+        # (linear, angular) to (angular, linear)
+        row[(direction // POSES) * POSES + (direction % POSES + 3) % POSES] = rise
+    r = vector(T.linear.r[body])
+    for part in range(2):
+        first = part * POSES
+        linear = (row[first + 3], row[first + 4], row[first + 5])
+        moment = cross(r, linear)
+        for k in range(3):
+            row[first + k] += moment[k]
+
+
+@jitable
+def add_program_slopes(scene, T, t, y, f, program, u):
+    """Add d(value)/d(bodies and states) times the wrench u of its unit on the bodies of force f."""
+    P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
+    i, j = sides_of(scene, f)
+    for at in range(T.depends.body_start[program], T.depends.body_start[program + 1]):
+        b = T.depends.body[at]
+        program_rise(scene, T, t, y, program, b, L.rise)
+        for side in range(2):
+            a = i if side == 0 else j
+            if a < nb:
+                sign = 1.0 if side == 0 else -1.0
+                add_product(L.K[P.place[a, b]], sign, u[side], L.rise[0:6])
+                add_product(L.D[P.place[a, b]], sign, u[side], L.rise[6:12])
+    first = len(scene.equations.program)
+    for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
+        z = T.depends.state[at]
+        rise = state_rise(scene, T, t, y, program, z)
+        for side in range(2):
+            a = i if side == 0 else j
+            if a < nb:
+                for k in range(6):
+                    L.column[first + z, a, k] += (rise if side == 0 else -rise) * u[side, k]
+
+
+@jitable
+def state_rise(scene, T, t, y, program, z):
+    """Return the derivative of a program by state z."""
+    place = scene.states.place[z]
+    if T.depends.user[program] == 0:
+        run(scene, t, y, program, A_STATE, place)
+        return scene.programs.stack[0, 1]
+    before, kept = value_anew(scene, t, y, program), y[place]
+    size = PUSH * max(abs(kept), scene.states.scale[z])
+    y[place] = kept + size
+    rise = (value_anew(scene, t, y, program) - before) / size
+    y[place] = kept
+    return rise
+
+
+@jitable
+def fill_state_slopes(scene, T, t, y):
+    """Fill how the slopes of the user's own states change with bodies and with each other."""
+    L, first = T.linear, len(scene.equations.program)
+    for z in range(len(scene.states.program)):
+        program = scene.states.program[z]
+        for other in range(len(scene.states.program)):
+            L.slopes[z, other] = 0.0
+        for at in range(T.depends.body_start[program], T.depends.body_start[program + 1]):
+            b = T.depends.body[at]
+            program_rise(scene, T, t, y, program, b, L.rise)
+            for k in range(6):
+                L.row[first + z, b, k] = L.rise[k]
+                L.row_rate[first + z, b, k] = L.rise[6 + k]
+        for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
+            other = T.depends.state[at]
+            L.slopes[z, other] = state_rise(scene, T, t, y, program, other)

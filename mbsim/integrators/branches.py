@@ -1,0 +1,144 @@
+"""Where within a step a force changes its branch, and how far the load of what holds is known.
+
+The problem's hook `switching` tells branches apart (`core.problem`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK, HALF, HALVES, LOAD, SETTLE
+from mbsim.integrators.scheme import TOL, VAIN, answer_of, interpolate
+
+#: At so many parts of a step for a side that is left and come back to: near the end of a touch what
+#: holds slips for a moment, a small part of a step of a high order.
+LOOKS_FOR_HIDDEN = 16
+#: Switches so near to an end of a step, as a part of it, are as good as at the end: what a switch
+#: makes wrong grows with the square of what is left of the step behind it, a jump's with that
+#: itself.
+NEAR_SWITCH = 1e-4
+#: The same where what goes on is another motion, which begins there: friction that sticks or slips.
+NEAR_CHANGE = 1e-9
+#: So much farther behind a switch ends a step after two that were cut there in vain, up to the
+#: whole of it: bodies do not move at all in a very short one, for positions have no more digits,
+#: and then no side changes.
+FARTHER = 10.0
+#: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol).
+BENT = 2.0
+
+
+@jitable
+def ask_switching(p, m, t, what, y, b):
+    """Return what the hook `switching` answers; 0 where it failed, which is noted."""
+    return answer_of(m, call_int(p.switching, (p.context, t, what, y, b)))
+
+
+@jitable
+def load_of(p, m, t, y):
+    """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
+    return m.error[0] if ask_switching(p, m, t, LOAD, y, m.error) == 1 else -1.0
+
+
+@jitable
+def side_at(p, m, t, h, s, what):
+    """Return whether a force is on another branch at the part s of the fitted step.
+
+    Sides are those just behind the step's begin: before that only what is found exactly counts.
+    """
+    interpolate(m, s, m.error)
+    differs = ask_switching(p, m, t + s * h, what, m.error, m.error)
+    return differs > (0 if s >= NEAR_SWITCH else 1)
+
+
+@jitable
+def first_switch(p, m, t, h, whole, behind):
+    """Return the length of the fitted step up to its first switch that matters, h for none.
+
+    `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
+    at which a side differs. The problem is left evaluated at the trial point.
+    """
+    farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
+    low, high, near = NEAR_SWITCH, behind, NEAR_SWITCH * farther
+    if near >= behind:
+        return h
+    side_at(p, m, t, h, low, SETTLE)
+    if behind < 1.0:
+        interpolate(m, behind, m.error)
+        differs = ask_switching(p, m, t + behind * h, ASK, m.error, m.error)
+    else:
+        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
+    if differs > 1:
+        # it is told from what was committed, however near that is
+        # a part of the whole step: where it lies at the very begin, as behind another, a step
+        # that is cut again and again would get too short to reach it
+        low, near = 0.0, NEAR_CHANGE * whole / h * farther
+    if differs > 0:
+        while high - low > 0.1 * near:
+            middle = 0.5 * (low + high)
+            if side_at(p, m, t, h, middle, ASK):
+                high = middle
+            else:
+                low = middle
+    ask_switching(p, m, t + h, ASK, m.trial, m.error)
+    # a little more, so that the step after it begins on the other side
+    return h if high > 1.0 - near else (high + 0.5 * near) * h
+
+
+@jitable
+def load_at(p, m, t, h, s):
+    """Return the load of what holds at the part s of the fitted step."""
+    interpolate(m, s, m.error)
+    return load_of(p, m, t + s * h, m.error)
+
+
+@jitable
+def horizon_of(p, m, t, h, begin):
+    """Return the part of the fitted step over which the load of what holds is known, 1 for all.
+
+    What holds does not move, so that the method's error says nothing of its load: that is to go
+    straight from `begin` to the trial point but for BENT sqrt(tol) of the limit, so that it cannot
+    pass the limit and come back unseen. What passes it there is cut off. The problem is left
+    evaluated at the trial point.
+    """
+    end = load_of(p, m, t + h, m.trial)
+    bent, passed = 0.0, 1.0
+    for k in range(3, 0, -1):
+        s = 0.25 * k
+        load = load_at(p, m, t, h, s)
+        bent = max(bent, abs(load - (1.0 - s) * begin - s * end))
+        if load > 1.0:
+            passed = s
+    load_of(p, m, t + h, m.trial)
+    allowed = BENT * math.sqrt(m.memory[TOL])
+    if passed < 1.0 or bent <= allowed:
+        return passed
+    return max(0.1, 0.9 * math.sqrt(allowed / bent))
+
+
+@jitable
+def way_error(p, m, t, h):
+    """Return the error, over tol, of friction that follows the way of the fitted step in one.
+
+    Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
+    stages tells how far that is off: two halves of the step do. What they make of it is kept.
+    """
+    interpolate(m, 0.5, m.error)
+    ask_switching(p, m, t + 0.5 * h, HALF, m.error, m.error)
+    ask_switching(p, m, t + h, HALVES, m.trial, m.error)
+    return m.error[0] / m.memory[TOL]
+
+
+@jitable
+def hidden_side(p, m, t, h):
+    """Return a part of the fitted step at which a side differs that does not at its end, else 0.
+
+    The problem is left evaluated at the trial point.
+    """
+    part = 0.0
+    for k in range(1, LOOKS_FOR_HIDDEN):
+        if part == 0.0 and side_at(p, m, t, h, k / LOOKS_FOR_HIDDEN, ASK):
+            part = k / LOOKS_FOR_HIDDEN
+    ask_switching(p, m, t + h, ASK, m.trial, m.error)
+    return part
