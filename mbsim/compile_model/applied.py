@@ -194,8 +194,7 @@ def _add_friction(
     """Fill row k with friction in a joint."""
     _place(model, markers, made, k, friction.joint_id)
     made.kind[k] = _FRICTIONS[model.joints[friction.joint_id].type]
-    radius = friction.pin_radius or friction.ball_radius or 0.0
-    made.par[k, :4] = radius, friction.preload, friction.bending_reaction_arm, 0.0
+    made.par[k, : len(friction.constants)] = friction.constants
     made.with_reactions[k] = 1
     # joints are the first connections, in the order of the model
     made.connection[k] = list(model.joints).index(friction.joint_id)

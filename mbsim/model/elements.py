@@ -417,9 +417,9 @@ class Sensor:
 class Request:
     """Post_Request, Adams' REQUEST.
 
-    `type` is MARKER_DISPLACEMENT, MARKER_VELOCITY, MARKER_ACCELERATION, MARKER_FORCE (all
-    forces between two markers), ELEMENTAL_FORCE (`elem_type`, `elem_id`, `jflag`) or EXPRESSION
-    (`exprs`: F1..F8, None where there is none).
+    `type` is one of `request_types.TYPES`: the motion of a marker, MARKER_FORCE (all forces between
+    two markers), ELEMENTAL_FORCE (`elem_type`, `elem_id`, `jflag`) or EXPRESSION (`exprs`: F1..F8,
+    None where there is none).
     """
 
     id: int

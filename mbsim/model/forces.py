@@ -126,6 +126,12 @@ class JointFriction:
     bending_reaction_arm: float = 0.0  # [L]
     source: Source = Source()
 
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """Radius, preload, arm: the order of `dynamics.forces.joint_friction`."""
+        radius = self.pin_radius or self.ball_radius or 0.0
+        return radius, self.preload, self.bending_reaction_arm
+
 
 @dataclass(frozen=True)
 class JointLimit:

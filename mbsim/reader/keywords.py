@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from mbsim.forces.catalog import FORCES
 from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.model.request_types import TYPES
 
 
 def fold(name: str) -> str:
@@ -52,14 +53,7 @@ CFF_OF_JOINTS = {word: name for word, name in CFF_TYPES.items() if name.startswi
 MASTER_SURFACES = spellings(I="", J="", I_AND_J="", AUTO="")
 ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")
 
-REQUEST_TYPES = spellings(
-    MARKER_DISPLACEMENT="DISPLACEMENT",
-    MARKER_VELOCITY="VELOCITY",
-    MARKER_ACCELERATION="ACCELERATION",
-    MARKER_FORCE="FORCE",
-    ELEMENTAL_FORCE="",
-    EXPRESSION="",
-)
+REQUEST_TYPES = spellings(**{name: type.spellings for name, type in TYPES.items()})
 REQUEST_NOT_BUILT = spellings(USERSUB="")
 #: What a request may ask the force of: Adams' statement, with MotionSolve's names for it.
 FORCE_ELEMENTS = spellings(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from mbsim.model.request_types import TYPES
 from mbsim.reader import units as u
 from mbsim.results.reading import Results
 
@@ -88,22 +89,16 @@ _BY_NAME = {
     "work_of_motions": ENERGY,
 }
 
-#: By the measure of an expression, where `requests.measures_of` knows it.
+#: By the measure of a request: `request_types.TYPES`, of an expression `requests.measures_of`.
 _BY_MEASURE = {
     "displacement": Quantity("Displacement", length=1),
     "angle": Quantity("Angle", angle=1),
     "velocity": _VELOCITY,
     "angular_velocity": _SPIN,
+    "acceleration": _ACCELERATION,
+    "angular_acceleration": Quantity("Angular acceleration", time=-2, angle=1),
     "force": _FORCE,
     "torque": _TORQUE,
-}
-#: Of F1..F4 and of F5..F8, by the type of a request.
-_OF_REQUESTS = {
-    "MARKER_DISPLACEMENT": (_BY_MEASURE["displacement"], _BY_MEASURE["angle"]),
-    "MARKER_VELOCITY": (_VELOCITY, _SPIN),
-    "MARKER_FORCE": (_FORCE, _TORQUE),
-    "ELEMENTAL_FORCE": (_FORCE, _TORQUE),
-    "MARKER_ACCELERATION": (_ACCELERATION, Quantity("Angular acceleration", time=-2, angle=1)),
 }
 
 
@@ -112,8 +107,8 @@ def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
     group, _, last = dataset.rpartition("/")
     if group == "requests":
         kind = str(results.attribute(dataset, "type") or "")
-        if kind in _OF_REQUESTS:
-            return _OF_REQUESTS[kind][column // 4]
+        if kind in TYPES and TYPES[kind].measures:
+            return _BY_MEASURE[TYPES[kind].measures[column // 4]]
         measures = results.attribute(dataset, "measures")
         if measures is not None and measures[column] in _BY_MEASURE:
             return _BY_MEASURE[measures[column]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,18 +11,10 @@ from mbsim.expressions import Expression
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Array, Request
 from mbsim.model.placement import MarkerPlace
+from mbsim.model.request_types import TYPES
 from mbsim.results.forces import Forces, Wrench
 from mbsim.results.motion import Motion, matrices
 
-_FORCES = ("mag", "fx", "fy", "fz", "tmag", "tx", "ty", "tz")
-#: What F1..F8 are, by type of request.
-COLUMNS = {
-    "MARKER_DISPLACEMENT": ("mag", "x", "y", "z", "angle", "psi", "theta", "phi"),
-    "MARKER_VELOCITY": ("mag", "vx", "vy", "vz", "wmag", "wx", "wy", "wz"),
-    "MARKER_ACCELERATION": ("mag", "ax", "ay", "az", "alphamag", "alphax", "alphay", "alphaz"),
-    "MARKER_FORCE": _FORCES,
-    "ELEMENTAL_FORCE": _FORCES,
-}
 #: What functions of the language measure.
 _MEASURES = {
     "displacement": ("DM", "DX", "DY", "DZ"),
@@ -130,7 +122,7 @@ def rotation_angle(R: Array) -> Array:
 def columns_of(request: Request) -> tuple[str, ...]:
     """Return what F1..F8 of a request are; of an EXPRESSION its texts."""
     if request.type != "EXPRESSION":
-        return COLUMNS[request.type]
+        return TYPES[request.type].columns
     exprs = (*request.exprs, *[None] * 8)[:8]
     return tuple(
         expr.text if expr is not None else "mag" if k in _MAGNITUDES else ""
@@ -225,13 +217,21 @@ def expressions(request: Request, values: Sequence[tuple[int, int]], value: Arra
     return made
 
 
+#: F2..F4 and F6..F8 (n, 3) of I relative to J, global axes; None for the angles of a rotation.
+_RELATIVE: dict[str, Callable[[MarkerMotion, MarkerMotion], tuple[Array, Array | None]]] = {
+    "MARKER_DISPLACEMENT": lambda i, j: (i.p - j.p, None),
+    "MARKER_VELOCITY": lambda i, j: (i.v - j.v, i.w - j.w),
+    "MARKER_ACCELERATION": lambda i, j: (i.a - j.a, i.alpha - j.alpha),
+}
+
+
 def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motion) -> Array:
     """Return F1..F8 of how markers move, shape (n, 8), in model units and radians.
 
     Parameters
     ----------
     request : Request
-        Of type MARKER_DISPLACEMENT, MARKER_VELOCITY or MARKER_ACCELERATION.
+        Of a type in `_RELATIVE`.
     markers : mapping of int to MarkerPlace
         All markers of the model.
     bodies : Motion
@@ -255,13 +255,7 @@ def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motio
         marker_motion(id, markers, bodies)
         for id in (request.i_marker_id, request.j_marker_id, request.ref_marker_id)
     )
-    if request.type == "MARKER_DISPLACEMENT":
-        linear, angular = i.p - j.p, None
-    elif request.type == "MARKER_VELOCITY":
-        linear, angular = i.v - j.v, i.w - j.w
-    else:
-        linear, angular = i.a - j.a, i.alpha - j.alpha
-
+    linear, angular = _RELATIVE[request.type](i, j)
     made = np.zeros((bodies.rows, 8))
     to_reference = reference.R.swapaxes(-1, -2)
     made[:, 0] = np.linalg.norm(linear, axis=-1)

@@ -20,6 +20,8 @@ from helpers.decks import GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS, PACKAGES
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
+from mbsim.model.request_types import TYPES
+from mbsim.results import quantities, requests
 from mbsim.results.curves import Choice, collect, names_of
 from mbsim.results.names import compact, matching
 from mbsim.results.quantities import TIME, Quantity, UnitSystem
@@ -589,3 +591,8 @@ def test_units():
     # 1 lbf in = 4.4482216152605 N 0.0254 m
     torque = inches.factor_to(si, Quantity("Torque", force=1, length=1))
     assert torque == pytest.approx(4.4482216152605 * 0.0254, rel=1e-15)
+
+
+def test_every_measure_of_a_request_has_its_quantity():
+    measures = {*requests._MEASURES, *(m for type in TYPES.values() for m in type.measures)}
+    assert measures == set(quantities._BY_MEASURE)

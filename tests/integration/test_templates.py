@@ -1,0 +1,297 @@
+"""What a new part of the program touches: the templates, each dropped into a copy, and run."""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import shutil
+import subprocess
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from helpers.decks import EARTH, contact, sphere
+from helpers.folders import MODELS, PACKAGES, TESTS
+
+G = 9.81
+
+
+class Template(NamedTuple):
+    """A file of `tests/templates`: where it goes, and how many files it may touch."""
+
+    place: str  # in the package; none where it holds lines for files that are there
+    files: int
+    line: tuple[str, str, str] | None = (
+        None  # of an integrator: file, what stands there, what shall
+    )
+
+
+HEUN = (
+    "integrators/catalog.py",
+    "SCHEMES = {\n",
+    'SCHEMES = {\n    "HEUN": "explicit, order 2",\n',
+)
+TEMPLATES = {
+    "friction_law": Template("laws/friction/viscous.py", 1),
+    "joint": Template("joints/kinds/pin_in_slot.py", 1),
+    "force": Template("forces/kinds/tether.py", 1),
+    "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
+    "integrator": Template("integrators/heun.py", 2, HEUN),
+    "request": Template("", 2),
+    "attribute": Template("", 3),
+}
+#: Runs decks in the copy, whose unchanged code is in the cache by its content.
+RUN = """
+import json, sys
+import mbsim
+wanted = json.loads(sys.stdin.read())
+for job in wanted:
+    results = mbsim.simulate(mbsim.read_model(job["deck"]), **job["settings"])
+    print(json.dumps({name: results[name].tolist() for name in job["signals"]}))
+"""
+CHECK = """
+import runpy, sys
+sys.argv[1:] = ["check", "deck0.xml"]
+runpy.run_module("mbsim", run_name="__main__")
+"""
+
+
+def replace(file, *pairs):
+    """Put lines in place of others, each of which stands once in the file."""
+    text = file.read_text(encoding="utf-8")
+    for old, new in zip(pairs[::2], pairs[1::2], strict=True):
+        assert text.count(old) == 1, f"{file.name}: {old!r}"
+        text = text.replace(old, new)
+    file.write_text(text, encoding="utf-8")
+
+
+def put_in(name, package):
+    """Put a template into the copy of the package."""
+    file, template = TESTS / "templates" / f"{name}.py", TEMPLATES[name]
+    if template.place:
+        assert not (package / template.place).exists()
+        shutil.copy(file, package / template.place)
+    else:
+        for path, pairs in runpy.run_path(str(file))["LINES"].items():
+            replace(package.parent / path, *pairs)
+    if template.line is not None:
+        path, old, new = template.line
+        replace(package / path, old, new)
+
+
+def touched(package):
+    """Return the files that are not as they are in the package under test."""
+    own = PACKAGES / "mbsim"
+    return {
+        file.relative_to(package).as_posix()
+        for file in package.rglob("*.py")
+        if not (known := own / file.relative_to(package)).is_file()
+        or known.read_bytes() != file.read_bytes()
+    }
+
+
+def copied(folder):
+    """Return a copy of the package, sources alone."""
+    leave_out = shutil.ignore_patterns("__pycache__", "shipped_code")
+    shutil.copytree(PACKAGES / "mbsim", folder / "mbsim", ignore=leave_out)
+    return folder / "mbsim"
+
+
+def in_copy(folder, script, given=""):
+    """Run a script with the copy in `folder` as the package, and return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=folder,
+        input=given,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def run_in_copy(folder, *jobs):
+    """Run decks (text, signals, settings) there; return the signals of each."""
+    wanted = []
+    for n, (deck, signals, settings) in enumerate(jobs):
+        file = folder / f"deck{n}.xml"
+        file.write_text(deck, encoding="utf-8")
+        wanted.append({"deck": str(file), "signals": ["time", *signals], "settings": settings})
+    lines = in_copy(folder, RUN, json.dumps(wanted)).splitlines()
+    return [{name: np.array(values) for name, values in json.loads(line).items()} for line in lines]
+
+
+@pytest.fixture
+def copy_with(tmp_path):
+    """Return a function that makes the copy with one template, whose files are counted."""
+
+    def make(name):
+        package = copied(tmp_path)
+        put_in(name, package)
+        assert len(touched(package)) == TEMPLATES[name].files, sorted(touched(package))
+        return tmp_path
+
+    return make
+
+
+def alone(shape):
+    """Return the statements of a body without its graphic."""
+    return shape.split("<Post_Graphic")[0]
+
+
+def whole(model, end, transient=""):
+    """Return a deck of these statements."""
+    return (
+        f"<MotionSolve><Model>{model}</Model><Command>{transient}"
+        f'<Simulate analysis_type="Transient" end_time="{end}" print_interval="{end / 10}"/>'
+        "</Command></MotionSolve>"
+    )
+
+
+def body(v=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0), z=0.0, x=0.0):
+    """Return ground and a body of 1 kg, markers 10 and 20."""
+    return EARTH + alone(sphere(z, v=v, w=w, x=x))
+
+
+def test_every_template_is_found(tmp_path):
+    """All of them in one copy, by the registries and the words that decks may say."""
+    package = copied(tmp_path)
+    for name in TEMPLATES:
+        put_in(name, package)
+    # no two of these touch one file
+    assert len(touched(package)) == sum(template.files for template in TEMPLATES.values())
+    script = """
+from mbsim.forces.catalog import FORCES
+from mbsim.geometry.catalog import PAIRS
+from mbsim.integrators import catalog
+from mbsim.joints.catalog import JOINTS
+from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.reader import keywords
+from mbsim.reader.joint_forces import FORCE_JOINTFRICTION
+from mbsim.reader.statements import BY_KEY
+assert "VISCOUS" in FRICTION_LAWS and "VISCOUS" in keywords.CFF_TYPES.values()
+assert "slip_coef" in BY_KEY["forcecontact"].attributes
+assert "PIN_IN_SLOT" in JOINTS
+assert "TETHER" in FORCES and "forcetether" in BY_KEY
+assert "ELLIPSOID-MESH" in PAIRS
+assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
+assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
+assert "preload_rate" in FORCE_JOINTFRICTION.attributes
+"""
+    in_copy(tmp_path, script)
+
+
+@pytest.mark.slow
+def test_friction_law(copy_with):
+    deck = (MODELS / "sliding_block.xml").read_text(encoding="utf-8")
+    old = deck[deck.index('cff_type="COULOMB_ON"') : deck.index('friction_trans_vel="1e-3"/>')]
+    deck = deck.replace(old, 'cff_type="VISCOUS" slip_coef="0.2" ')
+    deck = deck.replace('friction_trans_vel="1e-3"/>', "/>")
+    (found,) = run_in_copy(copy_with("friction_law"), (deck, ["bodies/2/velocity"], {}))
+    t, v = found["time"], found["bodies/2/velocity"][:, 0]
+    # N is the weight but for the block's pitching, which friction at its foot sets going
+    np.testing.assert_allclose(v, 5.0 * np.exp(-0.2 * G * t), rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_joint(copy_with):
+    deck = body(w=(0.0, 0.0, 2.0)) + (
+        '<Constraint_Joint id="1" type="PIN_IN_SLOT" i_marker_id="20" j_marker_id="10"/>'
+        '<Force_Gravity grav_x="3" grav_y="-9.81" grav_z="1"/>'
+    )
+    signals = ["bodies/2/position", "bodies/2/angular_velocity"]
+    (found,) = run_in_copy(copy_with("joint"), (whole(deck, 1.0), signals, {}))
+    fall = np.outer(1.5 * found["time"] ** 2, (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(found["bodies/2/position"], fall, atol=1e-10)
+    np.testing.assert_allclose(
+        found["bodies/2/angular_velocity"], np.full((11, 3), (0.0, 0.0, 2.0)), atol=1e-10
+    )
+
+
+def tethered(t):
+    """Return where a body at x = 1 with v_y = 2 is on a tether of 16 N/m."""
+    return np.stack([np.cos(4.0 * t), 0.5 * np.sin(4.0 * t), 0.0 * t], axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])  # the latter asks its slopes
+def test_force(copy_with, method):
+    deck = body(v=(0.0, 2.0, 0.0), x=1.0) + (
+        '<Force_Tether id="1" i_marker_id="20" j_marker_id="10" stiffness="16"/>'
+    )
+    settings = {"integrator": method, "tol": 1e-8}
+    (found,) = run_in_copy(copy_with("force"), (whole(deck, 1.0), ["bodies/2/position"], settings))
+    np.testing.assert_allclose(found["bodies/2/position"], tethered(found["time"]), atol=1e-6)
+
+
+@pytest.mark.slow
+def test_pair(copy_with):
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 0)]
+    faces = "0 1 3 0 3 2 4 6 7 4 7 5 0 4 5 0 5 1 2 3 7 2 7 6 0 2 6 0 6 4 1 5 7 1 7 3"
+    nodes = " ".join(str(float(c)) for corner in corners for c in corner)
+    stands = 0.3 - G / 1e4  # its weight of 9.81 N on 1e4 N/m
+    deck = (
+        EARTH
+        + f'<Post_Graphic id="100" type="TriaMesh" rm_id="10"><Nodes>{nodes}</Nodes>'
+        + f"<Faces>{faces}</Faces></Post_Graphic>"
+        + body(z=stands).removeprefix(EARTH)
+        + '<Post_Graphic id="200" type="Ellipsoid" center_marker_id="20" x_scale="0.2" '
+        + 'y_scale="0.1" z_scale="0.3"/><Force_Gravity grav_z="-9.81"/>'
+        + contact(stiffness=1e4, exponent=1, damping=10, dmax=1e-5)
+    )
+    signals = ["bodies/2/position", "contacts/301/penetration"]
+    folder = copy_with("pair")
+    (found,) = run_in_copy(folder, (whole(deck, 0.05), signals, {}))
+    np.testing.assert_allclose(found["bodies/2/position"][:, 2], stands, atol=1e-9)
+    np.testing.assert_allclose(found["contacts/301/penetration"], G / 1e4, rtol=1e-6)
+    assert "closed form ELLIPSOID-MESH" in in_copy(folder, CHECK)
+
+
+@pytest.mark.slow
+def test_integrator(copy_with):
+    jobs = []
+    for h in (0.02, 0.01):
+        deck = body(v=(0.0, 2.0, 0.0), x=1.0) + (
+            '<Force_Bushing id="1" i_marker_id="20" j_marker_id="10" kx="16" ky="16" kz="16"/>'
+        )
+        # a loose tolerance: the longest step is every step
+        deck = whole(deck, 1.0, f'<Param_Transient h_max="{h}"/>')
+        jobs.append((deck, ["bodies/2/position"], {"integrator": "HEUN", "tol": 0.1}))
+    found = run_in_copy(copy_with("integrator"), *jobs)
+    coarse, fine = (
+        np.linalg.norm((each["bodies/2/position"] - tethered(each["time"]))[-1]) for each in found
+    )
+    # a step of w h = 0.08: h^2 w^3 t/6 = 0.0043
+    assert coarse < 0.01
+    assert 1.8 < np.log2(coarse / fine) < 2.2
+
+
+@pytest.mark.slow
+def test_request(copy_with):
+    spins = alone(sphere(0.0, body=3, w=(0.0, 0.0, 2.0)))
+    deck = body(v=(1.0, 0.0, 0.0), x=0.5) + spins
+    deck += '<Post_Request id="7" type="MARKER_VELOCITY_IN_J" i_marker_id="20" j_marker_id="30"/>'
+    (found,) = run_in_copy(copy_with("request"), (whole(deck, 1.0), ["requests/7"], {}))
+    t, values = found["time"], found["requests/7"]
+    # I at (1/2 + t, 0), J spins at its place: v - w x r
+    expected = np.stack([1.0 + 0.0 * t, -2.0 * (0.5 + t), 0.0 * t], axis=1)
+    np.testing.assert_allclose(values[:, 1:4], expected, atol=1e-9)
+    np.testing.assert_allclose(values[:, 0], np.linalg.norm(expected, axis=1), atol=1e-9)
+    np.testing.assert_allclose(values[:, 7], -2.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_attribute(copy_with):
+    deck = body(v=(0.0, 0.0, 2.0)) + (
+        '<Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>'
+        '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY" mu_dynamic="0.5" '
+        'friction_trans_vel="1e-3" preload="1" preload_rate="2"/>'
+    )
+    (found,) = run_in_copy(copy_with("attribute"), (whole(deck, 1.0), ["bodies/2/velocity"], {}))
+    t = found["time"]
+    # 1 kg: dv/dt = -0.5 (1 + 2 t), 1 m/s left
+    np.testing.assert_allclose(found["bodies/2/velocity"][:, 2], 2.0 - 0.5 * (t + t * t), atol=1e-6)

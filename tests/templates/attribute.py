@@ -1,0 +1,39 @@
+"""`preload_rate` [F/T] of Force_JointFriction: the pin is drawn tighter, preload + preload_rate t.
+
+Template of an attribute that reaches a kernel: what these lines add to three files. Each is what
+stands there, then what is put in its place. An attribute that only one law or one force between
+markers has is a Parameter in its file, and no more.
+"""
+
+LINES = {
+    # the element, and its number among those that the kernel gets
+    "mbsim/model/forces.py": (
+        """    bending_reaction_arm: float = 0.0  # [L]
+""",
+        """    bending_reaction_arm: float = 0.0  # [L]
+    preload_rate: float = 0.0  # [F/T]
+""",
+        "return radius, self.preload, self.bending_reaction_arm",
+        "return radius, self.preload, self.bending_reaction_arm, self.preload_rate",
+    ),
+    # what decks say
+    "mbsim/reader/joint_forces.py": (
+        """        "preload": Spec(NOT_NEGATIVE),
+""",
+        """        "preload": Spec(NOT_NEGATIVE),
+        "preload_rate": Spec(NOT_NEGATIVE),
+""",
+        """        preload=entry.get("preload", 0.0),
+""",
+        """        preload=entry.get("preload", 0.0),
+        preload_rate=entry.get("preload_rate", 0.0),
+""",
+    ),
+    # the formula
+    "mbsim/dynamics/forces/joint_friction.py": (
+        "RADIUS, PRELOAD, ARM = range(3)",
+        "RADIUS, PRELOAD, ARM, PRELOAD_RATE = range(4)",
+        "    given[10] = press(scene, f)\n",
+        "    given[10] = press(scene, f) + applied.par[f, PRELOAD_RATE] * t\n",
+    ),
+}
