@@ -79,6 +79,7 @@ from mbsim.integrators.scheme import (
     STALE,
     STEP,
     STEPS,
+    SWITCH_CUT,
     TIME,
     TOL,
     VAIN,
