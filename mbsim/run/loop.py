@@ -197,7 +197,11 @@ class Runner:
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
+        from mbsim.integrators import scheme
+
         checkpoint.restore(self.system.scene, self.method, saved)
+        # what failed when the checkpoint was written is tried anew
+        self.method.counts[scheme.CODE] = 0
         self.methods.restore(saved)
         self.stage = int(saved["stage"])
         self.sensing.restore(saved)

@@ -101,7 +101,7 @@ class Asked:
         self.points = np.zeros((slots, POINT))
         self.frames = np.zeros((2, 12))
         scene = SimpleNamespace(
-            graphics=SimpleNamespace(size=self.size, reach=np.array([0.6, 0.6])),
+            graphics=SimpleNamespace(size=self.size, radius=np.array([0.6, 0.6])),
             pairs=SimpleNamespace(kind=one, slot=one, graphic_i=one, graphic_j=one + 1),
             kinds=SimpleNamespace(slots=one + slots, swapped=one),
             work=SimpleNamespace(points=self.points, frames=self.frames, fcl=one),

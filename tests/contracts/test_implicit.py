@@ -27,7 +27,16 @@ from mbsim.core.problem import (
     Problem,
     addresses,
 )
-from mbsim.integrators import catalog, control, driver, galpha, newton, radau5, scheme
+from mbsim.integrators import (
+    catalog,
+    control,
+    driver,
+    galpha,
+    galpha_iteration,
+    newton,
+    radau5,
+    scheme,
+)
 
 RELAX, VAN_DER_POL, ROBERTSON, OSCILLATOR, DECAY, BLOWS_UP, HALF_LINE = range(7)
 #: A body of mass 1 on a spring and a damper, driven, with a state z that follows it; a top whose
@@ -558,11 +567,11 @@ def test_a_problem_without_linearisation_is_refused():
 
 def test_the_constants_of_galpha_are_those_of_its_order():
     # Chung and Hulbert: second order, and roots of size RHO at infinity
-    am, af, gamma, beta = galpha.AM, galpha.AF, galpha.GAMMA, galpha.BETA
+    am, af, gamma, beta = galpha_iteration.AM, galpha_iteration.AF, galpha.GAMMA, galpha.BETA
     assert gamma == pytest.approx(0.5 - am + af)
     assert beta == pytest.approx(0.25 * (1.0 - am + af) ** 2)
-    assert af / (1.0 - af) == pytest.approx(galpha.RHO)
-    assert (am + 1.0) / (2.0 - am) == pytest.approx(galpha.RHO)
+    assert af / (1.0 - af) == pytest.approx(galpha_iteration.RHO)
+    assert (am + 1.0) / (2.0 - am) == pytest.approx(galpha_iteration.RHO)
     # one step on x = t^3/6 and on v = t^3/6, with what `a` is there
     shift = galpha.SHIFT
     curve = 0.5 * (1.0 - af) - (1.0 - am) * (0.5 + shift)

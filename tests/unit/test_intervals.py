@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from helpers import free_bodies as free
+from mbsim.compile_model import time_functions as tf
 from mbsim.compile_model import timetable as tt
 from mbsim.compile_model.build import build
 from mbsim.compile_model.splines import pieces
@@ -49,10 +50,10 @@ def group_of(text):
     """Return a scene whose first program is the text, and its only function as a group."""
     request = Request(1, "EXPRESSION", exprs=(parse(text),))
     system = build(free.model(free.body(2), requests=[request]), 1.0)
-    (code,), whole, blind = tt.parts(system.scene, 0)
+    (code,), whole, blind = tf.parts(system.scene, 0)
     assert whole
     assert not blind
-    return system, tt._Group([tt.Function(code, 0, tt.UNKNOWN)], {})
+    return system, tt._Group([tf.Function(code, 0, tf.UNKNOWN)], {})
 
 
 def test_every_elementary_function_has_bounds():
@@ -121,7 +122,7 @@ def test_a_curve_lies_within_its_bounds(method, order):
 
 def parts_of(text, **more):
     request = Request(1, "EXPRESSION", exprs=(parse(text),))
-    return tt.parts(build(free.model(free.body(2), requests=[request]), 1.0).scene, 0)
+    return tf.parts(build(free.model(free.body(2), requests=[request]), 1.0).scene, 0)
 
 
 @pytest.mark.parametrize(

@@ -154,10 +154,9 @@ def test_cut_steps_count_by_their_work():
 
 def test_it_is_as_costly_as_before_where_no_window_of_steps_tells_more():
     """What it had been was forgotten: then nothing was stiff enough for the next 200 steps."""
-    from mbsim.methods import Methods
-    from mbsim.system.build import build
-
+    from mbsim.compile_model.build import build
     from mbsim.integrators import scheme
+    from mbsim.run.methods import Methods
 
     methods = Methods(build(mbsim.read_model(MODELS / "free_top.xml")), "AUTO", 0.0)
     memory = methods.arrays.memory
@@ -173,10 +172,9 @@ def test_it_is_as_costly_as_before_where_no_window_of_steps_tells_more():
 
 
 def test_it_learns_what_a_change_was_worth():
-    from mbsim.methods import Methods
-    from mbsim.system.build import build
-
+    from mbsim.compile_model.build import build
     from mbsim.integrators import scheme
+    from mbsim.run.methods import Methods
 
     methods = Methods(build(mbsim.read_model(MODELS / "free_top.xml")), "AUTO", 0.0)
     memory, counts = methods.arrays.memory, methods.arrays.counts

@@ -186,7 +186,7 @@ def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
     system = listed(tmp_path, model)
     many, skin = len(listed_pairs(system)), float(system.scene.broadphase.size[0])
     monkeypatch.setattr(
-        contacts, "_crowd_places", lambda plans: (many - 3, plans.broadphase[0].kinds and 1)
+        contacts, "_broadphase_rows", lambda plans: (many - 3, plans.broadphase[0].kinds and 1)
     )
     tight = listed(tmp_path, model)
     assert tight.scene.pairs.count[WANTED] == 0
@@ -194,7 +194,7 @@ def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
     wanted = [(301, i, j) for k, i in enumerate(ids) for j in ids[k + 1 :]]
     check_against_brute_force(tight, random, wanted)
     # what touches cannot be left out
-    monkeypatch.setattr(contacts, "_crowd_places", lambda plans: (2, 1))
+    monkeypatch.setattr(contacts, "_broadphase_rows", lambda plans: (2, 1))
     assert listed(tmp_path, model).scene.pairs.count[WANTED] > 0
     with pytest.raises(SolverError, match="more pairs of graphics are near each other"):
         run_deck(tmp_path, model, end_time=0.1, allow_overlap=True)
