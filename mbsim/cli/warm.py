@@ -7,9 +7,14 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from mbsim.warming.tasks import Task
 
 
 @click.command("warm")
@@ -60,7 +65,7 @@ def command(
         raise ModelError("nothing of it could be run")
 
 
-def _do_all(todo, refused):  # type: ignore[no-untyped-def]
+def _do_all(todo: Sequence[Task], refused: Callable[[Task], str]) -> list[str]:
     """Do all tasks behind a progress bar, and return what failed."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -73,7 +78,7 @@ def _do_all(todo, refused):  # type: ignore[no-untyped-def]
         TextColumn("{task.description}"),
         TextColumn("{task.fields[now]}"),
     )
-    failed = []
+    failed: list[str] = []
     with Progress(
         *columns,
         console=Console(stderr=True),
