@@ -295,8 +295,11 @@ def extreme(stack, at, count, sign):
 
 
 @jitable
-def of_one(op, u):
-    """Return a function of one jet."""
+def of_one(op, u):  # noqa: C901
+    """Return a function of one jet.
+
+    Many branches because of a chain of equalities a table of jumps is made.
+    """
     x = u[0]
     if op == NEG:
         return scale(-1.0, u)

@@ -166,8 +166,11 @@ def extreme_value(s, at, count, sign):
 
 
 @jitable
-def value_of_one(op, x):
-    """Return a function of one number."""
+def value_of_one(op, x):  # noqa: C901
+    """Return a function of one number.
+
+    Many branches because of a chain of equalities a table of jumps is made.
+    """
     if op == NEG:
         return -x
     if op == ABS:

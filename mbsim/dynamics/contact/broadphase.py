@@ -193,15 +193,15 @@ def cell_at(scene, g, low, width, r, n):
 
 
 @jitable
-def search(scene, contact_set, skin):
-    """List all near pairs of a large contact."""
-    broadphase = scene.broadphase
-    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
-    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
-    low, width, nx, ny, nz = cell_range(scene, contact_set)
-    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
+def fill_cells(scene, contact_set, grid, skin):
+    """List members of J cell by cell; return how many. Planes and giants are taken against every I.
 
-    # J members cell by cell; planes and giants at once against every I
+    start[c + 1] is then where cell c begins; the next cell's begin is its end.
+    """
+    broadphase = scene.broadphase
+    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
+    low, width, nx, ny, nz = grid
+    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
     for cell in range(cells + 1):
         start[cell] = 0
     for k in range(first_j, last_j):
@@ -222,11 +222,21 @@ def search(scene, contact_set, skin):
             # the end of a cell's range moves down to its begin
             start[broadphase.cell[j] + 1] -= 1
             order[start[broadphase.cell[j] + 1]] = j
-
-    # start[c + 1] is now where cell c begins; the next cell's begin is its end
     usual = 0
     for k in range(first_j, last_j):
         usual += 1 if usual_size(scene, broadphase.member[k]) else 0
+    return usual
+
+
+@jitable
+def search(scene, contact_set, skin):
+    """List all near pairs of a large contact."""
+    broadphase = scene.broadphase
+    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
+    grid = cell_range(scene, contact_set)
+    usual = fill_cells(scene, contact_set, grid, skin)
+    low, width, nx, ny, nz = grid
+    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
     for k in range(first_i, last_i):
         i = broadphase.member[k]
         if not usual_size(scene, i):

@@ -371,10 +371,11 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
 
 
 @jitable
-def add_contact(scene, t, h, y, dy, s):
+def add_contact(scene, t, h, y, dy, s):  # noqa: C901
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
 
-    Long because normal force, friction and torques share the contact's frame and velocities.
+    Long, with many branches, because normal force, friction and torques share the contact's frame
+    and velocities.
     """
     contacts, work = scene.contacts, scene.work
     c = contact_of(scene, s)

@@ -120,8 +120,11 @@ def strength(scene, t, y, f, x, rate):
 
 
 @jitable
-def add_applied(scene, t, y, dy):
-    """Add every applied force to its bodies and what it dissipates to y'; return 0."""
+def add_applied(scene, t, y, dy):  # noqa: C901
+    """Add every applied force to its bodies and what it dissipates to y'; return 0.
+
+    Many branches because kinds differ in their line or axis; how they push is one for all.
+    """
     applied, work, lost = scene.applied, scene.work, 0.0
     none = (0.0, 0.0, 0.0)
     for f in range(len(applied.kind)):

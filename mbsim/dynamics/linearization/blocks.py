@@ -312,8 +312,11 @@ def eliminate(P, M, linear, free):
 
 
 @jitable
-def solve_bodies(P, M, linear, free, g):
-    """Replace the right side g, (nb, 6) at least, by the displacements of all bodies."""
+def solve_bodies(P, M, linear, free, g):  # noqa: C901
+    """Replace the right side g, (nb, 6) at least, by the displacements of all bodies.
+
+    Many branches because the sweeps forward and back both treat bodies on joints in their own way.
+    """
     nb = len(P.order)
     for step in range(nb):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]

@@ -228,8 +228,11 @@ def normal_slopes(scene, s, c, depth, rate):
 
 
 @jitable
-def add_contact_slopes(scene, T, t, h, y, s):
-    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
+def add_contact_slopes(scene, T, t, h, y, s):  # noqa: C901
+    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code.
+
+    Many branches because normal force, friction and its memory share levers and the law's slopes.
+    """
     P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
     nb, c = len(scene.bodies.mass), contact_of(scene, s)
     gi, gj = sides(scene, s)

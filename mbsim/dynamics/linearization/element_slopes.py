@@ -115,8 +115,11 @@ def by_force(R, u, i, part, k, h):
 
 
 @jitable
-def add_residual_slopes(scene, T, t, y, f):
-    """Add what the element of row f does; nothing where it cannot be solved there."""
+def add_residual_slopes(scene, T, t, y, f):  # noqa: C901
+    """Add what the element of row f does; nothing where it cannot be solved there.
+
+    Many branches because axes and states of one element share its levers.
+    """
     R, P, L = scene.residuals, T.pattern, T.linear
     e, nb = int(scene.applied.par[f, 0]), len(scene.bodies.mass)
     h = solve_slopes(scene, t, y, e)

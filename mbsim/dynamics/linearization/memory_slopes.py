@@ -196,8 +196,11 @@ def follow(K, k, n, Z, row, through, part):
 
 
 @jitable
-def add_to_matrix(scene, T, M):
-    """Form Z of every slot, and add C Z B to the matrix."""
+def add_to_matrix(scene, T, M):  # noqa: C901
+    """Form Z of every slot, and add C Z B to the matrix.
+
+    Many branches because the sums of one triple product stand in one another, in its scratch.
+    """
     K, P, nb = T.keeps, T.pattern, len(scene.bodies.mass)
     for k in range(K.held[len(K.held) - 1]):
         n, Z, A = count_of(K, k), M.keep[k], M.keep[len(M.keep) - 1]
