@@ -116,8 +116,8 @@ def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]
 
 def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     """Return user subroutines by element: function, file, and what they ask for under iflag."""
-    from mbsim.compile_model.acting import wanted
     from mbsim.model.names import element_name, is_adams
+    from mbsim.model.subroutines import wanted
     from mbsim.plugins.about import about
     from mbsim.plugins.contact_post import CONTACTPOST
     from mbsim.plugins.friction import friction_arguments
@@ -264,9 +264,10 @@ def _about_results(results: Results) -> dict[str, Any]:
 def _shorten(about: dict[str, Any], results: Results) -> None:
     """List signals as `plot` takes them, ids together, with parts and units; then the tables."""
     from mbsim.results.names import compact, parts_of
-    from mbsim.results.quantities import UnitSystem, quantity_of
+    from mbsim.results.quantities import quantity_of
+    from mbsim.results.units import UnitSystem
 
-    columns, units = results.signals(), UnitSystem.of(results)
+    columns, units = results.signals(), UnitSystem.of(results.attributes)
     about["signals"] = {}
     measured: dict[str, str] = {}
     for name in columns:

@@ -16,7 +16,6 @@ import numpy as np
 
 from mbsim.arrays import scene as a
 from mbsim.arrays.hooks import Hook
-from mbsim.compile_model.acting import wanted
 from mbsim.compile_model.instructions import ANGLE, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.core.address import pack
@@ -26,6 +25,7 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Model
+from mbsim.model.subroutines import wanted
 from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
 from mbsim.plugins.source.script import Scripts

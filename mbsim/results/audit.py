@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mbsim.arrays import scene as a
 from mbsim.model.names import element_name
-from mbsim.results.quantities import ENERGY as ENERGY_UNIT
-from mbsim.results.quantities import UnitSystem
+from mbsim.results.units import ENERGY as ENERGY_UNIT
+from mbsim.results.units import UnitSystem
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from mbsim.errors import ResultsError, UnknownSignal
+from mbsim.results.audit import Audit, from_attributes
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 
 if TYPE_CHECKING:
     import h5py
 
-    from mbsim.results.audit import Audit
 
 #: What h5py raises where a file is damaged.
 _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
@@ -105,8 +105,6 @@ class Results:
     @_reads
     def audit(self) -> Audit | None:
         """What the run found out about itself; None if it was killed, or never took a step."""
-        from mbsim.results.audit import from_attributes
-
         file = self._open()
         if "audit" not in file:
             return None

@@ -42,7 +42,7 @@ class Methods:
 
     def __init__(self, system: System, name: str, start: float, timed: bool = False) -> None:
         from mbsim.compile_model.timetable import ROWS
-        from mbsim.dynamics.pipeline.hooks import mechanism
+        from mbsim.dynamics.pipeline.problem import mechanism
 
         self.system = system
         changing = name == catalog.AUTO
@@ -93,7 +93,7 @@ class Methods:
         if self.other is not None and self.is_stiff:
             running = self.other
         if running.implicit and linearised is None:
-            from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+            from mbsim.dynamics.pipeline.problem import implicit_hooks
 
             problem, linearised = implicit_hooks(self.system.scene, problem, running.pair)
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY

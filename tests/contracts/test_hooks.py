@@ -16,7 +16,7 @@ from helpers.folders import MODELS
 from helpers.mechanics import Body
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
 from mbsim.arrays.scene import NEAR_FOLD
-from mbsim.dynamics.pipeline import hook_table, hooks, implicit_hooks
+from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
 
 FAILS = 77
@@ -119,13 +119,12 @@ class Failure:
 )
 def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, monkeypatch):
     failure = Failure(hook, request_)
-    for module in (hooks, implicit_hooks):
 
-        def fill(scene, *given, plain=module.fill):
-            plain(scene, *given)
-            failure.put(scene)
+    def fill(scene, *given, plain=problem.fill):
+        plain(scene, *given)
+        failure.put(scene)
 
-        monkeypatch.setattr(module, "fill", fill)
+    monkeypatch.setattr(problem, "fill", fill)
     detector = "fcl" if hook is Hook.FCL else "auto"
     with pytest.raises(SolverError, match=f"code {FAILS} at time"):
         mbsim.simulate(model_of(deck, tmp_path), integrator=method, detector=detector)

@@ -21,7 +21,7 @@ from helpers.mechanics import Body
 from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
 from mbsim.arrays.hooks import Joints
 from mbsim.compile_model.build import build
-from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.dynamics.pipeline.problem import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
 from mbsim.run.loop import Runner
 from mbsim.run.settings import settle

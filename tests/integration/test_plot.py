@@ -24,8 +24,8 @@ from mbsim.model.request_types import TYPES
 from mbsim.results import quantities, requests
 from mbsim.results.curves import Choice, collect, names_of
 from mbsim.results.names import compact, matching
-from mbsim.results.quantities import TIME, Quantity, UnitSystem
 from mbsim.results.reading import open_results
+from mbsim.results.units import TIME, Quantity, UnitSystem
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

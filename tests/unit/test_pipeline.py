@@ -12,7 +12,7 @@ import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS
 from mbsim.compile_model.build import build
-from mbsim.dynamics.pipeline.hooks import mechanism
+from mbsim.dynamics.pipeline.problem import mechanism
 
 POINTER = ctypes.c_void_p
 HOOK = ctypes.CFUNCTYPE(

@@ -59,12 +59,12 @@ from mbsim.arrays.scene import (
 )
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
+from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
 from mbsim.dynamics.pipeline.output import fill_energy
-from mbsim.dynamics.pipeline.scales import fill_squares
 
 #: Rounding of a sum of energies or momenta, over the sum of their sizes.
 ROUNDING = 1e-13

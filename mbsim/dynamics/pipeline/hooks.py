@@ -1,10 +1,8 @@
-"""The mechanism as a `Problem`: its hooks behind addresses, all given one packed `Scene`."""
+"""What an integrator calls of a mechanism (`core.problem`): all are given one packed `Scene`."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
 from mbsim.arrays.scene import (
@@ -16,24 +14,22 @@ from mbsim.arrays.scene import (
     LISTINGS,
     Scene,
 )
-from mbsim.core.address import call_int, pack, vector_at, view
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.problem import (
     ALONG,
     BY_CHECK,
     FRICTION_ALONE,
     FULL,
     IMPACTS_ALONE,
-    Problem,
     Taken,
-    addresses,
 )
+from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.events.stability import stable_step
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
-from mbsim.dynamics.pipeline.hook_table import fill
 from mbsim.dynamics.pipeline.output import (
     find_fault,
     friction_left,
@@ -42,7 +38,6 @@ from mbsim.dynamics.pipeline.output import (
     scaled_error,
     write_row,
 )
-from mbsim.dynamics.pipeline.scales import take_speeds
 
 
 def rhs(context, t, h, a, b):
@@ -178,7 +173,7 @@ def _reject(context, t, h, a, b):
     return 0
 
 
-def _stable(context, t, h, a, b):
+def stable(context, t, h, a, b):
     """The step for a method without error estimate, h being the tolerance."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -194,7 +189,8 @@ def list_near(context, y):
     return 0
 
 
-_HOOKS = {
+#: By their names in `Problem`; `stable` is only of a method without error estimate.
+HOOKS = {
     "rhs": rhs,
     "project": _project,
     "norm": _norm,
@@ -206,32 +202,3 @@ _HOOKS = {
     "output": _output,
     "reject": _reject,
 }
-
-
-def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
-    """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
-
-    Only a method without error estimate, `fixed_step`, needs the last hook.
-    """
-    table = pack(scene)
-    hooks = _HOOKS | {"stable": _stable} if fixed_step else dict(_HOOKS)
-    if len(scene.angles.i) > 0:
-        from mbsim.dynamics.pipeline.force_hooks import limit_turn
-
-        hooks["limit"] = limit_turn
-    if len(scene.sensors.id) > 0:
-        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
-
-        hooks["arrive"] = arrive_hook
-        if scene.sensors.located.any():
-            # where none is located, steps need not be looked into
-            hooks["happens"] = happens_hook
-    if len(scene.switching.program) > 0 and not fixed_step:
-        from mbsim.dynamics.events.switching import switching_hook
-
-        hooks["switching"] = switching_hook
-    problem = Problem(int(table.ctypes.data), **addresses(hooks))
-    fill(scene)
-    if "switching" in hooks:
-        scene.state.frozen[0] = int(len(scene.work.idle) > 0)
-    return problem, table

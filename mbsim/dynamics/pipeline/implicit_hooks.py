@@ -1,21 +1,11 @@
-"""The hooks of implicit methods, and those of derivatives of joints and forces.
-
-The linearised mechanism stands behind a hook of the scene, so its arrays are made only where a
-method asks for them.
-"""
+"""The hooks of implicit methods, and those of derivatives of joints and forces."""
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from mbsim.arrays.hooks import Hook, failure_or
-from mbsim.arrays.scene import MARKER_FORCE, Scene
-from mbsim.compile_model.program_dependence import find_depends
-from mbsim.compile_model.tangent import Tangent, make_tangent
-from mbsim.core.address import pack, vector_at, view
-from mbsim.core.problem import Problem, addresses
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.tangent import Tangent
+from mbsim.core.address import vector_at, view
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
@@ -23,7 +13,6 @@ from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_s
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
-from mbsim.dynamics.pipeline.hook_table import Method, fill
 
 
 def _linearise(context, t, h, a, b):
@@ -138,26 +127,6 @@ def bend_and_drive(context, t, y):
     return 0
 
 
-def _find_slopes(scene: Scene) -> None:
-    """Let marker forces have their slopes."""
-    from mbsim.forces.abi import slopes_address
-
-    applied = scene.applied
-    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
-        applied.slopes[f] = slopes_address(int(applied.law[f]))
-
-
-def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
-    """Return the problem with the hooks of an implicit method, and what must live with it.
-
-    `pair`: the method solves with complex coefficients as well.
-    """
-    tangent = make_tangent(scene, find_depends(scene), pair)
-    table = pack(tangent)
-    scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
-    _find_slopes(scene)
-    fill(scene, Method(tangent, pair))
-    hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
-    if pair:
-        hooks |= {"factor_pair": _factor_pair, "solve_pair": _solve_pair}
-    return problem._replace(**addresses(hooks)), (tangent, table)
+#: By their names in `Problem`; those of a method that solves with complex coefficients as well.
+HOOKS = {"linearise": _linearise, "factor": _factor, "solve": _solve}
+PAIR_HOOKS = {"factor_pair": _factor_pair, "solve_pair": _solve_pair}

@@ -33,6 +33,7 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.contact.forces import (
     ALONG_X,
     ALONG_Y,
@@ -52,7 +53,6 @@ from mbsim.dynamics.contact.forces import (
     sides,
 )
 from mbsim.dynamics.contact.points import effective_mass
-from mbsim.dynamics.pipeline.scales import fill_squares
 from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
 from mbsim.laws.catalog import BRANCHES, STICK
 from mbsim.laws.catalog import SLIP as SLIDING
@@ -313,7 +313,7 @@ def carried_error(scene, e, s):
 def scaled_error(scene, h, e, y):
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
-    L and V are those of the group of connected bodies (`pipeline.scales`), the energy is that of
+    L and V are those of the group of connected bodies (`bodies.scales`), the energy is that of
     its heaviest body at V. Detection that is exact only to a given noise makes forces uncertain;
     what the noise of a step can do to a velocity is not chased. With h = 0, `e` is no step's error,
     and what it does to friction, over the normal force, counts as well. The worst body
