@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Applied, Residuals, Sensors, States, Switching
 from mbsim.compile_model.applied import applied_forces
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
@@ -59,20 +59,20 @@ class Acting:
     """What acts and what is asked for, as rows and programs, which are made in one order."""
 
     programs: ProgramTable
-    applied: a.Applied
+    applied: Applied
     applied_ids: list[tuple[str, int]]
     mechanism: Mechanism
-    states: a.States
-    sensors: a.Sensors
-    switching: a.Switching
+    states: States
+    sensors: Sensors
+    switching: Switching
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
-    residuals: a.Residuals | None
+    residuals: Residuals | None
 
 
 def _link_dry(
-    model: Model, mechanism: Mechanism, applied: a.Applied, applied_ids: list[tuple[str, int]]
+    model: Model, mechanism: Mechanism, applied: Applied, applied_ids: list[tuple[str, int]]
 ) -> None:
     """Let rigid dry frictions and their equations, know each other.
 

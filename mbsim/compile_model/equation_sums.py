@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Equations
 
 
 @dataclass
@@ -51,14 +51,14 @@ class Sums:
         self.slot.append(-1)
         self.names.append(name)
 
-    def arrays(self) -> a.Equations:
+    def arrays(self) -> Equations:
         """Return the equations as arrays, all in use."""
         n = len(self.program)
 
         def ints(values: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
             return np.array(list(values), dtype=np.int64)
 
-        return a.Equations(
+        return Equations(
             first=ints(self.first),
             program=ints(self.program),
             level=ints(self.level),

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Applied, Connections, States
 from mbsim.compile_model.instructions import ELEMENT, NET
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError, Fault
@@ -37,12 +38,12 @@ class _Needs:
 
 def in_order(
     model: Model,
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
-) -> tuple[a.Applied, list[tuple[str, int]]]:
+) -> tuple[Applied, list[tuple[str, int]]]:
     """Return the applied forces and their elements in an order in which each can be evaluated.
 
     Late ones are marked in `Applied.with_reactions`, and listed in `Applied.late`.
@@ -66,15 +67,15 @@ def in_order(
     return made._replace(late=_late(made)), [elements[k] for k in order]
 
 
-def _programs(applied: a.Applied, row: int) -> list[int]:
+def _programs(applied: Applied, row: int) -> list[int]:
     """Return the programs of an applied force."""
     return [int(p) for p in (applied.program[row], *applied.components[row]) if p >= 0]
 
 
 def _needs(
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> _Needs:
@@ -91,9 +92,9 @@ def _needs(
 
 def _needed(
     wanted: list[int],
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> tuple[set[int], bool]:
@@ -118,7 +119,7 @@ def _needed(
     return rows - joint_friction, reaction or bool(joint_friction)
 
 
-def _between(i: int, j: int, applied: a.Applied) -> set[int]:
+def _between(i: int, j: int, applied: Applied) -> set[int]:
     """Return the rows of what acts between two markers, and of what acts on i alone without j."""
     found = set()
     for k in range(len(applied.kind)):
@@ -133,10 +134,10 @@ def _between(i: int, j: int, applied: a.Applied) -> set[int]:
 
 def check_states(
     model: Model,
-    states: a.States,
-    applied: a.Applied,
+    states: States,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> None:
@@ -198,16 +199,16 @@ def _circle(model: Model, ring: list[tuple[str, int]]) -> DeckError:
     return DeckError([Fault(source.file, source.line, name, f"{what}: {' -> '.join(names)}")])
 
 
-def _late(applied: a.Applied) -> np.ndarray[Any, Any]:
+def _late(applied: Applied) -> np.ndarray[Any, Any]:
     """Return the unknowns that are settled together: row, component and program of each."""
     found = []
     for row in range(len(applied.kind)):
         if applied.with_reactions[row] == 1:
             if applied.program[row] >= 0:
-                found.append((row, a.SCALAR, int(applied.program[row])))
+                found.append((row, codes.SCALAR, int(applied.program[row])))
             components = enumerate(applied.components[row])
             found += [(row, c, int(program)) for c, program in components if program >= 0]
     if found:
         joint_friction = np.flatnonzero(applied.connection >= 0)
-        found += [(int(row), a.JOINT_FRICTION, -1) for row in joint_friction]
+        found += [(int(row), codes.JOINT_FRICTION, -1) for row in joint_friction]
     return np.array(found, dtype=np.int64).reshape(-1, 3)

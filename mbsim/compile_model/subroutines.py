@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
 from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import ANGLE, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.core.address import pack
@@ -77,7 +77,7 @@ class StateReader:
         self.open_programs: list[int] = []
         self.known: dict[tuple[Any, ...], bytes | int | None] = {}
 
-    def open(self, scene: a.Scene) -> None:
+    def open(self, scene: Scene) -> None:
         """Look at this scene from now on."""
         self.scene = scene
         at = int(scene.programs.quick_start[self.spare])

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbsim.arrays.codes import TURN_ROOT
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import TURN_ROOT, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core import tags
 from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Residuals, Users
 from mbsim.model.elements import Model
 
 if TYPE_CHECKING:
@@ -123,10 +123,10 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
-def no_residuals() -> a.Residuals:
+def no_residuals() -> Residuals:
     """Return the rows of a model without elements of users' residuals."""
-    kinds = typing.get_type_hints(a.Residuals, include_extras=True).values()
-    return a.Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
+    kinds = typing.get_type_hints(Residuals, include_extras=True).values()
+    return Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
 
 
 def _load_residuals(
@@ -172,7 +172,7 @@ def load_user_code(
     )
 
 
-def users_table(code: UserCode, model: Model, n: int) -> a.Users:
+def users_table(code: UserCode, model: Model, n: int) -> Users:
     """Return the rows of user subroutines and of residuals behind them; `n`: numbers of y."""
     users, made = code.subroutines, code.residuals
     counts = [user.count for user in users.values()]
@@ -181,7 +181,7 @@ def users_table(code: UserCode, model: Model, n: int) -> a.Users:
 
         counts += [results_of(model.force_elements[id], user) for id, user in made.items()]
     addresses = [user.address for user in users.values()]
-    return a.Users(
+    return Users(
         np.array([*addresses, *(0 for _ in made)], dtype=np.int64),
         np.array([*(-1 for _ in users), *range(len(made))], dtype=np.int64),
         np.zeros((len(counts), max(counts, default=1))),

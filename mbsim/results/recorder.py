@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.scene import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.arrays.codes import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.contact_posts import ContactPosts
@@ -59,7 +59,7 @@ FIRST_FLUSH_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Block:
-    """Output rows as the pipeline leaves them; see `arrays.scene.Rows`."""
+    """Output rows as the pipeline leaves them; see `arrays.scratch.Rows`."""
 
     time: Table
     y: Table

@@ -118,7 +118,7 @@ class ContactProblems:
         """Return H (6 nb, 3 nc), force then torque about the cg in global axes, and forces."""
         from scipy import sparse
 
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
         from mbsim.dynamics.contact import forces as at
 
         scene = self.system.scene
@@ -148,7 +148,7 @@ class ContactProblems:
         """Return W, and the velocities q of the contacts after h without them."""
         from scipy import sparse
 
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
         from mbsim.dynamics.contact import forces as at
 
         scene = self.system.scene
@@ -198,7 +198,7 @@ class ContactProblems:
 
     def _accelerations(self, t: float, y: Array, forces: Array) -> Array:
         """Return accelerations, linear then angular in global axes, under all forces (6 nb,)."""
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
 
         scene = self.system.scene
         nb, work = len(scene.bodies.mass), scene.work

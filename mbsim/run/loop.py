@@ -58,7 +58,7 @@ class Runner:
         tell: Notify,
         changes: list[Parameters] | None = None,
     ) -> None:
-        from mbsim.arrays.scene import AUDIT_TOL
+        from mbsim.arrays.codes import AUDIT_TOL
         from mbsim.compile_model.timetable import follows_time
         from mbsim.core import jit
         from mbsim.integrators import driver, scheme
@@ -291,7 +291,7 @@ class Runner:
 
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
-        from mbsim.arrays.scene import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
+        from mbsim.arrays.codes import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
         from mbsim.core import problem
         from mbsim.integrators import scheme
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.scene import AUDIT_EVERY
+from mbsim.arrays.codes import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
 from mbsim.core import jit

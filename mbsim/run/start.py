@@ -77,7 +77,7 @@ def settle_contacts(
     tell: Tell,
 ) -> None:
     """Begin with the incidents that exist at the start; refuse those that are too deep."""
-    from mbsim.arrays.scene import TOLERANCE
+    from mbsim.arrays.codes import TOLERANCE
 
     scene, problem = system.scene, hooks.problem
     t = settings.stages[0].simulation.start_time
@@ -96,7 +96,7 @@ def settle_contacts(
 
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     """Report shapes that overlap at the start; return a line for each that is too deep."""
-    from mbsim.arrays.scene import ACTIVE
+    from mbsim.arrays.codes import ACTIVE
 
     scene, model = system.scene, system.model
     faults = []

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 def counters(scene: Scene, method: Any, changes: int) -> dict[str, float]:
     """Return what was counted; `method` is what the integrator keeps, `changes` those of AUTO."""
-    from mbsim.arrays import scene as a
+    from mbsim.arrays import codes
     from mbsim.integrators import scheme
 
     counts, memory = method.counts, method.memory
@@ -23,13 +23,13 @@ def counters(scene: Scene, method: Any, changes: int) -> dict[str, float]:
         "jacobians": int(counts[scheme.JACOBIANS]),
         "factorizations": int(counts[scheme.FACTORIZATIONS]),
         "method_changes": changes,
-        "narrowphase_pairs": int(counters[a.NARROWPHASE]),
-        "skipped_pairs": int(counters[a.SKIPPED]),
-        "pair_listings": int(counters[a.LISTINGS]),
-        "fcl_calls": int(counters[a.FCL_CALLS]),
-        "normal_calls": int(counters[a.NORMAL_CALLS]),
-        "friction_calls": int(counters[a.FRICTION_CALLS]),
-        "python_calls": int(counters[a.PYTHON_CALLS]),
+        "narrowphase_pairs": int(counters[codes.NARROWPHASE]),
+        "skipped_pairs": int(counters[codes.SKIPPED]),
+        "pair_listings": int(counters[codes.LISTINGS]),
+        "fcl_calls": int(counters[codes.FCL_CALLS]),
+        "normal_calls": int(counters[codes.NORMAL_CALLS]),
+        "friction_calls": int(counters[codes.FRICTION_CALLS]),
+        "python_calls": int(counters[codes.PYTHON_CALLS]),
         "h_smallest": float(memory[scheme.H_SMALLEST]),
         "h_largest": float(memory[scheme.H_LARGEST]),
     }

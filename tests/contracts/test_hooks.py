@@ -14,8 +14,8 @@ from helpers import crowd_decks, mechanism_decks
 from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
+from mbsim.arrays.codes import NEAR_FOLD
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
-from mbsim.arrays.scene import NEAR_FOLD
 from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_Q, AT_V, AT_W
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 
 

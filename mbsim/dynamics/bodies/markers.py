@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, rotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 

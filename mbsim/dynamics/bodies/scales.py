@@ -8,8 +8,8 @@ an error is judged.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, vector
 
 #: Of the largest speed so far: what moves fast for a moment is judged by less for long.

@@ -16,8 +16,7 @@ import math
 
 import numpy as np
 
-from mbsim.arrays.hooks import Held, Hook, answer_of
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ANGLE,
     ASKED,
     FOLD_POWER,
@@ -30,8 +29,9 @@ from mbsim.arrays.scene import (
     TOUCHING,
     TWIST,
     USUAL,
-    Scene,
 )
+from mbsim.arrays.hooks import Held, Hook, answer_of
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector

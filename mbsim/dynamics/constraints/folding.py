@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AUDIT_TOL,
     FOLD_BEGINS,
     FOLD_ENDS,

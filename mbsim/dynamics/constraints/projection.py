@@ -6,8 +6,9 @@ that the tree allows, weighted by inertia; last, velocities are treated likewise
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE, DRIFT, DRIFTER
+from mbsim.arrays.codes import DRIFT, DRIFTER
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.equations import (

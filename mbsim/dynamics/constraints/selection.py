@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     CHOSEN,
     FOLDS,
     KEPT,

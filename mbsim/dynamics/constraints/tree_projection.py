@@ -8,15 +8,9 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    BODY_SIZE,
-    TURN_AXIS,
-    TURN_CROSS,
-    TURN_FREE,
-    TURN_LOCKED,
-    TURN_ROOT,
-)
+from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_LOCKED, TURN_ROOT
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
 from mbsim.dynamics.constraints.tree import child_axis, parent_axis, parent_body

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import ACTIVE, BODY_SIZE, FIXED, FREE, LISTINGS, WANTED
+from mbsim.arrays.codes import ACTIVE, FIXED, FREE, LISTINGS, WANTED
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.dynamics.contact.detection import measure_pair
 

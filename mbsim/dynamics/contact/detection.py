@@ -7,8 +7,8 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable

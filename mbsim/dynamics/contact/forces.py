@@ -11,17 +11,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    AGAIN,
-    BODY_SIZE,
-    FRICTION_CALLS,
-    NORMAL_CALLS,
-    NOW,
-    PYTHON_CALLS,
-)
+from mbsim.arrays.codes import AGAIN, FRICTION_CALLS, NORMAL_CALLS, NOW, PYTHON_CALLS
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import (
     add,

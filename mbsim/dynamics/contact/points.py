@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
-    BODY_SIZE,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -32,9 +30,11 @@ from mbsim.arrays.scene import (
     TOUCHES,
     USED_EVENTS,
 )
-from mbsim.arrays.scene import SLIP as SLIP_EVENT
+from mbsim.arrays.codes import SLIP as SLIP_EVENT
+from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair

@@ -15,8 +15,7 @@ and it acts where it is on and was not. A located EQUAL acts wherever e comes to
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     EQUAL,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -32,8 +31,9 @@ from mbsim.arrays.scene import (
     ON,
     SENSOR,
     USED_EVENTS,
-    Scene,
 )
+from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
     AXIS_TORQUE,
     BOUND_DAMPING,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import ACTIVE, AUDIT_TOL, BODY_SIZE, SCALE_LENGTH
+from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, SCALE_LENGTH
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_V, AT_W
+from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES
 from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
-from mbsim.arrays.scene import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import SHOWN
+from mbsim.arrays.codes import SHOWN
 from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,

@@ -9,7 +9,7 @@ are what follows from velocities: bodies' own are taken as zero. A vector's jet 
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import VECTOR_FORCE
+from mbsim.arrays.codes import VECTOR_FORCE
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import nearest_turn

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import PYTHON_CALLS
 from mbsim.arrays.hooks import Hook, note_failure
-from mbsim.arrays.scene import PYTHON_CALLS
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     LINE_FORCE,

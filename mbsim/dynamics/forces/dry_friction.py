@@ -17,8 +17,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     DRY_SLIDE,
     DRY_TURN,
     LOST_POWER,
@@ -30,6 +29,7 @@ from mbsim.arrays.scene import (
     STICK,
     STORED_ENERGY,
 )
+from mbsim.arrays.hooks import Dry
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     BALL_FRICTION,
     FRICTION_CALLS,
     LOST_POWER,

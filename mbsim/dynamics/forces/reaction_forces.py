@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     JOINT_FRICTION,
@@ -25,6 +24,7 @@ from mbsim.arrays.scene import (
     LOST_POWER,
     SCALAR,
 )
+from mbsim.arrays.hooks import failure_or
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector

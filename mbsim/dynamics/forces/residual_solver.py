@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import PYTHON_CALLS
+from mbsim.arrays.codes import PYTHON_CALLS
 from mbsim.core.address import call_int
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable

@@ -11,8 +11,8 @@ from typing import Any
 
 from numba.extending import overload
 
+from mbsim.arrays.codes import LOST_POWER, MARKER_FORCE, STORED_ENERGY
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import LOST_POWER, MARKER_FORCE, STORED_ENERGY
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import ANGLE
 from mbsim.arrays.hooks import Joints
-from mbsim.arrays.scene import ANGLE, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import System
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting

@@ -6,7 +6,7 @@ reactions, and press friction in joints, these are taken as they are.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     DRY_TURN,

@@ -6,7 +6,7 @@ press friction are taken as they are.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BALL_FRICTION, SCREW_FRICTION, SLIDE_FRICTION
+from mbsim.arrays.codes import BALL_FRICTION, SCREW_FRICTION, SLIDE_FRICTION
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity

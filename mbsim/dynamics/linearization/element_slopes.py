@@ -10,7 +10,7 @@ turn the force is counted, that they turn the rates is not: Newton's method is a
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import RESIDUAL
+from mbsim.arrays.codes import RESIDUAL
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.forces.force_element import BEFORE, NOW, SHORT, find_unknowns, step_of, switches

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.compile_model.instructions import USER
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, vector
 from mbsim.dynamics.bodies.kinematics import place_body
 from mbsim.dynamics.expressions.jets import run, value

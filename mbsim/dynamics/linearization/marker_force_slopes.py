@@ -7,7 +7,7 @@ here.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import MARKER_FORCE
+from mbsim.arrays.codes import MARKER_FORCE
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, scale, sub, vector

@@ -15,11 +15,12 @@ point on the child, f = (n, F),
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import BODY_SIZE, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
 from mbsim.dynamics.constraints.equations import fill_equation, side_place

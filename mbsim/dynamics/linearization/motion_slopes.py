@@ -6,8 +6,8 @@ poses, of C a + s(q, v) with poses and velocities; a, the accelerations, as they
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
 from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, side_place

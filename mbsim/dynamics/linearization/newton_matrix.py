@@ -25,10 +25,10 @@ Both are taken over c1 or c2, so that rows of the border have one size.
 from __future__ import annotations
 
 from mbsim.arrays.hooks import Memory, note_failure
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.linearization.blocks import (

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ANEW,
     AUDIT_EVERY,
     AUDIT_TOL,
     AUDIT_UNTIL,
-    BODY_SIZE,
     CLOSED_AT,
     CONE,
     CONTACT_THEN,
@@ -58,6 +57,7 @@ from mbsim.arrays.scene import (
     WORST_TIME,
 )
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
 from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
 from mbsim.arrays.hooks import Hook, Joints
-from mbsim.arrays.scene import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import NEAR_FOLD, NOW, WITHIN
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
-from mbsim.arrays.scene import BODY_SIZE, NEAR_FOLD, NOW, WITHIN
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.detection import find_contacts

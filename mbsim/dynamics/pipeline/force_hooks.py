@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import FOLD_HALT
 from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import FOLD_HALT, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn

@@ -22,15 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from mbsim.arrays.codes import DRY_SLIDE, DRY_TURN, MARKER_FORCE, RESIDUAL, VECTOR_FORCE
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import (
-    DRY_SLIDE,
-    DRY_TURN,
-    MARKER_FORCE,
-    RESIDUAL,
-    VECTOR_FORCE,
-    Scene,
-)
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core import jit
 from mbsim.core.problem import HOOK

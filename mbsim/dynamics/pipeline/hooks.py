@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import ERROR_NOW, FOLD_HALT, FOLDS, HELD_OTHERWISE, LISTINGS
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
-from mbsim.arrays.scene import (
-    BODY_SIZE,
-    ERROR_NOW,
-    FOLD_HALT,
-    FOLDS,
-    HELD_OTHERWISE,
-    LISTINGS,
-    Scene,
-)
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import (
     ALONG,
     BY_CHECK,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Hook, Joints, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
-    BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
     INC_COUPLE,
@@ -29,8 +27,10 @@ from mbsim.arrays.scene import (
     INC_X,
     STORED_ENERGY,
 )
+from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.scales import fill_squares

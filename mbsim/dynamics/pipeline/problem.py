@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import MARKER_FORCE
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import MARKER_FORCE, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
 from mbsim.dynamics.pipeline.hook_table import Method, fill

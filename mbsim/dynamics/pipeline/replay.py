@@ -7,8 +7,7 @@ same code gives the same numbers to the last bit.
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AGAIN,
     CONTACT_COLUMNS,
     INC_COUPLE,
@@ -28,8 +27,9 @@ from mbsim.arrays.scene import (
     INC_TOUCHES,
     NOW,
     SLOT_COLUMNS,
-    Scene,
 )
+from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies

@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SLIP as SLIP_EVENT
+from mbsim.arrays.codes import STICK as STICK_EVENT
+from mbsim.arrays.codes import TOLERANCE
 from mbsim.arrays.hooks import Held, Hook, note_failure
-from mbsim.arrays.scene import SLIP as SLIP_EVENT
-from mbsim.arrays.scene import STICK as STICK_EVENT
-from mbsim.arrays.scene import TOLERANCE
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector

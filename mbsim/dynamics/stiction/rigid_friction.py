@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     HELD_OTHERWISE,
     SLIDER,
     SLIDER_BEFORE,
@@ -22,6 +21,7 @@ from mbsim.arrays.scene import (
     SLIP,
     STICK,
 )
+from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.forces.dry_friction import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import CONE_ROWS
+from mbsim.arrays.codes import CONE_ROWS
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, scale, vector
 from mbsim.dynamics.constraints.equations import add_wrench, along, fill_equation

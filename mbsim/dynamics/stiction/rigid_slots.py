@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.constraints.selection import sticks
