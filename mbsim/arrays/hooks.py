@@ -10,8 +10,12 @@ and the hook that an integrator called returns it.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 from mbsim.core.jitable import jitable
+
+if TYPE_CHECKING:
+    from mbsim.arrays.scene import Scene
 
 
 class Hook(IntEnum):
@@ -83,14 +87,14 @@ class Memory(IntEnum):
 
 
 @jitable
-def note_failure(scene, code):
+def note_failure(scene: Scene, code: int) -> None:
     """Keep the first code where it cannot be returned: `failure_or` hands it on."""
     if code != 0 and scene.users.failed[0] == 0:
         scene.users.failed[0] = code
 
 
 @jitable
-def failure_or(scene, code):
+def failure_or(scene: Scene, code: int) -> int:
     """Return the code that was noted, which is forgotten, or `code` if there is none."""
     noted = scene.users.failed[0]
     scene.users.failed[0] = 0
@@ -98,7 +102,7 @@ def failure_or(scene, code):
 
 
 @jitable
-def answer_of(scene, answer):
+def answer_of(scene: Scene, answer: int) -> int:
     """Return what a hook answers; 0 where it failed, which is noted."""
     if answer < 0:
         note_failure(scene, -answer)

@@ -22,7 +22,7 @@ class Pairs(NamedTuple):
     left: F1  # (np,) what the motion since has left of it for certain
     active: I1  # (np,) places in use, ascending; those of large contacts behind all others
     free: I1  # (np,) places not in use, the next one last
-    count: I1  # (4,) live, free, live for good, places that a listing lacked
+    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, places that a listing lacked
 
 
 @tags.state

@@ -35,7 +35,7 @@ from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
 SPARE_ANGLES = 32
 
 #: What py_sysary gives: functions and how many of the ids each takes.
-ARRAYS = {
+ARRAYS: dict[str, tuple[tuple[str, int], ...]] = {
     "TDISP": (("DX", 3), ("DY", 3), ("DZ", 3)),
     "RDISP": (("PSI", 2), ("THETA", 2), ("PHI", 2)),
     "TVEL": (("VX", 4), ("VY", 4), ("VZ", 4)),
@@ -83,7 +83,7 @@ class StateReader:
         at = int(scene.programs.quick_start[self.spare])
         self.place = scene.programs.quick[at].ctypes.data
         self.words = scene.programs.quick.shape[1]
-        self.values = memoryview(scene.programs.values)
+        self.values = scene.programs.values.data
         self.shown = b""
         self.run: Callable[..., float] | None = None
         host.sysfnc, host.sysary = self.sysfnc, self.sysary

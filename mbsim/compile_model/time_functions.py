@@ -108,9 +108,9 @@ def parts(scene: Scene, program: int) -> tuple[list[tuple[Code, ...]], bool, boo
             lone = chosen is not None and not any(part.mixed for part in given)
             blind |= seen and not lone and not _is_quotient(code, given)
         stack.append(_Part((), _OTHER, seen))
-    (whole,) = stack
-    if whole.looks == _OF_TIME:
-        return [whole.code], True, False
+    (all_of_it,) = stack
+    if all_of_it.looks == _OF_TIME:
+        return [all_of_it.code], True, False
     return list(found), False, blind
 
 

@@ -64,7 +64,7 @@ class _Group:
         self.numbers = {k: np.array([member.code[k].value for member in members]) for k in places}
         self.role = np.array([member.role for member in members])
         self.sizes = np.array([member.sizes for member in members])
-        self.known = self.sizes.any(axis=1)
+        self.known: Any = self.sizes.any(axis=1)
         self.count = len(members)
 
     def bound(self, member: Any, lo: Any, hi: Any) -> Bound:

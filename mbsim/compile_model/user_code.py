@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.arrays.model import Residuals, Users
-from mbsim.model.elements import Model
+from mbsim.model.elements import Model, Variable
+from mbsim.model.forces import ScalarForce, VectorForce
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -34,7 +35,8 @@ class UserCode:
     @property
     def laws_look(self) -> bool:
         """Whether a law of a contact looks at the state."""
-        return any(law.looks for law in (*self.friction.values(), *self.normal.values()))
+        friction = any(law.looks for law in self.friction.values())
+        return friction or any(law.looks for law in self.normal.values())
 
     @property
     def looks(self) -> bool:
@@ -108,7 +110,7 @@ def _load_subroutines(
     scripts: dict[Path, Script],
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Load the users' subroutines of forces and variables."""
-    elements = (
+    elements: tuple[ScalarForce | Variable | VectorForce, ...] = (
         *model.scalar_forces.values(),
         *model.variables.values(),
         *model.vector_forces.values(),

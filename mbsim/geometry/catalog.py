@@ -29,8 +29,9 @@ the normal; it is in a second registry.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
@@ -62,14 +63,18 @@ class Region(NamedTuple):
     whole: float
 
 
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
-def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
+def pair(
+    shape_i: str, shape_j: str, slots: int, regroups: bool = False
+) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
-    def register(points: Callable[..., int]) -> Callable[..., int]:
+    def register(points: Kernel) -> Kernel:
         name = f"{shape_i}-{shape_j}"
         PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
         return points
@@ -77,10 +82,10 @@ def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
     return register
 
 
-def region(shape_i: str, shape_j: str, whole: float) -> Any:
+def region(shape_i: str, shape_j: str, whole: float) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of a pair with its area."""
 
-    def register(function: Callable[..., Any]) -> Callable[..., Any]:
+    def register(function: Kernel) -> Kernel:
         REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
         return function
 
@@ -88,7 +93,7 @@ def region(shape_i: str, shape_j: str, whole: float) -> Any:
 
 
 @jitable
-def put_point(row, depth, p, n, share=1.0):
+def put_point(row: F1, depth: float, p: V3, n: V3, share: float = 1.0) -> None:
     """Write one candidate into a row of `points`."""
     row[0] = depth
     row[1], row[2], row[3] = p[0], p[1], p[2]
@@ -98,13 +103,13 @@ def put_point(row, depth, p, n, share=1.0):
 
 
 @jitable
-def put_couple(row, couple):
+def put_couple(row: F1, couple: V3) -> None:
     """Give a candidate the couple on I for a unit of its energy."""
     row[8], row[9], row[10] = couple[0], couple[1], couple[2]
 
 
 @jitable
-def plane_axes(n):
+def plane_axes(n: V3) -> tuple[V3, V3]:
     """Return two unit vectors x, y square to n; the same for n and -n, and x * y is one of both."""
     k = 0
     for c in range(1, 3):
@@ -116,6 +121,6 @@ def plane_axes(n):
 
 
 @jitable
-def axis(frame, k):
+def axis(frame: F1, k: int) -> V3:
     """Return axis k (column k of the rotation) of a frame."""
     return (frame[3 + k], frame[6 + k], frame[9 + k])

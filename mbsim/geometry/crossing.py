@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V3
 from mbsim.core.blend import step, step_derivative
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub
@@ -31,7 +32,7 @@ LEAST_SHARE = 1e-6
 
 
 @jitable
-def turning(kind, n, u, e):
+def turning(kind: int, n: V3, u: V3, e: V3) -> tuple[int, V3, V3]:
     """Return how n turns as I turns: for `carried`; u, e are the edges whose normal n is."""
     if kind != EDGES_MEET:
         return kind, u, e
@@ -41,7 +42,7 @@ def turning(kind, n, u, e):
 
 
 @jitable
-def carried(q, n, turn):
+def carried(q: V3, n: V3, turn: tuple[int, V3, V3]) -> V3:
     """Return the vector a with a.w = q.dn, dn the change of n as I turns by w and J stays."""
     kind, first, second = turn
     if kind == FACE_OF_J:
@@ -52,7 +53,7 @@ def carried(q, n, turn):
 
 
 @jitable
-def given_way(out, m, side, beyond):
+def given_way(out: V3, m: V3, side: V3, beyond: V3) -> tuple[float, float, V3]:
     """Return t, dt/d(tilt) and x with d(tilt) = x.d(out) for a face seen along -out.
 
     `m` is the face's outward normal, `side` the way across its edge in its plane, `beyond` the
@@ -70,7 +71,15 @@ def given_way(out, m, side, beyond):
 
 
 @jitable
-def share_of_crossing(u, e, n, ends, face_i, face_j, turn):
+def share_of_crossing(
+    u: V3,
+    e: V3,
+    n: V3,
+    ends: bool,
+    face_i: tuple[V3, V3],
+    face_j: tuple[V3, V3],
+    turn: tuple[int, V3, V3],
+) -> tuple[float, V3]:
     """Return the share of a crossing and the couple on I for a unit of energy.
 
     Parameters
@@ -117,7 +126,7 @@ def share_of_crossing(u, e, n, ends, face_i, face_j, turn):
 
 
 @jitable
-def middle_of_lines(p, u, e, g, way, d):
+def middle_of_lines(p: V3, u: V3, e: V3, g: V3, way: V3, d: float) -> V3:
     """Return the middle of two lines where they are nearest to each other.
 
     The line along u goes through p, that along e through p + `way`; they are d apart along their

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub
 from mbsim.geometry.catalog import put_point
@@ -24,28 +25,28 @@ ARC_ROWS = 6
 
 
 @jitable
-def put_apart(points, first, last, depth, p, n):
+def put_apart(points: F2, first: int, last: int, depth: float, p: V3, n: V3) -> None:
     """Write rows that do not touch."""
     for row in range(first, last):
         put_point(points[row], depth, p, n)
 
 
 @jitable
-def put_share(row, depth, p, n, share):
+def put_share(row: F1, depth: float, p: V3, n: V3, share: float) -> None:
     """Write one candidate, unless it carries nothing."""
     if share > SMALL:
         put_point(row, depth, p, n, share)
 
 
 @jitable
-def fade(x):
+def fade(x: float) -> float:
     """Return the smooth step 3 x^2 - 2 x^3 from 0 to 1, constant outside."""
     x = min(1.0, max(0.0, x))
     return x * x * (3.0 - 2.0 * x)
 
 
 @jitable
-def half_sector(arcs, count, begin, sign):
+def half_sector(arcs: F2, count: int, begin: float, sign: float) -> V3:
     """Return (angle, c, s) of what arcs leave of the 60 degrees from `begin` on.
 
     `sign` 1 looks to the left, -1 to the right; c, s are cosine and sine of the place that stands
@@ -81,7 +82,17 @@ def half_sector(arcs, count, begin, sign):
 
 
 @jitable
-def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
+def put_arcs(
+    points: F2,
+    first: int,
+    arcs: F2,
+    count: int,
+    disc: tuple[V3, V3, V3, float, float, float],
+    n: V3,
+    side: float,
+    reference: float,
+    weight: float,
+) -> None:
     """Write three points for what is left of a rim.
 
     The rim is cut into three sectors around `reference` and +-120 degrees. A sector's
@@ -115,7 +126,19 @@ def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
 
 
 @jitable
-def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepest):
+def put_rim(
+    points: F2,
+    first: int,
+    arcs: F2,
+    count: int,
+    disc: tuple[V3, V3, V3, float, float, float],
+    n: V3,
+    side: float,
+    total: float,
+    own: float,
+    weight: float,
+    deepest: float,
+) -> None:
     """Write up to six points for what is left of a rim, `total` [rad] in all.
 
     Tilted, the sectors are set around the deepest point (u), so that it carries wherever the
@@ -132,19 +155,19 @@ def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepe
 
 
 @jitable
-def turn_of(ax, ay, bx, by):
+def turn_of(ax: float, ay: float, bx: float, by: float) -> float:
     """Return the angle from a to b where it is to the left, else 0."""
     return max(0.0, math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 @jitable
-def line_share(length, radius):
+def line_share(length: float, radius: float) -> float:
     """Return the share of each end of a line contact: 1, fading to 1/2 as it shrinks to a point."""
     return 0.5 + 0.5 * fade(5.0 * length / radius)
 
 
 @jitable
-def disc_lies(width, tilt, f):
+def disc_lies(width: float, tilt: float, f: float) -> float:
     """Return the part that a patch carries: 1, and 0 where it is tilted to one place.
 
     `width` is how far it reaches along the tilt from its middle, `tilt` a tangent, f the depth.
@@ -154,19 +177,21 @@ def disc_lies(width, tilt, f):
 
 
 @jitable
-def line_lies(depth_a, depth_b, f):
+def line_lies(depth_a: float, depth_b: float, f: float) -> float:
     """Return the part that a line carries: 1, and 0 where one end is far above what touches."""
     return fade(2.0 - abs(depth_a - depth_b) / f)
 
 
 @jitable
-def side_faces(n, out):
+def side_faces(n: V3, out: V3) -> float:
     """Return the part that a side of normal `out` carries along n: none where its rim presses."""
     return fade(1.0 - 10.0 * norm(add(n, out)))
 
 
 @jitable
-def share_with_one(points, count, part, crossed, f, p, n):
+def share_with_one(
+    points: F2, count: int, part: float, crossed: bool, f: float, p: V3, n: V3
+) -> None:
     """Leave a part of the force to the first `count` rows, the rest to one point p, the next row.
 
     No row is deeper than f, the least overlap. Rows that carry less than one point would leave the
@@ -185,7 +210,17 @@ def share_with_one(points, count, part, crossed, f, p, n):
 
 
 @jitable
-def segment_on_disc(points, first, a, b, disc, o, n, side, f):
+def segment_on_disc(
+    points: F2,
+    first: int,
+    a: V3,
+    b: V3,
+    disc: tuple[V3, float],
+    o: V3,
+    n: V3,
+    side: float,
+    f: float,
+) -> float:
     """Write the ends of the part of segment a-b that lies over an end disc.
 
     Returns the part of the force that they carry, -1 where nothing lies over it.
@@ -218,7 +253,7 @@ def segment_on_disc(points, first, a, b, disc, o, n, side, f):
 
 
 @jitable
-def crossing_of(a, b, p, q, n):
+def crossing_of(a: V3, b: V3, p: V3, q: V3, n: V3) -> float:
     """Return the place 0..1 on p-q where it crosses the line a-b, seen along n; 1/2 if parallel."""
     across = cross(sub(b, a), n)
     along = dot(sub(q, p), across)

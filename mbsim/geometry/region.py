@@ -26,6 +26,7 @@ import math
 
 import numpy as np
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
@@ -50,7 +51,7 @@ _NARROW = 1e-3
 
 
 @jitable
-def sum_points(rows, whole, area):
+def sum_points(rows: F2, whole: float, area: float) -> None:
     """Write the incident and its area before the points that it stands for.
 
     Parameters
@@ -108,7 +109,7 @@ def sum_points(rows, whole, area):
 
 
 @jitable
-def _signs(k, sign, corner):
+def _signs(k: int, sign: float, corner: int) -> V3:
     """Return the signs along x, y, z of a corner of a box's face, round to the left for sign 1.
 
     The face has the normal sign times axis k; its corners are (+, +), (-, +), (-, -), (+, -) of
@@ -122,7 +123,7 @@ def _signs(k, sign, corner):
 
 
 @jitable
-def box_cut(frame, half, origin, n):
+def box_cut(frame: F1, half: F1, origin: V3, n: V3) -> float:
     """Return the area of the cut of a box with a plane.
 
     Every face that the plane crosses has one side of the cut, from where its border comes up
@@ -157,7 +158,7 @@ def box_cut(frame, half, origin, n):
 
 
 @jitable
-def disc_beyond(x, r):
+def disc_beyond(x: float, r: float) -> float:
     """Return the area of a disc of radius r beyond the chord at distance x of its centre."""
     if x >= r:
         return 0.0
@@ -168,13 +169,13 @@ def disc_beyond(x, r):
 
 
 @jitable
-def chord(x, r):
+def chord(x: float, r: float) -> float:
     """Return the length of the chord of a disc at distance x of its centre."""
     return 2.0 * math.sqrt(max(0.0, (r - x) * (r + x)))
 
 
 @jitable
-def cylinder_cut(frame, r, half, origin, n):
+def cylinder_cut(frame: F1, r: float, half: float, origin: V3, n: V3) -> float:
     """Return the area of the cut of a cylinder with a plane: of an ellipse, between both ends.
 
     Along the axis it is the part of a disc between two chords.
@@ -196,7 +197,7 @@ def cylinder_cut(frame, r, half, origin, n):
 
 
 @jitable
-def disc_below(centre, o, r, origin, n):
+def disc_below(centre: V3, o: V3, r: float, origin: V3, n: V3) -> float:
     """Return the area of the part of a disc with normal o below a plane, seen along n."""
     s = norm(cross(o, n))
     height = dot(sub(centre, origin), n)
@@ -208,7 +209,7 @@ def disc_below(centre, o, r, origin, n):
 
 
 @jitable
-def frustum_ends(frame, size, origin, n):
+def frustum_ends(frame: F1, size: F1, origin: V3, n: V3) -> float:
     """Return the area of those parts of a frustum's ends that face a plane from below it."""
     a, total = axis(frame, 2), 0.0
     for end in range(2):
@@ -220,7 +221,7 @@ def frustum_ends(frame, size, origin, n):
 
 
 @jitable
-def polygon_area(polygon, count):
+def polygon_area(polygon: F2, count: int) -> float:
     """Return the area of a polygon, positive where it goes round to the left."""
     total = 0.0
     for k in range(count):
@@ -230,13 +231,13 @@ def polygon_area(polygon, count):
 
 
 @jitable
-def _sector(ax, ay, bx, by, r):
+def _sector(ax: float, ay: float, bx: float, by: float, r: float) -> float:
     """Return the area of the sector of a disc from a round to b."""
     return 0.5 * r * r * math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
 
 @jitable
-def _under_edge(ax, ay, bx, by, r):
+def _under_edge(ax: float, ay: float, bx: float, by: float, r: float) -> float:
     """Return the area of the part of the triangle 0, a, b that lies in the disc around 0."""
     dx, dy = bx - ax, by - ay
     aa, ab = dx * dx + dy * dy, ax * dx + ay * dy
@@ -254,7 +255,7 @@ def _under_edge(ax, ay, bx, by, r):
 
 
 @jitable
-def disc_in_polygon(polygon, count, r):
+def disc_in_polygon(polygon: F2, count: int, r: float) -> float:
     """Return the area that a convex polygon and the disc of radius r around 0 have in common."""
     total = 0.0
     for k in range(count):
@@ -264,7 +265,9 @@ def disc_in_polygon(polygon, count, r):
 
 
 @jitable
-def put_rectangle(polygon, face, origin, u, v, way):
+def put_rectangle(
+    polygon: F2, face: tuple[V3, V3, V3, V3], origin: V3, u: V3, v: V3, way: V3
+) -> None:
     """Write the corners of a rectangle in the axes u, v of a plane, seen along `way`.
 
     `face` is its centre, its half edges and its unit normal.
@@ -279,7 +282,7 @@ def put_rectangle(polygon, face, origin, u, v, way):
 
 
 @jitable
-def cylinder_on_rectangle(frame, r, half, face):
+def cylinder_on_rectangle(frame: F1, r: float, half: float, face: tuple[V3, V3, V3, V3]) -> float:
     """Return the area of the cut of a cylinder with a rectangle.
 
     `face` is the rectangle's centre, its half edges and its unit normal. Seen along the
@@ -318,7 +321,7 @@ def cylinder_on_rectangle(frame, r, half, face):
 
 
 @jitable
-def disc_on_rectangle(centre, o, r, face):
+def disc_on_rectangle(centre: V3, o: V3, r: float, face: tuple[V3, V3, V3, V3]) -> float:
     """Return the area of the part of a disc that is below a rectangle, seen along its normal."""
     origin, _, _, n = face
     c, tilt = dot(o, n), cross(cross(o, n), o)

@@ -28,6 +28,7 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     BEGUN,
     BEGUN_WORK,
@@ -48,6 +49,8 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     TIME,
     WAS_CUT,
+    Method,
+    Steps,
     failure_or,
 )
 
@@ -77,7 +80,7 @@ WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
 @jitable
-def is_stiff(m, h, t_end):
+def is_stiff(m: Method, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
@@ -115,7 +118,7 @@ def is_stiff(m, h, t_end):
 
 
 @jitable
-def is_calm(p, m, steps, t_end):
+def is_calm(p: Problem, m: Method, steps: Steps, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
     if m.memory[IMPLICIT_STEPS] % TRY_EVERY != 0.0:
@@ -151,7 +154,7 @@ def is_calm(p, m, steps, t_end):
 
 
 @jitable
-def changes_over(p, m, steps, h, t_end):
+def changes_over(p: Problem, m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return is_calm(p, m, steps, t_end)

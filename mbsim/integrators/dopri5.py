@@ -11,14 +11,17 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
     STIFFNESS,
     TOL,
     WATCH,
+    Method,
     Scheme,
     in_workspace,
     project,
@@ -49,7 +52,7 @@ HIDES, SHOWN, BOUNDS = 4.0, 2.5, 0.01
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill stages 2..7, trial point and error; return a code.
 
     The trial point is projected before stage 7, which makes it the next step's stage 1.
@@ -101,7 +104,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def stiffness(m, h):
+def stiffness(m: Method, h: float) -> float:
     """Return the step times the rate of f between the last two stages, inf where that is hidden.
 
     Of bodies alone, where there are some: what is summed up beside them has other units.
@@ -128,7 +131,7 @@ def stiffness(m, h):
 
 
 @jitable
-def fit_dense(m, h):
+def fit_dense(m: Method, h: float) -> None:
     """Fill the polynomial of the step from y to trial; all stages are there."""
     k, d = m.k, m.dense
     for i in range(len(m.y)):
@@ -143,13 +146,13 @@ def fit_dense(m, h):
         )
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     problem, method = in_workspace(context)
     return attempt(problem, method, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Dense output of the step tried last."""
     _, method = in_workspace(context)
     fit_dense(method, h)

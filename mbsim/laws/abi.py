@@ -24,8 +24,12 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
 from mbsim.core.address import vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
+
+#: An intrinsic is called without the typing context that it is declared with.
+_as_tuple: Callable[..., tuple[float, ...]] = to_fixed_tuple
 
 FRICTION_INPUTS = 27
 #: Places of the last of them, which only derivatives and laws with memory look at.
@@ -40,7 +44,7 @@ FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
 
 
 @jitable
-def friction_input(a):
+def friction_input(a: F1) -> FrictionInput:
     """Return the `FrictionInput` that lies in the numbers of array `a`."""
     return FrictionInput(
         a[0],
@@ -67,8 +71,8 @@ def friction_input(a):
 def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
     """Return a normal law of `count` constants as a C function."""
 
-    def entry(depth, rate, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         result = vector_at(out, 3)
         force, elastic, stored = law(depth, rate, *values)
         result[0] = force
@@ -82,8 +86,8 @@ def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
 def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     """Return `force` of `count` parameters as a C function."""
 
-    def entry(element, inputs, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         result = vector_at(out, 5)
         given = friction_input(vector_at(inputs, FRICTION_INPUTS))
         fx, fy, mx, my, tz = force(given, *values)
@@ -101,10 +105,10 @@ def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int, carri
     """Return `force` of `count` parameters and so many numbers of memory as a C function."""
     given = memory + carried
 
-    def entry(element, inputs, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         a = vector_at(inputs, FRICTION_INPUTS + memory)
-        kept = to_fixed_tuple(a[FRICTION_INPUTS:], memory)
+        kept = _as_tuple(a[FRICTION_INPUTS:], memory)
         result = vector_at(out, MEMORY_OUT + given)
         found, new = force(friction_input(a), kept, *values)
         for k in range(MEMORY_OUT):

@@ -100,7 +100,7 @@ def quaternion_about_z(angle):
 
 def test_incident_marker_turns_with_a_turntable(tmp_path):
     from mbsim.dynamics.bodies.kinematics import place_bodies
-    from mbsim.dynamics.contact.forces import tangent
+    from mbsim.dynamics.contact.frames import tangent
 
     # a ball on a disc, both moving bodies; the frame must turn with both
     disc = """<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="2"/>

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
@@ -17,7 +19,7 @@ from mbsim.geometry.catalog import COUPLE
 
 
 @jitable
-def measure_pair(scene, pair):
+def measure_pair(scene: Scene, pair: int) -> bool:
     """Run a pair's closed form into its rows of `points`; False where FCL has to do it."""
     pairs, kinds, work = scene.pairs, scene.kinds, scene.work
     kind = pairs.kind[pair]
@@ -43,7 +45,7 @@ def measure_pair(scene, pair):
 
 
 @jitable
-def gather(scene, pair):
+def gather(scene: Scene, pair: int) -> None:
     """Append the slots of a pair that touch to the list of hits."""
     work, hit = scene.work, scene.work.hit
     kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
@@ -59,7 +61,7 @@ def gather(scene, pair):
 
 
 @jitable
-def find_contacts(scene, y):
+def find_contacts(scene: Scene, y: F1) -> int:
     """Fill the list of slots that touch, with their points; return 0, or a code."""
     pairs, work, log = scene.pairs, scene.work, scene.log
     hit, last = work.hit, len(work.hit) - 1

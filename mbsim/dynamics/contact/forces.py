@@ -11,28 +11,25 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AGAIN, FRICTION_CALLS, NORMAL_CALLS, NOW, PYTHON_CALLS
+from mbsim.arrays.codes import FRICTION_CALLS, NORMAL_CALLS, NOW, PYTHON_CALLS
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import (
     add,
-    any_tangent,
     cross,
     dot,
     norm,
-    rotate,
     scale,
-    spin,
     sub,
-    turn_about,
-    turn_with_normal,
     unrotate,
     vector,
 )
 from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.contact.frames import tangent
 from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
 from mbsim.laws.abi import (
     BRANCH_OUT,
@@ -77,60 +74,14 @@ HELD_BACK = 0.25
 
 
 @jitable
-def velocity_at(scene, y, b, p):
+def velocity_at(scene: Scene, y: F1, b: int, p: V3) -> V3:
     """Return the velocity of body b's material point at p."""
     arm = sub(p, position(scene, y, b))
     return add(vector(scene.work.v[b]), cross(vector(scene.work.w[b]), arm))
 
 
 @jitable
-def turned(scene, t, y, b, n, n0):
-    """Return the angle by which body b turned about n since the committed state, where it was n0.
-
-    What follows a frame through many steps must not depend on how long they are.
-    """
-    if b == len(scene.bodies.mass):
-        return 0.0
-    state, at = scene.state, BODY_SIZE * b + 3
-    q, w, w0 = (y[at], y[at + 1], y[at + 2], y[at + 3]), scene.work.w[b], state.w[b]
-    return turn_about(q, state.q[b], vector(w), vector(w0), n, n0, t - state.since[0])
-
-
-@jitable
-def birth_tangent(scene, graphic_i, n):
-    """Return the x-axis of a new incident marker: I's marker x-axis (or y), projected."""
-    R = scene.work.R[scene.graphics.body[graphic_i]]
-    S = scene.graphics.marker_R[graphic_i]
-    x = rotate(R, (S[0, 0], S[1, 0], S[2, 0]))
-    if abs(dot(x, n)) > 0.9:
-        x = rotate(R, (S[0, 1], S[1, 1], S[2, 1]))
-    x = sub(x, scale(dot(x, n), n))
-    return scale(1.0 / math.sqrt(dot(x, x)), x)
-
-
-@jitable
-def tangent(scene, time, y, s, c, graphic_i, bi, bj, n):
-    """Return the x-axis of the incident marker of slot s of contact c at the trial point.
-
-    Since the committed state it has turned with the normal by the shortest rotation and about
-    the normal by the mean of both bodies' turns; a new incident gets its axes by birth.
-    """
-    state = scene.state
-    if scene.contacts.framed[c] == 0:
-        # the law is the same in every tangent frame
-        return any_tangent(n)
-    if scene.world.past[0] == AGAIN:
-        return vector(state.t[s])
-    if state.touching[s] == 0:
-        return birth_tangent(scene, graphic_i, n)
-    n0 = vector(state.n[s])
-    t = turn_with_normal(vector(state.t[s]), n0, n)
-    both = turned(scene, time, y, bi, n, n0) + turned(scene, time, y, bj, n, n0)
-    return spin(t, n, 0.5 * both)
-
-
-@jitable
-def in_marker(scene, y, g, p):
+def in_marker(scene: Scene, y: F1, g: int, p: V3) -> V3:
     """Return point p from the origin of graphic g's reference marker, in that marker's axes."""
     b = scene.graphics.body[g]
     in_body = unrotate(scene.work.R[b], sub(p, position(scene, y, b)))
@@ -138,14 +89,14 @@ def in_marker(scene, y, g, p):
 
 
 @jitable
-def along_marker(scene, g, v):
+def along_marker(scene: Scene, g: int, v: V3) -> V3:
     """Return a vector along the axes of graphic g's reference marker."""
     in_body = unrotate(scene.work.R[scene.graphics.body[g]], v)
     return unrotate(scene.graphics.marker_R[g], in_body)
 
 
 @jitable
-def sides(scene, s):
+def sides(scene: Scene, s: int) -> tuple[int, int]:
     """Return the graphics of a slot in the contact's order: I, J."""
     pair = scene.slots.pair[s]
     i, j = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
@@ -155,25 +106,25 @@ def sides(scene, s):
 
 
 @jitable
-def contact_of(scene, s):
+def contact_of(scene: Scene, s: int) -> int:
     """Return the contact of slot s."""
     return scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
 
 
 @jitable
-def face_weight_of(scene, s):
+def face_weight_of(scene: Scene, s: int) -> float:
     """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
     return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
 
 
 @jitable
-def patch(scene, s):
+def patch(scene: Scene, s: int) -> float:
     """Return the area of contact of slot s, 0 for a point."""
     return scene.work.slot[s, PATCH] if face_weight_of(scene, s) > 0.0 else 0.0
 
 
 @jitable
-def add_wrench(scene, y, b, p, force, torque):
+def add_wrench(scene: Scene, y: F1, b: int, p: V3, force: V3, torque: V3) -> None:
     """Add a force at p and a torque to body b."""
     arm = sub(p, position(scene, y, b))
     moment = add(cross(arm, force), torque)
@@ -183,7 +134,7 @@ def add_wrench(scene, y, b, p, force, torque):
 
 
 @jitable
-def slipping_mass(scene, s):
+def slipping_mass(scene: Scene, s: int) -> float:
     """Return the mass of both bodies of slot s as one slips on the other, a part for each point."""
     inverse = 0.0
     for g in sides(scene, s):
@@ -195,7 +146,7 @@ def slipping_mass(scene, s):
 
 
 @jitable
-def remember(scene, y, s, c, given):
+def remember(scene: Scene, y: F1, s: int, c: int, given: F1) -> None:
     """Give a friction law what it kept, and what only laws with memory look at."""
     state, at, z, row = scene.state, FRICTION_INPUTS, scene.slots.z[s], scene.work.slot[s]
     carried = scene.contacts.carried[c]
@@ -216,7 +167,7 @@ def remember(scene, y, s, c, given):
 
 
 @jitable
-def keep(scene, dy, s, c, out):
+def keep(scene: Scene, dy: F1, s: int, c: int, out: F1) -> None:
     """Keep what a friction law with memory made of it."""
     row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
     row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
@@ -228,14 +179,26 @@ def keep(scene, dy, s, c, out):
 
 
 @jitable
-def show_state(scene, y):
+def show_state(scene: Scene, y: F1) -> None:
     """Let interpreted laws that ask for it see the trial point."""
     for k in range(len(scene.users.seen)):
         scene.users.seen[k] = y[k]
 
 
 @jitable
-def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
+def friction(
+    scene: Scene,
+    t: float,
+    h: float,
+    y: F1,
+    s: int,
+    c: int,
+    loci: V3,
+    locj: V3,
+    spin_rates: V3,
+    slip: V2,
+    normal: float,
+) -> int:
     """Call the friction law of contact c for slot s into `law_out`; return its code.
 
     Many arguments because compiled code is given numbers, not records.
@@ -273,7 +236,16 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
 
 
 @jitable
-def ask_normal(scene, t, y, c, at, depth, rate, out):
+def ask_normal(
+    scene: Scene,
+    t: float,
+    y: F1,
+    c: int,
+    at: tuple[int, int, V3, V3, float],
+    depth: float,
+    rate: float,
+    out: F1,
+) -> int:
     """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal, area."""
     contacts = scene.contacts
     if contacts.user_normal[c] == 0:
@@ -301,7 +273,7 @@ def ask_normal(scene, t, y, c, at, depth, rate, out):
 
 
 @jitable
-def yielding(scene, y, b, p, n):
+def yielding(scene: Scene, y: F1, b: int, p: V3, n: V3) -> float:
     """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
     bodies = scene.bodies
     if b == len(bodies.mass):
@@ -312,7 +284,9 @@ def yielding(scene, y, b, p, n):
 
 
 @jitable
-def hold_back(scene, y, bi, bj, p, n, h, slip, out):
+def hold_back(
+    scene: Scene, y: F1, bi: int, bj: int, p: V3, n: V3, h: float, slip: V2, out: F1
+) -> None:
     """Reduce a friction force to a quarter of what would stop the slip within the step.
 
     Friction that turns sign from step to step would shake what rests; a quarter, since some
@@ -328,7 +302,17 @@ def hold_back(scene, y, bi, bj, p, n, h, slip, out):
 
 
 @jitable
-def tilting(scene, t, y, c, s, at, depth, normal, w):
+def tilting(
+    scene: Scene,
+    t: float,
+    y: F1,
+    c: int,
+    s: int,
+    at: tuple[int, int, V3, V3, float],
+    depth: float,
+    normal: float,
+    w: V3,
+) -> tuple[int, V3, float]:
     """Return code, couple on I and power lost of the points of slot s that are damped one by one.
 
     With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
@@ -365,7 +349,7 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
 
 
 @jitable
-def add_contact(scene, t, h, y, dy, s):  # noqa: C901
+def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:  # noqa: C901
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
 
     Long, with many branches, because normal force, friction and torques share the contact's frame

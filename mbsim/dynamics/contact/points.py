@@ -32,7 +32,9 @@ from mbsim.arrays.codes import (
 )
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
@@ -55,7 +57,7 @@ from mbsim.laws import catalog
 
 
 @jitable
-def effective_mass(scene, y, s):
+def effective_mass(scene: Scene, y: F1, s: int) -> float:
     """Return the mass that meets in slot s along its normal: 1 / (n J M^-1 J' n)."""
     point = scene.work.points[s]
     p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
@@ -71,7 +73,7 @@ def effective_mass(scene, y, s):
 
 
 @jitable
-def deepest_of_impact(scene, c, energy):
+def deepest_of_impact(scene: Scene, c: int, energy: float) -> float:
     """Return the depth at which contact c has stored `energy`: how deep an impact goes, to 1 %.
 
     Newton for log E over log d, whose slope is F d / E: exact at once for a power law.
@@ -94,7 +96,7 @@ def deepest_of_impact(scene, c, energy):
 
 
 @jitable
-def first_depth(scene, t, h, y):
+def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
     """Return 1, or the part of the step to take so that a new incident begins shallow.
 
     The first depth of an impact is at most max(v Tc/70, 1e-3 dmax), with v the closing speed
@@ -129,7 +131,7 @@ def first_depth(scene, t, h, y):
 
 
 @jitable
-def record_event(scene, t, kind, s):
+def record_event(scene: Scene, t: float, kind: int, s: int) -> None:
     """Append an event; the driver empties the table before it can overflow."""
     rows = scene.rows
     k = rows.used[USED_EVENTS]
@@ -142,7 +144,7 @@ def record_event(scene, t, kind, s):
 
 
 @jitable
-def crossing(depth0, rate0, depth1, rate1, h):
+def crossing(depth0: float, rate0: float, depth1: float, rate1: float, h: float) -> float:
     """Return the part of the step at which the depth crosses zero, by its Hermite cubic."""
     low, high = 0.0, 1.0
     rising = depth1 > depth0
@@ -161,7 +163,7 @@ def crossing(depth0, rate0, depth1, rate1, h):
 
 
 @jitable
-def log_touch(scene, t, h, y, s):
+def log_touch(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
     """Note that slot s began to touch within the step that ends at t."""
     row, log = scene.work.slot[s], scene.log.contacts[contact_of(scene, s)]
     speed = max(row[RATE], 0.0)
@@ -179,7 +181,7 @@ def log_touch(scene, t, h, y, s):
 
 
 @jitable
-def log_leave(scene, t, h, y, s):
+def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
     """Note that slot s ceased to touch within the step that ends at t."""
     state, log = scene.state, scene.log.contacts[contact_of(scene, s)]
     depth, rate = state.depth[s], state.rate[s]
@@ -200,7 +202,7 @@ def log_leave(scene, t, h, y, s):
 
 
 @jitable
-def watch_peaks(scene, t):
+def watch_peaks(scene: Scene, t: float) -> None:
     """Keep the largest force, depth and slip of every contact at the point just evaluated."""
     work, net, hit = scene.work, scene.work.net, scene.work.hit
     if hit[len(hit) - 1] == 0:
@@ -223,7 +225,7 @@ def watch_peaks(scene, t):
 
 
 @jitable
-def reversal(scene, h):
+def reversal(scene: Scene, h: float) -> float:
     """Return where in the step (0..1) a contact was deepest, or -1: closing before, opening after.
 
     Called before `commit`: the committed table holds the begin of the step, `work` its end.
@@ -239,7 +241,7 @@ def reversal(scene, h):
 
 
 @jitable
-def bounding_gap(scene, pair):
+def bounding_gap(scene: Scene, pair: int) -> float:
     """Return a lower bound of two shapes' distance: ball of one to box or plane of the other."""
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     best = -math.inf
@@ -260,7 +262,7 @@ def bounding_gap(scene, pair):
 
 
 @jitable
-def measure_gap(scene, pair, measured):
+def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
     """Store how far apart the pair is at the accepted point, where it may be `measured` already."""
     pairs, work = scene.pairs, scene.work
     closed_form = scene.kinds.kernel[pairs.kind[pair]] != 0
@@ -275,7 +277,7 @@ def measure_gap(scene, pair, measured):
 
 
 @jitable
-def another_point(scene, y, h, s):
+def another_point(scene: Scene, y: F1, h: float, s: int) -> bool:
     """Return whether the point that FCL gives for slot s is too far to be the one before."""
     point, before = scene.work.points[s], scene.state.p[s]
     p = (point[1], point[2], point[3])
@@ -289,7 +291,7 @@ def another_point(scene, y, h, s):
 
 
 @jitable
-def commit_memory(scene, t, y, s, fresh):
+def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
     """Keep what friction in slot s makes of the step, anew if `fresh`.
 
     Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
@@ -313,7 +315,7 @@ def commit_memory(scene, t, y, s, fresh):
 
 
 @jitable
-def commit_slot(scene, t, h, y, s):
+def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
     """Write the incident of slot s for the accepted point; return what `commit` does."""
     state, work = scene.state, scene.work
     now, before = work.touching[s], state.touching[s]
@@ -357,7 +359,7 @@ def commit_slot(scene, t, h, y, s):
 
 
 @jitable
-def commit_incidents(scene, t, h, y):
+def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     """Write the incident table for the accepted point; return what `commit` does."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     old, new, last = state.hit, work.hit, len(work.hit) - 1
@@ -376,7 +378,7 @@ def commit_incidents(scene, t, h, y):
 
 
 @jitable
-def commit_gaps(scene):
+def commit_gaps(scene: Scene) -> None:
     """Take what the shapes moved from the distance of every pair; measure where half is gone."""
     pairs, work = scene.pairs, scene.work
     for k in range(pairs.count[ACTIVE]):
@@ -394,7 +396,7 @@ def commit_gaps(scene):
 
 
 @jitable
-def commit(scene, t, h, y):
+def commit(scene: Scene, t: float, h: float, y: F1) -> int:
     """Take the point evaluated last as accepted.
 
     Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.

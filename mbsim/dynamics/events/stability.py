@@ -31,7 +31,9 @@ from mbsim.arrays.codes import (
     SCALE_LENGTH,
     SCALE_SPEED,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies, position
@@ -53,7 +55,7 @@ SUBSTITUTIONS = 6
 
 
 @jitable
-def slopes(scene, c, depth, out):
+def slopes(scene: Scene, c: int, depth: float, out: F1) -> V2:
     """Return stiffness dF/dd and damping dF/dd' of contact c's law at a depth."""
     contacts, speed = scene.contacts, scene.world.scale[SCALE_SPEED]
     call_int(contacts.normal_law[c], (depth, speed, contacts.normal_par[c], out))
@@ -63,20 +65,20 @@ def slopes(scene, c, depth, out):
 
 
 @jitable
-def yielding(scene, b, arm, n):
+def yielding(scene: Scene, b: int, arm: V3, n: V3) -> float:
     """Return n' J I^-1 J' n: how a unit force along n at `arm` from body b's cg turns the point."""
     turning = unrotate(scene.work.R[b], cross(arm, n))
     return dot(turning, rotate(scene.bodies.inverse[b], turning))
 
 
 @jitable
-def translation(scene, b):
+def translation(scene: Scene, b: int) -> float:
     """Return 1/m of body b, 0 for ground."""
     return 1.0 / scene.bodies.mass[b] if b < len(scene.bodies.mass) else 0.0
 
 
 @jitable
-def turning(scene, g):
+def turning(scene: Scene, g: int) -> float:
     """Return a bound of n' J I^-1 J' n for a touch anywhere on graphic g: ground and planes 0.
 
     With the box half edges a (from the cg) and D = I^-1 in its axes (r x n)' D (r x n) is at most
@@ -108,7 +110,7 @@ def turning(scene, g):
 
 
 @jitable
-def depth_to_come(scene, c, energy, force):
+def depth_to_come(scene: Scene, c: int, energy: float, force: float) -> float:
     """Return the depth at which contact c has stored an impact's energy and what `force` adds.
 
     E(d) = energy + force d, by repeated substitution: of a power law of exponent e an error
@@ -122,7 +124,7 @@ def depth_to_come(scene, c, energy, force):
 
 
 @jitable
-def add_to_block(block, n, stiffness, damping, turn):
+def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float) -> None:
     """Add stiffness and damping along n to the block of a body; `turn`: see `yielding`."""
     for r in range(3):
         for q in range(3):
@@ -133,7 +135,7 @@ def add_to_block(block, n, stiffness, damping, turn):
 
 
 @jitable
-def add_points(scene, y, s, b, k, damping):
+def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) -> None:
     """Add the points that slot s stands for to the block of body b, each with its share."""
     rows = scene.work.points
     first = s + REGION_ROWS
@@ -145,7 +147,7 @@ def add_points(scene, y, s, b, k, damping):
 
 
 @jitable
-def add_touching(scene, y, s, out):
+def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
     point = work.points[s]
@@ -177,7 +179,7 @@ def add_touching(scene, y, s, out):
 
 
 @jitable
-def add_marker_force(scene, y, f):
+def add_marker_force(scene: Scene, y: F1, f: int) -> None:
     """Add the largest stiffness and damping of marker force f, along every axis and about it.
 
     Both bodies are pushed at I's origin P, so arms go there. A turn of body b moves P by its
@@ -211,7 +213,7 @@ def add_marker_force(scene, y, f):
 
 
 @jitable
-def add_spring(scene, y, f):
+def add_spring(scene: Scene, y: F1, f: int) -> None:
     """Add stiffness and damping of spring f to the blocks of its bodies.
 
     Along the line of a spring at distance d acts k, across it F/d, and an arm r turns with the
@@ -251,7 +253,7 @@ def add_spring(scene, y, f):
 
 
 @jitable
-def fast_pair(scene, pair, best):
+def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
     """Return whether a pair that may come to touch can be stiffer than the one in `best`.
 
     If so `best` becomes it: contact, its energy at touch, the force behind it, inverse mass.
@@ -274,7 +276,7 @@ def fast_pair(scene, pair, best):
 
 
 @jitable
-def add_meeting(scene, best, out, bound):
+def add_meeting(scene: Scene, best: F1, out: F1, bound: F1) -> None:
     """Raise the squared frequency and the rate in `bound` to those of the pair in `best`."""
     c, inverse = int(best[0]), best[3]
     depth = depth_to_come(scene, c, best[1], best[2])
@@ -284,7 +286,7 @@ def add_meeting(scene, best, out, bound):
 
 
 @jitable
-def anisotropy(inertia):
+def anisotropy(inertia: F2) -> float:
     """Return |I - E tr I / 3| over tr I / 3 (Frobenius): 0 of a ball, 1.22 of a thin rod."""
     mean = (inertia[0, 0] + inertia[1, 1] + inertia[2, 2]) / 3.0
     square = 0.0
@@ -296,7 +298,7 @@ def anisotropy(inertia):
 
 
 @jitable
-def turning_step(scene, tol):
+def turning_step(scene: Scene, tol: float) -> float:
     """Return the step over which the rotation of every body, as placed, is good to `tol`."""
     bodies, longest = scene.bodies, math.inf
     # (angle / 2)^4 / 384 = tol
@@ -314,7 +316,7 @@ def turning_step(scene, tol):
 
 
 @jitable
-def stable_step(scene, tol, y, f):
+def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     """Return the step that a method without error estimate is to take from the committed point."""
     work, bodies, pairs = scene.work, scene.bodies, scene.pairs
     # what was evaluated last may be another point: an output within the step, or nothing yet

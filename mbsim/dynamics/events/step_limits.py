@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, SCALE_LENGTH
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import dot, norm, sub, vector
@@ -41,7 +43,7 @@ ROUNDING = 1e-13
 
 
 @jitable
-def seen_part(scene, c, depth, per_mass):
+def seen_part(scene: Scene, c: int, depth: float, per_mass: float) -> float:
     """Return the part of the way out from a depth, or in to it, that may be one step; 1 for all.
 
     The spring of contact c is F ~ d^e there, e + 1 = F d/E, so that a step over the part x of this
@@ -58,7 +60,7 @@ def seen_part(scene, c, depth, per_mass):
 
 
 @jitable
-def is_over(scene, c, depth, normal, per_mass):
+def is_over(scene: Scene, c: int, depth: float, normal: float, per_mass: float) -> bool:
     """Return whether all that contact c may still do before it leaves is too little to matter.
 
     `per_mass` is h/m of a step over it, whose first stage takes it to last. Where points of a patch
@@ -72,7 +74,7 @@ def is_over(scene, c, depth, normal, per_mass):
 
 
 @jitable
-def longest_at_jump(scene, c, depth, speed, mass):
+def longest_at_jump(scene: Scene, c: int, depth: float, speed: float, mass: float) -> float:
     """Return the longest step that may begin just before a touch at which the force jumps.
 
     It does where a damper comes in over nothing; inf where what is there at AT_ONCE of `depth`,
@@ -87,7 +89,7 @@ def longest_at_jump(scene, c, depth, speed, mass):
 
 
 @jitable
-def pushes_at(scene, c, t, depth, rate, bend):
+def pushes_at(scene: Scene, c: int, t: float, depth: float, rate: float, bend: float) -> bool:
     """Return whether contact c would push after a time t in which depth goes on as it does."""
     out = scene.work.law_out
     d = depth + t * (rate + 0.5 * t * bend)
@@ -97,7 +99,7 @@ def pushes_at(scene, c, t, depth, rate, bend):
 
 
 @jitable
-def thrust(scene, f, b):
+def thrust(scene: Scene, f: F1, b: int) -> V3:
     """Return the acceleration of body b's cg."""
     if b == len(scene.bodies.mass):
         return (0.0, 0.0, 0.0)
@@ -106,7 +108,7 @@ def thrust(scene, f, b):
 
 
 @jitable
-def depth_bend(scene, f, s):
+def depth_bend(scene: Scene, f: F1, s: int) -> float:
     """Return the second rate of the depth of slot s that accelerations make, d'' of d."""
     gi, gj = sides(scene, s)
     i, j = thrust(scene, f, scene.graphics.body[gi]), thrust(scene, f, scene.graphics.body[gj])
@@ -114,7 +116,7 @@ def depth_bend(scene, f, s):
 
 
 @jitable
-def step_to_leave(scene, f, s, h):
+def step_to_leave(scene: Scene, f: F1, s: int, h: float) -> float:
     """Return the step that ends where the force of the parting slot s ends or comes back.
 
     A step across such a place is one whose error estimate may vanish by chance, and those
@@ -164,7 +166,7 @@ def step_to_leave(scene, f, s, h):
 
 
 @jitable
-def step_to_ramp(scene, f, s, h):
+def step_to_ramp(scene: Scene, f: F1, s: int, h: float) -> float:
     """Return the step that ends where the depth of slot s passes dmax; h where it does not in h.
 
     There the damper's curvature jumps, so that a step across it is taken where its error estimate
@@ -182,7 +184,7 @@ def step_to_ramp(scene, f, s, h):
 
 
 @jitable
-def longest_touching(scene, f, h):
+def longest_touching(scene: Scene, f: F1, h: float) -> float:
     """Return how much of a step h may be tried so that no force bends sharply or ends within it."""
     state, longest = scene.state, h
     for k in range(state.hit[len(state.hit) - 1]):
@@ -194,7 +196,7 @@ def longest_touching(scene, f, h):
 
 
 @jitable
-def time_for(travel, speed, push):
+def time_for(travel: float, speed: float, push: float) -> float:
     """Return the time in which a shape can come `travel` far: way = speed h + push h^2 / 2."""
     if speed == 0.0 and push == 0.0:
         return math.inf
@@ -202,7 +204,7 @@ def time_for(travel, speed, push):
 
 
 @jitable
-def place_side(scene, y, g):
+def place_side(scene: Scene, y: F1, g: int) -> None:
     """Place graphic g and its body at y."""
     if scene.graphics.body[g] < len(scene.bodies.mass):
         place_body(scene, y, scene.graphics.body[g])
@@ -210,7 +212,7 @@ def place_side(scene, y, g):
 
 
 @jitable
-def step_to_touch(scene, y, f, pair, h):
+def step_to_touch(scene: Scene, y: F1, f: F1, pair: int, h: float) -> float:
     """Return the step that ends where a pair is about to touch, or begins its contact; else inf.
 
     A step much longer than the contact would meet it with a force out of all proportion, and
@@ -263,7 +265,7 @@ def step_to_touch(scene, y, f, pair, h):
 
 
 @jitable
-def longest_stay(scene, y, f):
+def longest_stay(scene: Scene, y: F1, f: F1) -> float:
     """Return a step in which no shape of a large contact leaves where the list of near pairs holds.
 
     Speed and acceleration of all shapes are left in `work.speed`.
@@ -288,7 +290,7 @@ def longest_stay(scene, y, f):
 
 
 @jitable
-def longest_travel(scene, y, f, h):
+def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
 
     A step of length h, the one intended, ends where a pair begins to touch.
@@ -315,6 +317,6 @@ def longest_travel(scene, y, f, h):
 
 
 @jitable
-def longest_step(scene, y, f, h):
+def longest_step(scene: Scene, y: F1, f: F1, h: float) -> float:
     """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
     return min(longest_touching(scene, f, h), longest_travel(scene, y, f, h))

@@ -30,7 +30,9 @@ from mbsim.arrays.codes import (
     SLIDE_FRICTION,
     TURN_FRICTION,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
@@ -54,7 +56,7 @@ MOST_ROUNDS = 60
 
 
 @jitable
-def fill_slip(scene, f):
+def fill_slip(scene: Scene, f: int) -> None:
     """Fill the wrench of a unit force along the slip of friction f, and its speed."""
     applied, row = scene.applied, scene.work.rub[f]
     i, j, kind, radius = applied.i[f], applied.j[f], applied.kind[f], applied.par[f, RADIUS]
@@ -77,13 +79,13 @@ def fill_slip(scene, f):
 
 
 @jitable
-def across(a, z):
+def across(a: V3, z: V3) -> float:
     """Return how much of a is across the unit vector z."""
     return norm(cross(z, a))
 
 
 @jitable
-def press(scene, f):
+def press(scene: Scene, f: int) -> float:
     """Return the normal force [F] of friction f under the reactions as they are filled."""
     applied, reaction = scene.applied, scene.work.reaction
     at = 6 * applied.connection[f]
@@ -99,7 +101,7 @@ def press(scene, f):
 
 
 @jitable
-def ask_law(scene, t, f):
+def ask_law(scene: Scene, t: float, f: int) -> float:
     """Return the force along the slip that the law of friction f makes of the reactions."""
     applied, given, out = scene.applied, scene.work.law_in, scene.work.law_out
     if applied.law[f] == 0:
@@ -116,7 +118,7 @@ def ask_law(scene, t, f):
 
 
 @jitable
-def add_force(scene, f, size):
+def add_force(scene: Scene, f: int, size: float) -> None:
     """Add a force along the slip to what friction f does to both bodies."""
     applied, row = scene.applied, scene.work.rub[f]
     row[FORCE] += size
@@ -127,7 +129,7 @@ def add_force(scene, f, size):
 
 
 @jitable
-def compare(scene, t):
+def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
     """Fill by how much each friction misses its law.
 
     Returns the largest miss (no number if a force is none), the largest force, the row that
@@ -152,7 +154,7 @@ def compare(scene, t):
 
 
 @jitable
-def settle_friction(scene, t, y, stresses):
+def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
     """Find the friction forces and the accelerations under them; return 0 or a code."""
     applied, rub, step = scene.applied, scene.work.rub, 1.0
     for k in range(MOST_ROUNDS):
@@ -178,7 +180,7 @@ def settle_friction(scene, t, y, stresses):
 
 
 @jitable
-def add_friction(scene, t, y, dy):
+def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add friction to the accelerations and what it dissipates to y'; return 0 or a code."""
     applied, work, lost = scene.applied, scene.work, 0.0
     for f in range(len(applied.kind)):

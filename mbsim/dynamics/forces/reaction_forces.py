@@ -25,6 +25,8 @@ from mbsim.arrays.codes import (
     SCALAR,
 )
 from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
@@ -57,7 +59,7 @@ TOO_LARGE = 1e9
 
 
 @jitable
-def fill_direction(scene, y, f):
+def fill_direction(scene: Scene, y: F1, f: int) -> None:
     """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
     applied, row = scene.applied, scene.work.rub[f]
     i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
@@ -78,7 +80,7 @@ def fill_direction(scene, y, f):
 
 
 @jitable
-def push_scalar(scene, f, size):
+def push_scalar(scene: Scene, f: int, size: float) -> None:
     """Add `size` of scalar force f to its bodies."""
     applied, row = scene.applied, scene.work.rub[f]
     force = scale(size, (row[0], row[1], row[2]))
@@ -89,7 +91,7 @@ def push_scalar(scene, f, size):
 
 
 @jitable
-def push_component(scene, y, f, c, size):
+def push_component(scene: Scene, y: F1, f: int, c: int, size: float) -> None:
     """Add `size` of component c of vector force f to its bodies."""
     applied, none = scene.applied, (0.0, 0.0, 0.0)
     e = scale(size, marker_axis(scene, applied.axes[f], c % 3))
@@ -102,7 +104,7 @@ def push_component(scene, y, f, c, size):
 
 
 @jitable
-def add_to_all(scene, y):
+def add_to_all(scene: Scene, y: F1) -> None:
     """Add the last step of every unknown to the bodies."""
     late, work = scene.applied.late, scene.work.late
     for u in range(len(late)):
@@ -117,7 +119,7 @@ def add_to_all(scene, y):
 
 
 @jitable
-def add_to_row(scene, f, c, size):
+def add_to_row(scene: Scene, f: int, c: int, size: float) -> None:
     """Add an unknown to the force and torque of its row of `Work.applied`."""
     row = scene.work.applied[f]
     if c >= SCALAR:
@@ -131,7 +133,7 @@ def add_to_row(scene, f, c, size):
 
 
 @jitable
-def fill_rows(scene):
+def fill_rows(scene: Scene) -> None:
     """Fill force and torque of all rows that are settled."""
     late, work = scene.applied.late, scene.work
     for u in range(len(late)):
@@ -142,7 +144,7 @@ def fill_rows(scene):
 
 
 @jitable
-def measure_misses(scene, t, y):
+def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
     """Fill by how much each unknown misses its law or expression, and the change of that.
 
     Returns the first that is no number or -1, and the largest force, torque (over the length)
@@ -170,7 +172,7 @@ def measure_misses(scene, t, y):
 
 
 @jitable
-def unit(scene, u):
+def unit(scene: Scene, u: int) -> float:
     """Return what makes a force of unknown u: the length for torques, else 1."""
     f, c = scene.applied.late[u, 0], scene.applied.late[u, 1]
     turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE
@@ -178,7 +180,7 @@ def unit(scene, u):
 
 
 @jitable
-def worst_unknown(scene):
+def worst_unknown(scene: Scene) -> tuple[int, float]:
     """Return the unknown that misses most, and by how much."""
     worst, at = 0.0, 0
     for u in range(len(scene.applied.late)):
@@ -189,7 +191,7 @@ def worst_unknown(scene):
 
 
 @jitable
-def update_secant(scene):
+def update_secant(scene: Scene) -> None:
     """Let H take the last change of the misses to the last step."""
     H, work = scene.work.secant, scene.work.late
     n, below = len(H), 0.0
@@ -211,7 +213,7 @@ def update_secant(scene):
 
 
 @jitable
-def next_step(scene):
+def next_step(scene: Scene) -> None:
     """Fill the next step, -H r."""
     H, work = scene.work.secant, scene.work.late
     for i in range(len(H)):
@@ -222,7 +224,7 @@ def next_step(scene):
 
 
 @jitable
-def begin(scene, y):
+def begin(scene: Scene, y: F1) -> None:
     """Set all unknowns to 0, H to -1, and fill the directions in which they act."""
     late, work = scene.applied.late, scene.work
     for u in range(len(late)):
@@ -238,7 +240,7 @@ def begin(scene, y):
 
 
 @jitable
-def settle(scene, t, y, stresses):
+def settle(scene: Scene, t: float, y: F1, stresses: int) -> int:
     """Find the unknowns and the accelerations under them; return 0 or a code."""
     late, work = scene.applied.late, scene.work
     most, bound = MOST_ROUNDS + 2 * len(late), 0.0
@@ -268,7 +270,7 @@ def settle(scene, t, y, stresses):
 
 
 @jitable
-def lost_power(scene, y, u):
+def lost_power(scene: Scene, y: F1, u: int) -> float:
     """Return the power of unknown u with the sign turned."""
     applied, f, c = scene.applied, scene.applied.late[u, 0], scene.applied.late[u, 1]
     size = scene.work.late[u, SIZE]
@@ -286,7 +288,7 @@ def lost_power(scene, y, u):
 
 
 @jitable
-def add_late(scene, t, y, dy):
+def add_late(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add late forces and friction to the accelerations, what they dissipate to y'; return 0."""
     late, work, lost = scene.applied.late, scene.work, 0.0
     begin(scene, y)

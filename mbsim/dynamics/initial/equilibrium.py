@@ -392,10 +392,10 @@ def balance(
         if search.gone():
             far = True
             break
-    found = Balance(
+    balance = Balance(
         k, search.evaluations, size, scale or 1.0, worst, far, loose, unstable and done, done
     )
-    return found, search.y
+    return balance, search.y
 
 
 def _try_newton(search: Search, local: _Local, size: float, done: bool) -> Array | None:

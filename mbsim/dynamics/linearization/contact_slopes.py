@@ -7,9 +7,12 @@ and memory as they are. Laws are asked at neighbouring arguments.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from mbsim.arrays.hooks import Hook, Memory
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
@@ -33,6 +36,10 @@ from mbsim.laws.catalog import SLIP
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Pattern, Tangent
+
+
 #: Row of `basis` with how the force of one incident for many points changes.
 PRESS = 6
 #: Slip, over the model's speed, below which directions of rigid friction converge only as far as
@@ -45,14 +52,14 @@ _PART_OF_SLIP = 1e-3
 
 
 @jitable
-def contact_bodies(scene, s):
+def contact_bodies(scene: Scene, s: int) -> tuple[int, int]:
     """Return the bodies of a slot."""
     gi, gj = sides(scene, s)
     return scene.graphics.body[gi], scene.graphics.body[gj]
 
 
 @jitable
-def couple_contacts(scene, P):
+def couple_contacts(scene: Scene, P: Pattern) -> bool:
     """Couple the bodies that touch; return whether there is room."""
     nb, hit = len(scene.bodies.mass), scene.work.hit
     for k in range(hit[len(hit) - 1]):
@@ -63,7 +70,9 @@ def couple_contacts(scene, P):
 
 
 @jitable
-def ask_friction(scene, t, h, y, s, c, around, given):
+def ask_friction(
+    scene: Scene, t: float, h: float, y: F1, s: int, c: int, around: tuple[V3, V3], given: F1
+) -> int:
     """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
     loci, locj = around
     slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
@@ -74,7 +83,7 @@ def ask_friction(scene, t, h, y, s, c, around, given):
 
 
 @jitable
-def rigid_slip(scene, s, c):
+def rigid_slip(scene: Scene, s: int, c: int) -> float:
     """Return over which slip the friction of slot s turns if it is rigid and slips, else 0."""
     kept = scene.state.memory[s]
     if scene.contacts.rigid[c] == 0 or kept[KEPT_MODE] != SLIP:
@@ -83,7 +92,17 @@ def rigid_slip(scene, s, c):
 
 
 @jitable
-def friction_slopes(scene, t, h, y, s, c, around, given, table):
+def friction_slopes(
+    scene: Scene,
+    t: float,
+    h: float,
+    y: F1,
+    s: int,
+    c: int,
+    around: tuple[V3, V3],
+    given: F1,
+    table: F2,
+) -> int:
     """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
     out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[1]
     base, code, speed = table[:, 6:11], 0, rigid_slip(scene, s, c)
@@ -112,7 +131,7 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
 
 
 @jitable
-def damp_tilting(scene, T, y, s):
+def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     """Add the couple against tilting of `contact.tilting`."""
     P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
     i, j = contact_bodies(scene, s)
@@ -130,7 +149,9 @@ def damp_tilting(scene, T, y, s):
 
 
 @jitable
-def add_region_stiffness(scene, T, y, s, force, by_depth):
+def add_region_stiffness(
+    scene: Scene, T: Tangent, y: F1, s: int, force: float, by_depth: float
+) -> float:
     """Add how the force of one incident for many points changes with depth and tilt.
 
     With the energy S U(d), d^2 = sum w_i d_i^2 / S of `geometry.region` and g_i the displacement
@@ -168,7 +189,7 @@ def add_region_stiffness(scene, T, y, s, force, by_depth):
 
 
 @jitable
-def add_moves_of_place(scene, T, y, s, by_rate):
+def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) -> None:
     """Add that friction acts elsewhere, and at another slip, where tilting moves the place.
 
     The place is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
@@ -204,7 +225,9 @@ def add_moves_of_place(scene, T, y, s, by_rate):
 
 
 @jitable
-def normal_slopes(scene, s, c, depth, rate):
+def normal_slopes(
+    scene: Scene, s: int, c: int, depth: float, rate: float
+) -> tuple[int, float, float]:
     """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
     contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, 7]
     user = contacts.user_normal[c]
@@ -228,7 +251,9 @@ def normal_slopes(scene, s, c, depth, rate):
 
 
 @jitable
-def add_contact_slopes(scene, T, t, h, y, s):  # noqa: C901
+def add_contact_slopes(  # noqa: C901
+    scene: Scene, T: Tangent, t: float, h: float, y: F1, s: int
+) -> int:
     """Add what the incident in slot s does, as `contact.add_contact` left it; return a code.
 
     Many branches because normal force, friction and its memory share levers and the law's slopes.
@@ -314,7 +339,7 @@ def add_contact_slopes(scene, T, t, h, y, s):  # noqa: C901
 
 
 @jitable
-def add_contacts_slopes(scene, T, t, h, y):
+def add_contacts_slopes(scene: Scene, T: Tangent, t: float, h: float, y: F1) -> int:
     """Add what all incidents do; return a code."""
     hit = scene.work.hit
     T.keeps.held[len(T.keeps.held) - 1] = 0

@@ -6,6 +6,10 @@ poses, of C a + s(q, v) with poses and velocities; a, the accelerations, as they
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, sub, vector
@@ -16,12 +20,16 @@ from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
 from mbsim.dynamics.linearization.expression_slopes import keep_spin, pushed
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Tangent
+
+
 #: Differences of poses [part of the length, rad] and of velocities (likewise, a time).
 _PUSH = 1e-7
 
 
 @jitable
-def acceleration_along(scene, L, y, e):
+def acceleration_along(scene: Scene, L: Linear, y: F1, e: int) -> float:
     """Return C times the accelerations of the bodies, which stay as they are."""
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for term in range(eq.first[e], eq.first[e + 1]):
@@ -41,7 +49,7 @@ def acceleration_along(scene, L, y, e):
 
 
 @jitable
-def held_value(scene, L, t, y, e):
+def held_value(scene: Scene, L: Linear, t: float, y: F1, e: int) -> float:
     """Return the velocity or acceleration that equation e holds."""
     fill_equation(scene, t, y, e)
     if scene.equations.level[e] == 1:
@@ -50,7 +58,7 @@ def held_value(scene, L, t, y, e):
 
 
 @jitable
-def drive_by(scene, L, t, y, row, e, b):
+def drive_by(scene: Scene, L: Linear, t: float, y: F1, row: int, e: int, b: int) -> None:
     """Fill the rows of equation e for body b."""
     at, rise = BODY_SIZE * b, L.rise
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
@@ -92,7 +100,7 @@ def drive_by(scene, L, t, y, row, e, b):
 
 
 @jitable
-def slip_row(scene, L, row, e):
+def slip_row(scene: Scene, L: Linear, row: int, e: int) -> None:
     """Fill the row of slip in a contact that is held: its gradient, where it is now."""
     eq = scene.equations
     for term in range(eq.first[e], eq.first[e + 1]):
@@ -104,7 +112,7 @@ def slip_row(scene, L, row, e):
 
 
 @jitable
-def add_motion_rows(scene, T, t, y):
+def add_motion_rows(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Fill the rows of all motions in use that hold velocities or accelerations."""
     eq = scene.equations
     for row in range(active_count(scene)):

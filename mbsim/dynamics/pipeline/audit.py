@@ -56,6 +56,8 @@ from mbsim.arrays.codes import (
     WORST_OPEN,
     WORST_TIME,
 )
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
@@ -83,7 +85,7 @@ MASS, SHIFT, FLOW, TURN, SPEEDS, SPINS = 0, 1, 4, 7, 10, 11
 
 
 @jitable
-def note(scene, row, value, allowed, t, element):
+def note(scene: Scene, row: int, value: float, allowed: float, t: float, element: int) -> None:
     """Keep a value if it is larger over what is allowed than those before."""
     found = scene.audit.found[row]
     if not value * found[FOUND_ALLOWED] <= found[FOUND_VALUE] * allowed:
@@ -92,7 +94,7 @@ def note(scene, row, value, allowed, t, element):
 
 
 @jitable
-def hardest(scene):
+def hardest(scene: Scene) -> int:
     """Return the contact that presses hardest, their number for none."""
     hit, largest, found = scene.work.hit, 0.0, len(scene.contacts.id)
     for k in range(hit[len(hit) - 1]):
@@ -103,7 +105,7 @@ def hardest(scene):
 
 
 @jitable
-def examine_energy(scene, t, y, steps, local):
+def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the energy with what it was; `local` is the sum of local errors of those steps."""
     audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
     fill_energy(scene, y, energy)
@@ -143,7 +145,7 @@ def examine_energy(scene, t, y, steps, local):
 
 
 @jitable
-def examine_momentum(scene, t, y, steps, local):
+def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the momentum of groups that ground does not touch with what their weight gives."""
     audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
     sums = audit.sums
@@ -204,7 +206,7 @@ def examine_momentum(scene, t, y, steps, local):
 
 
 @jitable
-def own_time(scene, e):
+def own_time(scene: Scene, e: int) -> float:
     """Return L/V of the bodies that equation e holds."""
     eq, k = scene.equations, scene.equations.first[e]
     b = scene.markers.body[eq.i[k]]
@@ -216,7 +218,7 @@ def own_time(scene, e):
 
 
 @jitable
-def examine_equations(scene, t):
+def examine_equations(scene: Scene, t: float) -> None:
     """Look at the residuals of the equations in use, and at what slips although it is held."""
     eq, sweep = scene.equations, scene.sweep
     allowed = scene.audit.plan[AUDIT_TOL] + CLOSED
@@ -235,7 +237,7 @@ def examine_equations(scene, t):
 
 
 @jitable
-def examine_fold(scene, t):
+def examine_fold(scene: Scene, t: float) -> None:
     """Look at how far velocities were off when a fold was left behind."""
     quality, tol = scene.sweep.quality, scene.audit.plan[AUDIT_TOL]
     count = 0
@@ -245,7 +247,7 @@ def examine_fold(scene, t):
 
 
 @jitable
-def examine_friction(scene, t):
+def examine_friction(scene: Scene, t: float) -> None:
     """Look whether friction is within its cone at every incident."""
     audit, work, hit = scene.audit, scene.work, scene.work.hit
     for k in range(hit[len(hit) - 1]):
@@ -264,7 +266,7 @@ def examine_friction(scene, t):
 
 
 @jitable
-def examine(scene, t, h, y):
+def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     """Take a sample at an accepted step that is due for one; of no length, h = 0, begin anew."""
     audit, tally = scene.audit, scene.audit.tally
     hits = scene.work.hit[len(scene.work.hit) - 1]

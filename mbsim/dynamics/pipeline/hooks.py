@@ -8,6 +8,7 @@ from mbsim.arrays.codes import ERROR_NOW, FOLD_HALT, FOLDS, HELD_OTHERWISE, LIST
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import Pointer
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import (
     ALONG,
@@ -34,14 +35,14 @@ from mbsim.dynamics.pipeline.output import (
 )
 
 
-def rhs(context, t, h, a, b):
+def rhs(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """f(t, y)."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return failure_or(scene, evaluate(scene, t, h, vector_at(a, n), vector_at(b, n)))
 
 
-def _project(context, t, h, a, b):
+def _project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Quaternions back to unit length, and bodies onto their constraints."""
     scene = view(context, Scene)
     y = vector_at(a, scene.rows.y.shape[1])
@@ -57,7 +58,7 @@ def _project(context, t, h, a, b):
     return 0
 
 
-def _norm(context, t, h, a, b):
+def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The scaled local error."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -71,7 +72,7 @@ def _norm(context, t, h, a, b):
     return error
 
 
-def _check(context, t, h, a, b):
+def _check(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The guard of first penetration."""
     scene = view(context, Scene)
     part = first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
@@ -79,7 +80,7 @@ def _check(context, t, h, a, b):
     return part
 
 
-def _commit(context, t, h, a, b):
+def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The incident table, events and peaks."""
     scene = view(context, Scene)
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
@@ -112,7 +113,7 @@ def _commit(context, t, h, a, b):
     return word if code == 0 else -code
 
 
-def _look(context, t, h, a, b):
+def _look(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Peaks at an inner point of a step."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -124,12 +125,12 @@ def _look(context, t, h, a, b):
     return failure_or(scene, code)
 
 
-def _inner(context, t, h, a, b):
+def _inner(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """Where in the step a contact turned from closing to opening."""
     return reversal(view(context, Scene), h)
 
 
-def _limit(context, t, h, a, b):
+def _limit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -139,7 +140,7 @@ def _limit(context, t, h, a, b):
     return min(longest, halt - t) if halt > t else longest
 
 
-def _output(context, t, h, a, b):
+def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """A row of results at an interpolated, projected state."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -156,7 +157,7 @@ def _output(context, t, h, a, b):
     return FULL if full else 0
 
 
-def _reject(context, t, h, a, b):
+def _reject(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
@@ -167,7 +168,7 @@ def _reject(context, t, h, a, b):
     return 0
 
 
-def stable(context, t, h, a, b):
+def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step for a method without error estimate, h being the tolerance."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -176,7 +177,7 @@ def stable(context, t, h, a, b):
     return longest
 
 
-def list_near(context, y):
+def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
     follow(scene, vector_at(y, scene.rows.y.shape[1]))

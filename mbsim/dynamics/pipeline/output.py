@@ -28,7 +28,9 @@ from mbsim.arrays.codes import (
     STORED_ENERGY,
 )
 from mbsim.arrays.hooks import Hook, Joints, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
@@ -63,7 +65,7 @@ FAST, SLIGHT = 0.2, 5e-4
 
 
 @jitable
-def fill_energy(scene, y, row):
+def fill_energy(scene: Scene, y: F1, row: F1) -> None:
     """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
     kinetic, potential, dissipated = 0.0, 0.0, 0.0
@@ -89,7 +91,7 @@ def fill_energy(scene, y, row):
 
 
 @jitable
-def fill_contacts(scene, y, row):
+def fill_contacts(scene: Scene, y: F1, row: F1) -> None:
     """Write net force, net torque about I's cg, deepest depth, fastest slip, incidents, area."""
     work = scene.work
     for k in range(len(row)):
@@ -112,7 +114,7 @@ def fill_contacts(scene, y, row):
 
 
 @jitable
-def fill_incidents(scene, h, y):
+def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
     rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
@@ -158,7 +160,7 @@ def fill_incidents(scene, h, y):
 
 
 @jitable
-def write_row(scene, t, h, y, f):
+def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
     """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
     rows, work = scene.rows, scene.work
     k = rows.used[0]
@@ -189,7 +191,7 @@ def write_row(scene, t, h, y, f):
 
 
 @jitable
-def no_room(scene):
+def no_room(scene: Scene) -> bool:
     """Return whether another step or row could overflow the tables of events and incidents."""
     rows, pairs, slots = scene.rows, scene.pairs, 0
     room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
@@ -201,7 +203,7 @@ def no_room(scene):
 
 
 @jitable
-def beyond_noise(scene, b, h, dv, dw):
+def beyond_noise(scene: Scene, b: int, h: float, dv: float, dw: float) -> V2:
     """Return the squares of a velocity error less what detection noise does in a step h."""
     bodies, noise = scene.bodies, scene.work.noise
     if noise[b, 0] == 0.0:
@@ -213,7 +215,7 @@ def beyond_noise(scene, b, h, dv, dw):
 
 
 @jitable
-def speed_change(scene, e, y, b, p):
+def speed_change(scene: Scene, e: F1, y: F1, b: int, p: V3) -> V3:
     """Return by how much body b's point at p is faster with velocities that differ by e."""
     if b == len(scene.bodies.mass):
         return 0.0, 0.0, 0.0
@@ -223,7 +225,7 @@ def speed_change(scene, e, y, b, p):
 
 
 @jitable
-def friction_left(scene, e, y, turns):
+def friction_left(scene: Scene, e: F1, y: F1, turns: bool) -> float:
     """Return the largest change of friction that e causes, over the normal force.
 
     By friction's slopes where it was linearised last, 0 where none was; and, if `turns`, by a slip
@@ -258,7 +260,7 @@ def friction_left(scene, e, y, turns):
 
 
 @jitable
-def impact_left(scene, h, e, y):
+def impact_left(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest change of a closing speed that e causes, over that in the step h.
 
     That is of the motion or, where a weight is nearly balanced, what the contact's force would make
@@ -292,7 +294,7 @@ def impact_left(scene, h, e, y):
 
 
 @jitable
-def carried_error(scene, e, s):
+def carried_error(scene: Scene, e: F1, s: int) -> float:
     """Return the velocity as which e in what friction in slot s integrates counts.
 
     Where it slips that is the way of slip over the spring's length, which acts only across the
@@ -310,7 +312,7 @@ def carried_error(scene, e, s):
 
 
 @jitable
-def scaled_error(scene, h, e, y):
+def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
     L and V are those of the group of connected bodies (`bodies.scales`), the energy is that of
@@ -372,7 +374,7 @@ def scaled_error(scene, h, e, y):
 
 
 @jitable
-def find_fault(scene):
+def find_fault(scene: Scene) -> int:
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
     worst, hardest, contact = scene.work.trouble[0], 0.0, -1
     hit = scene.work.hit

@@ -31,6 +31,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.forces import add_contact
@@ -39,7 +40,7 @@ from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
 
 
 @jitable
-def put_back(scene, row):
+def put_back(scene: Scene, row: F1) -> int:
     """Put the incident of a table's row back into its slot; return the slot."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     s = int(row[INC_SLOT])
@@ -64,7 +65,7 @@ def put_back(scene, row):
 
 
 @jitable
-def evaluate_replay(scene, t, y, dy, contacts, table):
+def evaluate_replay(scene: Scene, t: float, y: F1, dy: F1, contacts: F1, table: F2) -> int:
     """Fill `contacts` as a row has them, `table` with inputs, outputs, `Work.slot` of each.
 
     The rows of incidents lie in `Rows.incidents`. Return 0 or a law's code.
@@ -92,7 +93,7 @@ def evaluate_replay(scene, t, y, dy, contacts, table):
     return code
 
 
-def replay_hook(context, t, h, a, b):
+def replay_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Forces of a row once more: `a` is its y, `b` room for y', contacts and the table."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]

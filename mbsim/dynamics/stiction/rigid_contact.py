@@ -20,7 +20,9 @@ from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.codes import STICK as STICK_EVENT
 from mbsim.arrays.codes import TOLERANCE
 from mbsim.arrays.hooks import Held, Hook, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.in_use import active_count
@@ -59,7 +61,7 @@ OVER = 1e-5
 
 
 @jitable
-def slip_of(scene, y, s):
+def slip_of(scene: Scene, y: F1, s: int) -> V2:
     """Return slip along x and y of slot s at the point evaluated last."""
     gi, gj = sides(scene, s)
     point = scene.work.points[s]
@@ -73,13 +75,13 @@ def slip_of(scene, y, s):
 
 
 @jitable
-def settled(scene):
+def settled(scene: Scene) -> float:
     """Return what slip is none to the tolerance."""
     return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[1]
 
 
 @jitable
-def held_part(scene):
+def held_part(scene: Scene) -> float:
     """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
 
     What presses next to nothing has no limit of its own: the least is a part of the largest.
@@ -98,7 +100,7 @@ def held_part(scene):
 
 
 @jitable
-def onward(scene, s, v):
+def onward(scene: Scene, s: int, v: V2) -> float:
     """Return the part of slip along the direction in which slot s began to slip."""
     kept = scene.state.memory[s]
     size = math.hypot(kept[KEPT_X], kept[KEPT_Y])
@@ -106,13 +108,13 @@ def onward(scene, s, v):
 
 
 @jitable
-def rest(scene):
+def rest(scene: Scene) -> float:
     """Return what is no slip but rounding."""
     return ROUNDING * scene.world.scale[1]
 
 
 @jitable
-def ask_held(scene, y):
+def ask_held(scene: Scene, y: F1) -> int:
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
     if held_part(scene) > 1.0:
         return 1
@@ -126,19 +128,19 @@ def ask_held(scene, y):
 
 
 @jitable
-def load_held(scene):
+def load_held(scene: Scene) -> int:
     """Return the largest force that holds a slot, in millionths of what holds at most."""
     return int(1e6 * min(held_part(scene), 1e6))
 
 
 @jitable
-def goes_back(scene, s, along):
+def goes_back(scene: Scene, s: int, along: float) -> bool:
     """Return whether slot s goes back that slips by so much along the way it had."""
     return along < -(rest(scene) + BEYOND * scene.state.memory[s, KEPT_PLAY])
 
 
 @jitable
-def let_slip(scene, s, x, y, speed, play):
+def let_slip(scene: Scene, s: int, x: float, y: float, speed: float, play: float) -> None:
     """Let slot s slip along (x, y) from here on, at a speed, let go with some play."""
     kept = scene.state.memory[s]
     size = (rest(scene) + settled(scene) + BEYOND**2 * play) / math.hypot(x, y)
@@ -147,14 +149,14 @@ def let_slip(scene, s, x, y, speed, play):
 
 
 @jitable
-def let_stick(scene, s):
+def let_stick(scene: Scene, s: int) -> None:
     """Let slot s stick from here on."""
     kept = scene.state.memory[s]
     kept[KEPT_MODE], kept[KEPT_SPEED], kept[KEPT_PLAY] = STICK, 0.0, 0.0
 
 
 @jitable
-def begin_slot(scene, y, s):
+def begin_slot(scene: Scene, y: F1, s: int) -> int:
     """Set the mode of slot s, which does not stick; return 1 where it turns.
 
     What turns at a speed that the tolerance explains has come to rest, and so has what went back:
@@ -179,7 +181,7 @@ def begin_slot(scene, y, s):
 
 
 @jitable
-def came_to_rest(scene, pair):
+def came_to_rest(scene: Scene, pair: int) -> bool:
     """Return whether a slot of a pair sticks that did not."""
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -191,7 +193,7 @@ def came_to_rest(scene, pair):
 
 
 @jitable
-def begin_held(scene, y):
+def begin_held(scene: Scene, y: F1) -> int:
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
     What is at rest is first taken to stick wherever something changes, and what is as good as at
@@ -224,13 +226,13 @@ def begin_held(scene, y):
 
 
 @jitable
-def was_sticking(scene, s):
+def was_sticking(scene: Scene, s: int) -> bool:
     """Return whether slot s has been held so far."""
     return scene.state.before[s, KEPT_MODE] == STICK
 
 
 @jitable
-def hold_implied(scene, t, y):
+def hold_implied(scene: Scene, t: float, y: F1) -> None:
     """Let all slots stick whose slip those that stick imply: they move by rounding at most.
 
     What has been released for this very change does slip.
@@ -254,7 +256,7 @@ def hold_implied(scene, t, y):
 
 
 @jitable
-def fill_sliding(scene, t, y, count):
+def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
     """Fill what friction would be where the slots of so many rows slid against what holds them."""
     cone = scene.sweep.cone
     for k in range(count // 2):
@@ -273,7 +275,7 @@ def fill_sliding(scene, t, y, count):
 
 
 @jitable
-def solve_slips(scene, count, r):
+def solve_slips(scene: Scene, count: int, r: int) -> float:
     """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
     cone, most, grows = scene.sweep.cone, 0.0, True
     for k in range(count // 2):
@@ -294,7 +296,7 @@ def solve_slips(scene, count, r):
 
 
 @jitable
-def release_held(scene, t, y):
+def release_held(scene: Scene, t: float, y: F1) -> int:
     """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
     hold_implied(scene, t, y)
     share_held(scene, t, y)
@@ -319,7 +321,7 @@ def release_held(scene, t, y):
 
 
 @jitable
-def record_held(scene, t):
+def record_held(scene: Scene, t: float) -> None:
     """Append events of the slots that go on otherwise than before."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -341,7 +343,7 @@ def record_held(scene, t):
 
 
 @jitable
-def changed_held(scene):
+def changed_held(scene: Scene) -> int:
     """Return 1 if other slots stick than in the last step, else 0."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -353,7 +355,7 @@ def changed_held(scene):
 
 
 @jitable
-def serve_sticking(scene, what, t, y):
+def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
     """Do what contacts with rigid friction are asked for (`Held`); return an answer or 0."""
     if what == Held.PLACE:
         place_held(scene, t, y)

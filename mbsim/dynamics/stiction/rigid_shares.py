@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import CONE_ROWS
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, scale, vector
 from mbsim.dynamics.constraints.equations import add_wrench, along, fill_equation
@@ -20,13 +22,13 @@ STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
 
 
 @jitable
-def first_of_slots(scene):
+def first_of_slots(scene: Scene) -> int:
     """Return the first equation of slots: they are the last."""
     return len(scene.equations.slot) - len(scene.sweep.share)
 
 
 @jitable
-def fill_slip(scene, t, y, e, first, row):
+def fill_slip(scene: Scene, t: float, y: F1, e: int, first: int, row: F1) -> float:
     """Fill row e of S of `stiction.cones`, from the equation in use `first` on.
 
     Of A = L L' of the equations in use and b how they act on e, it is the end of L^-1 b. Returns
@@ -53,7 +55,7 @@ def fill_slip(scene, t, y, e, first, row):
 
 
 @jitable
-def fill_load(scene, first, m):
+def fill_load(scene: Scene, first: int, m: F1) -> None:
     """Fill what is held of m of `stiction.cones`: L' times the multipliers."""
     sweep, n = scene.sweep, active_count(scene)
     for k in range(first, n):
@@ -65,14 +67,14 @@ def fill_load(scene, first, m):
 
 
 @jitable
-def capacity(scene, s):
+def capacity(scene: Scene, s: int) -> float:
     """Return what slot s holds at most."""
     held = scene.contacts.friction_par[contact_of(scene, s), 0]
     return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
 
 
 @jitable
-def most_capacity(scene):
+def most_capacity(scene: Scene) -> float:
     """Return what the slot that sticks best holds at most."""
     slot, most = scene.equations.slot, 0.0
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -82,7 +84,7 @@ def most_capacity(scene):
 
 
 @jitable
-def fill_cones(scene, t, y, most):
+def fill_cones(scene: Scene, t: float, y: F1, most: float) -> tuple[int, int]:
     """Fill limits, slips and load of all slots that stick; return rows and equations in use.
 
     p and multipliers stay.
@@ -109,7 +111,7 @@ def fill_cones(scene, t, y, most):
 
 
 @jitable
-def is_loaded(scene, r):
+def is_loaded(scene: Scene, r: int) -> bool:
     """Return whether anything is to be held."""
     for k in range(r):
         if scene.sweep.cone[LOAD, k] != 0.0:
@@ -118,7 +120,7 @@ def is_loaded(scene, r):
 
 
 @jitable
-def spread(scene, t, y, most):
+def spread(scene: Scene, t: float, y: F1, most: float) -> None:
     """Share what is held out over all slots that stick, in `Work.held`."""
     sweep, slot = scene.sweep, scene.equations.slot
     count, r = fill_cones(scene, t, y, most)
@@ -131,7 +133,7 @@ def spread(scene, t, y, most):
 
 
 @jitable
-def share_held(scene, t, y):
+def share_held(scene: Scene, t: float, y: F1) -> None:
     """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
     held, active, first = scene.work.held, scene.equations.active, first_of_slots(scene)
     slot, count = scene.equations.slot, 0
@@ -153,7 +155,7 @@ def share_held(scene, t, y):
 
 
 @jitable
-def show_sticking(scene, s):
+def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
     row, held = scene.work.slot[s], scene.work.held[s]
     point = scene.work.points[s]

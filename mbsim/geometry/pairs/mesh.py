@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -41,7 +42,7 @@ LEANS, LIES = 0.9945, 0.9994
 
 
 @jitable
-def _shares_of_patches(hull, local, points):
+def _shares_of_patches(hull: F1, local: V3, points: F2) -> None:
     """Fill the shares of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
@@ -70,7 +71,7 @@ def _shares_of_patches(hull, local, points):
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
-def mesh_plane(frame_i, size_i, frame_j, size_j, points):
+def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Every corner below the plane is a point; of a patch of corners its deepest one.
 
     A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
@@ -107,7 +108,7 @@ def mesh_plane(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
+def _two_hulls(frame_i: F1, hull_i: F1, frame_j: F1, hull_j: F1, points: F2) -> int:
     """Write the points of two polyhedra; rows without a point hold the gap, 0 in overlap."""
     rows = hull_slots(hull_i, hull_j)
     for row in range(rows):
@@ -120,14 +121,14 @@ def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
 
 
 @pair("MESH", "MESH", slots=HULL_SLOTS, regroups=True)
-def mesh_mesh(frame_i, size_i, frame_j, size_j, points):
+def mesh_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The common polygon of the two faces that look at each other."""
     hull_i, hull_j = floats_at(size_i[0], size_i[1]), floats_at(size_j[0], size_j[1])
     return _two_hulls(frame_i, hull_i, frame_j, hull_j, points)
 
 
 @pair("MESH", "BOX", slots=HULL_SLOTS, regroups=True)
-def mesh_box(frame_i, size_i, frame_j, size_j, points):
+def mesh_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """A box is a polyhedron too."""
     box = CUBE.copy()
     corners, planes = int(box[AT_CORNERS]), int(box[AT_PLANES])
@@ -143,7 +144,7 @@ def mesh_box(frame_i, size_i, frame_j, size_j, points):
 
 
 @pair("SPHERE", "MESH", slots=1)
-def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
+def sphere_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The nearest point of the mesh to the centre; inside, the way out through the nearest face."""
     hull = floats_at(size_j[0], size_j[1])
     apart = sub(vector(frame_i), vector(frame_j))
@@ -156,7 +157,7 @@ def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def hull_cut(hull, height, n):
+def hull_cut(hull: F1, height: float, n: V3) -> float:
     """Return the area of the cut of a polyhedron with a plane of normal n in its axes.
 
     `height` is that of its origin. As of a box every face that is crossed has one side of it.
@@ -185,7 +186,9 @@ def hull_cut(hull, height, n):
 
 
 @region("MESH", "PLANE", whole=4.0)
-def mesh_plane_region(frame_i, size_i, frame_j, size_j, points):
+def mesh_plane_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The corners below the plane, and the cut of the mesh with the plane."""
     count = mesh_plane(frame_i, size_i, frame_j, size_j, points)
     hull, n = floats_at(size_i[0], size_i[1]), axis(frame_j, 2)
