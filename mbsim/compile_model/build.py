@@ -237,7 +237,7 @@ def _sizes(
         memory=contacts.memory,
         looked=looked,
         ahead=y if looked and contacts.laws.carried.any() else 0,
-        points=int((pairs.last - pairs.slot).max(initial=0)),
+        points=int((pairs.last - pairs.slot).max(initial=0)) if contacts.laws.rigid.any() else 0,
         groups=groups,
         region=codes.INC_REGION if any(kind.region for kind in plans.kinds) else 0,
     )

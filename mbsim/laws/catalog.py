@@ -44,6 +44,7 @@ class NormalLaw(NamedTuple):
     law: Callable[..., tuple[float, float, float]]
     parameters: tuple[str, ...]
     constants: Callable[..., tuple[float, ...]]
+    of_shapes: bool = False  # it needs the radii of what touches
 
     @property
     def takes(self) -> tuple[str, ...]:
@@ -128,12 +129,15 @@ def _as_given(*parameters: float) -> tuple[float, ...]:
 
 
 def normal_law(
-    name: str, *parameters: str, constants: Callable[..., tuple[float, ...]] = _as_given
+    name: str,
+    *parameters: str,
+    constants: Callable[..., tuple[float, ...]] = _as_given,
+    of_shapes: bool = False,
 ) -> Callable[[Law], Law]:
     """Register the decorated function as the normal law `name` of these attributes."""
 
     def register(law: Law) -> Law:
-        NORMAL_LAWS.put(name, NormalLaw(name, jitable(law), parameters, constants))
+        NORMAL_LAWS.put(name, NormalLaw(name, jitable(law), parameters, constants, of_shapes))
         return law
 
     return register

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import runpy
 import shutil
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from helpers.decks import EARTH, contact, sphere
+from helpers.decks import EARTH, GRAVITY, GROUND, contact, sphere
 from helpers.folders import MODELS, PACKAGES, TESTS
 
 G = 9.81
@@ -36,6 +37,7 @@ HEUN = (
 )
 TEMPLATES = {
     "friction_law": Template("laws/friction/viscous.py", 1),
+    "normal_law": Template("laws/normal/kelvin_voigt.py", 1),
     "joint": Template("joints/kinds/pin_in_slot.py", 1),
     "force": Template("forces/kinds/tether.py", 1),
     "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
@@ -169,12 +171,13 @@ from mbsim.forces.catalog import FORCES
 from mbsim.geometry.catalog import PAIRS
 from mbsim.integrators import catalog
 from mbsim.joints.catalog import JOINTS
-from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.reader import keywords
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION
 from mbsim.reader.statements import BY_KEY
 assert "VISCOUS" in FRICTION_LAWS and "VISCOUS" in keywords.CFF_TYPES.values()
 assert "slip_coef" in BY_KEY["forcecontact"].attributes
+assert "KELVIN_VOIGT" in NORMAL_LAWS and "KELVIN_VOIGT" in keywords.CNF_OF_LIMITS.values()
 assert "PIN_IN_SLOT" in JOINTS
 assert "TETHER" in FORCES and "forcetether" in BY_KEY
 assert "ELLIPSOID-MESH" in PAIRS
@@ -195,6 +198,20 @@ def test_friction_law(copy_with):
     t, v = found["time"], found["bodies/2/velocity"][:, 0]
     # N is the weight but for the block's pitching, which friction at its foot sets going
     np.testing.assert_allclose(v, 5.0 * np.exp(-0.2 * G * t), rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_normal_law(copy_with):
+    stands, deep = 0.1 - G / 1e4, 0.1 - 2.0 * G / 1e4  # its weight of 9.81 N on 1e4 N/m
+    deck = GROUND + sphere(deep) + GRAVITY
+    deck += contact(cnf_type="KELVIN_VOIGT", stiffness=1e4, damping=20)
+    folder = copy_with("normal_law")
+    (found,) = run_in_copy(folder, (whole(deck, 0.05), ["bodies/2/position"], {"tol": 1e-8}))
+    # 1 kg: x'' = -1e4 x - 20 x', from G/1e4 below where it stands
+    t, w = found["time"], math.sqrt(1e4 - 100.0)
+    swing = np.exp(-10.0 * t) * (np.cos(w * t) + 10.0 / w * np.sin(w * t))
+    below = (stands - found["bodies/2/position"][:, 2]) / (G / 1e4)
+    np.testing.assert_allclose(below, swing, atol=1e-4)
 
 
 @pytest.mark.slow

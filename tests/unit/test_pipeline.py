@@ -34,6 +34,12 @@ def evaluator(path):
     return system, rhs
 
 
+@pytest.mark.parametrize(("name", "rigid"), [("drop_m.xml", False), ("stiction_rigid.xml", True)])
+def test_only_rigid_friction_has_its_arrays(name, rigid):
+    work = build(mbsim.read_model(MODELS / name)).scene.work
+    assert {array.size > 0 for array in (work.hold, work.held, work.look)} == {rigid}
+
+
 @pytest.mark.parametrize("name", ["drop_m.xml", "incline_slip.xml", "sphere_pair.xml"])
 def test_work_filled_with_nan_changes_nothing(name):
     system, rhs = evaluator(MODELS / name)

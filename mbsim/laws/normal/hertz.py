@@ -51,6 +51,7 @@ def hertz_constants(stiffness: float, *attributes: Any) -> V2:
     *("stiffness", "i_elastic_modulus", "j_elastic_modulus", "i_poisson_ratio", "j_poisson_ratio"),
     *("i_radius", "j_radius", "damping", "restitution_coef", "ref_velocity"),
     constants=hertz_constants,
+    of_shapes=True,
 )
 def hertz(depth: float, depth_rate: float, stiffness: float, dissipation: float) -> V3:
     """Return force [F], force at rate 0 [F] and stored energy [F L].
