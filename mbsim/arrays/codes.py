@@ -184,6 +184,9 @@ INC_REGION = 4
 INC_HELD = INC_MEMORY + 3
 
 
+# entries of `Work.best`, of a pair: contact, energy at touch, the force behind it, inverse mass
+BEST_CONTACT, BEST_ENERGY, BEST_FORCE, BEST_INVERSE = range(4)
+
 # entries of `World.scale`
 SCALE_LENGTH, SCALE_SPEED, SCALE_ENERGY, TOLERANCE = range(4)
 

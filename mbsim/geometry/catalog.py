@@ -38,7 +38,8 @@ from mbsim.core.rotation import any_tangent, cross, scale
 
 #: Numbers of one candidate: depth, point, normal, share, couple.
 POINT = 11
-COUPLE = 8
+#: Where they begin.
+AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
 #: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
 #: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
 #: points' part of the force about the incident, in `plane_axes`.
@@ -95,17 +96,17 @@ def region(shape_i: str, shape_j: str, whole: float) -> Callable[[Kernel], Kerne
 @jitable
 def put_point(row: F1, depth: float, p: V3, n: V3, share: float = 1.0) -> None:
     """Write one candidate into a row of `points`."""
-    row[0] = depth
-    row[1], row[2], row[3] = p[0], p[1], p[2]
-    row[4], row[5], row[6] = n[0], n[1], n[2]
-    row[7] = share
-    row[8] = row[9] = row[10] = 0.0
+    row[AT_DEPTH] = depth
+    row[AT_POINT], row[AT_POINT + 1], row[AT_POINT + 2] = p[0], p[1], p[2]
+    row[AT_NORMAL], row[AT_NORMAL + 1], row[AT_NORMAL + 2] = n[0], n[1], n[2]
+    row[AT_WEIGHT] = share
+    row[COUPLE] = row[COUPLE + 1] = row[COUPLE + 2] = 0.0
 
 
 @jitable
 def put_couple(row: F1, couple: V3) -> None:
     """Give a candidate the couple on I for a unit of its energy."""
-    row[8], row[9], row[10] = couple[0], couple[1], couple[2]
+    row[COUPLE], row[COUPLE + 1], row[COUPLE + 2] = couple[0], couple[1], couple[2]
 
 
 @jitable

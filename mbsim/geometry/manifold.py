@@ -15,7 +15,7 @@ import math
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub
-from mbsim.geometry.catalog import put_point
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, put_point
 
 TURN = 2.0 * math.pi
 #: Shares below this are no incident.
@@ -199,13 +199,13 @@ def share_with_one(
     """
     carried = 0.0
     for row in range(count):
-        points[row, 0] = min(points[row, 0], f)
-        carried += points[row, 7] * max(0.0, points[row, 0]) / f
+        points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
+        carried += points[row, AT_WEIGHT] * max(0.0, points[row, AT_DEPTH]) / f
     part = max(0.0, part) if crossed else max(0.0, part) * fade(2.0 * carried - 1.0)
     for row in range(count):
-        points[row, 7] *= part
-        if points[row, 7] <= SMALL:
-            points[row, 0], points[row, 7] = min(points[row, 0], -f), 1.0
+        points[row, AT_WEIGHT] *= part
+        if points[row, AT_WEIGHT] <= SMALL:
+            points[row, AT_DEPTH], points[row, AT_WEIGHT] = min(points[row, AT_DEPTH], -f), 1.0
     put_share(points[count], f, p, n, 1.0 - part)
 
 

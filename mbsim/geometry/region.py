@@ -31,6 +31,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
     AREA,
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
     COUPLE,
     MOMENT_XX,
     MOMENT_XY,
@@ -66,16 +70,16 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
     square, weight, deepest = 0.0, 0.0, REGION_ROWS
     p, push, couple = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(REGION_ROWS, len(rows)):
-        depth = rows[k, 0]
-        if depth > rows[deepest, 0]:
+        depth = rows[k, AT_DEPTH]
+        if depth > rows[deepest, AT_DEPTH]:
             deepest = k
         if depth > 0.0:
-            w = rows[k, 7] * depth
+            w = rows[k, AT_WEIGHT] * depth
             square += w * depth
             weight += w
-            p = add(p, scale(w, vector(rows[k, 1:4])))
-            push = add(push, scale(w, vector(rows[k, 4:7])))
-            couple = add(couple, scale(0.5 * rows[k, 0] ** 2, vector(rows[k, COUPLE:])))
+            p = add(p, scale(w, vector(rows[k, AT_POINT:])))
+            push = add(push, scale(w, vector(rows[k, AT_NORMAL:])))
+            couple = add(couple, scale(0.5 * rows[k, AT_DEPTH] ** 2, vector(rows[k, COUPLE:])))
     if square <= 0.0:
         for c in range(POINT):
             rows[0, c] = rows[1, c] = rows[deepest, c]
@@ -87,9 +91,9 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
     # where normals differ the forces may have a torque about p; a force along n has none there
     torque = (0.0, 0.0, 0.0)
     for k in range(REGION_ROWS, len(rows)):
-        if rows[k, 0] > 0.0:
-            part = scale(rows[k, 7] * rows[k, 0], vector(rows[k, 4:7]))
-            torque = add(torque, cross(sub(vector(rows[k, 1:4]), p), part))
+        if rows[k, AT_DEPTH] > 0.0:
+            part = scale(rows[k, AT_WEIGHT] * rows[k, AT_DEPTH], vector(rows[k, AT_NORMAL:]))
+            torque = add(torque, cross(sub(vector(rows[k, AT_POINT:]), p), part))
     p = add(p, scale(1.0 / force, cross(n, torque)))
     depth = math.sqrt(square / whole)
     put_point(rows[0], depth, p, n, force / depth)
@@ -100,8 +104,11 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
     rows[1, AREA] = area
     x, y = plane_axes(n)
     for k in range(REGION_ROWS, len(rows)):
-        if rows[k, 0] > 0.0:
-            part, q = rows[k, 7] * rows[k, 0] / depth, sub(vector(rows[k, 1:4]), p)
+        if rows[k, AT_DEPTH] > 0.0:
+            part, q = (
+                rows[k, AT_WEIGHT] * rows[k, AT_DEPTH] / depth,
+                sub(vector(rows[k, AT_POINT:]), p),
+            )
             a, b = dot(q, x), dot(q, y)
             rows[1, MOMENT_XX] += part * a * a
             rows[1, MOMENT_XY] += part * a * b

@@ -6,7 +6,7 @@ that the tree allows, weighted by inertia; last, velocities are treated likewise
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import DRIFT, DRIFTER
+from mbsim.arrays.codes import DRIFT, DRIFTER, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -196,7 +196,7 @@ def project(scene: Scene, t: float, y: F1, level: int) -> None:
     carry_all(scene, y)
     if active_count(scene) > 0:
         fill_equations(scene, t, y)
-        part = FORGIVEN * scene.world.scale[0] / scene.world.scale[1]
+        part = FORGIVEN * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
         note_drift(scene, level, MISMATCH, part)
         correct(scene, level, MISMATCH)
         speed_up(scene, y)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SCALE_LENGTH
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
@@ -85,7 +86,7 @@ def self_stress(scene: Scene, t: float, y: F1, e: int, out: F1) -> None:
 @jitable
 def product(scene: Scene, a: F1, b: F1) -> float:
     """Return the sum of F.F' + T.T'/L^2 over all connections."""
-    L2, total = scene.world.scale[0] ** 2, 0.0
+    L2, total = scene.world.scale[SCALE_LENGTH] ** 2, 0.0
     for c in range(len(scene.connections.i)):
         for i in range(3):
             at = 6 * c + i

@@ -15,7 +15,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
-from mbsim.geometry.catalog import COUPLE
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, COUPLE
 
 
 @jitable
@@ -39,7 +39,7 @@ def measure_pair(scene: Scene, pair: int) -> bool:
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):
-                work.points[s, 4 + k] = -work.points[s, 4 + k]
+                work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
     return True
 
@@ -53,7 +53,7 @@ def gather(scene: Scene, pair: int) -> None:
     # of one region the points behind the first row are in that
     count = scene.kinds.slots[kind] if scene.kinds.whole[kind] == 0.0 else 1
     for s in range(first, first + count):
-        depth = work.points[s, 0]
+        depth = work.points[s, AT_DEPTH]
         if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
             work.touching[s] = 1
             hit[hit[last]] = s

@@ -30,21 +30,45 @@ from mbsim.core.rotation import (
 )
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.frames import tangent
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    plane_axes,
+)
 from mbsim.laws.abi import (
+    AREA_IN,
     BRANCH_OUT,
+    ELASTIC,
+    ENERGY,
     FRICTION_INPUTS,
     FROZEN,
     GROWTH,
     LIMIT_RATE,
+    LOAD,
+    LOCI_IN,
+    LOCJ_IN,
     MEMORY_OUT,
     MODE_OUT,
+    NFORCE_IN,
     NORMAL_RATE,
     NORMAL_STIFFNESS,
+    RADIUS_IN,
+    ROLLING_IN,
     SLIDING_LIMIT,
     SLIPPING_MASS,
+    STEP_IN,
     STORED_OUT,
+    TIME_IN,
     UNIT_OUT,
+    X_IN,
+    XDOT_IN,
 )
 from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
@@ -154,7 +178,7 @@ def remember(scene: Scene, y: F1, s: int, c: int, given: F1) -> None:
     given[NORMAL_STIFFNESS], given[GROWTH] = row[STIFFNESS], row[STIFFENS]
     given[SLIPPING_MASS] = slipping_mass(scene, s)
     given[SLIDING_LIMIT] = math.nan
-    known = row[FOUND_AT] == given[0]
+    known = row[FOUND_AT] == given[TIME_IN]
     given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
     given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
     for k in range(scene.contacts.memory[c]):
@@ -206,18 +230,18 @@ def friction(
     contacts, work = scene.contacts, scene.work
     given = work.law_in
     at = scene.slots.x[s]
-    given[0] = t
-    given[1] = h
+    given[TIME_IN] = t
+    given[STEP_IN] = h
     for k in range(3):
-        given[2 + k] = y[at + k] if at >= 0 else 0.0
-        given[13 + k] = loci[k]
-        given[16 + k] = locj[k]
-    given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
-    given[8], given[9] = spin_rates[0], spin_rates[1]
-    given[10] = normal
+        given[X_IN + k] = y[at + k] if at >= 0 else 0.0
+        given[LOCI_IN + k] = loci[k]
+        given[LOCJ_IN + k] = locj[k]
+    given[XDOT_IN], given[XDOT_IN + 1], given[XDOT_IN + 2] = slip[0], slip[1], spin_rates[2]
+    given[ROLLING_IN], given[ROLLING_IN + 1] = spin_rates[0], spin_rates[1]
+    given[NFORCE_IN] = normal
     area = patch(scene, s)
-    given[11] = area
-    given[12] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
+    given[AREA_IN] = area
+    given[RADIUS_IN] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
     if contacts.memory[c] > 0:
         remember(scene, y, s, c, given)
     scene.log.counters[FRICTION_CALLS] += 1
@@ -267,7 +291,7 @@ def ask_normal(
     place[PLACE_MODE] = EVALUATE
     code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     place[PLACE_MODE] = EXPLORE
-    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[0]):
+    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[LOAD]):
         return Code.USER_NORMAL_FAILED
     return code
 
@@ -334,12 +358,12 @@ def tilting(
         return 0, none, 0.0
     rate = math.sqrt(square)
     code = ask_normal(scene, t, y, c, at, depth, rate, out)
-    closing = out[0]
+    closing = out[LOAD]
     if code == 0:
         code = ask_normal(scene, t, y, c, at, depth, -rate, out)
     if code != 0:
         return code, none, 0.0
-    damping = (closing - out[0]) / (2.0 * rate)
+    damping = (closing - out[LOAD]) / (2.0 * rate)
     about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
     size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
     part = most / size if size > most else 1.0
@@ -360,7 +384,7 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
-    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
 
     # how the surfaces move at p
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
@@ -384,11 +408,11 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
     if code != 0:
         return code
-    share = point[7]
-    normal, elastic, stored = share * out[0], share * out[1], share * out[2]
+    share = point[AT_WEIGHT]
+    normal, elastic, stored = share * out[LOAD], share * out[ELASTIC], share * out[ENERGY]
     lost = (normal - elastic) * rate
     # of shares that turn with the shapes
-    couple = scale(out[1] if whole > 0.0 else out[2], vector(point[COUPLE:]))
+    couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
     row[HELD] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
@@ -397,7 +421,7 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
     if whole > 0.0:
         # see geometry.region
-        stored = whole * out[2]
+        stored = whole * out[ENERGY]
         code, torque, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
         if code != 0:
             return code

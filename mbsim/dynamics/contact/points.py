@@ -52,15 +52,16 @@ from mbsim.dynamics.contact.forces import (
     sides,
     velocity_at,
 )
-from mbsim.geometry.catalog import axis
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
 from mbsim.laws import catalog
+from mbsim.laws.abi import ELASTIC, ENERGY
 
 
 @jitable
 def effective_mass(scene: Scene, y: F1, s: int) -> float:
     """Return the mass that meets in slot s along its normal: 1 / (n J M^-1 J' n)."""
     point = scene.work.points[s]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     inverse = 0.0
     gi, gj = sides(scene, s)
     for g in (gi, gj):
@@ -84,13 +85,13 @@ def deepest_of_impact(scene: Scene, c: int, energy: float) -> float:
     depth = 1e-4 * scene.world.scale[SCALE_LENGTH]
     for _ in range(50):
         call_int(contacts.normal_law[c], (depth, 0.0, contacts.normal_par[c], out))
-        if out[2] <= 0.0 or not out[1] > 0.0:
+        if out[ENERGY] <= 0.0 or not out[ELASTIC] > 0.0:
             depth *= 16.0
             continue
-        ratio = energy / out[2]
+        ratio = energy / out[ENERGY]
         if 0.99 < ratio < 1.01:
             break
-        change = ratio ** (out[2] / (out[1] * depth))
+        change = ratio ** (out[ENERGY] / (out[ELASTIC] * depth))
         depth *= min(1e4, max(1e-4, change))
     return depth
 
@@ -117,7 +118,7 @@ def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
             continue
         c = scene.kinds.contact[kind]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
-        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, 7]
+        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, AT_WEIGHT]
         deepest = deepest_of_impact(scene, c, energy)
         allowed = max(3.0 * deepest / 70.0, 1e-3 * contacts.dmax[c])
         if depth > allowed:
@@ -185,7 +186,7 @@ def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
     """Note that slot s ceased to touch within the step that ends at t."""
     state, log = scene.state, scene.log.contacts[contact_of(scene, s)]
     depth, rate = state.depth[s], state.rate[s]
-    after = scene.work.points[s, 0]
+    after = scene.work.points[s, AT_DEPTH]
     if after < 0.0 and after > -1e3 * depth:
         part = crossing(depth, rate, after, min(rate, (after - depth) / h), h)
     else:
@@ -269,7 +270,7 @@ def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
     if (measured and closed_form) or measure_pair(scene, pair):
         first, deepest = pairs.slot[pair], -math.inf
         for s in range(first, first + scene.kinds.slots[pairs.kind[pair]]):
-            deepest = max(deepest, work.points[s, 0])
+            deepest = max(deepest, work.points[s, AT_DEPTH])
         gap = -deepest
     else:
         gap = bounding_gap(scene, pair)
@@ -280,7 +281,7 @@ def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
 def another_point(scene: Scene, y: F1, h: float, s: int) -> bool:
     """Return whether the point that FCL gives for slot s is too far to be the one before."""
     point, before = scene.work.points[s], scene.state.p[s]
-    p = (point[1], point[2], point[3])
+    p = vector(point[AT_POINT:])
     gi, gj = sides(scene, s)
     graphics = scene.graphics
     speed = norm(velocity_at(scene, y, graphics.body[gi], p))
@@ -352,8 +353,8 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         state.normal[s] = work.slot[s, NORMAL]
         if scene.world.fixed_step[0] == 0 or scene.contacts.framed[contact_of(scene, s)] == 1:
             for k in range(3):
-                state.p[s, k] = work.points[s, 1 + k]
-                state.n[s, k] = work.points[s, 4 + k]
+                state.p[s, k] = work.points[s, AT_POINT + k]
+                state.n[s, k] = work.points[s, AT_NORMAL + k]
                 state.t[s, k] = work.t[s, k]
     return changed
 

@@ -21,6 +21,10 @@ import math
 from mbsim.arrays.codes import (
     ACTIVE,
     AXIS_TORQUE,
+    BEST_CONTACT,
+    BEST_ENERGY,
+    BEST_FORCE,
+    BEST_INVERSE,
     BOUND_DAMPING,
     BOUND_FORCE,
     BOUND_STIFFNESS,
@@ -42,7 +46,8 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides
 from mbsim.dynamics.contact.points import deepest_of_impact
 from mbsim.dynamics.events.step_limits import longest_travel
-from mbsim.geometry.catalog import REGION_ROWS
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, REGION_ROWS
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
@@ -59,9 +64,9 @@ def slopes(scene: Scene, c: int, depth: float, out: F1) -> V2:
     """Return stiffness dF/dd and damping dF/dd' of contact c's law at a depth."""
     contacts, speed = scene.contacts, scene.world.scale[SCALE_SPEED]
     call_int(contacts.normal_law[c], (depth, speed, contacts.normal_par[c], out))
-    here, damping = out[1], (out[0] - out[1]) / speed
+    here, damping = out[ELASTIC], (out[LOAD] - out[ELASTIC]) / speed
     call_int(contacts.normal_law[c], (1.001 * depth, 0.0, contacts.normal_par[c], out))
-    return max(0.0, (out[1] - here) / (0.001 * depth)), max(0.0, damping)
+    return max(0.0, (out[ELASTIC] - here) / (0.001 * depth)), max(0.0, damping)
 
 
 @jitable
@@ -140,8 +145,12 @@ def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) ->
     rows = scene.work.points
     first = s + REGION_ROWS
     for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
-        if rows[row, 0] > 0.0:
-            p, n, share = vector(rows[row, 1:4]), vector(rows[row, 4:7]), rows[row, 7]
+        if rows[row, AT_DEPTH] > 0.0:
+            p, n, share = (
+                vector(rows[row, AT_POINT:]),
+                vector(rows[row, AT_NORMAL:]),
+                rows[row, AT_WEIGHT],
+            )
             turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
             add_to_block(scene.work.block[b], n, share * k, share * damping, turn)
 
@@ -151,8 +160,8 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
     point = work.points[s]
-    c, depth, share = contact_of(scene, s), point[0], point[7]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    c, depth, share = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     ground = len(bodies.mass)
@@ -161,8 +170,8 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     kinetic = 0.5 * rate * rate / (share * inverse)
     force = (work.speed[gi, 1] + work.speed[gj, 1]) / (share * inverse)
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    if kinetic + force * depth > AT_REST * out[2]:
-        energy = max(0.0, out[2] + kinetic - force * depth)
+    if kinetic + force * depth > AT_REST * out[ENERGY]:
+        energy = max(0.0, out[ENERGY] + kinetic - force * depth)
         depth = max(depth, depth_to_come(scene, c, energy, force))
     k, damping = slopes(scene, c, depth, out)
     k *= share
@@ -269,17 +278,23 @@ def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
     force = push / inverse
     energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
     inverse += turning(scene, i) + turning(scene, j)
-    if c == best[0] and energy <= best[1] and force <= best[2] and inverse <= best[3]:
+    if (
+        c == best[BEST_CONTACT]
+        and energy <= best[BEST_ENERGY]
+        and force <= best[BEST_FORCE]
+        and inverse <= best[BEST_INVERSE]
+    ):
         return False
-    best[0], best[1], best[2], best[3] = c, energy, force, inverse
+    best[BEST_CONTACT], best[BEST_ENERGY] = c, energy
+    best[BEST_FORCE], best[BEST_INVERSE] = force, inverse
     return True
 
 
 @jitable
 def add_meeting(scene: Scene, best: F1, out: F1, bound: F1) -> None:
     """Raise the squared frequency and the rate in `bound` to those of the pair in `best`."""
-    c, inverse = int(best[0]), best[3]
-    depth = depth_to_come(scene, c, best[1], best[2])
+    c, inverse = int(best[BEST_CONTACT]), best[BEST_INVERSE]
+    depth = depth_to_come(scene, c, best[BEST_ENERGY], best[BEST_FORCE])
     k, damping = slopes(scene, c, depth, out)
     bound[0] = max(bound[0], k * inverse)
     bound[1] = max(bound[1], damping * inverse)
@@ -341,7 +356,7 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
             damped += block[10 + k] * block[10 + k]
         bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
         bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
-    best[0] = -1.0
+    best[BEST_CONTACT] = -1.0
     for k in range(pairs.count[ACTIVE]):
         if pairs.touches[pairs.active[k]] == 0 and fast_pair(scene, pairs.active[k], best):
             add_meeting(scene, best, work.law_out, bound)

@@ -19,6 +19,8 @@ from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
 from mbsim.dynamics.contact.points import deepest_of_impact, effective_mass
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Halvings of the way out in which a force is looked for, and of where it ends.
 SHALLOWEST = 12
@@ -51,10 +53,15 @@ def seen_part(scene: Scene, c: int, depth: float, per_mass: float) -> float:
     """
     out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    if not out[2] > 0.0:
+    if not out[ENERGY] > 0.0:
         return 1.0
-    e = out[1] * depth / out[2] - 1.0
-    wrong = min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0))) * BLIND * out[1] * per_mass
+    e = out[ELASTIC] * depth / out[ENERGY] - 1.0
+    wrong = (
+        min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0)))
+        * BLIND
+        * out[ELASTIC]
+        * per_mass
+    )
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
     return (allowed / wrong) ** (1.0 / (e + 1.0)) if wrong > allowed > 0.0 else 1.0
 
@@ -70,7 +77,7 @@ def is_over(scene: Scene, c: int, depth: float, normal: float, per_mass: float) 
     out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
-    return BLIND_JUMP * max(normal, out[1]) * per_mass <= allowed
+    return BLIND_JUMP * max(normal, out[ELASTIC]) * per_mass <= allowed
 
 
 @jitable
@@ -85,7 +92,7 @@ def longest_at_jump(scene: Scene, c: int, depth: float, speed: float, mass: floa
         scene.contacts.normal_law[c], (AT_ONCE * depth, speed, scene.contacts.normal_par[c], out)
     )
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
-    return allowed * mass / (BLIND_JUMP * out[0]) if out[0] > 0.0 else math.inf
+    return allowed * mass / (BLIND_JUMP * out[LOAD]) if out[LOAD] > 0.0 else math.inf
 
 
 @jitable
@@ -95,7 +102,7 @@ def pushes_at(scene: Scene, c: int, t: float, depth: float, rate: float, bend: f
     d = depth + t * (rate + 0.5 * t * bend)
     par = scene.contacts.normal_par[c]
     call_int(scene.contacts.normal_law[c], (d, rate + t * bend, par, out))
-    return out[0] > 0.0
+    return out[LOAD] > 0.0
 
 
 @jitable
@@ -228,12 +235,12 @@ def step_to_touch(scene: Scene, y: F1, f: F1, pair: int, h: float) -> float:
         return math.inf
     s = pairs.slot[pair]
     for k in range(s + 1, s + scene.kinds.slots[pairs.kind[pair]]):
-        if work.points[k, 0] > work.points[s, 0]:
+        if work.points[k, AT_DEPTH] > work.points[s, AT_DEPTH]:
             s = k
-    gap, bi, bj = -work.points[s, 0], graphics.body[gi], graphics.body[gj]
+    gap, bi, bj = -work.points[s, AT_DEPTH], graphics.body[gi], graphics.body[gj]
     if gap < 0.0:
         return math.inf
-    p, n = vector(work.points[s, 1:4]), vector(work.points[s, 4:7])
+    p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
     if scene.kinds.swapped[pairs.kind[pair]] == 1:
         bi, bj = bj, bi
     v = dot(sub(velocity_at(scene, y, bj, p), velocity_at(scene, y, bi, p)), n)

@@ -19,6 +19,7 @@ from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.contact.forces import FORCE, TORQUE, contact_of, sides
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
+from mbsim.geometry.catalog import AT_POINT
 
 AT_REST, AS_THEY_ARE = -2, -1
 
@@ -319,9 +320,7 @@ def contact_force(scene: Scene, y: F1, contact: int, jflag: int, k: int, comp: i
             values, point = work.slot[s], work.points[s]
             graphic = sides(scene, s)[jflag]
             push = vector(values[FORCE : FORCE + 3])
-            arm = sub(
-                (point[1], point[2], point[3]), position(scene, y, scene.graphics.body[graphic])
-            )
+            arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[graphic]))
             force = add(force, push)
             torque = add(torque, add(cross(arm, push), vector(values[TORQUE : TORQUE + 3])))
     sign = 1.0 if jflag == 0 else -1.0

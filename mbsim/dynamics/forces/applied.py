@@ -47,6 +47,7 @@ from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point,
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.dry_friction import add_dry, is_dry
 from mbsim.dynamics.forces.wrenches import wrench
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 
 @jitable
@@ -102,7 +103,7 @@ def at_limit(scene: Scene, f: int, x: float, rate: float) -> V3:
         return 0.0, 0.0, 0.0
     if call_int(applied.law[f], (depth, closing, applied.law_par[f], out)) != 0:
         return math.nan, 0.0, 0.0
-    return side * out[0], out[2], (out[0] - out[1]) * closing
+    return side * out[LOAD], out[ENERGY], (out[LOAD] - out[ELASTIC]) * closing
 
 
 @jitable

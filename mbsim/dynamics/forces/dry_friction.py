@@ -21,6 +21,8 @@ from mbsim.arrays.codes import (
     DRY_SLIDE,
     DRY_TURN,
     LOST_POWER,
+    SCALE_LENGTH,
+    SCALE_SPEED,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -114,8 +116,8 @@ def add_dry(scene: Scene, y: F1, f: int) -> float:
 @jitable
 def rest_of(scene: Scene, f: int) -> float:
     """Return what is no velocity of rigid dry friction f but rounding."""
-    scale = scene.world.scale
-    return ROUNDING * (scale[1] / scale[0] if scene.applied.kind[f] == DRY_TURN else scale[1])
+    speed, turns = scene.world.scale[SCALE_SPEED], scene.applied.kind[f] == DRY_TURN
+    return ROUNDING * (speed / scene.world.scale[SCALE_LENGTH] if turns else speed)
 
 
 @jitable

@@ -41,6 +41,7 @@ from mbsim.dynamics.constraints.equations import hold_again
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.forces.applied import push
+from mbsim.laws.abi import NFORCE_IN, TIME_IN, XDOT_IN
 
 # columns of `Work.rub`: wrench on I of a unit force (force 3, torque 3), then
 SPEED, FORCE, MISS = 6, 7, 8
@@ -108,9 +109,9 @@ def ask_law(scene: Scene, t: float, f: int) -> float:
         return 0.0
     for k in range(len(given)):
         given[k] = 0.0
-    given[0] = t
-    given[5] = scene.work.rub[f, SPEED]
-    given[10] = press(scene, f)
+    given[TIME_IN] = t
+    given[XDOT_IN] = scene.work.rub[f, SPEED]
+    given[NFORCE_IN] = press(scene, f)
     scene.log.counters[FRICTION_CALLS] += 1
     if call_int(applied.law[f], (applied.id[f], given, applied.law_par[f], out)) != 0:
         return math.nan

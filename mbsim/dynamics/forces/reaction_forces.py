@@ -23,6 +23,7 @@ from mbsim.arrays.codes import (
     LINE_FORCE,
     LOST_POWER,
     SCALAR,
+    SCALE_LENGTH,
 )
 from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import Scene
@@ -151,7 +152,7 @@ def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
     and reaction.
     """
     late, work = scene.applied.late, scene.work
-    length = scene.world.scale[0]
+    length = scene.world.scale[SCALE_LENGTH]
     largest, reaction = 0.0, 0.0
     for k in range(len(work.reaction)):
         reaction = max(reaction, abs(work.reaction[k]) / (1.0 if k % 6 < 3 else length))
@@ -176,7 +177,7 @@ def unit(scene: Scene, u: int) -> float:
     """Return what makes a force of unknown u: the length for torques, else 1."""
     f, c = scene.applied.late[u, 0], scene.applied.late[u, 1]
     turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE
-    return scene.world.scale[0] if turns else 1.0
+    return scene.world.scale[SCALE_LENGTH] if turns else 1.0
 
 
 @jitable

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import PYTHON_CALLS
+from mbsim.arrays.codes import PYTHON_CALLS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.model import Residuals
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -44,7 +44,7 @@ def unknowns_of(scene: Scene, e: int) -> int:
 @jitable
 def own_time(scene: Scene) -> float:
     """Return L/V."""
-    return scene.world.scale[0] / scene.world.scale[1]
+    return scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
 
 
 @jitable

@@ -15,6 +15,8 @@ from mbsim.arrays.codes import (
     LINE_FORCE,
     MARKER_FORCE,
     RESIDUAL,
+    SCALE_LENGTH,
+    SCALE_SPEED,
     SLIDE_LIMIT,
     TURN_LIMIT,
     VECTOR_FORCE,
@@ -107,8 +109,8 @@ def add_vector_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None
 @jitable
 def limit_slopes(scene: Scene, f: int, x: float, rate: float) -> V2:
     """Return dF/dx and dF/dx' of a limit."""
-    step = PUSH * max(abs(x), 1e-3 * scene.world.scale[0])
-    fast = PART_OF_SPEED * scene.world.scale[1] + PART * abs(rate)
+    step = PUSH * max(abs(x), 1e-3 * scene.world.scale[SCALE_LENGTH])
+    fast = PART_OF_SPEED * scene.world.scale[SCALE_SPEED] + PART * abs(rate)
     by_x = at_limit(scene, f, x + step, rate)[0] - at_limit(scene, f, x - step, rate)[0]
     by_rate = at_limit(scene, f, x, rate + fast)[0] - at_limit(scene, f, x, rate - fast)[0]
     return by_x / (2.0 * step), by_rate / (2.0 * fast)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import BALL_FRICTION, SCREW_FRICTION, SLIDE_FRICTION
+from mbsim.arrays.codes import BALL_FRICTION, SCALE_SPEED, SCREW_FRICTION, SLIDE_FRICTION
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 def rub_slopes(scene: Scene, t: float, f: int) -> V3:
     """Return slip speed s, dF/ds and F/s of friction f in a joint, its normal force as it is."""
     row = scene.work.rub[f]
-    s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[1]
+    s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     low, high = max(s - kept, 0.0), s + kept
     row[SPEED] = low
     before = ask_law(scene, t, f)

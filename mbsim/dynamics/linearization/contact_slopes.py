@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -30,8 +31,18 @@ from mbsim.dynamics.contact.forces import (
 )
 from mbsim.dynamics.linearization.blocks import couple
 from mbsim.dynamics.linearization.stiffness import PART, PART_OF_SPEED, add_two_sided, lever
-from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
-from mbsim.laws.abi import DFLAG
+from mbsim.geometry.catalog import (
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    REGION_ROWS,
+    plane_axes,
+)
+from mbsim.laws.abi import DFLAG, LOAD
 from mbsim.laws.catalog import SLIP
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
@@ -104,7 +115,7 @@ def friction_slopes(
     table: F2,
 ) -> int:
     """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
-    out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[1]
+    out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     base, code, speed = table[:, 6:11], 0, rigid_slip(scene, s, c)
     if speed > 0.0:
         # it turns over a way in velocities as short as itself
@@ -112,7 +123,7 @@ def friction_slopes(
     for column in range(6):
         size = PART * abs(given[column])
         if column < 5:
-            size += least if column < 2 else least / scene.world.scale[0]
+            size += least if column < 2 else least / scene.world.scale[SCALE_LENGTH]
         elif size == 0.0:
             size = PART
         kept = given[column]
@@ -137,7 +148,7 @@ def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     i, j = contact_bodies(scene, s)
     point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
     numbers = scene.work.points[s + 1]
-    p, (ax, ay) = vector(point[1:4]), plane_axes(vector(point[4:7]))
+    p, (ax, ay) = vector(point[AT_POINT:]), plane_axes(vector(point[AT_NORMAL:]))
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
         lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
@@ -162,22 +173,22 @@ def add_region_stiffness(
     """
     P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
-    depth, whole, none = rows[s, 0], face_weight_of(scene, s), (0.0, 0.0, 0.0)
+    depth, whole, none = rows[s, AT_DEPTH], face_weight_of(scene, s), (0.0, 0.0, 0.0)
     one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
     every[:] = press[:] = 0.0
     weight, moment = 0.0, 0.0
     first = s + REGION_ROWS
     for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
-        if rows[k, 0] > 0.0:
-            p, n, w = vector(rows[k, 1:4]), vector(rows[k, 4:7]), rows[k, 7]
+        if rows[k, AT_DEPTH] > 0.0:
+            p, n, w = vector(rows[k, AT_POINT:]), vector(rows[k, AT_NORMAL:]), rows[k, AT_WEIGHT]
             for side in range(2):
                 lever(scene, L, y, i if side == 0 else j, p, n, none, one[side])
             add_two_sided(P, L.K, nb, i, j, -w * force / depth, one, one)
             weight += w
-            moment += w * rows[k, 0]
+            moment += w * rows[k, AT_DEPTH]
             for side in range(2):
                 for c in range(6):
-                    every[side, c] += w * rows[k, 0] * one[side, c]
+                    every[side, c] += w * rows[k, AT_DEPTH] * one[side, c]
                     press[side, c] += w * force / depth * one[side, c]
     rest = (by_depth - force / depth) / (whole * depth * depth)
     add_two_sided(P, L.K, nb, i, j, -rest, every, every)
@@ -198,30 +209,30 @@ def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) 
     P, L, work, nb = T.pattern, T.linear, scene.work, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
     point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
-    p, n, tx = vector(point[1:4]), vector(point[4:7]), vector(work.t[s])
+    p, n, tx = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), vector(work.t[s])
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
     rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
     one, moved, first = L.basis[:, 7], L.basis[:, 8], s + REGION_ROWS
     last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
-        weight += max(0.0, work.points[k, 0]) * work.points[k, 7]
+        weight += max(0.0, work.points[k, AT_DEPTH]) * work.points[k, AT_WEIGHT]
     for k in range(first, last):
         row = work.points[k]
-        if row[0] <= 0.0:
+        if row[AT_DEPTH] <= 0.0:
             continue
-        q = sub(vector(row[1:4]), p)
+        q = sub(vector(row[AT_POINT:]), p)
         faster = cross(w_rel, q)
         slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
         torque = cross(q, rub)
         for side in range(2):
             b = i if side == 0 else j
-            lever(scene, L, y, b, vector(row[1:4]), vector(row[4:7]), none, one[side])
+            lever(scene, L, y, b, vector(row[AT_POINT:]), vector(row[AT_NORMAL:]), none, one[side])
             lever(scene, L, y, b, p, scale(by_rate * rate, n), torque, moved[side])
             for r in range(5):
                 rise = L.law[r, 0] * slip_x + L.law[r, 1] * slip_y + L.law[r, 5] * by_rate * rate
                 for c in range(6):
                     moved[side, c] += rise * L.basis[side, 1 + r, c]
-        add_two_sided(P, L.K, nb, i, j, -row[7] / weight, moved, one)
+        add_two_sided(P, L.K, nb, i, j, -row[AT_WEIGHT] / weight, moved, one)
 
 
 @jitable
@@ -229,7 +240,7 @@ def normal_slopes(
     scene: Scene, s: int, c: int, depth: float, rate: float
 ) -> tuple[int, float, float]:
     """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
-    contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, 7]
+    contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
     user = contacts.user_normal[c]
     if user != 0:
         place = floats_at(user, PLACE)
@@ -237,14 +248,14 @@ def normal_slopes(
     step = PART * depth
     call = (depth + step, rate, contacts.normal_par[c], out)
     code = call_int(contacts.normal_law[c], call)
-    upper = out[0]
+    upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth - step, rate, contacts.normal_par[c], out))
-    by_depth = share * (upper - out[0]) / (2.0 * step)
-    step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[1]
+    by_depth = share * (upper - out[LOAD]) / (2.0 * step)
+    step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     code += call_int(contacts.normal_law[c], (depth, rate + step, contacts.normal_par[c], out))
-    upper = out[0]
+    upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
-    by_rate = share * (upper - out[0]) / (2.0 * step)
+    by_rate = share * (upper - out[LOAD]) / (2.0 * step)
     if user != 0:
         floats_at(user, PLACE)[MODE] = EXPLORE
     return code, by_depth, by_rate
@@ -263,8 +274,8 @@ def add_contact_slopes(  # noqa: C901
     gi, gj = sides(scene, s)
     i, j = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
-    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
-    share, none = point[7], (0.0, 0.0, 0.0)
+    depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
+    share, none = point[AT_WEIGHT], (0.0, 0.0, 0.0)
     rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
 
     code, by_depth, by_rate = normal_slopes(scene, s, c, depth, rate)
@@ -305,7 +316,7 @@ def add_contact_slopes(  # noqa: C901
     counts = 1.0
     if contacts.rigid[c] == 1:
         slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
-        counts = min(1.0, slow / (SLOW * scene.world.scale[1]))
+        counts = min(1.0, slow / (SLOW * scene.world.scale[SCALE_SPEED]))
     for k in range(4):
         work.grip[s, k] = counts * L.law[k // 2, k % 2] / given[5] if given[5] > 0.0 else 0.0
     for side in range(2):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import RESIDUAL
+from mbsim.arrays.codes import RESIDUAL, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.model import Residuals
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 def fill_moves(scene: Scene, e: int) -> int:
     """Fill `moves` with the residual by x and x', where r is in `rows`; return a code."""
     R, na = scene.residuals, axes_of(scene, e)
-    length, speed = scene.world.scale[0], scene.world.scale[1]
+    length, speed = scene.world.scale[SCALE_LENGTH], scene.world.scale[SCALE_SPEED]
     for k in range(na):
         turns = R.angle[R.first[e] + k] >= 0
         for part in range(2):

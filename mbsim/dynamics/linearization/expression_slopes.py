@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import USER
 from mbsim.core.arrays import F1, F2
@@ -81,9 +82,9 @@ def program_rise(
     at = BODY_SIZE * body
     for direction in range(DIRECTIONS):
         if T.depends.user[program] == 1:
-            size = PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+            size = PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[SCALE_LENGTH])
             if direction >= POSES:
-                size *= scene.world.scale[1] / scene.world.scale[0]
+                size *= scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
             before = value_anew(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.codes import SCALE_LENGTH, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -283,7 +283,7 @@ def bend_by(scene: Scene, T: Tangent, t: float, y: F1, row: int, e: int, term: i
         for j in range(12):
             L.law[i, j] = 0.0
     for direction in range(6):
-        scale_of_direction = scene.world.scale[0] if direction < 3 else 1.0
+        scale_of_direction = scene.world.scale[SCALE_LENGTH] if direction < 3 else 1.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             pushed(scene, y, b, direction, sign * _PUSH * scale_of_direction)

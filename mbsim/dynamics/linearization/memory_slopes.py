@@ -15,17 +15,19 @@ Behind hooks of the scene, so that only scenes with such friction compile it.
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Keeps, Linear, Pair, Real, Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, F2, N1, N2, V3, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, scale, sub
+from mbsim.core.rotation import add, scale, sub, vector
 from mbsim.dynamics.contact.forces import contact_of, in_marker, sides
 from mbsim.dynamics.linearization.contact_slopes import ask_friction
 from mbsim.dynamics.linearization.newton_matrix import times_rate
-from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT, STEP_IN, TIME_IN
 
 #: Differences of X, as a part of the model's length, and of memory, as a part of its size.
 _PUSH_X, _PUSH = 1e-10, 1e-6
@@ -55,7 +57,7 @@ def carried(scene: Scene, s: int) -> int:
 def ask_at(scene: Scene, y: F1, s: int, around: tuple[V3, V3], given: F1, out: F1) -> int:
     """Copy forces and rates of memory for these arguments into `out`; return a code."""
     law_in, law_out, c = scene.work.law_in, scene.work.law_out, contact_of(scene, s)
-    code = ask_friction(scene, law_in[0], law_in[1], y, s, c, around, given)
+    code = ask_friction(scene, law_in[TIME_IN], law_in[STEP_IN], y, s, c, around, given)
     for k in range(5):
         out[k] = law_out[k]
     at = 5
@@ -75,14 +77,17 @@ def push_of(scene: Scene, y: F1, s: int, given: F1, column: int) -> float:
     if column >= _GIVEN:
         j = column - _GIVEN
         if scene.slots.x[s] >= 0 and j < 3:
-            length = scene.world.scale[0] if j < 2 else 1.0
+            length = scene.world.scale[SCALE_LENGTH] if j < 2 else 1.0
             return _PUSH_X * (length + abs(y[place_of(scene, s, j)]))
         size = scene.work.law_out[SIZE_OUT]
         return _PUSH * (size if size > 0.0 else 1.0)
     if column < 2:
-        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1]
+        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[SCALE_SPEED]
     if column < 5:
-        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1] / scene.world.scale[0]
+        return (
+            1e-6 * abs(given[column])
+            + 1e-8 * scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
+        )
     return 1e-6 * given[column] if given[column] > 0.0 else 1e-6
 
 
@@ -108,8 +113,8 @@ def fill(scene: Scene, T: Tangent, y: F1) -> int:
     point, around = scene.work.points[s], ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if scene.contacts.framed[contact_of(scene, s)] == 1:
         p, half = (
-            (point[1], point[2], point[3]),
-            scale(0.5 * point[0], (point[4], point[5], point[6])),
+            vector(point[AT_POINT:]),
+            scale(0.5 * point[AT_DEPTH], vector(point[AT_NORMAL:])),
         )
         around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
     first = 0 if scene.slots.z[s] >= 0 else take_known(L, table)

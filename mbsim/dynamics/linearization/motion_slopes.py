@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -64,9 +65,9 @@ def drive_by(scene: Scene, L: Linear, t: float, y: F1, row: int, e: int, b: int)
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
     speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
     for direction in range(DIRECTIONS):
-        size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+        size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[SCALE_LENGTH])
         if direction >= POSES:
-            size *= scene.world.scale[1] / scene.world.scale[0]
+            size *= scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
         change = 0.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0

@@ -67,6 +67,7 @@ from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
 from mbsim.dynamics.pipeline.output import fill_energy
+from mbsim.geometry.catalog import AT_NORMAL
 
 #: Rounding of a sum of energies or momenta, over the sum of their sizes.
 ROUNDING = 1e-13
@@ -255,7 +256,7 @@ def examine_friction(scene: Scene, t: float) -> None:
         c = contact_of(scene, s)
         if audit.cone[c] == math.inf:
             continue
-        force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, 4:7])
+        force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, AT_NORMAL:])
         normal = dot(force, n)
         rubs = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])

@@ -55,7 +55,16 @@ from mbsim.dynamics.contact.forces import (
     sides,
 )
 from mbsim.dynamics.contact.points import effective_mass
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+)
 from mbsim.laws.catalog import BRANCHES, STICK
 from mbsim.laws.catalog import SLIP as SLIDING
 
@@ -102,7 +111,7 @@ def fill_contacts(scene: Scene, y: F1, row: F1) -> None:
         values, point = work.slot[s], work.points[s]
         gi = sides(scene, s)[0]
         force = vector(values[FORCE : FORCE + 3])
-        arm = sub((point[1], point[2], point[3]), position(scene, y, scene.graphics.body[gi]))
+        arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[gi]))
         moment = cross(arm, force)
         for k in range(3):
             row[at + k] += force[k]
@@ -125,15 +134,15 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
         at = scene.slots.x[s]
         row[INC_SLOT] = s
         for j in range(3):
-            row[INC_POINT + j] = work.points[s, 1 + j]
-            row[INC_NORMAL + j] = work.points[s, 4 + j]
+            row[INC_POINT + j] = work.points[s, AT_POINT + j]
+            row[INC_NORMAL + j] = work.points[s, AT_NORMAL + j]
             row[INC_COUPLE + j] = work.points[s, COUPLE + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
         row[INC_DEPTH] = work.slot[s, DEPTH]
         # what its force followed from besides y: see pipeline.replay
         pair = scene.slots.pair[s]
-        row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
+        row[INC_SHARE], row[INC_STEP] = work.points[s, AT_WEIGHT], h
         row[INC_FROZEN] = 1.0 if scene.state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
         row[INC_TOUCHES] = scene.pairs.touches[pair]
         row[INC_KIND] = scene.pairs.kind[pair]
@@ -238,7 +247,7 @@ def friction_left(scene: Scene, e: F1, y: F1, turns: bool) -> float:
         if work.slot[s, NORMAL] <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
             continue
         gi, gj = sides(scene, s)
-        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
         tx = vector(work.t[s])
         v = sub(
             speed_change(scene, e, y, scene.graphics.body[gi], p),
@@ -280,7 +289,7 @@ def impact_left(scene: Scene, h: float, e: F1, y: F1) -> float:
         c = contact_of(scene, s)
         least = FAST * math.sqrt(work.squares[scene.scales.of_contact[c]])
         gi, gj = sides(scene, s)
-        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
         v = sub(
             speed_change(scene, e, y, scene.graphics.body[gi], p),
             speed_change(scene, e, y, scene.graphics.body[gj], p),

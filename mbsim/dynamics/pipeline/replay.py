@@ -36,7 +36,15 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.forces import add_contact
 from mbsim.dynamics.pipeline.output import fill_contacts
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_DEPTH,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+)
 
 
 @jitable
@@ -49,7 +57,7 @@ def put_back(scene: Scene, row: F1) -> int:
     pairs.graphic_i[pair] = int(row[INC_GRAPHIC_I])
     pairs.graphic_j[pair] = int(row[INC_GRAPHIC_J])
     point = work.points[s]
-    point[0], point[7] = row[INC_DEPTH], row[INC_SHARE]
+    point[AT_DEPTH], point[AT_WEIGHT] = row[INC_DEPTH], row[INC_SHARE]
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         point[COUPLE + k] = row[INC_COUPLE + k]

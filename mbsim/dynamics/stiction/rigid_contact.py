@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, TOLERANCE
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.codes import STICK as STICK_EVENT
-from mbsim.arrays.codes import TOLERANCE
 from mbsim.arrays.hooks import Held, Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -44,6 +44,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     share_held,
 )
 from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_held
+from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
 
@@ -65,7 +66,7 @@ def slip_of(scene: Scene, y: F1, s: int) -> V2:
     """Return slip along x and y of slot s at the point evaluated last."""
     gi, gj = sides(scene, s)
     point = scene.work.points[s]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     v = sub(
         velocity_at(scene, y, scene.graphics.body[gi], p),
         velocity_at(scene, y, scene.graphics.body[gj], p),
@@ -77,7 +78,7 @@ def slip_of(scene: Scene, y: F1, s: int) -> V2:
 @jitable
 def settled(scene: Scene) -> float:
     """Return what slip is none to the tolerance."""
-    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[1]
+    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[SCALE_SPEED]
 
 
 @jitable
@@ -110,7 +111,7 @@ def onward(scene: Scene, s: int, v: V2) -> float:
 @jitable
 def rest(scene: Scene) -> float:
     """Return what is no slip but rounding."""
-    return ROUNDING * scene.world.scale[1]
+    return ROUNDING * scene.world.scale[SCALE_SPEED]
 
 
 @jitable
@@ -238,7 +239,7 @@ def hold_implied(scene: Scene, t: float, y: F1) -> None:
     What has been released for this very change does slip.
     """
     slot, first = scene.equations.slot, first_of_slots(scene)
-    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
     for e in range(first, len(slot), 2):
         s, implied = slot[e], True
         kept = scene.state.memory[s]
@@ -268,7 +269,7 @@ def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
         point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
-        n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+        n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
         rubs = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
         cone[SLIDING, k] = rubs if scene.work.touching[s] == 1 else 0.0
         let_stick(scene, s)

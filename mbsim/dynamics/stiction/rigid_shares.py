@@ -14,6 +14,7 @@ from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
 from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
+from mbsim.geometry.catalog import AT_NORMAL
 
 #: What presses less than this part of what presses most counts as that: no limit is 0.
 LEAST_PART = 1e-9
@@ -159,7 +160,7 @@ def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
     row, held = scene.work.slot[s], scene.work.held[s]
     point = scene.work.points[s]
-    n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+    n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
     rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))
     force = add(scale(row[NORMAL], n), rubs)
     for k in range(3):

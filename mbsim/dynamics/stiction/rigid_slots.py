@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -101,7 +102,7 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     back = sub(vector(now[1:4]), vector(before[1:4]))
     jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
     first, last, time = 2, 1, 2.0 * moment
-    if jump > 0.1 * way + SMOOTH * scene.world.scale[0]:
+    if jump > 0.1 * way + SMOOTH * scene.world.scale[SCALE_LENGTH]:
         # the shapes touch at another corner: the side on which they do not
         if norm(ahead) < norm(back):
             first, time = 0, moment
@@ -121,7 +122,7 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
 def place_held(scene: Scene, t: float, y: F1) -> None:
     """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
     slot, last = scene.equations.slot, -1
-    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue

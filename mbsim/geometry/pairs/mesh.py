@@ -12,7 +12,7 @@ from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point, region
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, axis, pair, put_point, region
 from mbsim.geometry.crossing import LEAST_SHARE
 from mbsim.geometry.polyhedron import (
     CUBE,
@@ -52,8 +52,8 @@ def _shares_of_patches(hull: F1, local: V3, points: F2) -> None:
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
     loops, data = int(hull[AT_LOOPS]), int(hull[AT_DATA])
     for row in range(rows):
-        points[row, 7] = 0.0
-        if points[row, 0] > points[deepest, 0]:
+        points[row, AT_WEIGHT] = 0.0
+        if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
     for f in range(int(hull[FACES])):
         lies = step(-dot(vector(hull[planes + 4 * f :]), local), LEANS, 0.0, LIES, 1.0)
@@ -66,8 +66,8 @@ def _shares_of_patches(hull: F1, local: V3, points: F2) -> None:
                 points[int(hull[data + 3 * corner + 2]), 7] += 4.0 * lies / (last - first)
     if total > 0.0:
         for row in range(rows):
-            points[row, 7] *= flat / total
-    points[deepest, 7] += 1.0 - flat
+            points[row, AT_WEIGHT] *= flat / total
+    points[deepest, AT_WEIGHT] += 1.0 - flat
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
@@ -85,25 +85,25 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
     corners, data = int(hull[AT_CORNERS]), int(hull[AT_DATA])
     shares = int(hull[AT_SHARES])
     for row in range(rows):
-        points[row, 0] = -math.inf
+        points[row, AT_DEPTH] = -math.inf
     for k in range(int(hull[CORNERS])):
         row = int(hull[data + 3 * k + 2])
         depth = -height - dot(vector(hull[corners + 3 * k :]), local)
-        if depth > points[row, 0]:
+        if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
-            points[row, 0], points[row, 1] = depth, k
+            points[row, AT_DEPTH], points[row, 1] = depth, k
     if int(hull[CORNERS]) > rows:
         _shares_of_patches(hull, local, points)
     else:
         for row in range(rows):
-            points[row, 7] = hull[shares + row]
+            points[row, AT_WEIGHT] = hull[shares + row]
     for row in range(rows):
-        depth, k = points[row, 0], int(points[row, 1])
+        depth, k = points[row, AT_DEPTH], int(points[row, 1])
         p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
-        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, 7])
-        if points[row, 7] <= LEAST_SHARE:
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
+        if points[row, AT_WEIGHT] <= LEAST_SHARE:
             # a point without force is none
-            points[row, 0] = min(depth, 0.0)
+            points[row, AT_DEPTH] = min(depth, 0.0)
     return rows
 
 
@@ -116,7 +116,7 @@ def _two_hulls(frame_i: F1, hull_i: F1, frame_j: F1, hull_j: F1, points: F2) -> 
     gap = overlapping(moved(hull_i, frame_i, frame_j), hull_j, frame_j, points)
     if gap > 0.0:
         for row in range(rows):
-            points[row, 0] = -gap
+            points[row, AT_DEPTH] = -gap
     return rows
 
 

@@ -7,7 +7,7 @@ import math
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair, put_point, region
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, pair, put_point, region
 from mbsim.geometry.convex import (
     BOX,
     ROTOR,
@@ -416,15 +416,15 @@ def face_below(j: Shape, points: F2, count: int) -> tuple[bool, tuple[V3, V3, V3
     """
     deepest = 0
     for row in range(1, count):
-        if points[row, 0] > points[deepest, 0]:
+        if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
-    n = vector(points[deepest, 4:7])
+    n = vector(points[deepest, AT_NORMAL:])
     k = first_two(j, n)[0]
     k1, k2 = (k + 1) % 3, (k + 2) % 3
     o = edge_axis(j, k)
     o = scale(1.0 if dot(o, n) >= 0.0 else -1.0, o)
     a, b = scale(j[5][k1], edge_axis(j, k1)), scale(j[5][k2], edge_axis(j, k2))
-    return points[deepest, 0] > 0.0, (add(j[1], scale(j[5][k], o)), a, b, o)
+    return points[deepest, AT_DEPTH] > 0.0, (add(j[1], scale(j[5][k], o)), a, b, o)
 
 
 @region("CYLINDER", "BOX", whole=3.0)

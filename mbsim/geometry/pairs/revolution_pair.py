@@ -7,7 +7,7 @@ import math
 from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, pair
 from mbsim.geometry.convex import (
     ROTOR,
     Shape,
@@ -291,11 +291,11 @@ def side_by_side(i: Shape, j: Shape, n: V3, f: float, points: F2) -> float:
     d1 = put_ball(points[1], i, j, x1, 1.0)
     both = min(1.0, max(0.0, min(d0, d1) / max(f, 1e-300))) * fade(1.0 - 10.0 * off)
     for row in range(2):
-        points[row, 0] = min(points[row, 0], f)
-        points[row, 7] = share * both
+        points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
+        points[row, AT_WEIGHT] = share * both
         if share * both < 1e-6:
-            points[row, 0] = -length
-            points[row, 7] = 1.0
+            points[row, AT_DEPTH] = -length
+            points[row, AT_WEIGHT] = 1.0
     x = add(low_j, scale(length * crossing_of(low_i, high_i, low_j, high_j, n), t))
     if both > 0.0:
         # between the ends, also where the lines are so parallel that they cross nowhere
