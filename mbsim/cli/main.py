@@ -76,7 +76,8 @@ def main() -> None:
     """Multibody contact simulation from MotionSolve-style decks.
 
     Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
-    failed; 5 results could not be written; 130 interrupted, results up to there kept.
+    failed; 5 results could not be written; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: results up to
+    there kept.
     """
 
 

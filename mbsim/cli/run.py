@@ -71,6 +71,13 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     show_default=True,
     help="fcl: no closed forms.",
 )
+@click.option(
+    "--signals",
+    multiple=True,
+    metavar="NAME",
+    help="Record these only, e.g. bodies/2/position, 'contacts/*/force', joints; may be repeated. "
+    "Time, events and the deck's requests are always there.  [default: everything]",
+)
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option("--allow-overlap", is_flag=True, help="Start although shapes overlap deeply.")
 @click.option(
