@@ -100,6 +100,14 @@ class RunLock:
             self._handle = -1
 
 
+def free_memory() -> int | None:
+    """Return how many bytes of memory are free, None where the system does not say."""
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
 def prepare_directory(directory: Path, model_name: str) -> None:
     """Make the folder and see that result files can be written there.
 
@@ -144,7 +152,9 @@ def replace_text(path: Path, text: str) -> None:
     """
     temporary = path.with_name(f".{path.name}.tmp")
     try:
-        with os.fdopen(create(temporary), "w", encoding="utf-8", newline="\n") as file:
+        with os.fdopen(
+            create(temporary), "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+        ) as file:
             file.write(text)
         sync(temporary)
         os.replace(temporary, path)

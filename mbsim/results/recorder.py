@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
-from mbsim.results.files import prepare_directory
+from mbsim.results.files import free_memory, prepare_directory
 from mbsim.results.forces import check_requests
 from mbsim.results.going_on import MADE_OF, check_same, digest
 from mbsim.results.identity import Identity
@@ -33,6 +34,8 @@ _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLI
 
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
+#: Memory that an output time takes while its rows are not there yet [bytes].
+TIME_BYTES = 32
 #: Time between two publications: at least this [s], and so many times what one costs.
 FLUSH_SECONDS = 5.0
 FLUSH_SHARE = 20.0
@@ -134,6 +137,28 @@ class Recorder:
                 return tables
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
+
+    def check_room(self, rows: float) -> None:
+        """Raise `ModelError` where so many output rows cannot be kept.
+
+        `rows` is a float: of a mistyped end time there may be more than integers count.
+        """
+        empty = self._signals(nothing(self.system))
+        size = sum(table.itemsize * math.prod(table.shape[1:]) for _, table in empty)
+        if self._target is None:
+            place, free = "in memory", free_memory()
+        else:
+            place, free = f"in {self.directory}", self._store.room()
+        memory = free_memory()
+        if memory is not None and rows * TIME_BYTES > memory:
+            # the times themselves are kept in memory
+            size, place, free = TIME_BYTES, "in memory", memory
+        if free is not None and rows * size > free:
+            raise ModelError(
+                f"{rows:.9g} output rows of {size} bytes would take {rows * size / 1e9:.3g} GB "
+                f"{place}, where {free / 1e9:.3g} GB are free; give a longer --print-interval, an "
+                "earlier --end-time, or --signals"
+            )
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""

@@ -157,7 +157,7 @@ class Store:
             for name, facts in attributes.items():
                 if name != "/" and name not in file:
                     file.create_group(name)
-                file[name].attrs.update(facts)
+                file[name].attrs.update({key: _text(value) for key, value in facts.items()})
             file.flush()
 
     def _append(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
@@ -218,6 +218,13 @@ class Store:
         self.broken = True  # there is nothing left to write to
         self._unlock()
         return None
+
+
+def _text(value: Any) -> Any:
+    """Return a text as HDF5 takes it: bytes of file names that are no text as escapes."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode("utf-8")
+    return value
 
 
 def _compression(rows: Table) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
 from mbsim.run.loop import Notify, Progress, Runner
-from mbsim.run.settings import Settings, settle
+from mbsim.run.settings import Settings, output_rows, settle
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -152,6 +152,11 @@ def simulate(
     attributes = _attributes(system, settings, detector, files, interpret_plugins)
     attributes["signals"] = "\n".join(signals)
     recorder = Recorder(system, attributes, folder, resume, settings, signals)
+    try:
+        recorder.check_room(output_rows(settings))
+    except ModelError:
+        recorder.abandon()
+        raise
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
