@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
@@ -309,4 +311,4 @@ def _show(about: dict[str, Any]) -> None:
     for key, value in about.items():
         add(key, value, 0, 28)
     # in one piece: a pager that closes early breaks the pipe only once
-    click.echo("\n".join(lines))
+    echo("\n".join(lines))

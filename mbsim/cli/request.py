@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from mbsim.cli.messages import echo
+
 
 @click.command("request")
 @click.argument("result", type=click.Path(path_type=Path), metavar="RESULT.h5")
@@ -48,7 +50,7 @@ def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: 
         sys.stdout.writelines(lines)
         return
     replace_text(output, "".join(lines))
-    click.echo(f"{output}: {len(columns)} columns, {len(time)} rows")
+    echo(f"{output}: {len(columns)} columns, {len(time)} rows")
 
 
 def _csv(time: list[float], columns: dict[str, list[Any]]) -> Iterator[str]:

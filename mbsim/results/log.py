@@ -47,8 +47,8 @@ def number(value: float, unit: str = "") -> str:
 class RunLog:
     """The log of a run; `directory` None keeps it in `lines`.
 
-    The file is written whole now and then and at `close`, each time atomically. A failure
-    to write it while the run goes on does not stop the run; `close` raises it.
+    The file is written whole at `close`, and now and then from `show` on, each time atomically. A
+    failure to write it while the run goes on does not stop the run; `close` raises it.
     """
 
     def __init__(
@@ -61,6 +61,8 @@ class RunLog:
         self.system = system
         self.path = None if directory is None else directory / f"{system.model.name}.log"
         self.lines: list[str] = []
+        self.closed = False
+        self._shown = resume
         self._dropped = 0
         self._written_at = time.monotonic()
         if resume and self.path is not None and self.path.is_file():
@@ -75,11 +77,16 @@ class RunLog:
             self._dropped += 1
             return
         self.lines += text.splitlines() or [""]
-        if self.path is not None and time.monotonic() - self._written_at > _WRITE_SECONDS:
-            try:
-                self.flush()
-            except ResultsError:
-                self._written_at = time.monotonic()
+        if self._shown and time.monotonic() - self._written_at > _WRITE_SECONDS:
+            self.show()
+
+    def show(self) -> None:
+        """Write the file as it is now, and now and then from here on: results are beside it."""
+        self._shown = True
+        try:
+            self.flush()
+        except ResultsError:
+            self._written_at = time.monotonic()
 
     def flush(self) -> None:
         """Write the file as it is now.
@@ -120,6 +127,7 @@ class RunLog:
         if self._dropped:
             self.lines.append(f"... and {self._dropped} lines more that are not kept")
         self.lines += ["", *summary(self.system, status, stats, watch, audit)]
+        self.closed = True
         self.flush()
 
 

@@ -86,7 +86,7 @@ class Runner:
         self.pace = Pace(start, start)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
-        self.interrupted = False
+        self.interrupted = 0  # number of the signal that asks for an end
         self.dump: ContactProblems | None = None
 
     def _make_detector(self) -> Any:
@@ -344,9 +344,11 @@ class Runner:
                 return
             self._answer(outcome, simulation.end_time)
             if self.interrupted:
-                raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
+                now = float(method.memory[scheme.TIME])
+                raise Interrupted(f"interrupted at time {now:.6g}", self.interrupted)
             if self.recorder.due():
                 self.recorder.flush(self.checkpoint())
+                self.log.show()
             if progress is not None:
                 h = float(method.memory[scheme.STEP])
                 progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
