@@ -34,6 +34,11 @@ def _file_of(function: Any) -> str:
     return path.relative_to(_PACKAGE.parent).as_posix() if _PACKAGE in path.parents else path.name
 
 
+def _without_name(text: str) -> str:
+    """Return the first sentence of a file's head without the name that it begins with."""
+    return re.sub(r"^[A-Z0-9_, and]+(\([^)]*\))?: ", "", first_sentence(text))
+
+
 def _about(function: Any) -> str:
     """Return what the first line of a part's file says of it."""
     module = inspect.getmodule(getattr(function, "py_func", function))
@@ -114,7 +119,7 @@ def _joint_file(name: str) -> str:
 def _joint_about(name: str) -> str:
     path = _PACKAGE.parent / _joint_file(name)
     text = path.read_text(encoding="utf-8").split('"""')[1]
-    return re.sub(r"^[A-Z0-9_, and]+(\([^)]*\))?: ", "", first_sentence(text))
+    return _without_name(text)
 
 
 def _moves(kind: JointKind) -> str:
@@ -125,12 +130,11 @@ def _moves(kind: JointKind) -> str:
 def joints(_: str, page: Page) -> list[str]:
     """Return the types of Constraint_Joint and Constraint_Jprim."""
     return rows(
-        ("type", "equations", "needs", "moves by", "what it does"),
+        ("type", "equations", "moves by", "what it does"),
         (
             (
                 reference(page, name, f"`{name}`"),
                 str(len(JOINTS[name].equations)),
-                ", ".join(f"`{each}`" for each in JOINTS[name].needs),
                 _moves(JOINTS[name]),
                 _joint_about(name),
             )

@@ -30,11 +30,13 @@ def _type(kind: Kind) -> str:
     short = _SHORT.get(id(kind))
     if short:
         return short
-    text = re.sub(r"^an? ", "", kind.allowed)
-    text = text.replace(", separated by blanks or commas", "").replace(
-        "one or more of ", "some of "
-    )
+    text = range_of(kind).replace(", separated by blanks or commas", "")
     return text if len(text) <= _WIDEST_CHOICE else "one of those below"
+
+
+def range_of(kind: Kind) -> str:
+    """Return what a value may be, in a few words; a number has its range alone."""
+    return re.sub(r"^number (?=[<>])", "", re.sub(r"^an? ", "", kind.allowed))
 
 
 def _default(spec: Spec) -> str:
