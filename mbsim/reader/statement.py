@@ -46,6 +46,11 @@ NAMED = {
     "label": Spec(TEXT, "name in logs and pictures"),
     "full_label": Spec(TEXT, "a longer name; is not shown"),
 }
+#: The two markers of an element between bodies.
+MARKERS = {
+    "i_marker_id": Spec(ID, "marker I", required=True),
+    "j_marker_id": Spec(ID, "marker J", required=True),
+}
 
 
 def _needs_no_names(node: Node) -> bool:
