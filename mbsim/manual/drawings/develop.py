@@ -38,15 +38,15 @@ def structure(figure: Figure) -> None:
     """Draw what a run goes through: Python outside, the compiled loop inside."""
     axes = figure.add_subplot()
     axes.set_axis_off()
-    axes.set(xlim=(-1.1, 7.3), ylim=(-0.55, 4.65))
+    axes.set(xlim=(-1.1, 7.3), ylim=(-0.5, 4.55))
     from matplotlib.patches import FancyBboxPatch
 
     loop = FancyBboxPatch((-0.95, 0.55), 8.1, 2.05, boxstyle="round,pad=0.02,rounding_size=0.1")
     loop.set(facecolor=_COMPILED, edgecolor="#b58a2a", linewidth=1.0)
     axes.add_patch(loop)
     axes.text(
-        3.1,
-        2.42,
+        1.55,
+        2.32,
         "compiled (Numba), one call from output row to output row",
         ha="center",
         fontsize=8.5,
@@ -70,8 +70,8 @@ def structure(figure: Figure) -> None:
     _box(axes, 6.1, -0.1, "FCL, subroutines", "mbsim/geometry, plugins", _PYTHON)
     _arrow(axes, (0.95, 4.1), (1.45, 4.1))
     _arrow(axes, (3.35, 4.1), (3.85, 4.1))
-    _arrow(axes, (4.4, 3.7), (3.5, 1.7), "")
-    axes.text(4.35, 3.0, "mbsim/run: the loop, settings, checkpoints", fontsize=7.5)
+    _arrow(axes, (4.8, 3.7), (3.5, 1.7))
+    axes.text(4.6, 3.05, "mbsim/run: the loop,\nsettings, checkpoints", fontsize=7.5)
     _arrow(axes, (0.95, 1.4), (2.15, 1.4), "t, y", 0.12)
     _arrow(axes, (2.15, 1.2), (0.95, 1.2), "dy/dt", -0.13)
     _arrow(axes, (4.05, 1.4), (5.15, 1.4), "call", 0.12)
