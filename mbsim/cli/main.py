@@ -23,6 +23,7 @@ COMMANDS = {
     "plot-law": "mbsim.cli.plot_law",
     "fclib": "mbsim.cli.fclib",
     "warm": "mbsim.cli.warm",
+    "manual": "mbsim.cli.manual",
 }
 
 

@@ -150,7 +150,16 @@ def _of_laws() -> dict[str, Spec]:
     """Return the attributes that friction laws bring with them."""
     laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
     own = [parameter for law in laws for parameter in law.own]
-    return {parameter.name: Spec(_kind_of(parameter)) for parameter in own}
+    return {each.name: Spec(_kind_of(each), each.about, each.unit, _usual(each)) for each in own}
+
+
+def _usual(parameter: Parameter) -> str:
+    """Return what is taken where the deck does not give a parameter, as the deck would say it."""
+    if parameter.usual or parameter.default is None:
+        return parameter.usual
+    if parameter.flag:
+        return "TRUE" if parameter.default else "FALSE"
+    return f"{parameter.default:g}"
 
 
 def _kind_of(parameter: Parameter) -> Kind:

@@ -81,9 +81,15 @@ def _statement(kind: ForceKind) -> Statement:
         "j_marker_id": Spec(ID, required=True),
     }
     for each in kind.parameters:
-        found = Spec(kind_of(each) if each.count == 1 else _several(each.count), alias=each.alias)
+        found = Spec(
+            kind_of(each) if each.count == 1 else _several(each.count),
+            each.about,
+            each.unit,
+            f"{each.default:g}" if isinstance(each.default, float) else "",
+            alias=each.alias,
+        )
         attributes[each.name] = replace(found, required=each.default is None)
-    return Statement(kind.statement, attributes, build)
+    return Statement(kind.statement, attributes, build, about=kind.about)
 
 
 def marker_forces() -> list[Statement]:

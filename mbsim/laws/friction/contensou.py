@@ -77,7 +77,17 @@ def disc_friction(v, w):
 
 
 @friction_law(
-    "CONTENSOU", "mu_dynamic", "friction_trans_vel", Parameter("patch_radius", 0.0, positive=True)
+    "CONTENSOU",
+    "mu_dynamic",
+    "friction_trans_vel",
+    Parameter(
+        "patch_radius",
+        0.0,
+        positive=True,
+        about="radius of the disc of contact",
+        unit="L",
+        usual="of the area",
+    ),
 )
 def contensou(inputs, mu_dynamic, friction_trans_vel, patch_radius):
     """Return Fx, Fy, Mx, My, Tz on I."""

@@ -20,7 +20,11 @@ from mbsim.laws.catalog import FASTEST, LASTS, SLIP, Parameter, friction_law
 
 
 @friction_law(
-    "DAHL", "mu_dynamic", Parameter("bristle_stiffness", positive=True), memory=2, carried=2
+    "DAHL",
+    "mu_dynamic",
+    Parameter("bristle_stiffness", positive=True, about="stiffness along the surface", unit="F/L"),
+    memory=2,
+    carried=2,
 )
 def dahl(inputs, memory, mu_dynamic, bristle_stiffness):
     """Return (Fx, Fy, Mx, My, Tz, energy of the spring, mode) and the rate of the stretch."""
