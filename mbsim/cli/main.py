@@ -40,6 +40,7 @@ class Commands(click.Group):
         if module is None:
             return None
         command: click.Command = import_module(module).command
+        command.epilog = f"More: mbsim manual {cmd_name}"
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -49,6 +50,8 @@ class Commands(click.Group):
         except MbsimError as error:
             for line in _messages(error):
                 click.echo(f"mbsim: error: {line}", err=True)
+            for name in pages_of(error):
+                click.echo(f"mbsim: see: mbsim manual {name}", err=True)
             ctx.exit(error.exit_code)
         except BrokenPipeError:
             # whoever read our output has seen enough; nothing is left to flush to it
@@ -64,6 +67,18 @@ class Commands(click.Group):
             ctx.exit(Interrupted.exit_code)
 
 
+#: Pages named below a message; more would hide it.
+_MOST_PAGES = 3
+
+
+def pages_of(error: MbsimError) -> list[str]:
+    """Return the pages of the manual that tell more about an error."""
+    from mbsim.manual.errors import about
+
+    texts = [fault.element for fault in error.faults] if isinstance(error, DeckError) else []
+    return about(type(error), texts or [str(error)])[:_MOST_PAGES]
+
+
 def _messages(error: MbsimError) -> list[str]:
     """Return what to print, each with its own prefix: all faults of a deck, else one message."""
     if isinstance(error, DeckError):
@@ -75,6 +90,8 @@ def _messages(error: MbsimError) -> list[str]:
 @click.version_option(__version__, prog_name="mbsim")
 def main() -> None:
     """Multibody contact simulation from MotionSolve-style decks.
+
+    `mbsim manual` is the manual; `mbsim manual TOPIC` a page, or a search.
 
     Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
     failed; 5 results could not be written; 130 interrupted, results up to there kept.

@@ -71,9 +71,22 @@ def draw(name: str, folder: Path = FOLDER) -> Path:
 
 
 def _smaller(svg: str) -> str:
-    """Return an SVG file without trailing blanks, header and digits that nobody sees."""
-    svg = re.sub(r"[ \t]+\n", "\n", svg)
-    svg = re.sub(
-        r"<\?xml[^>]*>\s*|<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", svg, flags=re.S
-    )
-    return re.sub(r"(\d+\.\d\d)\d{2,}", r"\1", svg)
+    """Return an SVG file without what nobody sees: header, digits, letters' shapes again."""
+    head = r"<\?xml[^>]*>\s*|<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*|<!--.*?-->\s*"
+    svg = re.sub(head, "", svg, flags=re.DOTALL)
+    svg = re.sub(r"\s*\n\s*", "\n", svg)
+    names: dict[str, str] = {}
+
+    def once(match: re.Match[str]) -> str:
+        """Return the shape of a letter where it comes first, under a short name."""
+        name = match.group(1)
+        if name in names:
+            return ""
+        names[name] = f"c{len(names)}"
+        return match.group().replace(name, names[name])
+
+    svg = re.sub(r'<path id="(\w+-(?:\w+-)?\w+)"[^>]*/>\n', once, svg)
+    svg = re.sub(r'#([\w-]+)"', lambda match: f'#{names.get(match.group(1), match.group(1))}"', svg)
+    svg = re.sub(r"<defs>\s*</defs>\n?", "", svg)
+    svg = re.sub(r"([1-9]\d*\.\d\d)\d+", r"\1", svg)
+    return re.sub(r"(\b0\.\d{6})\d+", r"\1", svg)

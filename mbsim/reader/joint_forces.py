@@ -102,7 +102,7 @@ FORCE_JOINTFRICTION = Statement(
         **_of_contact(_COULOMB),
         "pin_radius": Spec(POSITIVE, "radius of the pin; REVOLUTE and CYLINDRICAL need it", "L"),
         "ball_radius": Spec(POSITIVE, "radius of the ball; SPHERICAL needs it", "L"),
-        "preload": Spec(NOT_NEGATIVE, "force that presses beside the reaction", "F", "0"),
+        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
         "bending_reaction_arm": Spec(NOT_NEGATIVE, "arm of the torque that presses", "L", "0"),
         **{name: Spec(refused="is documented but not built yet") for name in _NOT_BUILT},
     },

@@ -8,41 +8,17 @@ import runpy
 import shutil
 import subprocess
 import sys
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from helpers.decks import EARTH, contact, sphere
 from helpers.folders import MODELS, PACKAGES, TESTS
+from helpers.templates import TEMPLATES
 
 G = 9.81
 
 
-class Template(NamedTuple):
-    """A file of `tests/templates`: where it goes, and how many files it may touch."""
-
-    place: str  # in the package; none where it holds lines for files that are there
-    files: int
-    line: tuple[str, str, str] | None = (
-        None  # of an integrator: file, what stands there, what shall
-    )
-
-
-HEUN = (
-    "integrators/catalog.py",
-    "SCHEMES = {\n",
-    'SCHEMES = {\n    "HEUN": "explicit, order 2",\n',
-)
-TEMPLATES = {
-    "friction_law": Template("laws/friction/viscous.py", 1),
-    "joint": Template("joints/kinds/pin_in_slot.py", 1),
-    "force": Template("forces/kinds/tether.py", 1),
-    "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
-    "integrator": Template("integrators/heun.py", 2, HEUN),
-    "request": Template("", 2),
-    "attribute": Template("", 3),
-}
 #: Runs decks in the copy, whose unchanged code is in the cache by its content.
 RUN = """
 import json, sys
@@ -77,9 +53,8 @@ def put_in(name, package):
     else:
         for path, pairs in runpy.run_path(str(file))["LINES"].items():
             replace(package.parent / path, *pairs)
-    if template.line is not None:
-        path, old, new = template.line
-        replace(package / path, old, new)
+    for path, *pairs in template.lines:
+        replace(package / path, *pairs)
 
 
 def touched(package):
@@ -169,7 +144,7 @@ from mbsim.forces.catalog import FORCES
 from mbsim.geometry.catalog import PAIRS
 from mbsim.integrators import catalog
 from mbsim.joints.catalog import JOINTS
-from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.reader import keywords
 from mbsim.reader.joint_forces import FORCE_JOINTFRICTION
 from mbsim.reader.statements import BY_KEY
@@ -181,6 +156,18 @@ assert "ELLIPSOID-MESH" in PAIRS
 assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
 assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
 assert "preload_rate" in FORCE_JOINTFRICTION.attributes
+assert "FOUNDATION" in NORMAL_LAWS and "FOUNDATION" in keywords.CNF_TYPES.values()
+assert "forcelift" in BY_KEY
+from mbsim.manual.tables import made
+from mbsim.manual.book import Page
+page = Page("reference/x", "")
+for table, word in (
+    ("law VISCOUS", "slip_coef"), ("law FOUNDATION", "dmax"), ("joints", "PIN_IN_SLOT"),
+    ("attributes Force_Tether", "stiffness"), ("couple-of-shapes", "C"), ("methods", "HEUN"),
+    ("statements", "Force_Lift"), ("requests", "MARKER_VELOCITY_IN_J"),
+    ("attributes Force_JointFriction", "preload_rate"),
+):
+    assert word in made(table, page), table
 """
     in_copy(tmp_path, script)
 
@@ -195,6 +182,27 @@ def test_friction_law(copy_with):
     t, v = found["time"], found["bodies/2/velocity"][:, 0]
     # N is the weight but for the block's pitching, which friction at its foot sets going
     np.testing.assert_allclose(v, 5.0 * np.exp(-0.2 * G * t), rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_normal_law(copy_with):
+    deck = (MODELS / "bouncing_sphere.xml").read_text(encoding="utf-8")
+    start = deck.index('cnf_type="')
+    end = deck.index("/>", start)
+    deck = deck[:start] + 'cnf_type="FOUNDATION" stiffness="1e5" dmax="0.01"' + deck[end:]
+    signals = ["energy/kinetic", "energy/potential", "energy/dissipated"]
+    (found,) = run_in_copy(copy_with("normal_law"), (deck, signals, {"tol": 1e-8}))
+    total = found["energy/kinetic"] + found["energy/potential"]
+    # it bounces for ever
+    np.testing.assert_allclose(total, total[0], atol=1e-5 * np.ptp(found["energy/kinetic"]))
+    np.testing.assert_allclose(found["energy/dissipated"], 0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_statement(copy_with):
+    deck = body() + '<Force_Lift id="1" i_marker_id="20" lift="2"/>'
+    (found,) = run_in_copy(copy_with("statement"), (whole(deck, 1.0), ["bodies/2/position"], {}))
+    np.testing.assert_allclose(found["bodies/2/position"][:, 2], found["time"] ** 2, atol=1e-9)
 
 
 @pytest.mark.slow
