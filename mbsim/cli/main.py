@@ -24,6 +24,7 @@ COMMANDS = {
     "plot-law": "mbsim.cli.plot_law",
     "fclib": "mbsim.cli.fclib",
     "warm": "mbsim.cli.warm",
+    "manual": "mbsim.cli.manual",
 }
 
 
@@ -40,6 +41,7 @@ class Commands(click.Group):
         if module is None:
             return None
         command: click.Command = import_module(module).command
+        command.epilog = f"More: mbsim manual {cmd_name}"
         return command
 
     def main(self, *args: Any, **options: Any) -> Any:
@@ -68,6 +70,8 @@ class Commands(click.Group):
         except MbsimError as error:
             for line in _messages(error):
                 echo(f"mbsim: error: {line}", err=True)
+            for name in pages_of(error):
+                echo(f"mbsim: see: mbsim manual {name}", err=True)
             ctx.exit(error.exit_code)
         except BrokenPipeError:
             # whoever read our output has seen enough; nothing is left to flush to it
@@ -86,6 +90,18 @@ class Commands(click.Group):
             ctx.exit(Interrupted.exit_code)
 
 
+#: Pages named below a message; more would hide it.
+_MOST_PAGES = 3
+
+
+def pages_of(error: MbsimError) -> list[str]:
+    """Return the pages of the manual that tell more about an error."""
+    from mbsim.manual.errors import about
+
+    texts = [fault.element for fault in error.faults] if isinstance(error, DeckError) else []
+    return about(type(error), texts or [str(error)])[:_MOST_PAGES]
+
+
 def _messages(error: MbsimError) -> list[str]:
     """Return what to print, each with its own prefix: all faults of a deck, else one message."""
     if isinstance(error, DeckError):
@@ -97,6 +113,8 @@ def _messages(error: MbsimError) -> list[str]:
 @click.version_option(__version__, prog_name="mbsim")
 def main() -> None:
     """Multibody contact simulation from MotionSolve-style decks.
+
+    `mbsim manual` is the manual; `mbsim manual TOPIC` a page, or a search.
 
     Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
     failed; 5 results could not be written; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: results up to

@@ -43,6 +43,8 @@ class Parameter(NamedTuple):
     signed: bool = False  # else it may not be negative
     count: int = 1  # type: ignore[assignment]  # hides a method of tuples
     alias: str = ""
+    about: str = ""  # its meaning, for the manual
+    unit: str = ""
 
 
 class Adams(NamedTuple):
@@ -89,6 +91,7 @@ class ForceKind(NamedTuple):
     check: Callable[[Values], Iterable[Finding]]
     function: str
     adams: Adams | None
+    about: str
 
 
 FORCES: Registry[ForceKind] = Registry("mbsim.forces.kinds")
@@ -110,6 +113,7 @@ def force(
     check: Callable[[Values], Iterable[Finding]] = _nothing_wrong,
     function: str = "",
     adams: Adams | None = None,
+    about: str = "",
 ) -> None:
     """Register a kind of forces.
 
@@ -129,6 +133,8 @@ def force(
         Its function in expressions: ``BUSH(id, jflag, comp, marker)``.
     adams : Adams, optional
         The statement of an Adams deck.
+    about : str, optional
+        What it is, one line for the manual.
     """
     made = ForceKind(
         name,
@@ -143,5 +149,6 @@ def force(
         check,
         function,
         adams,
+        about,
     )
     FORCES.put(name, made)

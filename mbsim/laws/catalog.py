@@ -63,6 +63,9 @@ class Parameter(NamedTuple):
     flag: bool = False  # TRUE or FALSE: 1 or 0
     needs: str = ""  # another attribute without which it means nothing
     infinite: bool = False  # it may be INFINITE: then `FrictionLaw.rigid` is the law
+    about: str = ""  # its meaning, for the manual
+    unit: str = ""
+    usual: str = ""  # what a missing one means, where `default` does not say it
 
 
 #: What a law with memory does: mode 0 says that it began.

@@ -349,7 +349,7 @@ class Differential:
     """Control_Diff, Adams' DIFF: a state z of the user's own, z' = expr, that starts at `ic`.
 
     Others use z by DIF(id) and z' by DIF1(id). `scale`: below this size of z a local error
-    counts as one of z at this size (README, "Tolerance").
+    counts as one of z at this size (manual, error control).
     """
 
     id: int
@@ -388,7 +388,7 @@ class ArrayOfNumbers:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Sensor_Event, Adams' SENSOR: acts when its condition becomes true (README, "Sensors").
+    """Sensor_Event, Adams' SENSOR: acts when its condition becomes true (manual, Sensor_Event).
 
     `zero_crossing`: a step ends where it becomes true. What it does: `halt` ends the run,
     `stops` (return) the Simulate, `prints` adds a row; `dt` [T] is the print interval, `stepsize`

@@ -10,8 +10,8 @@ from mbsim.model import elements as el
 from mbsim.model.frames import orthonormalise, rotation_313
 from mbsim.reader import units
 from mbsim.reader.keywords import spellings
-from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, TEXT, keyword
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, keyword
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _INERTIAS = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_yz", "inertia_xz")
 _VELOCITIES = tuple(f"{kind}_ic_{axis}" for kind in "vw" for axis in "xyz")
@@ -153,50 +153,99 @@ def _build_marker(entry: Entry) -> None:
     entry.register(entry.draft.markers, marker)
 
 
+def _about_inertia(name: str) -> str:
+    a, b = name[-2], name[-1]
+    if a == b:
+        return f"moment of inertia about the centre of mass, along {a} of im_id"
+    return f"integral of {a} {b} dm"
+
+
+def _no(name: str) -> str:
+    """Return the default of an inertia: products are 0, moments must be given with mass."""
+    return "" if name[-1] == name[-2] else "0"
+
+
+def _about_velocity(name: str) -> str:
+    what = "angular velocity" if name[0] == "w" else "velocity of the centre of mass"
+    return f"{what} at the start, along {name[-1]} of {name[0]}m_id"
+
+
+def _speed(name: str) -> str:
+    return "rad/T" if name[0] == "w" else "L/T"
+
+
 PARAM_UNIT = Statement(
     "Param_Unit",
     {
-        "force_unit": Spec(keyword(units.names(units.FORCE))),
-        "mass_unit": Spec(keyword(units.names(units.MASS))),
-        "length_unit": Spec(keyword(units.names(units.LENGTH))),
-        "time_unit": Spec(keyword(units.names(units.TIME))),
-        "mass_mult_factor": Spec(POSITIVE),
+        "force_unit": Spec(keyword(units.names(units.FORCE)), "unit F", "", "NEWTON"),
+        "mass_unit": Spec(keyword(units.names(units.MASS)), "unit M", "", "KILOGRAM"),
+        "length_unit": Spec(keyword(units.names(units.LENGTH)), "unit L", "", "METER"),
+        "time_unit": Spec(keyword(units.names(units.TIME)), "unit T", "", "SECOND"),
+        "mass_mult_factor": Spec(POSITIVE, "M L/T^2 in F, in place of unit names", "", "by names"),
     },
     _build_units,
+    about="the units of all numbers of the deck and of the results",
 )
 
 BODY_RIGID = Statement(
     "Body_Rigid",
     {
-        "id": Spec(ID, required=True),
-        "label": Spec(TEXT),
-        "isground": Spec(FLAG),
-        "cg_id": Spec(ID),
-        "im_id": Spec(ID),
-        "lprf_id": Spec(ID),
-        "mass": Spec(POSITIVE),
-        # ours: mass and inertia from the body's graphics where mass is not given
-        "density": Spec(POSITIVE),
-        **{name: Spec(REAL) for name in _INERTIAS},
-        **{name: Spec(REAL) for name in _VELOCITIES},
-        **{f"{name}_flag": Spec(FLAG) for name in _VELOCITIES},
-        "vm_id": Spec(ID),
-        "wm_id": Spec(ID),
+        "id": NAMED["id"],
+        "label": NAMED["label"],
+        "isground": Spec(FLAG, "TRUE: the body that does not move", "", "FALSE"),
+        "cg_id": Spec(ID, "marker of the body at its centre of mass; moving bodies need one"),
+        "im_id": Spec(ID, "marker of the body along whose axes inertias are", "", "cg_id"),
+        "lprf_id": Spec(ID, "marker in which the body's markers are given", "", "global frame"),
+        "mass": Spec(POSITIVE, "mass; moving bodies need it or density", "M"),
+        # ours
+        "density": Spec(POSITIVE, "gives mass and inertia from the body's graphics", "M/L^3"),
+        **{name: Spec(REAL, _about_inertia(name), "M L^2", _no(name)) for name in _INERTIAS},
+        **{name: Spec(REAL, _about_velocity(name), _speed(name), "0") for name in _VELOCITIES},
+        **{
+            f"{name}_flag": Spec(FLAG, f"whether {name} counts", "", "FALSE")
+            for name in _VELOCITIES
+        },
+        "vm_id": Spec(ID, "marker along whose axes v_ic are", "", "global frame"),
+        "wm_id": Spec(ID, "marker along whose axes w_ic are", "", "global frame"),
     },
     _build_body,
+    about="a rigid body, or the ground",
 )
+
+_ABOUT_ANGLES = {
+    "psi": "first turn, about z",
+    "theta": "second turn, about x after the first",
+    "phi": "third turn, about z after both",
+}
+
+
+def _about_cosine(name: str) -> str:
+    row, column = (int(digit) for digit in name[1:])
+    return f"{'xyz'[row]} of the marker's {'xyz'[column]}-axis, a direction cosine"
+
+
+def _unity(name: str) -> str:
+    return "1" if name[1] == name[2] else "0"
+
 
 _NOT_BUILT = "is documented but not built yet"
 REFERENCE_MARKER = Statement(
     "Reference_Marker",
     {
-        "id": Spec(ID, required=True),
-        "label": Spec(TEXT),
-        "body_id": Spec(ID, required=True),
-        "body_type": Spec(keyword(spellings(RIGIDBODY=""), spellings(FLEXBODY="", POINTBODY=""))),
-        "rm_id": Spec(ID),
+        "id": NAMED["id"],
+        "label": NAMED["label"],
+        "body_id": Spec(ID, "body that carries the marker", required=True),
+        "body_type": Spec(
+            keyword(spellings(RIGIDBODY=""), spellings(FLEXBODY="", POINTBODY="")),
+            "sort of that body",
+            "",
+            "RIGIDBODY",
+        ),
+        "rm_id": Spec(ID, "marker in which it is given", "", "lprf_id, else global"),
         "node_id": Spec(ID, refused=_NOT_BUILT),
-        **{name: Spec(REAL) for name in (*_POSITIONS, *_COSINES, *_ANGLES)},
+        **{name: Spec(REAL, f"position along {name[-1]}", "L", "0") for name in _POSITIONS},
+        **{name: Spec(REAL, _about_cosine(name), "", _unity(name)) for name in _COSINES},
+        **{name: Spec(REAL, about, "rad", "0") for name, about in _ABOUT_ANGLES.items()},
         "usrsub_param_string": Spec(refused=_NOT_BUILT),
         "usrsub_fnc_name": Spec(refused=_NOT_BUILT),
         "usrsub_dll_name": Spec(refused=_NOT_BUILT),
@@ -204,4 +253,5 @@ REFERENCE_MARKER = Statement(
         "interpreter": Spec(refused=_NOT_BUILT),
     },
     _build_marker,
+    about="a point with axes on a body",
 )

@@ -18,7 +18,7 @@ from mbsim.reader.kinds import (
     TEXT,
     keyword,
 )
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _MAX_ROWS = 1e8  # more output rows than this is a slip of the pen, and no disk holds them
 _OUTPUTS = ("num_steps", "print_interval")
@@ -202,15 +202,16 @@ _UNUSED = {
 PARAM_TRANSIENT = Statement(
     "Param_Transient",
     {
-        "integrator_type": Spec(TEXT),
-        "integr_tol": Spec(POSITIVE),
-        "h_max": Spec(POSITIVE),
-        "h_min": Spec(POSITIVE),
-        "h0_max": Spec(POSITIVE),
+        "integrator_type": Spec(TEXT, "method, or MotionSolve's name for one", "", "AUTO"),
+        "integr_tol": Spec(POSITIVE, "100 times mbsim's dimensionless tol", "", "1e-3"),
+        "h_max": Spec(POSITIVE, "longest step", "T", "none"),
+        "h_min": Spec(POSITIVE, "shortest step; a shorter one ends the run", "T", "rounding"),
+        "h0_max": Spec(POSITIVE, "longest first step", "T", "none"),
         **{name: Spec(kind, note=_NO_EFFECT) for name, kind in _UNUSED.items()},
     },
     _build_transient,
     in_command=True,
+    about="method, tolerance and step lengths",
 )
 _ITS_OWN = (
     "is not honoured: the search goes on until rounding allows no better; "
@@ -219,8 +220,8 @@ _ITS_OWN = (
 PARAM_STATIC = Statement(
     "Param_Static",
     {
-        "max_num_iter": Spec(COUNT, alias="maxit"),
-        "imbalance": Spec(POSITIVE),
+        "max_num_iter": Spec(COUNT, "most iterations", "", "300", alias="maxit"),
+        "imbalance": Spec(POSITIVE, "largest force left over", "F", "1e-10 of the weight"),
         **{
             name: Spec(TEXT, refused=_ITS_OWN)
             for name in ("error", "kinetic_energy_error", "stability", "method")
@@ -228,28 +229,35 @@ PARAM_STATIC = Statement(
     },
     _build_static,
     in_command=True,
+    about="how static equilibria are found",
 )
 FORCE_GRAVITY = Statement(
     "Force_Gravity",
     {
-        "id": Spec(ID),
-        "label": Spec(TEXT),
-        **{f"grav_{axis}": Spec(REAL_OR_EXPRESSION) for axis in "xyz"},
+        "id": Spec(ID, "number by which others name it", "", "1"),
+        "label": NAMED["label"],
+        **{
+            f"grav_{axis}": Spec(REAL_OR_EXPRESSION, f"gravity along global {axis}", "L/T^2", "0")
+            for axis in "xyz"
+        },
     },
     _build_gravity,
     in_command=True,
+    about="gravity",
 )
 _NOT_BUILT = "is documented but not built yet; use print_interval or num_steps"
 SIMULATE = Statement(
     "Simulate",
     {
-        "analysis_type": Spec(keyword(ANALYSIS_TYPES, ANALYSIS_NOT_BUILT)),
-        "label": Spec(TEXT),
-        "start_time": Spec(REAL),
-        "end_time": Spec(REAL),
-        "duration": Spec(POSITIVE),
-        "num_steps": Spec(COUNT, alias="num_step"),
-        "print_interval": Spec(POSITIVE),
+        "analysis_type": Spec(
+            keyword(ANALYSIS_TYPES, ANALYSIS_NOT_BUILT), "what is done", "", "TRANSIENT"
+        ),
+        "label": Spec(TEXT, "is not shown"),
+        "start_time": Spec(REAL, "time at which it starts", "T", "0, or the last end"),
+        "end_time": Spec(REAL, "time at which it ends; this or duration", "T"),
+        "duration": Spec(POSITIVE, "how long it lasts", "T"),
+        "num_steps": Spec(COUNT, "output intervals; or print_interval", alias="num_step"),
+        "print_interval": Spec(POSITIVE, "time between output rows", "T"),
         "print_increment": Spec(TEXT, refused=_NOT_BUILT),
         "print_array_id": Spec(TEXT, refused=_NOT_BUILT),
         "restart_array_id": Spec(TEXT, refused="is documented but not built yet"),
@@ -257,6 +265,7 @@ SIMULATE = Statement(
     _build_simulate,
     in_model=False,
     in_command=True,
+    about="one analysis: transient, static or assembly",
 )
 STOP = Statement(
     "Stop", {}, _build_stop, in_model=False, in_command=True, note="the deck ends here"

@@ -27,7 +27,7 @@ from mbsim.reader.kinds import (
     WORDS,
     keyword,
 )
-from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 
 _NOT_BUILT = "is documented but not built yet"
 #: What only some joints have; DISTANCE may have a length, the others must have theirs.
@@ -38,6 +38,9 @@ USERSUB_REFUSED = {
     name: Spec(refused=f"{_NOT_BUILT}; give expr")
     for name in (*USERSUB, "script_name", "interpreter")
 }
+
+#: What says that an element is given by an expression; the other way is not built.
+BY_WHAT = Spec(keyword(BY_EXPRESSION, BY_USERSUB), "how it is given", "", "EXPRESSION")
 
 
 def _build_joint(entry: Entry) -> None:
@@ -186,71 +189,77 @@ def complete_motions(draft: Draft) -> None:
 
 
 _JOINT_TYPES = spellings(**{name: "" for name in JOINTS})
-_MARKERS = {"i_marker_id": Spec(ID, required=True), "j_marker_id": Spec(ID, required=True)}
-
 CONSTRAINT_JOINT = Statement(
     "Constraint_Joint",
     {
         **NAMED,
-        "type": Spec(keyword(_JOINT_TYPES), required=True),
-        **_MARKERS,
-        "pitch": Spec(REAL),
-        "pitch_diameter": Spec(POSITIVE),
-        "length": Spec(POSITIVE),  # ours
-        "is_virtual": Spec(FLAG),
+        "type": Spec(keyword(_JOINT_TYPES), "sort of joint", required=True),
+        **MARKERS,
+        "pitch": Spec(REAL, "way along z a turn, SCREW, right-handed", "L"),
+        "pitch_diameter": Spec(POSITIVE, "diameter of the pinion, RACK_PINION", "L"),
+        "length": Spec(POSITIVE, "distance, DISTANCE", "L", "as assembled"),  # ours
+        "is_virtual": Spec(FLAG, "virtual joints are not built", "", "FALSE"),
     },
     _build_joint,
+    about="a joint between two bodies",
 )
 CONSTRAINT_JPRIM = Statement(
     "Constraint_Jprim",
-    {**NAMED, "type": Spec(keyword(PRIMITIVES), required=True), **_MARKERS},
+    {**NAMED, "type": Spec(keyword(PRIMITIVES), "sort of primitive", required=True), **MARKERS},
     _build_primitive,
+    about="a joint primitive, with ids of its own",
 )
 CONSTRAINT_COUPLER = Statement(
     "Constraint_Coupler",
     {
         **NAMED,
-        "joint_ids": Spec(IDS, required=True),
-        "motion_types": Spec(WORDS, required=True),
-        "scales": Spec(REALS, required=True),
+        "joint_ids": Spec(IDS, "two or three joints", required=True),
+        "motion_types": Spec(WORDS, "R or T, one for each joint", required=True),
+        "scales": Spec(REALS, "factor of each joint's displacement", required=True),
     },
     _build_coupler,
+    about="a linear relation between displacements of joints",
 )
 CONSTRAINT_GENERAL = Statement(
     "Constraint_General",
     {
         **NAMED,
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION, required=True),
+        "type": BY_WHAT,
+        "expr": Spec(EXPRESSION, "what shall be 0: of displacements and TIME", required=True),
         **USERSUB_REFUSED,
     },
     _build_general,
+    about="a constraint: an expression is 0",
 )
 _GIVEN_MOTION: dict[str, Spec] = {
-    "val_type": Spec(keyword(VALUE_TYPES), required=True),
-    "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-    "expr": Spec(EXPRESSION),
-    "ic_disp": Spec(REAL),
-    "ic_vel": Spec(REAL),
+    "val_type": Spec(keyword(VALUE_TYPES), "what expr gives, see below", required=True),
+    "type": BY_WHAT,
+    "expr": Spec(EXPRESSION, "displacement, velocity or acceleration over TIME; needed"),
+    "ic_disp": Spec(REAL, "displacement at the start, with V and A", "L or rad", "as assembled"),
+    "ic_vel": Spec(REAL, "velocity at the start, with A", "L/T or rad/T", "as bodies move"),
     **USERSUB_REFUSED,
 }
 MOTION_JOINT = Statement(
     "Motion_Joint",
     {
         **NAMED,
-        "joint_id": Spec(ID, required=True),
-        "motion_type": Spec(keyword(DIRECTIONS)),
+        "joint_id": Spec(ID, "joint that is driven", required=True),
+        "motion_type": Spec(keyword(DIRECTIONS), "R turns, T slides", "", "the joint's"),
         **_GIVEN_MOTION,
     },
     _build_motion,
+    about="drives a joint by an expression of TIME",
 )
 MOTION_MARKER = Statement(
     "Motion_Marker",
     {
         **NAMED,
-        **_MARKERS,
-        "direction": Spec(keyword(MARKER_DIRECTIONS), required=True),
+        **MARKERS,
+        "direction": Spec(
+            keyword(MARKER_DIRECTIONS), "along J's X, Y, Z or about them", required=True
+        ),
         **_GIVEN_MOTION,
     },
     _build_motion,
+    about="drives one direction between two markers by an expression of TIME",
 )

@@ -150,7 +150,16 @@ def _of_laws() -> dict[str, Spec]:
     """Return the attributes that friction laws bring with them."""
     laws = (FRICTION_LAWS[name] for name in FRICTION_LAWS)
     own = [parameter for law in laws for parameter in law.own]
-    return {parameter.name: Spec(_kind_of(parameter)) for parameter in own}
+    return {each.name: Spec(_kind_of(each), each.about, each.unit, _usual(each)) for each in own}
+
+
+def _usual(parameter: Parameter) -> str:
+    """Return what is taken where the deck does not give a parameter, as the deck would say it."""
+    if parameter.usual or parameter.default is None:
+        return parameter.usual
+    if parameter.flag:
+        return "TRUE" if parameter.default else "FALSE"
+    return f"{parameter.default:g}"
 
 
 def _kind_of(parameter: Parameter) -> Kind:
@@ -221,62 +230,69 @@ FORCE_CONTACT = Statement(
     "Force_Contact",
     {
         **NAMED,
-        "num_i_graphics": Spec(COUNT),
-        "i_graphics_id": Spec(IDS, required=True),
-        "num_j_graphics": Spec(COUNT),
-        "j_graphics_id": Spec(IDS, required=True),
+        "num_i_graphics": Spec(COUNT, "number of ids in i_graphics_id, checked"),
+        "i_graphics_id": Spec(IDS, "graphics of side I", required=True),
+        "num_j_graphics": Spec(COUNT, "number of ids in j_graphics_id, checked"),
+        "j_graphics_id": Spec(IDS, "of side J; both lists alike: in itself", required=True),
         "i_flexbody_id": Spec(ID, refused=_NOT_BUILT),
         "i_flip_flex": Spec(FLAG, refused=_NOT_BUILT, harmless="FALSE"),
         "j_flexbody_id": Spec(ID, refused=_NOT_BUILT),
         "j_flip_flex": Spec(FLAG, refused=_NOT_BUILT, harmless="FALSE"),
-        "ignore_penetration_larger_than": Spec(POSITIVE),
+        "ignore_penetration_larger_than": Spec(POSITIVE, "no force above this depth", "L", "never"),
         "master_surface": Spec(keyword(MASTER_SURFACES), note=_SEARCH, harmless="AUTO"),
         "enable_node_mode": Spec(FLAG, note=_SEARCH, harmless="FALSE"),
         "enable_analytical": Spec(FLAG, note=_SEARCH),
         "contact_stability_2d": Spec(REAL, refused=_NOT_BUILT),
         # ours: an incident a contact point, or one for all that two graphics touch with
-        "contact_points": Spec(keyword(spellings(POINTS="", REGION=""))),
-        "cnf_type": Spec(keyword(CNF_TYPES, CNF_NOT_BUILT), required=True),
-        "stiffness": Spec(NOT_NEGATIVE),
-        "exponent": Spec(POSITIVE),
-        "damping": Spec(NOT_NEGATIVE),
-        "dmax": Spec(POSITIVE),
-        "penalty": Spec(NOT_NEGATIVE),
-        "restitution_coef": Spec(UNIT, alias="restitution_coeff"),
-        # ours: the approach speed at which restitution_coef holds
-        "ref_velocity": Spec(POSITIVE),
-        "normal_trans_vel": Spec(POSITIVE),
-        "i_elastic_modulus": Spec(NOT_NEGATIVE),
-        "j_elastic_modulus": Spec(NOT_NEGATIVE),
-        # ours: what Hertz's theory needs beside the moduli; radii are else those of the graphics
-        "i_poisson_ratio": Spec(RATIO),
-        "j_poisson_ratio": Spec(RATIO),
-        "i_radius": Spec(POSITIVE),
-        "j_radius": Spec(POSITIVE),
-        "i_layer_depth": Spec(POSITIVE),
-        "j_layer_depth": Spec(POSITIVE),
-        "cnf_param_string": Spec(USER),
-        "cnf_fnc_name": Spec(TEXT),
-        "cnf_dll_name": Spec(TEXT),
-        "cnf_language": Spec(LANGUAGE),
-        "cff_type": Spec(keyword(CFF_TYPES)),
-        "mu_static": Spec(NOT_NEGATIVE),
-        "mu_dynamic": Spec(NOT_NEGATIVE),
-        "stiction_trans_vel": Spec(POSITIVE),
-        "friction_trans_vel": Spec(POSITIVE),
+        "contact_points": Spec(
+            keyword(spellings(POINTS="", REGION="")), "one point each, or one in all", "", "POINTS"
+        ),
+        "cnf_type": Spec(keyword(CNF_TYPES, CNF_NOT_BUILT), "normal force", required=True),
+        "stiffness": Spec(NOT_NEGATIVE, "stiffness k, force = k depth^exponent", "F/L^e", "0"),
+        "exponent": Spec(POSITIVE, "exponent e of the depth", "", "1.5"),
+        "damping": Spec(NOT_NEGATIVE, "damping; T/L with HUNT_CROSSLEY and HERTZ", "F T/L", "0"),
+        "dmax": Spec(POSITIVE, "depth of full damping; IMPACT needs it with damping", "L"),
+        "penalty": Spec(NOT_NEGATIVE, "stiffness of POISSON", "F/L", "0.1"),
+        "restitution_coef": Spec(
+            UNIT, "rebound over approach speed; of POISSON 0", alias="restitution_coeff"
+        ),
+        # ours
+        "ref_velocity": Spec(POSITIVE, "approach speed at which it holds", "L/T"),
+        "normal_trans_vel": Spec(POSITIVE, "speed over which POISSON softens", "L/T", "1e-3"),
+        "i_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of I, HERTZ", "F/L^2", "rigid"),
+        "j_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of J, HERTZ", "F/L^2", "rigid"),
+        # ours: what Hertz's theory needs beside the moduli
+        "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ"),
+        "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ"),
+        "i_radius": Spec(POSITIVE, "radius of I where they touch", "L", "the graphic's"),
+        "j_radius": Spec(POSITIVE, "radius of J where they touch", "L", "the graphic's"),
+        "i_layer_depth": Spec(POSITIVE, "of VOLUME, which is not built", "L"),
+        "j_layer_depth": Spec(POSITIVE, "of VOLUME, which is not built", "L"),
+        "cnf_param_string": Spec(USER, "par of the user's normal force", "", "USER()"),
+        "cnf_fnc_name": Spec(TEXT, "name of the user's normal force", "", "CNFSUB"),
+        "cnf_dll_name": Spec(TEXT, "shared library that has it"),
+        "cnf_language": Spec(LANGUAGE, "its language, where its name does not tell"),
+        "cff_type": Spec(keyword(CFF_TYPES), "law of friction", "", "COULOMB_OFF"),
+        "mu_static": Spec(NOT_NEGATIVE, "coefficient of static friction", "", "0"),
+        "mu_dynamic": Spec(NOT_NEGATIVE, "coefficient of sliding friction", "", "0"),
+        "stiction_trans_vel": Spec(POSITIVE, "slip speed of the static peak", "L/T", "1e-3"),
+        "friction_trans_vel": Spec(POSITIVE, "slip speed of full sliding", "L/T", "1e-3"),
         **_of_laws(),
-        "cff_param_string": Spec(USER),
-        "cff_fnc_name": Spec(TEXT),
-        "cff_dll_name": Spec(TEXT),
-        # ours: what a library's function is written in, where its name does not tell
-        "cff_language": Spec(LANGUAGE),
-        "script_name": Spec(TEXT),
-        "interpreter": Spec(keyword(spellings(PYTHON="", MATLAB="", OCTAVE=""))),
-        "cpost_param_string": Spec(USER),
-        "cpost_fnc_name": Spec(TEXT),
+        "cff_param_string": Spec(USER, "par of the user's friction", "", "USER()"),
+        "cff_fnc_name": Spec(TEXT, "name of the user's friction", "", "CFFSUB"),
+        "cff_dll_name": Spec(TEXT, "shared library that has it"),
+        # ours
+        "cff_language": Spec(LANGUAGE, "its language, where its name does not tell"),
+        "script_name": Spec(TEXT, "file of the user's functions, relative to the deck"),
+        "interpreter": Spec(
+            keyword(spellings(PYTHON="", MATLAB="", OCTAVE="")), "its language", "", "PYTHON"
+        ),
+        "cpost_param_string": Spec(USER, "par of CONTACTPOST", "", "USER()"),
+        "cpost_fnc_name": Spec(TEXT, "function called at output times", "", "CONTACTPOST"),
         "cpost_dll_name": Spec(TEXT, refused=_POST_IN_PYTHON, harmless="NULL"),
-        "cpost_script_name": Spec(TEXT),
-        "cpost_interpreter": Spec(keyword(spellings(PYTHON=""))),
+        "cpost_script_name": Spec(TEXT, "its file", "", "script_name"),
+        "cpost_interpreter": Spec(keyword(spellings(PYTHON="")), "its language", "", "PYTHON"),
     },
     _build_contact,
+    about="contact between graphics: normal force and friction",
 )

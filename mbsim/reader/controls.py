@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from mbsim.model import elements as el
-from mbsim.reader.constraints import USERSUB_REFUSED
-from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB
+from mbsim.reader.constraints import BY_WHAT, USERSUB_REFUSED
 from mbsim.reader.kinds import (
     EXPRESSION,
     FLAG,
@@ -39,15 +38,16 @@ CONTROL_DIFF = Statement(
     "Control_Diff",
     {
         **NAMED,
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION, required=True),
-        "ic": Spec(REAL),
+        "type": BY_WHAT,
+        "expr": Spec(EXPRESSION, "z', the rate of the state", required=True),
+        "ic": Spec(REAL, "z at the start", "", "0"),
         "ic_dot": Spec(REAL, note=_NO_SLOPE),
         "is_implicit": Spec(FLAG, refused=_IMPLICIT, harmless="FALSE"),
-        "scale": Spec(POSITIVE),  # ours: what the error norm takes for small
+        "scale": Spec(POSITIVE, "size of z by which its error is judged", "", "1"),  # ours
         **USERSUB_REFUSED,
     },
     _build_differential,
+    about="a state of your own, by its differential equation",
 )
 
 
@@ -99,22 +99,23 @@ SENSOR_EVENT = Statement(
     "Sensor_Event",
     {
         **NAMED,
-        "type": Spec(keyword(BY_EXPRESSION, BY_USERSUB)),
-        "expr": Spec(EXPRESSION, required=True),
-        "compare": Spec(keyword(_COMPARE)),
-        "value": Spec(REAL),
-        "error_tol": Spec(NOT_NEGATIVE),
-        "zero_crossing": Spec(FLAG),
-        "evaluate": Spec(EXPRESSION),  # ours; Adams' EVALUATE
+        "type": BY_WHAT,
+        "expr": Spec(EXPRESSION, "what is watched", required=True),
+        "compare": Spec(keyword(_COMPARE), "how expr is held against value", "", "EQ"),
+        "value": Spec(REAL, "what it is held against", "", "0"),
+        "error_tol": Spec(NOT_NEGATIVE, "so far from value counts as there", "", "0"),
+        "zero_crossing": Spec(FLAG, "whether a step ends at the crossing", "", "FALSE"),
+        "evaluate": Spec(EXPRESSION, "what SENVAL(id) shows from then on"),  # ours; Adams'
         "evaluate_id": Spec(TEXT, refused=_NO_IDS),
-        "halt": Spec(FLAG),
-        "return": Spec(FLAG),
-        "print": Spec(FLAG),
-        "dt": Spec(POSITIVE),
-        "stepsize": Spec(POSITIVE),
-        "hmax": Spec(POSITIVE),
-        "verbose": Spec(FLAG),
+        "halt": Spec(FLAG, "end the run", "", "FALSE"),
+        "return": Spec(FLAG, "end this Simulate, the next begins", "", "FALSE"),
+        "print": Spec(FLAG, "write a row at that time", "", "FALSE"),
+        "dt": Spec(POSITIVE, "print interval until this Simulate ends", "T"),
+        "stepsize": Spec(POSITIVE, "length of the next step", "T"),
+        "hmax": Spec(POSITIVE, "longest step until this Simulate ends", "T"),
+        "verbose": Spec(FLAG, "say so on the terminal; the log always does", "", "FALSE"),
         **USERSUB_REFUSED,
     },
     _build_sensor,
+    about="acts when a condition becomes true",
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mbsim.model import elements as el
 from mbsim.reader.keywords import DRY_TYPES
-from mbsim.reader.kinds import ID, NOT_NEGATIVE, POSITIVE, keyword
-from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.kinds import NOT_NEGATIVE, POSITIVE, keyword
+from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 
 
 def _build(entry: Entry) -> None:
@@ -34,16 +34,16 @@ FORCE_DRYFRICTION = Statement(
     "Force_DryFriction",
     {
         **NAMED,
-        "i_marker_id": Spec(ID, required=True),
-        "j_marker_id": Spec(ID, required=True),
-        "type": Spec(keyword(DRY_TYPES), required=True),
-        "friction": Spec(POSITIVE, required=True),
-        "friction_static": Spec(POSITIVE),
-        "dx": Spec(NOT_NEGATIVE),
+        **MARKERS,
+        "type": Spec(keyword(DRY_TYPES), "along J's axis (T) or about it (R)", required=True),
+        "friction": Spec(POSITIVE, "force or torque while it slips", "F or F L", required=True),
+        "friction_static": Spec(POSITIVE, "what begins the slip", "F or F L", "friction"),
+        "dx": Spec(NOT_NEGATIVE, "give before it slips; 0: none", "L or rad", "0"),
         "scale": Spec(
             refused="is Muscade's x'scale, by which it tells stick from slip; here the mode is "
             "kept, and there is nothing to scale"
         ),
     },
     _build,
+    about="a dry slider between two markers that holds and slips",
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mbsim.model import elements as el
 from mbsim.reader.keywords import DRY_TYPES
-from mbsim.reader.kinds import ID, BadValueError, Kind
-from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.kinds import BadValueError, Kind
+from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import USERSUB, subroutine
 
 _AXES = tuple(dict.fromkeys(DRY_TYPES.values()))
@@ -42,10 +42,12 @@ FORCE_ELEMENT = Statement(
     "Force_Element",
     {
         **NAMED,
-        "i_marker_id": Spec(ID, required=True),
-        "j_marker_id": Spec(ID, required=True),
-        "direction": Spec(Kind(_ALLOWED, _parse_directions), required=True),
+        **MARKERS,
+        "direction": Spec(
+            Kind(_ALLOWED, _parse_directions), "along and about axes of J", required=True
+        ),
         **USERSUB,
     },
     _build,
+    about="forces between two markers by a residual of your own",
 )

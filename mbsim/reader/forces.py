@@ -8,7 +8,7 @@ from mbsim.model import elements as el
 from mbsim.model.mechanism_checks import COMPONENTS
 from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES, VECTOR_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, keyword
-from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
 
 
@@ -130,61 +130,75 @@ def _build_variable(entry: Entry) -> None:
     entry.register(entry.draft.variables, variable)
 
 
-_MARKERS = {"i_marker_id": Spec(ID, required=True), "j_marker_id": Spec(ID, required=True)}
-
 FORCE_SPRINGDAMPER = Statement(
     "Force_SpringDamper",
     {
         **NAMED,
-        "type": Spec(keyword(SPRING_TYPES), required=True),
-        **_MARKERS,
-        "stiffness": Spec(NOT_NEGATIVE),
-        "damping": Spec(NOT_NEGATIVE),
-        "length": Spec(REAL),
-        "preload": Spec(REAL),
+        "type": Spec(keyword(SPRING_TYPES), "along the line I-J, or about J's z", required=True),
+        **MARKERS,
+        "stiffness": Spec(NOT_NEGATIVE, "stiffness", "F/L or F L/rad", "0"),
+        "damping": Spec(NOT_NEGATIVE, "damping", "F T/L or F L T/rad", "0"),
+        "length": Spec(REAL, "length or angle without force", "L or rad", "0"),
+        "preload": Spec(REAL, "force at that length, > 0 pushes apart", "F or F L", "0"),
     },
     _build_spring,
+    about="a linear spring with a damper",
 )
 FORCE_SCALAR_TWOBODY = Statement(
     "Force_Scalar_TwoBody",
     {
         **NAMED,
-        "type": Spec(keyword(SCALAR_TYPES), required=True),
-        **_MARKERS,
-        "expr": Spec(EXPRESSION),
+        "type": Spec(keyword(SCALAR_TYPES), "force along I-J, torque about J's z", required=True),
+        **MARKERS,
+        "expr": Spec(EXPRESSION, "the force, > 0 pushes apart; or the torque on I", "F or F L"),
         **USERSUB,
-        "action_only": Spec(FLAG),  # ours; Adams' ACTIONONLY
+        "action_only": Spec(FLAG, "nothing acts on J", "", "FALSE"),  # ours; Adams' ACTIONONLY
     },
     _build_scalar,
+    about="a force along a line or a torque, by an expression",
 )
+
+
+def _about_component(name: str) -> str:
+    return f"{'force' if name[0] == 'f' else 'torque'} on I along {name[1]}"
+
+
 _VECTOR: dict[str, Spec] = {
-    "type": Spec(keyword(VECTOR_TYPES), required=True),
-    "ref_marker_id": Spec(ID),
-    **{name: Spec(EXPRESSION) for name in COMPONENTS},
+    "type": Spec(keyword(VECTOR_TYPES), "which components there are", required=True),
+    "ref_marker_id": Spec(ID, "marker along whose axes they are", "", "global frame"),
+    **{
+        name: Spec(EXPRESSION, _about_component(name), "F" if name[0] == "f" else "F L", "0")
+        for name in COMPONENTS
+    },
     **USERSUB,
 }
 FORCE_VECTOR_TWOBODY = Statement(
     "Force_Vector_TwoBody",
     {
         **NAMED,
-        "i_marker_id": Spec(ID, required=True),
-        "j_floating_marker_id": Spec(ID, required=True),
+        "i_marker_id": MARKERS["i_marker_id"],
+        "j_floating_marker_id": Spec(
+            ID, "marker of the body that takes the opposite at I's origin", required=True
+        ),
         **_VECTOR,
     },
     _build_vector,
+    about="force and torque between two bodies by components",
 )
 FORCE_VECTOR_ONEBODY = Statement(
     "Force_Vector_OneBody",
-    {**NAMED, "i_marker_id": Spec(ID, required=True), **_VECTOR},
+    {**NAMED, "i_marker_id": MARKERS["i_marker_id"], **_VECTOR},
     _build_body_force,
+    about="force and torque on one body by components",
 )
 REFERENCE_VARIABLE = Statement(
     "Reference_Variable",
     {
         **NAMED,
-        "type": Spec(BY_EITHER),
-        "expr": Spec(EXPRESSION),
+        "type": Spec(BY_EITHER, "how it is given", "", "by what is given"),
+        "expr": Spec(EXPRESSION, "its value"),
         **USERSUB,
     },
     _build_variable,
+    about="an expression with a name, used as VARVAL(id)",
 )

@@ -23,7 +23,7 @@ from mbsim.reader.kinds import (
     keyword,
 )
 from mbsim.reader.parse import Node
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 
 @dataclass(frozen=True)
@@ -233,31 +233,44 @@ def _numbers(entry: Entry, node: Node, what: str) -> el.Array | None:
 
 
 _PICTURE = "pictures are not written"
+_ABOUT_TYPE = "shape: Sphere, BoxDefinedFromCenter, Plane, ..."
+_ABOUT_RADII = {
+    "bottom_radius": "radius of a frustum at its marker",
+    "top_radius": "radius of a frustum at z = length",
+}
 _COMMON = {
-    "id": Spec(ID, required=True),
-    "type": Spec(TEXT, required=True),
-    "label": Spec(TEXT),
+    "id": NAMED["id"],
+    "type": Spec(TEXT, _ABOUT_TYPE, required=True),
+    "label": NAMED["label"],
     "color": Spec(TEXT, note=_PICTURE),
     "hidden": Spec(FLAG, note=_PICTURE),
     "refinement_level": Spec(REAL, note="closed forms and meshes are used as they are"),
-    "is_material_inside": Spec(FLAG),
+    "is_material_inside": Spec(FLAG, "FALSE (a cavity) is refused in a contact", "", "TRUE"),
 }
 POST_GRAPHIC = Statement(
     "Post_Graphic",
     {
         **_COMMON,
-        "center_marker_id": Spec(ID),
-        "corner_marker_id": Spec(ID),
-        "rm_id": Spec(ID),
-        "radius": Spec(POSITIVE),
-        "length": Spec(POSITIVE),
-        **{name: Spec(NOT_NEGATIVE) for name in _RADII},
-        **{name: Spec(POSITIVE) for name in (*_LENGTHS, "x_scale", "y_scale", "z_scale")},
-        **{name: Spec(REAL_NO_EXPRESSION) for name in _BOUNDS},
-        "ends_type": Spec(keyword(ENDS_TYPES)),
-        "file": Spec(TEXT),
+        "center_marker_id": Spec(ID, "marker at the centre; of Cylinder, Frustum at the base"),
+        "corner_marker_id": Spec(ID, "marker at the corner of BoxDefinedFromCorner"),
+        "rm_id": Spec(ID, "marker of a Plane (solid at z <= 0) or of a TriaMesh"),
+        "radius": Spec(POSITIVE, "radius of a Sphere or Cylinder", "L"),
+        "length": Spec(POSITIVE, "length along z of a Cylinder or Frustum", "L"),
+        **{name: Spec(NOT_NEGATIVE, about, "L") for name, about in _ABOUT_RADII.items()},
+        **{name: Spec(POSITIVE, f"edge of a box along {name[-1]}", "L") for name in _LENGTHS},
+        **{
+            f"{axis}_scale": Spec(POSITIVE, f"semi-axis of an Ellipsoid along {axis}", "L")
+            for axis in "xyz"
+        },
+        **{
+            name: Spec(REAL_NO_EXPRESSION, "bound of a Plane's picture; contact has none", "L")
+            for name in _BOUNDS
+        },
+        "ends_type": Spec(keyword(ENDS_TYPES), "contact takes ends as closed", "", "CLOSED"),
+        "file": Spec(TEXT, "file of a TriaMesh: STL, OBJ, PLY or OFF, relative to the deck"),
     },
     _build_graphic,
     children=("Nodes", "Faces"),
     any_attribute=_is_display,
+    about="a shape on a body: what contacts act on",
 )

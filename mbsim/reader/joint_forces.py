@@ -91,32 +91,34 @@ def _build_limit(entry: Entry) -> None:
 
 _ON_JOINT = {
     **NAMED,
-    "joint_id": Spec(ID, required=True),
+    "joint_id": Spec(ID, "joint in which it acts", required=True),
 }
 
 FORCE_JOINTFRICTION = Statement(
     "Force_JointFriction",
     {
         **_ON_JOINT,
-        "cff_type": Spec(keyword(CFF_OF_JOINTS), required=True),
+        "cff_type": Spec(keyword(CFF_OF_JOINTS), "law of friction", required=True),
         **_of_contact(_COULOMB),
-        "pin_radius": Spec(POSITIVE),
-        "ball_radius": Spec(POSITIVE),
-        "preload": Spec(NOT_NEGATIVE),
-        "bending_reaction_arm": Spec(NOT_NEGATIVE),
+        "pin_radius": Spec(POSITIVE, "radius of the pin; REVOLUTE and CYLINDRICAL need it", "L"),
+        "ball_radius": Spec(POSITIVE, "radius of the ball; SPHERICAL needs it", "L"),
+        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
+        "bending_reaction_arm": Spec(NOT_NEGATIVE, "arm of the torque that presses", "L", "0"),
         **{name: Spec(refused="is documented but not built yet") for name in _NOT_BUILT},
     },
     _build_friction,
+    about="Coulomb friction in a joint, pressed by its reaction",
 )
 FORCE_JOINTLIMIT = Statement(
     "Force_JointLimit",
     {
         **_ON_JOINT,
-        "motion_type": Spec(keyword(DIRECTIONS), required=True),
-        "lower": Spec(REAL),
-        "upper": Spec(REAL),
-        "cnf_type": Spec(keyword(CNF_OF_LIMITS), required=True),
+        "motion_type": Spec(keyword(DIRECTIONS), "R turns, T slides", required=True),
+        "lower": Spec(REAL, "least displacement; this, upper or both", "L or rad", "none"),
+        "upper": Spec(REAL, "largest displacement", "L or rad", "none"),
+        "cnf_type": Spec(keyword(CNF_OF_LIMITS), "law of the stop", required=True),
         **_of_contact(_NORMAL),
     },
     _build_limit,
+    about="stops of a joint's displacement",
 )

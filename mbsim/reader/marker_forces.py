@@ -9,7 +9,6 @@ from typing import Any
 from mbsim.forces.catalog import FORCES, ForceKind, Parameter
 from mbsim.model import elements as el
 from mbsim.reader.kinds import (
-    ID,
     NOT_NEGATIVE,
     POSITIVE,
     REAL,
@@ -17,7 +16,7 @@ from mbsim.reader.kinds import (
     BadValueError,
     Kind,
 )
-from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 
 
 def kind_of(parameter: Parameter) -> Kind:
@@ -77,13 +76,18 @@ def _statement(kind: ForceKind) -> Statement:
 
     attributes = {
         **NAMED,
-        "i_marker_id": Spec(ID, required=True),
-        "j_marker_id": Spec(ID, required=True),
+        **MARKERS,
     }
     for each in kind.parameters:
-        found = Spec(kind_of(each) if each.count == 1 else _several(each.count), alias=each.alias)
+        found = Spec(
+            kind_of(each) if each.count == 1 else _several(each.count),
+            each.about,
+            each.unit,
+            f"{each.default:g}" if isinstance(each.default, float) else "",
+            alias=each.alias,
+        )
         attributes[each.name] = replace(found, required=each.default is None)
-    return Statement(kind.statement, attributes, build)
+    return Statement(kind.statement, attributes, build, about=kind.about)
 
 
 def marker_forces() -> list[Statement]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbsim.model import elements as el
 from mbsim.reader.keywords import FORCE_ELEMENTS, REQUEST_NOT_BUILT, REQUEST_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, TEXT, keyword
-from mbsim.reader.statement import Entry, Spec, Statement
+from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _EXPRESSIONS = tuple(f"expr{k}" for k in range(1, 9))
 _MARKERS = ("i_marker_id", "j_marker_id", "ref_marker_id")
@@ -61,16 +61,19 @@ def _build_request(entry: Entry) -> None:
 POST_REQUEST = Statement(
     "Post_Request",
     {
-        "id": Spec(ID, required=True),
-        "type": Spec(keyword(REQUEST_TYPES, REQUEST_NOT_BUILT), required=True),
-        "label": Spec(TEXT),
-        "comment": Spec(TEXT),
-        **{name: Spec(ID) for name in _MARKERS},
-        "elem_type": Spec(keyword(FORCE_ELEMENTS)),
-        "elem_id": Spec(ID),
-        "jflag": Spec(FLAG),
-        **{name: Spec(EXPRESSION) for name in _EXPRESSIONS},
-        **{name: Spec(TEXT) for name in _USERSUB},
+        "id": NAMED["id"],
+        "type": Spec(keyword(REQUEST_TYPES, REQUEST_NOT_BUILT), "what is written", required=True),
+        "label": NAMED["label"],
+        "comment": Spec(TEXT, "name in the CSV file, where there is no label"),
+        "i_marker_id": Spec(ID, "marker I"),
+        "j_marker_id": Spec(ID, "marker J", "", "global frame; of MARKER_FORCE: any"),
+        "ref_marker_id": Spec(ID, "marker along whose axes F1..F8 are", "", "global frame"),
+        "elem_type": Spec(keyword(FORCE_ELEMENTS), "sort of the element of ELEMENTAL_FORCE"),
+        "elem_id": Spec(ID, "its id"),
+        "jflag": Spec(FLAG, "TRUE: what acts on J", "", "FALSE"),
+        **{name: Spec(EXPRESSION, f"F{name[-1]} of EXPRESSION", "", "0") for name in _EXPRESSIONS},
+        **{name: Spec(TEXT, "of type USERSUB, which is not built") for name in _USERSUB},
     },
     _build_request,
+    about="numbers for the result file: motion, forces, expressions",
 )

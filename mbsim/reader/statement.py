@@ -21,12 +21,17 @@ _SHOWN = 60  # characters of a value that a message quotes
 class Spec:
     """One documented attribute.
 
-    `note` says why it is accepted without effect, `refused` why it cannot be accepted;
-    `harmless` is the value (folded) at which neither is worth a word. What `repeats` may be given
-    more than once; its values are then put together with a ``|`` between.
+    `about` is its meaning, one line for people; `unit` is in F, L, M, T and rad, `default` what is
+    taken where the deck does not give it, in the deck's words. `note` says why it is accepted
+    without effect, `refused` why it cannot be accepted; `harmless` is the value (folded) at which
+    neither is worth a word. What `repeats` may be given more than once; its values are then put
+    together with a ``|`` between.
     """
 
     kind: Kind = TEXT
+    about: str = ""
+    unit: str = ""
+    default: str = ""
     required: bool = False
     note: str = ""
     refused: str = ""
@@ -36,7 +41,16 @@ class Spec:
 
 
 #: What an element with an id has in every deck.
-NAMED = {"id": Spec(ID, required=True), "label": Spec(TEXT), "full_label": Spec(TEXT)}
+NAMED = {
+    "id": Spec(ID, "number by which others name it, unique per statement", required=True),
+    "label": Spec(TEXT, "name in logs and pictures"),
+    "full_label": Spec(TEXT, "a longer name; is not shown"),
+}
+#: The two markers of an element between bodies.
+MARKERS = {
+    "i_marker_id": Spec(ID, "marker I", required=True),
+    "j_marker_id": Spec(ID, "marker J", required=True),
+}
 
 
 def _needs_no_names(node: Node) -> bool:
@@ -53,7 +67,7 @@ class Statement:
 
     `build` gets the parsed attributes and adds an element to the draft. `any_attribute`
     tells of a node whose attributes are not looked at, because nothing in it can matter. `text`
-    is the attribute that may be given as the element's text as well.
+    is the attribute that may be given as the element's text as well. `about` says what it is.
     """
 
     name: str
@@ -65,6 +79,7 @@ class Statement:
     note: str = ""
     any_attribute: Callable[[Node], bool] = _needs_no_names
     text: str = ""
+    about: str = ""
 
     def spec_names(self) -> dict[str, str]:
         """Return folded spelling -> attribute name, aliases included."""

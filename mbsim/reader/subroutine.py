@@ -12,11 +12,11 @@ from mbsim.reader.statement import Entry, Spec
 
 #: Attributes of a statement that takes a user subroutine in place of an expression.
 USERSUB = {
-    "usrsub_param_string": Spec(USER),
-    "usrsub_fnc_name": Spec(TEXT),
-    "usrsub_dll_name": Spec(TEXT),
-    "script_name": Spec(TEXT),
-    "interpreter": Spec(TEXT),
+    "usrsub_param_string": Spec(USER, "par of the user's function; it stands for expressions"),
+    "usrsub_fnc_name": Spec(TEXT, "name of the user's function", "", "see below"),
+    "usrsub_dll_name": Spec(TEXT, "NULL; libraries are for Force_Contact alone", "", "NULL"),
+    "script_name": Spec(TEXT, "its file, relative to the deck; or --plugin"),
+    "interpreter": Spec(TEXT, "its language", "", "PYTHON"),
 }
 BY_EITHER = keyword({**BY_EXPRESSION, **BY_USERSUB})
 

@@ -118,23 +118,27 @@ REFERENCE_SPLINE = Statement(
     "Reference_Spline",
     {
         **NAMED,
-        "x": Spec(REALS),
-        "y": Spec(REALS),
-        "z": Spec(REALS),
-        "points": Spec(REALS),
-        "file": Spec(TEXT, alias="file_name"),
-        "linear_extrapolate": Spec(FLAG),
+        "x": Spec(REALS, "abscissae, ascending"),
+        "y": Spec(REALS, "ordinates; of a surface one curve after the other"),
+        "z": Spec(REALS, "second abscissae of a surface, ascending"),
+        "points": Spec(REALS, "rows of x y, or x and one y for each z; text of the element too"),
+        "file": Spec(TEXT, "file of such rows, relative to the deck", alias="file_name"),
+        "linear_extrapolate": Spec(FLAG, "lines, not parabolas, outside", "", "FALSE"),
     },
     _build_spline,
     text="points",
+    about="a table that AKISPL, CUBSPL and LINSPL interpolate",
 )
 REFERENCE_ARRAY = Statement(
     "Reference_Array",
     {
         **NAMED,
-        "type": Spec(keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"})),
-        "values": Spec(REALS, required=True),
+        "type": Spec(
+            keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"}), "sort of array", "", "IC"
+        ),
+        "values": Spec(REALS, "the numbers; text of the element too", required=True),
     },
     _build_array,
     text="values",
+    about="numbers that ARYVAL gives by their place",
 )

@@ -32,7 +32,7 @@ class Judged(NamedTuple):
     element: str  # what the row's element is: contact, body, equation, or nothing
 
 
-#: What a run is judged by. How the limits were found is in the README, "A run judges itself".
+#: What a run is judged by. How the limits were found is in the manual, computation/audit.
 ENTRIES = (
     Judged(
         codes.ENERGY, "energy", "the energy balance is off by {value:.3g} {energy}", 30.0, "contact"

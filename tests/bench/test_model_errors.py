@@ -1,4 +1,4 @@
-"""Errors of decks of `models/` against their references, as README lists them.
+"""Errors of decks of `models/` against their references (manual, trust/verification).
 
 python -m pytest -m bench -s tests/bench/test_model_errors.py
 """

@@ -1,4 +1,4 @@
-"""Functions of numbers as README defines them, written once more with NumPy for whole arrays.
+"""Functions of numbers as the manual defines them, written once more with NumPy for whole arrays.
 
 Forms differ from those of the simulator where the mathematics has another one. `CASES` says of
 each function with which arguments it is called: it is drawn at random within its domain.

@@ -9,42 +9,17 @@ import runpy
 import shutil
 import subprocess
 import sys
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from helpers.decks import EARTH, GRAVITY, GROUND, contact, sphere
 from helpers.folders import MODELS, PACKAGES, TESTS
+from helpers.templates import TEMPLATES
 
 G = 9.81
 
 
-class Template(NamedTuple):
-    """A file of `tests/templates`: where it goes, and how many files it may touch."""
-
-    place: str  # in the package; none where it holds lines for files that are there
-    files: int
-    line: tuple[str, str, str] | None = (
-        None  # of an integrator: file, what stands there, what shall
-    )
-
-
-HEUN = (
-    "integrators/catalog.py",
-    "SCHEMES = {\n",
-    'SCHEMES = {\n    "HEUN": "explicit, order 2",\n',
-)
-TEMPLATES = {
-    "friction_law": Template("laws/friction/viscous.py", 1),
-    "normal_law": Template("laws/normal/kelvin_voigt.py", 1),
-    "joint": Template("joints/kinds/pin_in_slot.py", 1),
-    "force": Template("forces/kinds/tether.py", 1),
-    "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
-    "integrator": Template("integrators/heun.py", 2, HEUN),
-    "request": Template("", 2),
-    "attribute": Template("", 3),
-}
 #: Runs decks in the copy, whose unchanged code is in the cache by its content.
 RUN = """
 import json, sys
@@ -79,9 +54,8 @@ def put_in(name, package):
     else:
         for path, pairs in runpy.run_path(str(file))["LINES"].items():
             replace(package.parent / path, *pairs)
-    if template.line is not None:
-        path, old, new = template.line
-        replace(package / path, old, new)
+    for path, *pairs in template.lines:
+        replace(package / path, *pairs)
 
 
 def touched(package):
@@ -184,6 +158,17 @@ assert "ELLIPSOID-MESH" in PAIRS
 assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
 assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
 assert "preload_rate" in FORCE_JOINTFRICTION.attributes
+assert "forcelift" in BY_KEY
+from mbsim.manual.tables import made
+from mbsim.manual.book import Page
+page = Page("reference/x", "")
+for table, word in (
+    ("law VISCOUS", "slip_coef"), ("law KELVIN_VOIGT", "damping"), ("joints", "PIN_IN_SLOT"),
+    ("attributes Force_Tether", "stiffness"), ("couple-of-shapes", "C"), ("methods", "HEUN"),
+    ("statements", "Force_Lift"), ("requests", "MARKER_VELOCITY_IN_J"),
+    ("attributes Force_JointFriction", "preload_rate"),
+):
+    assert word in made(table, page), table
 """
     in_copy(tmp_path, script)
 
@@ -212,6 +197,13 @@ def test_normal_law(copy_with):
     swing = np.exp(-10.0 * t) * (np.cos(w * t) + 10.0 / w * np.sin(w * t))
     below = (stands - found["bodies/2/position"][:, 2]) / (G / 1e4)
     np.testing.assert_allclose(below, swing, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_statement(copy_with):
+    deck = body() + '<Force_Lift id="1" i_marker_id="20" lift="2"/>'
+    (found,) = run_in_copy(copy_with("statement"), (whole(deck, 1.0), ["bodies/2/position"], {}))
+    np.testing.assert_allclose(found["bodies/2/position"][:, 2], found["time"] ** 2, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -16,12 +16,12 @@ LINES = {
         "return radius, self.preload, self.bending_reaction_arm",
         "return radius, self.preload, self.bending_reaction_arm, self.preload_rate",
     ),
-    # what decks say
+    # what decks say, with meaning, unit and default for the manual's table
     "mbsim/reader/joint_forces.py": (
-        """        "preload": Spec(NOT_NEGATIVE),
+        """        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
 """,
-        """        "preload": Spec(NOT_NEGATIVE),
-        "preload_rate": Spec(NOT_NEGATIVE),
+        """        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
+        "preload_rate": Spec(NOT_NEGATIVE, "how fast it grows", "F/T", "0"),
 """,
         """        preload=entry.get("preload", 0.0),
 """,

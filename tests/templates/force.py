@@ -1,7 +1,7 @@
 """Force_Tether: a spring without length in every direction, F = -k d, T = 0; stored k d.d/2.
 
-Template of a force between two markers: copy it into mbsim/forces/kinds/, change it, and add it to
-the manual's table. `forces.catalog` says what each function takes and returns.
+Template of a force between two markers: copy it into mbsim/forces/kinds/, change it, and give it
+a page in the manual. `forces.catalog` says what each function takes and returns.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ force(
     "TETHER",
     "Force_Tether",
     "tethers",
-    Parameter("stiffness", None, positive=True),
+    Parameter("stiffness", None, positive=True, about="stiffness", unit="F/L"),
     constants=_constants,
     wrench=_wrench,
     slopes=_slopes,
     bounds=_bounds,
+    about="a spring without length",
 )

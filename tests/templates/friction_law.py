@@ -10,7 +10,7 @@ from mbsim.laws.catalog import Parameter, friction_law
 
 
 # a name of Force_Contact's own (`"mu_dynamic"`) stands for its attribute, a Parameter is a new one
-@friction_law("VISCOUS", Parameter("slip_coef", None))
+@friction_law("VISCOUS", Parameter("slip_coef", None, about="force over slip and N", unit="T/L"))
 def viscous(inputs, slip_coef):
     """Return Fx, Fy, Mx, My, Tz on I; `slip_coef` [T/L]."""
     pull = -slip_coef * inputs.nforce

@@ -100,7 +100,7 @@ def test_poisson_tends_to_its_coefficient_with_the_square_of_the_blend(tmp_path)
     ]
     assert 80.0 < errors[0] / errors[1] < 120.0
     assert 80.0 < errors[1] / errors[2] < 120.0
-    # README states this figure for the default of 1e-3 at 1 m/s
+    # the manual states this figure for the default of 1e-3 at 1 m/s
     assert errors[2] == pytest.approx(2.1e-7, rel=0.1)
 
 

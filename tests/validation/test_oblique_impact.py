@@ -32,7 +32,7 @@ def test_what_slides_all_the_way_has_its_closed_form(tmp_path, angle):
 
 
 def test_a_spring_that_loses_what_it_must_rebounds_less_at_steep_impacts(tmp_path):
-    # README says by how much
+    # the manual says by how much (computation/stiction)
     off = [
         abs(rebound(tmp_path, angle, 'tangential_damping="0"')[0] / TABLE[angle] - 1)
         for angle in TABLE

@@ -30,7 +30,8 @@ from mbsim.core.rotation import add, norm, scale, sub
 from mbsim.forces.catalog import Adams, Bounds, Finding, Motion, Parameter, Values, force
 from mbsim.forces.turning import turned_back
 
-_PRELOAD = tuple(f"preload_{axis}" for axis in ("x", "y", "z", "tx", "ty", "tz"))
+_AXES = ("x", "y", "z", "tx", "ty", "tz")
+_PRELOAD = tuple(f"preload_{axis}" for axis in _AXES)
 #: Half of the difference of angles [rad].
 _PUSH = 1e-7
 #: Where K, C and the preload stand among the constants, behind the length.
@@ -153,22 +154,34 @@ force(
     "BEAM",
     "Force_Beam",
     "beams",
-    Parameter("length", None, positive=True),
-    Parameter("E", None, positive=True, alias="e_modulus"),
-    Parameter("G", None, positive=True, alias="g_modulus"),
-    Parameter("area", None, positive=True, alias="area_x_section"),
-    *(Parameter(name, None, positive=True) for name in ("ixx", "iyy", "izz")),
-    Parameter("ASY", alias="shear_y_area_ratio"),
-    Parameter("ASZ", alias="shear_z_area_ratio"),
-    Parameter("cratio"),
-    Parameter("cmatrix", (), signed=True, count=21),
-    *(Parameter(name, signed=True) for name in _PRELOAD),
+    Parameter("length", None, positive=True, about="length without load, along J's x", unit="L"),
+    Parameter("E", None, positive=True, alias="e_modulus", about="Young's modulus", unit="F/L^2"),
+    Parameter("G", None, positive=True, alias="g_modulus", about="shear modulus", unit="F/L^2"),
+    Parameter(
+        "area", None, positive=True, alias="area_x_section", about="area of the section", unit="L^2"
+    ),
+    Parameter("ixx", None, positive=True, about="torsion constant", unit="L^4"),
+    Parameter("iyy", None, positive=True, about="second moment of area about J's y", unit="L^4"),
+    Parameter("izz", None, positive=True, about="second moment of area about J's z", unit="L^4"),
+    Parameter("ASY", alias="shear_y_area_ratio", about="shear ratio for shear along y; 0: none"),
+    Parameter("ASZ", alias="shear_z_area_ratio", about="shear ratio for shear along z; 0: none"),
+    Parameter("cratio", about="damping matrix over stiffness matrix", unit="T"),
+    Parameter(
+        "cmatrix", (), signed=True, count=21, about="damping matrix, lower triangle by columns"
+    ),
+    *(
+        Parameter(
+            f"preload_{axis}", signed=True, about=f"constant load on I, {axis} of J", unit=unit
+        )
+        for axis, unit in zip(_AXES, ("F", "F", "F", "F L", "F L", "F L"), strict=True)
+    ),
     constants=_constants,
     wrench=_wrench,
     slopes=_slopes,
     bounds=_bounds,
     check=_check,
     function="BEAM",
+    about="straight massless beam of constant section between two markers",
     adams=Adams(
         "BEAM",
         {

@@ -22,6 +22,17 @@ _AXES = ("x", "y", "z", "tx", "ty", "tz")
 _STIFFNESS, _DAMPING, _PRELOAD = (
     tuple(f"{prefix}{axis}" for axis in _AXES) for prefix in ("k", "c", "preload_")
 )
+
+
+def _where(name: str) -> str:
+    """Return along or about which axis of J an attribute is."""
+    return f"about J's {name[-1]}" if "t" in name[-2:] else f"along J's {name[-1]}"
+
+
+def _unit(name: str, along: str, about: str) -> str:
+    return about if "t" in name[-2:] else along
+
+
 #: Half of the difference of angles [rad].
 _PUSH = 1e-7
 
@@ -94,14 +105,30 @@ force(
     "BUSHING",
     "Force_Bushing",
     "bushings",
-    *(Parameter(name) for name in (*_STIFFNESS, *_DAMPING)),
-    *(Parameter(name, signed=True) for name in _PRELOAD),
+    *(
+        Parameter(name, about=f"stiffness {_where(name)}", unit=_unit(name, "F/L", "F L/rad"))
+        for name in _STIFFNESS
+    ),
+    *(
+        Parameter(name, about=f"damping {_where(name)}", unit=_unit(name, "F T/L", "F L T/rad"))
+        for name in _DAMPING
+    ),
+    *(
+        Parameter(
+            name,
+            signed=True,
+            about=f"constant load on I {_where(name)}",
+            unit=_unit(name, "F", "F L"),
+        )
+        for name in _PRELOAD
+    ),
     constants=_constants,
     wrench=_wrench,
     slopes=_slopes,
     bounds=_bounds,
     check=_check,
     function="BUSH",
+    about="springs and dampers along and about the axes of a marker",
     adams=Adams(
         "BUSHING",
         {

@@ -21,7 +21,7 @@ from mbsim.laws.curves import against, tanh_ratio
     "mu_static",
     "mu_dynamic",
     "stiction_trans_vel",
-    Parameter("viscous_coef", 0.0),
+    Parameter("viscous_coef", 0.0, about="force per slip speed, whatever N is", unit="F T/L"),
 )
 def brown_mcphee(
     inputs: FrictionInput,

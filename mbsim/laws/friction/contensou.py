@@ -78,7 +78,17 @@ def disc_friction(v: float, w: float) -> V2:
 
 
 @friction_law(
-    "CONTENSOU", "mu_dynamic", "friction_trans_vel", Parameter("patch_radius", 0.0, positive=True)
+    "CONTENSOU",
+    "mu_dynamic",
+    "friction_trans_vel",
+    Parameter(
+        "patch_radius",
+        0.0,
+        positive=True,
+        about="radius of the disc of contact",
+        unit="L",
+        usual="of the area",
+    ),
 )
 def contensou(
     inputs: FrictionInput, mu_dynamic: float, friction_trans_vel: float, patch_radius: float

@@ -20,7 +20,11 @@ from mbsim.laws.catalog import FASTEST, LASTS, SLIP, FrictionInput, Parameter, f
 
 
 @friction_law(
-    "DAHL", "mu_dynamic", Parameter("bristle_stiffness", positive=True), memory=2, carried=2
+    "DAHL",
+    "mu_dynamic",
+    Parameter("bristle_stiffness", positive=True, about="stiffness along the surface", unit="F/L"),
+    memory=2,
+    carried=2,
 )
 def dahl(
     inputs: FrictionInput, memory: tuple[float, ...], mu_dynamic: float, bristle_stiffness: float

@@ -23,8 +23,14 @@ from mbsim.laws.friction.coulomb import coulomb_on
     "mu_dynamic",
     "stiction_trans_vel",
     "friction_trans_vel",
-    Parameter("rolling_arm", positive=True),
-    Parameter("rolling_trans_vel", 1e-2, positive=True),
+    Parameter("rolling_arm", positive=True, about="lever arm of N that resists rolling", unit="L"),
+    Parameter(
+        "rolling_trans_vel",
+        1e-2,
+        positive=True,
+        about="rolling speed from which the torque is whole",
+        unit="rad/T",
+    ),
 )
 def coulomb_rolling(
     inputs: FrictionInput,

@@ -1,4 +1,4 @@
-"""STICTION: Coulomb friction that holds, by a spring between the surfaces that slips at its limit.
+"""STICTION: Coulomb friction that holds, by a spring that slips at its limit.
 
 z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
 
@@ -159,12 +159,43 @@ def rigid(
     "STICTION",
     "mu_static",
     "mu_dynamic",
-    Parameter("tangential_stiffness", math.nan, positive=True, infinite=True),
-    Parameter("tangential_damping", math.nan),
-    Parameter("poisson_ratio", 0.3, ratio=True),
-    Parameter("rotational_stiffness", 0.0, needs="torsion_radius"),
-    Parameter("torsion_radius", 0.0, needs="rotational_stiffness"),
-    Parameter("incremental", 1.0, flag=True),
+    Parameter(
+        "tangential_stiffness",
+        math.nan,
+        positive=True,
+        infinite=True,
+        about="stiffness while it sticks; INFINITE: no give at all",
+        unit="F/L",
+        usual="by Mindlin",
+    ),
+    Parameter(
+        "tangential_damping",
+        math.nan,
+        about="damping while it sticks",
+        unit="F T/L",
+        usual="0.2 critical",
+    ),
+    Parameter("poisson_ratio", 0.3, ratio=True, about="Poisson's ratio in Mindlin's stiffness"),
+    Parameter(
+        "rotational_stiffness",
+        0.0,
+        needs="torsion_radius",
+        about="stiffness against spin while it sticks",
+        unit="F L/rad",
+    ),
+    Parameter(
+        "torsion_radius",
+        0.0,
+        needs="rotational_stiffness",
+        about="arm of the largest torque against spin, mu_s N r",
+        unit="L",
+    ),
+    Parameter(
+        "incremental",
+        1.0,
+        flag=True,
+        about="whether the spring keeps its force, not its stretch, as N grows",
+    ),
     memory=12,
     carried=2,
     uses_x=True,

@@ -21,9 +21,9 @@ from mbsim.laws.curves import stribeck as falling
     "mu_static",
     "mu_dynamic",
     "stiction_trans_vel",
-    Parameter("stribeck_vel", positive=True),
-    Parameter("stribeck_exponent", 2.0, positive=True),
-    Parameter("viscous_coef", 0.0),
+    Parameter("stribeck_vel", positive=True, about="speed scale of the falling branch", unit="L/T"),
+    Parameter("stribeck_exponent", 2.0, positive=True, about="exponent of the falling branch"),
+    Parameter("viscous_coef", 0.0, about="force per slip speed, whatever N is", unit="F T/L"),
 )
 def stribeck(
     inputs: FrictionInput,

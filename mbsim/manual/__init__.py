@@ -1,0 +1,1 @@
+"""The manual: Markdown pages shipped with the package, and what finds, shows and makes them."""

@@ -1,0 +1,1 @@
+"""Pictures of the manual, one module a chapter; each function registers itself by `picture`."""

@@ -1,0 +1,60 @@
+"""Pages and lists of hits on a terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+
+from rich.console import Console, RenderableType
+from rich.markdown import Markdown
+from rich.text import Text
+
+from mbsim.manual.book import Page, pages
+from mbsim.manual.markdown import for_terminal
+from mbsim.manual.search import Hit
+
+_WIDEST = 110  # columns; longer lines are hard to read
+_OTHERS = 5  # pages named under one that was found by a word
+_SHOWN = 20
+
+
+def show_page(page: Page, others: Sequence[Hit] = ()) -> None:
+    """Print a page; `others` are named below it."""
+    parts: list[RenderableType] = [Markdown(for_terminal(page), hyperlinks=False)]
+    also = [hit.page.short for hit in others if hit.page != page][:_OTHERS]
+    if also:
+        parts.append(Text(f"\nAlso in: {', '.join(also)}", style="dim"))
+    _print(parts)
+
+
+def show_hits(topic: str, hits: Sequence[Hit]) -> None:
+    """Print pages found by words, best first, each with its line."""
+    parts: list[RenderableType] = [Text(f"{len(hits)} pages have {topic!r}; the best first:\n")]
+    for hit in hits[:_SHOWN]:
+        parts.append(_entry(hit.page))
+        parts.append(Text(f"    {hit.line}", style="dim", overflow="ellipsis", no_wrap=True))
+    if len(hits) > _SHOWN:
+        parts.append(Text(f"... and {len(hits) - _SHOWN} more"))
+    _print(parts)
+
+
+def show_list() -> None:
+    """Print the names and titles of all pages in reading order."""
+    _print([_entry(page) for page in pages().values()])
+
+
+def _entry(page: Page) -> Text:
+    return Text.assemble((page.name, "bold"), f"  {page.title}", overflow="ellipsis", no_wrap=True)
+
+
+def _print(parts: Sequence[RenderableType]) -> None:
+    """Print to standard output, through a pager where that is a terminal too small for it."""
+    console = Console(highlight=False)
+    width = min(console.width, _WIDEST) if console.is_terminal else _WIDEST
+    console = Console(highlight=False, width=width)
+    lines = sum(len(console.render_lines(part)) for part in parts)
+    paged = sys.stdout.isatty() and lines > console.height
+    with console.pager(styles=True) if paged else nullcontext():
+        for part in parts:
+            console.print(part)
