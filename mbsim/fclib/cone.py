@@ -29,7 +29,7 @@ LARGEST = 1e10
 FREE = 9.9
 #: How much is looked at: the published error alone (`relative_errors`); of the contacts' shares
 #: none, most, or all (`own_errors`).
-PUBLISHED, NO_WEIGHTS, DECIDING, EVERY_SHARE = range(4)
+PUBLISHED, NO_SHARES, DECIDING, EVERY_SHARE = range(4)
 #: Growth of |r| that every gain is worth.
 GROWTH = 2.0
 

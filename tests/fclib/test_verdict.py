@@ -159,7 +159,7 @@ def test_what_decides_is_what_every_share_gives():
         jit.function(blocks.product)(b.system, b.q, given.r, u)
         found = [
             jit.function(cone.own_errors)(b.system, u, given.r, shares, np.empty_like(u))
-            for shares in (cone.EVERY_SHARE, cone.DECIDING, cone.NO_WEIGHTS)
+            for shares in (cone.EVERY_SHARE, cone.DECIDING, cone.NO_SHARES)
         ]
         assert found[1] == (found[0][0], 0.0, *found[0][2:])
         assert found[2] == (found[0][0], 0.0, found[0][2], 0.0)

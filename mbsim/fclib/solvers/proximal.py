@@ -17,7 +17,7 @@ from mbsim.fclib.blocks import mean_diagonals, product
 from mbsim.fclib.clock import late
 from mbsim.fclib.cone import (
     DECIDING,
-    NO_WEIGHTS,
+    NO_SHARES,
     PUBLISHED,
     bring_into_cones,
     errors_at,
@@ -127,7 +127,7 @@ def _newton_iterations(
         for k in range(MEMORY - 1):
             recent[k] = recent[k + 1]
         recent[MEMORY - 1] = size
-        near = own_errors(system, point.u, point.r, NO_WEIGHTS, room)[0]
+        near = own_errors(system, point.u, point.r, NO_SHARES, room)[0]
         if near <= aim:
             return newtons, True, jacobian
         if state[PHASE] > 0.0:
