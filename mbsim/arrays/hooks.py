@@ -28,8 +28,8 @@ class Hook(IntEnum):
     WRENCH = 4  # a bushing or a vector force
     ELEMENT = 5  # a Force_Element by its residual
     JOINTS = 6  # what joints are asked for: `Joints`
-    HELD = 7  # contacts whose friction holds without give: `Held`
-    LATE = 8  # forces that follow from reactions: friction in joints, expressions of them
+    STICKING = 7  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 8  # forces by reactions: friction in joints, expressions of them
     EVALUATE = 9  # the whole rhs
     TANGENT = 10  # no hook: where the packed arrays of `compile_model.tangent` are
     BEND = 11  # how forces of equations turn with the bodies
@@ -64,7 +64,7 @@ class Dry(IntEnum):
     KEEP = 1  # what it is at a committed state; the answer is 0 or `HELD_OTHERWISE`
 
 
-class Held(IntEnum):
+class Sticking(IntEnum):
     """What contacts are asked for whose friction is rigid: see stiction.rigid_contact."""
 
     PLACE = 0  # where equations of what sticks act

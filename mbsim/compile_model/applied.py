@@ -66,7 +66,7 @@ def applied_forces(
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
         equation=np.full(n, -1, dtype=np.int64),
-        late=np.zeros((0, 3), dtype=np.int64),
+        by_reactions=np.zeros((0, 3), dtype=np.int64),
     )
     for k, (statement, element) in enumerate(given):
         made.law[k], values = found[k]

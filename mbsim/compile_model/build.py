@@ -229,7 +229,7 @@ def _sizes(
         contacts=len(contacts.listed),
         connections=len(acts.mechanism.elements),
         forces=len(acts.applied_ids),
-        late=len(acts.applied.late),
+        by_reactions=len(acts.applied.by_reactions),
         sensors=len(acts.sensors.id),
         dry_frictions=len(model.dry_frictions),
         switching=len(acts.switching.program),

@@ -75,7 +75,8 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     ):
         raise _refused(system, changes, "asks for another law than before: not built yet")
     if rows.applied_ids != system.applied or not all(
-        np.array_equal(getattr(applied, n), getattr(scene.applied, n)) for n in ("kind", "late")
+        np.array_equal(getattr(applied, n), getattr(scene.applied, n))
+        for n in ("kind", "by_reactions")
     ):
         raise _refused(system, changes, "follows from other forces than before: not built yet")
     programs = rows.programs.arrays(rows.mechanism.elements, rows.applied_ids, system.contact_ids)

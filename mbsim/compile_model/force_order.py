@@ -1,8 +1,9 @@
-"""Forces by expressions of other forces: in which order they are evaluated, and which come late.
+"""Forces by expressions of other forces: in which order, and which depend on reactions.
 
 A force that needs other applied forces stands behind them. One that needs a reaction, of a joint
-or a motion, is *late*, and so is what needs it: these, with the friction in joints, are settled
-together when accelerations are known (`forces.reaction_forces`). Contacts are known before all.
+or a motion, depends on reactions, and so does what needs it: these, with the friction in joints,
+are settled together when accelerations are known (`forces.reaction_forces`). Contacts are known
+before all.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def in_order(
 ) -> tuple[Applied, list[tuple[str, int]]]:
     """Return the applied forces and their elements in an order in which each can be evaluated.
 
-    Late ones are marked in `Applied.with_reactions`, and listed in `Applied.late`.
+    Those by reactions are marked in `Applied.with_reactions`, and listed in `Applied.by_reactions`.
 
     Raises
     ------
@@ -57,14 +58,14 @@ def in_order(
     if not any(needs.rows) and not any(needs.reaction):
         return applied, elements
     order = _order(model, elements, needs)
-    late = np.zeros(len(elements), dtype=bool)
+    by_reactions = np.zeros(len(elements), dtype=bool)
     for row in order:
-        late[row] = needs.reaction[row] or any(late[k] for k in needs.rows[row])
+        by_reactions[row] = needs.reaction[row] or any(by_reactions[k] for k in needs.rows[row])
     at = np.array(order, dtype=np.int64)
-    rows = {name: array[at] for name, array in applied._asdict().items() if name != "late"}
-    rows["with_reactions"] = np.maximum(applied.with_reactions, late)[at]
+    rows = {name: array[at] for name, array in applied._asdict().items() if name != "by_reactions"}
+    rows["with_reactions"] = np.maximum(applied.with_reactions, by_reactions)[at]
     made = applied._replace(**rows)
-    return made._replace(late=_late(made)), [elements[k] for k in order]
+    return made._replace(by_reactions=_by_reactions(made)), [elements[k] for k in order]
 
 
 def _programs(applied: Applied, row: int) -> list[int]:
@@ -199,7 +200,7 @@ def _circle(model: Model, ring: list[tuple[str, int]]) -> DeckError:
     return DeckError([Fault(source.file, source.line, name, f"{what}: {' -> '.join(names)}")])
 
 
-def _late(applied: Applied) -> np.ndarray[Any, Any]:
+def _by_reactions(applied: Applied) -> np.ndarray[Any, Any]:
     """Return the unknowns that are settled together: row, component and program of each."""
     found = []
     for row in range(len(applied.kind)):

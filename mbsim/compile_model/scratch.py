@@ -30,7 +30,7 @@ class Sizes:
     contacts: int
     connections: int
     forces: int
-    late: int  # forces that depend on reactions
+    by_reactions: int  # forces that depend on reactions
     sensors: int
     dry_frictions: int
     switching: int  # programs with branches
@@ -144,13 +144,13 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
         wrench=np.zeros(8),
         slopes=np.zeros((12, 6)),
         rub=np.zeros((nf, 9)),
-        late=np.zeros((n.late, 5)),
-        secant=np.zeros((n.late, n.late)),
+        by_reactions=np.zeros((n.by_reactions, 5)),
+        secant=np.zeros((n.by_reactions, n.by_reactions)),
         reaction=np.zeros(6 * n.connections),
         squares=np.full(n.groups, np.nan),
         trouble=np.full(2, -1, dtype=np.int64),
-        hold=np.zeros((ns if points else 0, 15)),
-        held=np.zeros((ns if points else 0, 2)),
+        sticking_point=np.zeros((ns if points else 0, 15)),
+        sticking_force=np.zeros((ns if points else 0, 2)),
         look=np.zeros((3, points, POINT)),
     )
     place_fixed(work, graphics)

@@ -9,12 +9,12 @@ arrays:
   polyhedron (`model.hull`);
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
-  its share of the law's force (1 unless a manifold splits the force of one corner over
+  its weight of the law's force (1 unless a manifold splits the force of one corner over
   several points, so that the sum does not jump when a corner passes over an edge), and the
-  couple on I for a unit of the law's energy where the share turns with the shapes
+  couple on I for a unit of the law's energy where the weight turns with the shapes
   (`geometry.crossing`), else 0.
 
-The elastic energy of a pair is the sum of share E(depth) over its points: forces and couples are
+The elastic energy of a pair is the sum of weight E(depth) over its points: forces and couples are
 its slopes.
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
@@ -36,7 +36,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
 
-#: Numbers of one candidate: depth, point, normal, share, couple.
+#: Numbers of one candidate: depth, point, normal, weight, couple.
 POINT = 11
 #: Where they begin.
 AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
@@ -58,7 +58,7 @@ class Pair(NamedTuple):
 
 
 class Region(NamedTuple):
-    """How a pair gives its points and the area of contact, and the shares of a flat face."""
+    """How a pair gives its points and the area of contact, and the weights of a flat face."""
 
     points: Callable[..., tuple[int, float]]
     whole: float
@@ -94,12 +94,12 @@ def region(shape_i: str, shape_j: str, whole: float) -> Callable[[Kernel], Kerne
 
 
 @jitable
-def put_point(row: F1, depth: float, p: V3, n: V3, share: float = 1.0) -> None:
+def put_point(row: F1, depth: float, p: V3, n: V3, weight: float = 1.0) -> None:
     """Write one candidate into a row of `points`."""
     row[AT_DEPTH] = depth
     row[AT_POINT], row[AT_POINT + 1], row[AT_POINT + 2] = p[0], p[1], p[2]
     row[AT_NORMAL], row[AT_NORMAL + 1], row[AT_NORMAL + 2] = n[0], n[1], n[2]
-    row[AT_WEIGHT] = share
+    row[AT_WEIGHT] = weight
     row[COUPLE] = row[COUPLE + 1] = row[COUPLE + 2] = 0.0
 
 

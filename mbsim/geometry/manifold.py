@@ -2,8 +2,8 @@
 
 What carries is spread by the exterior angle of the patch's border: an arc has its own angle,
 a corner the angle by which the border turns there. Their sum is 2 pi for every convex patch,
-so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 shares, a
-polygon of 4 corners 4. A line has 2 shares, fading to 1 as it shrinks to a point.
+so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 weights, a
+polygon of 4 corners 4. A line has 2 weights, fading to 1 as it shrinks to a point.
 What is tilted until no more than one place of it touches is no patch: there one point carries, at
 the depth of the least overlap, whose slope its force is. `share_with_one` leads over to that.
 """
@@ -32,10 +32,10 @@ def put_apart(points: F2, first: int, last: int, depth: float, p: V3, n: V3) -> 
 
 
 @jitable
-def put_share(row: F1, depth: float, p: V3, n: V3, share: float) -> None:
+def put_weighted(row: F1, depth: float, p: V3, n: V3, weight: float) -> None:
     """Write one candidate, unless it carries nothing."""
-    if share > SMALL:
-        put_point(row, depth, p, n, share)
+    if weight > SMALL:
+        put_point(row, depth, p, n, weight)
 
 
 @jitable
@@ -121,8 +121,8 @@ def put_arcs(
         x, y = r * (x + c) / angle, r * (y + s) / angle
         depth = depth0 + rise * x
         p = add(centre, add(scale(x, u), scale(y, v)))
-        share = weight * angle / TURN
-        put_share(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, share)
+        arc = weight * angle / TURN
+        put_weighted(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, arc)
 
 
 @jitable
@@ -161,8 +161,8 @@ def turn_of(ax: float, ay: float, bx: float, by: float) -> float:
 
 
 @jitable
-def line_share(length: float, radius: float) -> float:
-    """Return the share of each end of a line contact: 1, fading to 1/2 as it shrinks to a point."""
+def line_weight(length: float, radius: float) -> float:
+    """Return the weight of each end of a line contact: 1, fading to 1/2 as it becomes a point."""
     return 0.5 + 0.5 * fade(5.0 * length / radius)
 
 
@@ -206,7 +206,7 @@ def share_with_one(
         points[row, AT_WEIGHT] *= part
         if points[row, AT_WEIGHT] <= SMALL:
             points[row, AT_DEPTH], points[row, AT_WEIGHT] = min(points[row, AT_DEPTH], -f), 1.0
-    put_share(points[count], f, p, n, 1.0 - part)
+    put_weighted(points[count], f, p, n, 1.0 - part)
 
 
 @jitable
@@ -243,12 +243,12 @@ def segment_on_disc(
     low, high = max(0.0, (-qw - root) / ww), min(1.0, (root - qw) / ww)
     if low >= high:
         return -1.0
-    share = line_share((high - low) * math.sqrt(ww), r)
+    weight = line_weight((high - low) * math.sqrt(ww), r)
     for k in range(2):
         s = low if k == 0 else high
         depth = depth_a + s * (depth_b - depth_a)
         x = add(a, scale(s, sub(b, a)))
-        put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, share)
+        put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, weight)
     return line_lies(low * (depth_b - depth_a), high * (depth_b - depth_a), f)
 
 

@@ -5,7 +5,7 @@ Along J's outward face normal, I's reversed one, or the common normal of two edg
 meet (their arcs on the unit sphere of normals cross), the polyhedra overlap by how far the
 support of J lies above that of I. The least overlap says which faces look at each other: the
 face itself, and of the other polyhedron the face at the supporting corner or edge that
-looks most against it. Points, depths and shares then follow as for boxes (`pairs.box_box`):
+looks most against it. Points, depths and weights then follow as for boxes (`pairs.box_box`):
 the vertices of the faces' common polygon seen along n, each with the normal and the depth of
 its own features.
 """
@@ -25,10 +25,10 @@ from mbsim.geometry.crossing import (
     EDGES_MEET,
     FACE_OF_I,
     FACE_OF_J,
-    LEAST_SHARE,
+    LEAST_WEIGHT,
     middle_of_lines,
-    share_of_crossing,
     turning,
+    weight_of_crossing,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.model.hull import (
@@ -283,13 +283,13 @@ def common_polygon(
             name = int(b[loops_j + 2 * (first_j + after - count_i)])
             data = int(b[AT_DATA]) + 3 * name
             row = 2 * int(a[COLOURS]) + int(b[data + 1])
-            g, share = scale(-1.0, m), b[data]
+            g, weight = scale(-1.0, m), b[data]
             d = depth * dot(g, n)
             middle = sub(on_j, scale(0.5 * d, g))
         elif before < count_i and after < count_i:
             data = int(a[AT_DATA]) + 3 * name_i
             row = 2 * int(a[data + 1])
-            g, share = nj, a[data]
+            g, weight = nj, a[data]
             d = depth * dot(g, n)
             middle = add(on_i, scale(0.5 * d, g))
         else:
@@ -312,7 +312,7 @@ def common_polygon(
                 int(a[loops_i + 2 * start + 1]),
                 int(b[loops_j + 2 * (first_j + side) + 1]),
             )
-            share, couple = share_of_crossing(
+            weight, couple = weight_of_crossing(
                 u,
                 e,
                 n,
@@ -330,10 +330,10 @@ def common_polygon(
             d = depth * dot(g, n)
             middle = middle_of_lines(on_i, u, e, g, scale(depth, n), d)
         before = after
-        if share <= LEAST_SHARE:
+        if weight <= LEAST_WEIGHT:
             continue
         p = add(vector(frame_j), to_global(frame_j, middle))
-        put_point(points[row], d, p, to_global(frame_j, g), share)
+        put_point(points[row], d, p, to_global(frame_j, g), weight)
         put_couple(points[row], to_global(frame_j, couple))
 
 

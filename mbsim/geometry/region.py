@@ -1,14 +1,14 @@
 """One incident for all that a pair touches with: what its points sum up to, and the area.
 
 The rows of such a pair (`contact_points="REGION"`) are the incident, the area, then the points
-that the pair has else. With d_i the depth of a point, w_i its share and S the shares of a face
+that the pair has else. With d_i the depth of a point, w_i its weight and S the weights of a face
 that lies flat (`whole`),
 
     depth^2 = sum w_i d_i^2 / S         place = sum w_i d_i p_i / sum w_i d_i
     force   = law(depth) sum w_i d_i / depth
 
 over points with d_i > 0. Its elastic energy is S U(depth), so force and place follow from a
-potential: what a tilt moves the place by, the torque of the points does too. Where shares turn
+potential: what a tilt moves the place by, the torque of the points does too. Where weights turn
 with the shapes (`geometry.crossing`), or normals differ, a couple is left, for a unit of the
 law's force. Of a linear law
 force and torque are those of the points in every pose; of others they are where the depth is
@@ -97,7 +97,7 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
     p = add(p, scale(1.0 / force, cross(n, torque)))
     depth = math.sqrt(square / whole)
     put_point(rows[0], depth, p, n, force / depth)
-    # where shares turn with the shapes, and what the place cannot take
+    # where weights turn with the shapes, and what the place cannot take
     couple = add(couple, scale(dot(torque, n), n))
     put_couple(rows[0], scale(1.0 / depth, couple))
     put_point(rows[1], 0.0, (0.0, 0.0, 0.0), n, 0.0)

@@ -15,7 +15,7 @@ from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
 from mbsim.arrays.codes import NEAR_FOLD
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
+from mbsim.arrays.hooks import Dry, Hook, Joints, Memory, Sticking
 from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
 
@@ -33,8 +33,8 @@ CASES = [
     (Hook.WRENCH, None, "stiff/bushing_chain", "DOPRI5"),
     (Hook.ELEMENT, None, "dry_friction_element", "DOPRI5"),
     *((Hook.JOINTS, what, "cam", "DOPRI5") for what in Joints),
-    *((Hook.HELD, what, "stiction_rigid", "RADAU5") for what in Held),
-    (Hook.LATE, None, "pin", "DOPRI5"),
+    *((Hook.STICKING, what, "stiction_rigid", "RADAU5") for what in Sticking),
+    (Hook.REACTION_FORCES, None, "pin", "DOPRI5"),
     (Hook.EVALUATE, None, "dry_friction_element", "DOPRI5"),
     (Hook.BEND, None, "four_bar", "RADAU5"),
     *((Hook.MEMORY, what, "lugre_stick_slip", "RADAU5") for what in Memory),
@@ -133,7 +133,7 @@ def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, 
 
 def test_every_hook_and_request_is_tried():
     tried = {(hook, what) for hook, what, *_ in CASES}
-    requests = {Hook.JOINTS: Joints, Hook.HELD: Held, Hook.DRY: Dry, Hook.MEMORY: Memory}
+    requests = {Hook.JOINTS: Joints, Hook.STICKING: Sticking, Hook.DRY: Dry, Hook.MEMORY: Memory}
     for hook in set(Hook) - {Hook.TANGENT}:
         for what in requests.get(hook, (None,)):
             assert (hook, what) in tried, (hook, what)

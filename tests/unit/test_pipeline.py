@@ -37,7 +37,8 @@ def evaluator(path):
 @pytest.mark.parametrize(("name", "rigid"), [("drop_m.xml", False), ("stiction_rigid.xml", True)])
 def test_only_rigid_friction_has_its_arrays(name, rigid):
     work = build(mbsim.read_model(MODELS / name)).scene.work
-    assert {array.size > 0 for array in (work.hold, work.held, work.look)} == {rigid}
+    arrays = (work.sticking_point, work.sticking_force, work.look)
+    assert {array.size > 0 for array in arrays} == {rigid}
 
 
 @pytest.mark.parametrize("name", ["drop_m.xml", "incline_slip.xml", "sphere_pair.xml"])

@@ -30,7 +30,7 @@ from mbsim.arrays.codes import (
     TWIST,
     USUAL,
 )
-from mbsim.arrays.hooks import Held, Hook, answer_of
+from mbsim.arrays.hooks import Hook, Sticking, answer_of
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2
@@ -113,8 +113,8 @@ def lasting(scene: Scene) -> np.ndarray:
 @jitable
 def fill_equations(scene: Scene, t: float, y: F1) -> None:
     """Fill gradient, residual and rates of the equations in use."""
-    if scene.world.hooks[Hook.HELD] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.PLACE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 

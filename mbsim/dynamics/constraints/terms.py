@@ -157,7 +157,7 @@ def touching_term(scene: Scene, y: F1, i: int, j: int, way: int, s: int, G: F1) 
 
     and where nothing slips t' . v = -(t . n') (n . v). `stiction.rigid_contact` places the slot.
     """
-    row = scene.work.hold[s]
+    row = scene.work.sticking_point[s]
     p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
     if way == 1:
         t = cross(n, t)

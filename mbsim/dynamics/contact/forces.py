@@ -137,7 +137,7 @@ def contact_of(scene: Scene, s: int) -> int:
 
 @jitable
 def face_weight_of(scene: Scene, s: int) -> float:
-    """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
+    """Return the weights of a flat face where slot s is the one incident of its pair, else 0."""
     return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
 
 
@@ -408,10 +408,10 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
     if code != 0:
         return code
-    share = point[AT_WEIGHT]
-    normal, elastic, stored = share * out[LOAD], share * out[ELASTIC], share * out[ENERGY]
+    weight = point[AT_WEIGHT]
+    normal, elastic, stored = weight * out[LOAD], weight * out[ELASTIC], weight * out[ENERGY]
     lost = (normal - elastic) * rate
-    # of shares that turn with the shapes
+    # of weights that turn with the shapes
     couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
     row[HELD] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:

@@ -141,18 +141,18 @@ def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float
 
 @jitable
 def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) -> None:
-    """Add the points that slot s stands for to the block of body b, each with its share."""
+    """Add the points that slot s stands for to the block of body b, each with its weight."""
     rows = scene.work.points
     first = s + REGION_ROWS
     for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
         if rows[row, AT_DEPTH] > 0.0:
-            p, n, share = (
+            p, n, weight = (
                 vector(rows[row, AT_POINT:]),
                 vector(rows[row, AT_NORMAL:]),
                 rows[row, AT_WEIGHT],
             )
             turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
-            add_to_block(scene.work.block[b], n, share * k, share * damping, turn)
+            add_to_block(scene.work.block[b], n, weight * k, weight * damping, turn)
 
 
 @jitable
@@ -160,28 +160,28 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
     point = work.points[s]
-    c, depth, share = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
+    c, depth, weight = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
     p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     ground = len(bodies.mass)
     rate = state.rate[s] if state.touching[s] == 1 else 0.0
     inverse = translation(scene, bi) + translation(scene, bj)
-    kinetic = 0.5 * rate * rate / (share * inverse)
-    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (share * inverse)
+    kinetic = 0.5 * rate * rate / (weight * inverse)
+    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (weight * inverse)
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
     if kinetic + force * depth > AT_REST * out[ENERGY]:
         energy = max(0.0, out[ENERGY] + kinetic - force * depth)
         depth = max(depth, depth_to_come(scene, c, energy, force))
     k, damping = slopes(scene, c, depth, out)
-    k *= share
-    damping *= share
+    k *= weight
+    damping *= weight
     both = 2.0 if bi < ground and bj < ground else 1.0
     for b in (bi, bj):
         if b == ground:
             continue
         if face_weight_of(scene, s) > 0.0:
-            add_points(scene, y, s, b, both * k / share, both * damping / share)
+            add_points(scene, y, s, b, both * k / weight, both * damping / weight)
             continue
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
         add_to_block(work.block[b], n, both * k, both * damping, turn)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES
-from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
+from mbsim.arrays.hooks import Hook, Sticking, answer_of, failure_or, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
@@ -141,7 +141,7 @@ def side(scene: Scene, t: float, y: F1, k: int) -> float:
 
 
 @jitable
-def watch_held(scene: Scene, t: float, y: F1, what: float) -> int:
+def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
     Of a step that was taken: 1 if it was cut for that. Such a step adds 1, whether a mode
@@ -154,7 +154,8 @@ def watch_held(scene: Scene, t: float, y: F1, what: float) -> int:
         chattering[0] = chattering[0] + 1.0 if chattering[1] == 1.0 else 0.5 * chattering[0]
         chattering[1] = 0.0
     elif chattering[0] <= CHATTERS:
-        if answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.ASK, t, y))) == 1:
+        asked = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.ASK, t, y))
+        if answer_of(scene, asked) == 1:
             chattering[1], differs = 1.0, 2
     return differs
 
@@ -177,8 +178,8 @@ def load(scene: Scene, context: int, t: float, y: F1) -> float:
             force = holding_force(scene, f)
             if not math.isnan(force):
                 most = max(most, abs(force) / scene.applied.par[f, STATIC])
-    if scene.world.hooks[Hook.HELD] != 0:
-        held = call_int(scene.world.hooks[Hook.HELD], (scene, Held.LOAD, t, y))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        held = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
         most = max(most, 1e-6 * answer_of(scene, held))
     return most
 
@@ -217,8 +218,8 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
             sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
-    if scene.world.hooks[Hook.HELD] != 0:
-        differs = max(differs, watch_held(scene, t, y, what))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        differs = max(differs, watch_sticking(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
     chatters = sides[last, CHATTERING] > CHATTERS_MODES
     for k in range(last):

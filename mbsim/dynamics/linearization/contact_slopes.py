@@ -240,7 +240,7 @@ def normal_slopes(
     scene: Scene, s: int, c: int, depth: float, rate: float
 ) -> tuple[int, float, float]:
     """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
-    contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
+    contacts, out, weight = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
     user = contacts.user_normal[c]
     if user != 0:
         place = floats_at(user, PLACE)
@@ -250,12 +250,12 @@ def normal_slopes(
     code = call_int(contacts.normal_law[c], call)
     upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth - step, rate, contacts.normal_par[c], out))
-    by_depth = share * (upper - out[LOAD]) / (2.0 * step)
+    by_depth = weight * (upper - out[LOAD]) / (2.0 * step)
     step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     code += call_int(contacts.normal_law[c], (depth, rate + step, contacts.normal_par[c], out))
     upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
-    by_rate = share * (upper - out[LOAD]) / (2.0 * step)
+    by_rate = weight * (upper - out[LOAD]) / (2.0 * step)
     if user != 0:
         floats_at(user, PLACE)[MODE] = EXPLORE
     return code, by_depth, by_rate
@@ -275,7 +275,7 @@ def add_contact_slopes(  # noqa: C901
     i, j = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
     depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
-    share, none = point[AT_WEIGHT], (0.0, 0.0, 0.0)
+    weight, none = point[AT_WEIGHT], (0.0, 0.0, 0.0)
     rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
 
     code, by_depth, by_rate = normal_slopes(scene, s, c, depth, rate)
@@ -285,8 +285,8 @@ def add_contact_slopes(  # noqa: C901
     # depth and its rate are -n . of displacement and velocity
     normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
-        slope = by_depth / share
-        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
+        slope = by_depth / weight
+        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
     u, v = normal[:, 0], normal[:, 0]

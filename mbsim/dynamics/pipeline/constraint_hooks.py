@@ -34,9 +34,9 @@ def constrain(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
     prepare(scene, y)
     hold(scene, t, y)
-    if scene.world.hooks[Hook.LATE] != 0:
+    if scene.world.hooks[Hook.REACTION_FORCES] != 0:
         # friction follows from reactions, and these from friction
-        code = call_int(scene.world.hooks[Hook.LATE], (scene, t, y, dy))
+        code = call_int(scene.world.hooks[Hook.REACTION_FORCES], (scene, t, y, dy))
         if code != 0:
             return code
     show_sticking(scene)

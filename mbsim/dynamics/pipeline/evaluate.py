@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import NEAR_FOLD, NOW, WITHIN
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -86,7 +86,7 @@ def evaluate_past(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
     code = evaluate(scene, t, h, y, dy)
-    if code == 0 and scene.world.hooks[Hook.HELD] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, y)))
+    if code == 0 and scene.world.hooks[Hook.STICKING] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, y)))
     scene.world.past[0] = NOW
     return failure_or(scene, code)

@@ -18,7 +18,7 @@ from mbsim.dynamics.forces.applied import add_applied
 from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
-from mbsim.dynamics.forces.reaction_forces import add_late
+from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
 from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
 from mbsim.dynamics.stiction.rigid_contact import serve_sticking
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
@@ -76,7 +76,7 @@ def settle(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """Forces that need reactions, with friction in joints, and the accelerations with them."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_late(scene, t, vector_at(y, n), vector_at(dy, n))
+    return add_reaction_forces(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
 def express(context: int, t: float, y: Pointer, program: int, body: int, direction: int) -> int:
@@ -114,7 +114,7 @@ def serve_rigid_alone(context: int, what: int, t: float, y: Pointer) -> int:
     return serve_rigid(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
-def serve_held_contacts(context: int, what: int, t: float, y: Pointer) -> int:
+def serve_sticking_contacts(context: int, what: int, t: float, y: Pointer) -> int:
     """What contacts do whose friction is rigid."""
     scene = view(context, Scene)
     return serve_sticking(scene, what, t, vector_at(y, scene.rows.y.shape[1]))

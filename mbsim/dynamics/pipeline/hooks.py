@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import ERROR_NOW, FOLD_HALT, FOLDS, HELD_OTHERWISE, LISTINGS
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import Pointer
@@ -84,9 +84,9 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The incident table, events and peaks."""
     scene = view(context, Scene)
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
-    if scene.world.hooks[Hook.HELD] != 0:
+    if scene.world.hooks[Hook.STICKING] != 0:
         # before equations may be chosen anew
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, a)))
     if scene.world.hooks[Hook.JOINTS] != 0:
         code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
         if code != 0:

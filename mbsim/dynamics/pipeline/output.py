@@ -13,17 +13,17 @@ from mbsim.arrays.codes import (
     INC_FROZEN,
     INC_GRAPHIC_I,
     INC_GRAPHIC_J,
-    INC_HELD,
     INC_KIND,
     INC_MEMORY,
     INC_NORMAL,
     INC_POINT,
     INC_REGION,
-    INC_SHARE,
     INC_SLOT,
     INC_STEP,
+    INC_STICKING,
     INC_TANGENT,
     INC_TOUCHES,
+    INC_WEIGHT,
     INC_X,
     STORED_ENERGY,
 )
@@ -142,7 +142,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
         row[INC_DEPTH] = work.slot[s, DEPTH]
         # what its force followed from besides y: see pipeline.replay
         pair = scene.slots.pair[s]
-        row[INC_SHARE], row[INC_STEP] = work.points[s, AT_WEIGHT], h
+        row[INC_WEIGHT], row[INC_STEP] = work.points[s, AT_WEIGHT], h
         row[INC_FROZEN] = 1.0 if scene.state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
         row[INC_TOUCHES] = scene.pairs.touches[pair]
         row[INC_KIND] = scene.pairs.kind[pair]
@@ -162,7 +162,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
         if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here
             for j in range(2):
-                row[INC_HELD + j] = work.held[s, j]
+                row[INC_STICKING + j] = work.sticking_force[s, j]
         k += 1
     rows.used[1] = k
     return k - first

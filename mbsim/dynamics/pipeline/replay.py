@@ -20,11 +20,11 @@ from mbsim.arrays.codes import (
     INC_NORMAL,
     INC_POINT,
     INC_REGION,
-    INC_SHARE,
     INC_SLOT,
     INC_STEP,
     INC_TANGENT,
     INC_TOUCHES,
+    INC_WEIGHT,
     NOW,
     SLOT_COLUMNS,
 )
@@ -57,7 +57,7 @@ def put_back(scene: Scene, row: F1) -> int:
     pairs.graphic_i[pair] = int(row[INC_GRAPHIC_I])
     pairs.graphic_j[pair] = int(row[INC_GRAPHIC_J])
     point = work.points[s]
-    point[AT_DEPTH], point[AT_WEIGHT] = row[INC_DEPTH], row[INC_SHARE]
+    point[AT_DEPTH], point[AT_WEIGHT] = row[INC_DEPTH], row[INC_WEIGHT]
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         point[COUPLE + k] = row[INC_COUPLE + k]

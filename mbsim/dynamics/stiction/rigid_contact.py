@@ -19,7 +19,7 @@ import math
 from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, TOLERANCE
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.codes import STICK as STICK_EVENT
-from mbsim.arrays.hooks import Held, Hook, note_failure
+from mbsim.arrays.hooks import Hook, Sticking, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V2
@@ -41,9 +41,9 @@ from mbsim.dynamics.stiction.rigid_shares import (
     fill_slip,
     first_of_slots,
     most_capacity,
-    share_held,
+    share_sticking,
 )
-from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_held
+from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_sticking
 from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
@@ -82,7 +82,7 @@ def settled(scene: Scene) -> float:
 
 
 @jitable
-def held_part(scene: Scene) -> float:
+def sticking_part(scene: Scene) -> float:
     """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
 
     What presses next to nothing has no limit of its own: the least is a part of the largest.
@@ -91,7 +91,7 @@ def held_part(scene: Scene) -> float:
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue
-        held, able = scene.work.held[slot[e]], max(capacity(scene, slot[e]), least)
+        held, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
         force = math.hypot(held[0], held[1])
         if able > 0.0:
             part = max(part, force / able)
@@ -115,9 +115,9 @@ def rest(scene: Scene) -> float:
 
 
 @jitable
-def ask_held(scene: Scene, y: F1) -> int:
+def ask_sticking(scene: Scene, y: F1) -> int:
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
-    if held_part(scene) > 1.0:
+    if sticking_part(scene) > 1.0:
         return 1
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -129,9 +129,9 @@ def ask_held(scene: Scene, y: F1) -> int:
 
 
 @jitable
-def load_held(scene: Scene) -> int:
+def load_sticking(scene: Scene) -> int:
     """Return the largest force that holds a slot, in millionths of what holds at most."""
-    return int(1e6 * min(held_part(scene), 1e6))
+    return int(1e6 * min(sticking_part(scene), 1e6))
 
 
 @jitable
@@ -194,14 +194,14 @@ def came_to_rest(scene: Scene, pair: int) -> bool:
 
 
 @jitable
-def begin_held(scene: Scene, y: F1) -> int:
+def begin_sticking(scene: Scene, y: F1) -> int:
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
     What is at rest is first taken to stick wherever something changes, and what is as good as at
-    rest beside what comes to rest: what of it slips is found for all together (`release_held`).
+    rest beside what comes to rest: what of it slips is found for all together (`release_sticking`).
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
-    changed, held, begun = 1 if held_part(scene) > 1.0 else 0, 0, 0
+    changed, held, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
     for e in range(first, len(slot), 2):
         s = slot[e]
         mode = state.memory[s, KEPT_MODE]
@@ -262,7 +262,7 @@ def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
     cone = scene.sweep.cone
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
-        x, z = scene.work.held[s, 0], scene.work.held[s, 1]
+        x, z = scene.work.sticking_force[s, 0], scene.work.sticking_force[s, 1]
         let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
     code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
     note_failure(scene, code)
@@ -297,11 +297,11 @@ def solve_slips(scene: Scene, count: int, r: int) -> float:
 
 
 @jitable
-def release_held(scene: Scene, t: float, y: F1) -> int:
+def release_sticking(scene: Scene, t: float, y: F1) -> int:
     """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
     hold_implied(scene, t, y)
-    share_held(scene, t, y)
-    if held_part(scene) <= 1.0:
+    share_sticking(scene, t, y)
+    if sticking_part(scene) <= 1.0:
         return 0
     count, r = fill_cones(scene, t, y, most_capacity(scene))
     fill_sliding(scene, t, y, count)
@@ -317,12 +317,12 @@ def release_held(scene: Scene, t: float, y: F1) -> int:
         # sliding would rub more than sticking holds: it goes on to stick
         code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
         note_failure(scene, code)
-        share_held(scene, t, y)
+        share_sticking(scene, t, y)
     return released
 
 
 @jitable
-def record_held(scene: Scene, t: float) -> None:
+def record_sticking(scene: Scene, t: float) -> None:
     """Append events of the slots that go on otherwise than before."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -344,7 +344,7 @@ def record_held(scene: Scene, t: float) -> None:
 
 
 @jitable
-def changed_held(scene: Scene) -> int:
+def changed_sticking(scene: Scene) -> int:
     """Return 1 if other slots stick than in the last step, else 0."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -357,23 +357,23 @@ def changed_held(scene: Scene) -> int:
 
 @jitable
 def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
-    """Do what contacts with rigid friction are asked for (`Held`); return an answer or 0."""
-    if what == Held.PLACE:
-        place_held(scene, t, y)
-    elif what == Held.SHARE:
-        share_held(scene, t, y)
-    elif what == Held.ASK:
-        share_held(scene, t, y)
-        return ask_held(scene, y)
-    elif what == Held.BEGIN:
-        return begin_held(scene, y)
-    elif what == Held.RELEASE:
-        return release_held(scene, t, y)
-    elif what == Held.RECORD:
-        record_held(scene, t)
-    elif what == Held.CHANGED:
-        return changed_held(scene)
-    elif what == Held.LOAD:
-        share_held(scene, t, y)
-        return load_held(scene)
+    """Do what contacts with rigid friction are asked for (`Sticking`); return an answer or 0."""
+    if what == Sticking.PLACE:
+        place_sticking(scene, t, y)
+    elif what == Sticking.SHARE:
+        share_sticking(scene, t, y)
+    elif what == Sticking.ASK:
+        share_sticking(scene, t, y)
+        return ask_sticking(scene, y)
+    elif what == Sticking.BEGIN:
+        return begin_sticking(scene, y)
+    elif what == Sticking.RELEASE:
+        return release_sticking(scene, t, y)
+    elif what == Sticking.RECORD:
+        record_sticking(scene, t)
+    elif what == Sticking.CHANGED:
+        return changed_sticking(scene)
+    elif what == Sticking.LOAD:
+        share_sticking(scene, t, y)
+        return load_sticking(scene)
     return 0

@@ -21,7 +21,7 @@ from mbsim.arrays.codes import (
     SLIP,
     STICK,
 )
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -61,7 +61,7 @@ def begin_or_go_on(scene: Scene, y: F1, f: int) -> bool:
 @jitable
 def ask_contacts(scene: Scene, what: int, t: float, y: F1) -> int:
     """Return what contacts answer whose friction is rigid; 0 if there are none, or it fails."""
-    hook = scene.world.hooks[Hook.HELD]
+    hook = scene.world.hooks[Hook.STICKING]
     return answer_of(scene, call_int(hook, (scene, what, t, y))) if hook != 0 else 0
 
 
@@ -99,22 +99,22 @@ def release(scene: Scene) -> int:
 @jitable
 def commit_rigid(scene: Scene, t: float, y: F1) -> int:
     """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
-    changed = ask_contacts(scene, Held.BEGIN, t, y) == 1
+    changed = ask_contacts(scene, Sticking.BEGIN, t, y) == 1
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
-        ask_contacts(scene, Held.RECORD, t, y)
+        ask_contacts(scene, Sticking.RECORD, t, y)
         return 0
     # one more slides each time, so this ends
     code = hold_sticking(scene, t, y)
     while code == 0:
         # contacts are asked for all of theirs at once, under what the rest does
-        if release(scene) == 0 and ask_contacts(scene, Held.RELEASE, t, y) == 0:
+        if release(scene) == 0 and ask_contacts(scene, Sticking.RELEASE, t, y) == 0:
             break
         code = hold_sticking(scene, t, y)
     note_failure(scene, code)
-    ask_contacts(scene, Held.RECORD, t, y)
+    ask_contacts(scene, Sticking.RECORD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
@@ -130,7 +130,7 @@ def commit_rigid(scene: Scene, t: float, y: F1) -> int:
 @jitable
 def hold_again(scene: Scene, t: float, y: F1) -> None:
     """Take into use what holds at the point to be evaluated, where the last step changed that."""
-    kept, contacts = scene.state.dry, ask_contacts(scene, Held.CHANGED, t, y)
+    kept, contacts = scene.state.dry, ask_contacts(scene, Sticking.CHANGED, t, y)
     if contacts == 1:
         ask_joints(scene, Joints.CHOOSE, t, y)
         return

@@ -130,13 +130,13 @@ def spread(scene: Scene, t: float, y: F1, most: float) -> None:
     level, _ = solve_cones(sweep.share, count, r, sweep.cone, sweep.mix, SHARED)
     for k in range(count):
         s = slot[int(sweep.cone[WHICH, k // 2])]
-        scene.work.held[s, k % 2] = sweep.cone[HELD_BY, k] / level
+        scene.work.sticking_force[s, k % 2] = sweep.cone[HELD_BY, k] / level
 
 
 @jitable
-def share_held(scene: Scene, t: float, y: F1) -> None:
+def share_sticking(scene: Scene, t: float, y: F1) -> None:
     """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
-    held, active, first = scene.work.held, scene.equations.active, first_of_slots(scene)
+    held, active, first = scene.work.sticking_force, scene.equations.active, first_of_slots(scene)
     slot, count = scene.equations.slot, 0
     for e in range(first, len(slot), 2):
         held[slot[e], 0] = held[slot[e], 1] = 0.0
@@ -158,7 +158,7 @@ def share_held(scene: Scene, t: float, y: F1) -> None:
 @jitable
 def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
-    row, held = scene.work.slot[s], scene.work.held[s]
+    row, held = scene.work.slot[s], scene.work.sticking_force[s]
     point = scene.work.points[s]
     n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
     rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))

@@ -95,7 +95,7 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 @jitable
 def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
-    points, row = scene.work.look, scene.work.hold[s]
+    points, row = scene.work.look, scene.work.sticking_point[s]
     k = s - scene.pairs.slot[scene.slots.pair[s]]
     now, later, before = points[0, k], points[1, k], points[2, k]
     ahead = sub(vector(later[1:4]), vector(now[1:4]))
@@ -119,7 +119,7 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
 
 
 @jitable
-def place_held(scene: Scene, t: float, y: F1) -> None:
+def place_sticking(scene: Scene, t: float, y: F1) -> None:
     """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
     slot, last = scene.equations.slot, -1
     moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]

@@ -16,9 +16,9 @@ that meet there and lies on the line along which they push, so that its force ha
     corner of J on I's face   the same with I's face
     edge of I on edge of J    normal u x e of the edges, distance of their lines
 
-A corner has share 1; a crossing of two edges has the polygon's exterior angle over a right
+A corner has weight 1; a crossing of two edges has the polygon's exterior angle over a right
 angle, so that a corner that passes over an edge of the other box becomes two crossings with
-shares that add up to 1, and all shares add up to 4. At that moment the normals differ by the
+weights that add up to 1, and all weights add up to 4. At that moment the normals differ by the
 tilt of the faces against each other, as they do for rigid boxes; depths differ by its square.
 """
 
@@ -36,10 +36,10 @@ from mbsim.geometry.crossing import (
     EDGES_MEET,
     FACE_OF_I,
     FACE_OF_J,
-    LEAST_SHARE,
+    LEAST_WEIGHT,
     middle_of_lines,
-    share_of_crossing,
     turning,
+    weight_of_crossing,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.geometry.region import polygon_area
@@ -192,7 +192,7 @@ def _edge_normal(u: V3, e: V3, n: V3) -> V3:
     g = cross(u, e)
     square = dot(g, g)
     if square <= PARALLEL:
-        # edges that lie on each other have no share either
+        # edges that lie on each other have no weight either
         return n
     return scale((1.0 if dot(g, n) >= 0.0 else -1.0) / math.sqrt(square), g)
 
@@ -294,7 +294,7 @@ def _manifold(
         # the points of J's and I's surface that lie on each other
         on_j = (x, y, hj[kj])
         on_i = sub(on_j, scale(depth, way))
-        share, couple = 1.0, (0.0, 0.0, 0.0)
+        weight, couple = 1.0, (0.0, 0.0, 0.0)
         if before >= 4 and after >= 4:
             row = 8 + _corner_of_j(kj, sj, before - 4)
             # against I's face
@@ -322,16 +322,16 @@ def _manifold(
                 else (-1.0 if side == 1 else 1.0, 0.0, 0.0)
             )
             g = _edge_normal(u, e, way)
-            share, couple = share_of_crossing(
+            weight, couple = weight_of_crossing(
                 u, e, way, ends, (out_i, cross(out_i, u)), (out_j, cross(e, out_j)), turn
             )
             d = depth * dot(g, way)
             middle = middle_of_lines(on_i, u, e, g, scale(depth, way), d)
         before = after
-        if share <= LEAST_SHARE:
+        if weight <= LEAST_WEIGHT:
             continue
         p = add(vector(frame_j), _to_global(frame_j, middle, mj, oj, kj, sj))
-        put_point(points[row], d, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
+        put_point(points[row], d, p, _to_global(frame_j, g, mj, oj, kj, sj), weight)
         put_couple(points[row], _to_global(frame_j, couple, mj, oj, kj, sj))
     if not with_area:
         return 0.0

@@ -13,7 +13,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
 from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, axis, pair, put_point, region
-from mbsim.geometry.crossing import LEAST_SHARE
+from mbsim.geometry.crossing import LEAST_WEIGHT
 from mbsim.geometry.polyhedron import (
     CUBE,
     HULL_SLOTS,
@@ -28,9 +28,9 @@ from mbsim.model.hull import (
     AT_DATA,
     AT_LOOPS,
     AT_PLANES,
-    AT_SHARES,
     AT_SIDES,
     AT_STARTS,
+    AT_WEIGHTS,
     CORNERS,
     FACES,
     MOST_ROWS,
@@ -42,11 +42,11 @@ LEANS, LIES = 0.9945, 0.9994
 
 
 @jitable
-def _shares_of_patches(hull: F1, local: V3, points: F2) -> None:
-    """Fill the shares of the patches of a fine mesh over a plane of normal `local`.
+def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
+    """Fill the weights of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
-    lies, the deepest corner has a share of 1. Facets of a round surface are no sides.
+    lies, the deepest corner has a weight of 1. Facets of a round surface are no sides.
     """
     rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
@@ -75,7 +75,7 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
     """Every corner below the plane is a point; of a patch of corners its deepest one.
 
     A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
-    the whole force, unless a face lies flat (see `_shares_of_patches`).
+    the whole force, unless a face lies flat (see `_weights_of_patches`).
     """
     hull = floats_at(size_i[0], size_i[1])
     n = axis(frame_j, 2)
@@ -83,7 +83,7 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
     local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
     rows = int(hull[ROWS])
     corners, data = int(hull[AT_CORNERS]), int(hull[AT_DATA])
-    shares = int(hull[AT_SHARES])
+    weights = int(hull[AT_WEIGHTS])
     for row in range(rows):
         points[row, AT_DEPTH] = -math.inf
     for k in range(int(hull[CORNERS])):
@@ -93,15 +93,15 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
             # remember which corner; its place follows once
             points[row, AT_DEPTH], points[row, 1] = depth, k
     if int(hull[CORNERS]) > rows:
-        _shares_of_patches(hull, local, points)
+        _weights_of_patches(hull, local, points)
     else:
         for row in range(rows):
-            points[row, AT_WEIGHT] = hull[shares + row]
+            points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
         depth, k = points[row, AT_DEPTH], int(points[row, 1])
         p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
         put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
-        if points[row, AT_WEIGHT] <= LEAST_SHARE:
+        if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
             points[row, AT_DEPTH] = min(depth, 0.0)
     return rows

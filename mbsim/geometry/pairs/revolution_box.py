@@ -26,10 +26,10 @@ from mbsim.geometry.manifold import (
     crossing_of,
     disc_lies,
     line_lies,
-    line_share,
+    line_weight,
     put_apart,
     put_rim,
-    put_share,
+    put_weighted,
     segment_on_disc,
     share_with_one,
     side_faces,
@@ -167,7 +167,7 @@ def put_corners(
             depth = depth0 + rise * x
             p = add(centre, add(scale(x, u), scale(y, v)))
             p = add(p, scale(0.5 * depth, n))
-            put_share(work[2 * e + side], depth, p, n, weight * angle / TURN)
+            put_weighted(work[2 * e + side], depth, p, n, weight * angle / TURN)
 
 
 @jitable
@@ -287,12 +287,12 @@ def line_on_face(i: Shape, j: Shape, k: int, n: V3, f: float, points: F2) -> flo
     # a rim on an edge: which side of it rounding leaves a line on tells nothing
     if last - first <= 1e-9:
         return -1.0
-    share = line_share((last - first) * norm(way), widest(i[5]))
+    weight = line_weight((last - first) * norm(way), widest(i[5]))
     for row in range(2):
         s = first if row == 0 else last
         depth = depth_low + s * (depth_high - depth_low)
         p = add(add(low, scale(s, way)), scale(0.5 * depth, n))
-        put_point(points[row], depth, p, n, share)
+        put_point(points[row], depth, p, n, weight)
     rise = depth_high - depth_low
     return line_lies(first * rise, last * rise, f) * side_faces(n, out)
 
@@ -324,21 +324,21 @@ def side_on_edge(
         return -1.0
     if first >= last:
         return -1.0
-    share = line_share(last - first, widest(i[5]))
+    weight = line_weight(last - first, widest(i[5]))
     x0, x1 = add(q, scale(first, e)), add(q, scale(last, e))
     d0, n0 = side_distance(i, x0)
     d1, n1 = side_distance(i, x1)
     both = min(1.0, max(0.0, min(-d0, -d1) / max(f, 1e-300)))
     # row 0 is towards the bottom of the solid
     flip = rise < 0.0
-    put_share(points[1 if flip else 0], -d0, sub(x0, scale(0.5 * d0, n0)), scale(-1.0, n0),
-              share * both)  # fmt: skip
-    put_share(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
-              share * both)  # fmt: skip
+    put_weighted(points[1 if flip else 0], -d0, sub(x0, scale(0.5 * d0, n0)), scale(-1.0, n0),
+              weight * both)  # fmt: skip
+    put_weighted(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
+              weight * both)  # fmt: skip
     if both == 0.0:
         x0, x1 = sub(q, scale(half, e)), add(q, scale(half, e))
     x = add(x0, scale(crossing_of(low, high, x0, x1, n), sub(x1, x0)))
-    put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
+    put_weighted(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
     return side_faces(n, out)
 
 

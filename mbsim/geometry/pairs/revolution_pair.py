@@ -27,10 +27,10 @@ from mbsim.geometry.manifold import (
     crossing_of,
     disc_lies,
     fade,
-    line_share,
+    line_weight,
     put_apart,
     put_rim,
-    put_share,
+    put_weighted,
     segment_on_disc,
     share_with_one,
     turn_of,
@@ -242,12 +242,12 @@ def end_on_end(i: Shape, j: Shape, end_i: int, end_j: int, n: V3, f: float, poin
             if k == 0:
                 turn = turn_of(cy - y, x - cx, -y, x)
             middle = add(p, scale(0.5 * depth, n))
-            put_share(points[2 * ARC_ROWS + k], depth, middle, n, 3.0 * turn / TURN)
+            put_weighted(points[2 * ARC_ROWS + k], depth, middle, n, 3.0 * turn / TURN)
     return disc_lies(min(a[1], b[1]), norm(cross(a[2], b[2])), f)
 
 
 @jitable
-def put_ball(row: F1, i: Shape, j: Shape, x: V3, share: float) -> float:
+def put_ball(row: F1, i: Shape, j: Shape, x: V3, weight: float) -> float:
     """Write the contact of J's ball that touches its side from within at x, with the side of I."""
     inward, out = side_distance(j, x)
     # the ball's centre is where the normal at x meets the axis
@@ -260,7 +260,7 @@ def put_ball(row: F1, i: Shape, j: Shape, x: V3, share: float) -> float:
     distance, away = side_distance(i, centre)
     n = scale(-1.0, away)
     depth = radius - distance
-    put_share(row, depth, add(centre, scale(0.5 * (radius + distance), n)), n, share)
+    put_weighted(row, depth, add(centre, scale(0.5 * (radius + distance), n)), n, weight)
     return depth
 
 
@@ -285,22 +285,22 @@ def side_by_side(i: Shape, j: Shape, n: V3, f: float, points: F2) -> float:
     if first >= last:
         return -1.0
     # the smaller radius tells a line from a point
-    share = line_share(last - first, min(widest(i[5]), widest(j[5])))
+    weight = line_weight(last - first, min(widest(i[5]), widest(j[5])))
     x0, x1 = add(low_j, scale(first, t)), add(low_j, scale(last, t))
     d0 = put_ball(points[0], i, j, x0, 1.0)
     d1 = put_ball(points[1], i, j, x1, 1.0)
     both = min(1.0, max(0.0, min(d0, d1) / max(f, 1e-300))) * fade(1.0 - 10.0 * off)
     for row in range(2):
         points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
-        points[row, AT_WEIGHT] = share * both
-        if share * both < 1e-6:
+        points[row, AT_WEIGHT] = weight * both
+        if weight * both < 1e-6:
             points[row, AT_DEPTH] = -length
             points[row, AT_WEIGHT] = 1.0
     x = add(low_j, scale(length * crossing_of(low_i, high_i, low_j, high_j, n), t))
     if both > 0.0:
         # between the ends, also where the lines are so parallel that they cross nowhere
         x = add(x0, scale(crossing_of(low_i, high_i, x0, x1, n), sub(x1, x0)))
-    put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
+    put_weighted(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
     # where a rim presses it is the one point
     return fade(1.0 - 10.0 * off)
 
