@@ -80,6 +80,15 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     "Time, events and the deck's requests are always there.  [default: everything]",
 )
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
+@click.option(
+    "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
+)
+@click.option(
+    "--plugin-timeout",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="S",
+    help="End a call of an interpreted user function that takes longer.",
+)
 @click.option("--allow-overlap", is_flag=True, help="Start although shapes overlap deeply.")
 @click.option(
     "--dump-fclib",

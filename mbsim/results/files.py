@@ -100,14 +100,6 @@ class RunLock:
             self._handle = -1
 
 
-def free_memory() -> int | None:
-    """Return how many bytes of memory are free, None where the system does not say."""
-    try:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
-
-
 def prepare_directory(directory: Path, model_name: str) -> None:
     """Make the folder and see that result files can be written there.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.asked import Asked
 from mbsim.results.audit import Audit, to_attributes
@@ -17,7 +18,7 @@ from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
-from mbsim.results.files import free_memory, prepare_directory
+from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
 from mbsim.results.going_on import MADE_OF, check_same, digest
 from mbsim.results.identity import Identity

@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +52,15 @@ def _stoppable(runner: Runner) -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractContextManager[None]:
+    """Return what watches over users' functions while the run goes on, where there are some."""
+    if not (system.user_laws or system.subroutines or system.posts or system.residuals):
+        return nullcontext()
+    from mbsim.plugins.permission import limited
+
+    return limited(timeout, tell)
+
+
 def _parameters(system: System, settings: Settings) -> list[Parameters]:
     """Return the parameters of every stage where commands change elements, else nothing."""
     given = [stage.simulation.changes for stage in settings.stages]
@@ -79,6 +88,8 @@ def simulate(
     allow_overlap: bool = False,
     dump_fclib: int | None = None,
     signals: Sequence[str] = (),
+    scripts: bool = True,
+    plugin_timeout: float | None = None,
     progress: Progress | None = None,
     notify: Notify | None = None,
 ) -> Results:
@@ -113,6 +124,10 @@ def simulate(
     signals : sequence of str
         Names or patterns of what to record, ``bodies/2/position``, ``contacts/*/force``,
         ``joints``, beside time, events and requests; default: everything.
+    scripts : bool
+        False refuses a model that needs users' code, that of `plugins` included.
+    plugin_timeout : float, optional
+        Longest time of one call of an interpreted user function [s]; default: no bound.
     progress : callable, optional
         Called with time, step and end time [T] now and then.
     notify : callable, optional
@@ -125,6 +140,7 @@ def simulate(
     """
     from mbsim.compile_model.build import build
     from mbsim.core import jit
+    from mbsim.plugins.permission import no_scripts
     from mbsim.results.going_on import completed
     from mbsim.results.log import RunLog
     from mbsim.results.recorder import Recorder
@@ -146,7 +162,8 @@ def simulate(
     if resume and folder is not None and (whole := completed(model, folder, tell)) is not None:
         return whole
     said: list[str] = []
-    system = build(model, files, interpret_plugins, detector, said.append)
+    with no_scripts(not scripts):
+        system = build(model, files, interpret_plugins, detector, said.append)
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
     attributes = _attributes(system, settings, detector, files, interpret_plugins)
@@ -167,7 +184,7 @@ def simulate(
     status = "failed"
     runner = Runner(system, settings, recorder, log, tell, changes)
     try:
-        with _stoppable(runner):
+        with _stoppable(runner), _limited(system, plugin_timeout, tell):
             if resume:
                 runner.restore(recorder.checkpoint)
             else:
