@@ -168,7 +168,7 @@ def iterate_damped(p, m, t, h):
         if code != 0:
             return code
         note(m, size)
-        if size <= target(m.memory[TOL]):
+        if size <= target(m):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0
