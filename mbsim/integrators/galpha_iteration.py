@@ -171,7 +171,7 @@ def iterate_damped(p: Problem, m: Method, t: float, h: float) -> int:
         if code != 0:
             return code
         note(m, size)
-        if size <= target(m.memory[TOL]):
+        if size <= target(m):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0

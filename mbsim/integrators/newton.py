@@ -22,6 +22,8 @@ from mbsim.integrators.scheme import (
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     JACOBIANS,
+    LEFT,
+    LEFT_PART,
     REST,
     RETRY,
     TOL,
@@ -31,8 +33,6 @@ from mbsim.integrators.scheme import (
 
 # what `judge` says
 GO_ON, SOLVED, HOPELESS = range(3)
-#: What is left unsolved of a step's equations may be this part of its error, or less.
-LEFT = 0.03
 #: A step's velocities may be off by this part of its error for what f at its end is not.
 OFF = 0.2
 #: No correction need be smaller than this.
@@ -44,9 +44,10 @@ HALF, QUARTER = 0.5, 0.25
 
 
 @jitable
-def target(tol: float) -> float:
+def target(m: Method) -> float:
     """Return how large what is left may be, in the norm of the error."""
-    return max(ROUNDING, tol * min(LEFT, math.sqrt(tol)))
+    tol = m.memory[TOL]
+    return max(ROUNDING, tol * min(m.memory[LEFT_PART], math.sqrt(tol)))
 
 
 @jitable
@@ -138,7 +139,7 @@ def judge(
     step's error, is rounding. Only the second correction may be larger than the first, by less than
     `late`.
     """
-    goal = target(m.memory[TOL])
+    goal = target(m)
     note(m, size)
     if not size < math.inf:
         m.memory[RETRY] = QUARTER

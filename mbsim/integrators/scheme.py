@@ -84,12 +84,16 @@ VAIN = 48
 BEGUN_WORK, RELUCTANCE = range(49, 51)
 # 1 where the step that was tried last was cut at a switch
 SWITCH_CUT = 51
-MEMORY = 52
+# what Newton's iteration may leave unsolved, as a part of a step's error
+LEFT_PART = 52
+MEMORY = 53
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
 COUNTS = 11
+#: What is left unsolved of a step's equations may be this part of its error, or less.
+LEFT = 0.03
 
 
 class Scheme(NamedTuple):
@@ -158,6 +162,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
+    memory[LEFT_PART] = LEFT
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
     counts = np.zeros(COUNTS, dtype=np.int64)
     counts[NEXT_WATCH] = np.iinfo(np.int64).max  # nobody watches

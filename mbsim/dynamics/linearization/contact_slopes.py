@@ -317,8 +317,12 @@ def add_contact_slopes(  # noqa: C901
     if contacts.rigid[c] == 1:
         slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
         counts = min(1.0, slow / (SLOW * scene.world.scale[SCALE_SPEED]))
+    # bristles that are damped rub by more than what presses as that falls to 0: velocities that
+    # differ by rounding then change friction by much of it
+    force = vector(work.slot[s, FORCE : FORCE + 3])
+    pressed = max(given[5], math.hypot(dot(force, tx), dot(force, ty)))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2] / given[5] if given[5] > 0.0 else 0.0
+        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[5] > 0.0 else 0.0
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]
