@@ -84,7 +84,9 @@ VAIN = 48
 BEGUN_WORK, RELUCTANCE = range(49, 51)
 # 1 where the step that was tried last was cut at a switch
 SWITCH_CUT = 51
-MEMORY = 52
+# of AUTO: 1 once explicit steps are to stay within the bound of stability
+BOUNDED = 52
+MEMORY = 53
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
