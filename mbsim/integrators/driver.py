@@ -35,7 +35,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import ask_switching
-from mbsim.integrators.changing import changes_over
+from mbsim.integrators.changing import changes_over, stay_within
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -46,6 +46,7 @@ from mbsim.integrators.control import (
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
+    BOUNDED,
     CHANGE_DUE,
     CODE,
     CORRECTION,
@@ -442,6 +443,8 @@ def advance(  # noqa: C901
             m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
+        if m.memory[BOUNDED] == 1.0 and not steps.implicit:
+            stay_within(m, most, uncut)
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
         arrive_at(m, t, h, h < whole and h == m.memory[HORIZON] - t, t_end)

@@ -86,7 +86,9 @@ BEGUN_WORK, RELUCTANCE = range(49, 51)
 SWITCH_CUT = 51
 # what Newton's iteration may leave unsolved, as a part of a step's error
 LEFT_PART = 52
-MEMORY = 53
+# of AUTO: 1 once explicit steps are to stay within the bound of stability
+BOUNDED = 53
+MEMORY = 54
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -392,7 +392,7 @@ class Runner:
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run; seconds in all, and of these for compiling."""
-        found = statistics.counters(self.system.scene, self.method, self.methods.changes)
+        found = statistics.counters(self.system.scene, self.methods)
         halted = self.sensing.halted_by
         seconds = {"loop_s": self.loop_seconds, "wall_s": wall, "compile_s": compiled}
         return {**found, **seconds, **({"halted_by_sensor": halted} if halted else {})}

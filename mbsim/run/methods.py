@@ -82,12 +82,21 @@ class Methods:
         self.changes = 0
         #: When AUTO changed over last, and the work by then.
         self._since = (start, 0.0)
+        #: Evaluations by AUTO's implicit method before that, and all of them by then.
+        self._spent = (0, 0)
         self.bind()
 
     @property
     def is_stiff(self) -> bool:
         """Whether AUTO's implicit method runs."""
         return bool(self.arrays.memory[scheme.STIFF] == 1.0)
+
+    @property
+    def implicit_evaluations(self) -> int:
+        """How many of the evaluations so far an implicit method took."""
+        before, since = self._spent
+        now = int(self.arrays.counts[scheme.EVALUATIONS])
+        return before + (now - since if self.steps.implicit else 0)
 
     def bind(self) -> None:
         """Bind the method that memory names."""
@@ -109,7 +118,11 @@ class Methods:
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""
-        kept: dict[str, Any] = {"changes": np.array(self.changes), "since": np.array(self._since)}
+        kept: dict[str, Any] = {
+            "changes": np.array(self.changes),
+            "since": np.array(self._since),
+            "spent": np.array(self._spent),
+        }
         if self.steps.implicit:
             kept |= tangent.saved(self._tangent[0])
         return kept
@@ -118,6 +131,7 @@ class Methods:
         """Bind the method that ran, whose arrays are as they were, to what it kept."""
         self.changes = int(kept["changes"])
         self._since = (float(kept["since"][0]), float(kept["since"][1]))
+        self._spent = (int(kept["spent"][0]), int(kept["spent"][1]))
         self.bind()
         if self.steps.implicit:
             tangent.restore(self._tangent[0], kept)
@@ -154,6 +168,7 @@ class Methods:
         """Let AUTO's other method go on from the committed point; return what is to be said."""
         memory, counts = self.arrays.memory, self.arrays.counts
         stiff = not self.is_stiff
+        self._spent = (self.implicit_evaluations, int(counts[scheme.EVALUATIONS]))
         bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0
