@@ -85,7 +85,7 @@ def evaluate_past(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     scene.world.past[0] = WITHIN
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
-    code = evaluate(scene, t, h, y, dy)
+    code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, h, y, dy))
     if code == 0 and scene.world.hooks[Hook.STICKING] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, y)))
     scene.world.past[0] = NOW

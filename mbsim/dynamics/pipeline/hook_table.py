@@ -155,8 +155,8 @@ def _reaction_forces(scene: Scene) -> Callable[..., Any]:
     return settle if len(scene.applied.by_reactions) > 0 else rub
 
 
-def _has_switching(scene: Scene, method: Method) -> bool:
-    return len(scene.switching.program) > 0 and scene.world.fixed_step[0] == 0
+def _always(scene: Scene, method: Method) -> bool:
+    return True
 
 
 def _evaluate(scene: Scene) -> Callable[..., Any]:
@@ -330,9 +330,9 @@ TABLE = (
     Row(
         Hook.EVALUATE,
         HOOK,
-        _has_switching,
+        _always,
         _evaluate,
-        "evaluates y' at a point that is no step's, to see what branch forces are on there",
+        "evaluates y' at a point that is no step's: of a row, within one, of another branch",
     ),
     # linearisation
     Row(
