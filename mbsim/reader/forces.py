@@ -155,7 +155,7 @@ FORCE_SCALAR_TWOBODY = Statement(
         "action_only": Spec(FLAG, "nothing acts on J", "", "FALSE"),  # ours; Adams' ACTIONONLY
     },
     _build_scalar,
-    about="a force along the line of two markers, or a torque, by an expression",
+    about="a force along a line or a torque, by an expression",
 )
 
 

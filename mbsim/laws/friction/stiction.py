@@ -1,4 +1,4 @@
-"""STICTION: Coulomb friction that holds, by a spring between the surfaces that slips at its limit.
+"""STICTION: Coulomb friction that holds, by a spring that slips at its limit.
 
 z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
 
