@@ -11,7 +11,6 @@ from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import Problem
 from mbsim.integrators.newton import (
     GO_ON,
-    LEFT,
     OFF,
     QUARTER,
     SOLVED,
@@ -33,6 +32,7 @@ from mbsim.integrators.scheme import (
     FRESH,
     HAVE_JACOBIAN,
     LAST_STEP,
+    LEFT,
     RATE,
     RETRY,
     TOL,
