@@ -87,7 +87,8 @@ def item(text: str) -> list[str]:
 def reference(page: Page, name: str, text: str = "") -> str:
     """Return `text` as a link to the page `name`, as code alone where there is no such page."""
     text = text or f"`{name}`"
-    found = named(name)
+    # other chapters may have a page of that name too
+    found = sorted(named(name), key=lambda each: not each.name.startswith("reference/"))
     return f"[{text}]({link_between(page.name, found[0].name)})" if found else text
 
 
