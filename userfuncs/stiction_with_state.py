@@ -13,7 +13,8 @@ the stretch is slip (return mapping):
 Why X alone cannot do it: X says where the surfaces are, not how they came there. A force
 -clip(k X, mu N) is that of a spring of limited strength: after a reversal it goes on pulling
 towards X = 0, along the motion, and gives back all that it took. Friction turns against the new
-motion at once, so that it has to know how far it had slipped. See `mbsim manual friction-with-memory`.
+motion at once, so that it has to know how far it had slipped; see
+`mbsim manual friction-with-memory`.
 """
 
 CFFSUB_STATES = 4  # stretch x, y; X and Y then

@@ -50,8 +50,9 @@ class Commands(click.Group):
         except MbsimError as error:
             for line in _messages(error):
                 click.echo(f"mbsim: error: {line}", err=True)
-            for name in pages_of(error):
-                click.echo(f"mbsim: see: mbsim manual {name}", err=True)
+            if pages := pages_of(error):
+                line = "; ".join(f"mbsim manual {page}" for page in pages)
+                click.echo(f"mbsim: see: {line}", err=True)
             ctx.exit(error.exit_code)
         except BrokenPipeError:
             # whoever read our output has seen enough; nothing is left to flush to it

@@ -20,8 +20,8 @@ import click
 def command(topic: tuple[str, ...], listed: bool, file: Path | None) -> None:
     """Show the page of TOPIC: a page's name, words of its title, or words to search for.
 
-    Where several pages have the words they are listed, the best first. Without TOPIC the first
-    page is shown, which says where to find what.
+    Where no page has that name and several have the words, they are listed, the best first.
+    Without TOPIC the first page is shown, which says where to find what.
     """
     from mbsim.errors import ModelError
     from mbsim.manual import book, search
@@ -42,9 +42,13 @@ def command(topic: tuple[str, ...], listed: bool, file: Path | None) -> None:
         terminal.show_page(book.page_of(book.INDEX))
         return
     hits = search.search(words)
-    found = book.named(words) or search.titled(words)
-    if len(found) == 1 or (not found and len(hits) == 1):
-        terminal.show_page(found[0] if found else hits[0].page, hits)
+    found = book.named(words)
+    if not found and len(titled := search.titled(words)) == 1:
+        found = titled
+    if not found and len(hits) == 1:
+        found = [hits[0].page]
+    if found:
+        terminal.show_page(found[0], [*found, *(hit.page for hit in hits)])
     elif hits:
         terminal.show_hits(words, hits)
     else:

@@ -138,19 +138,24 @@ def pages() -> dict[str, Page]:
 
 
 def _follow(found: dict[str, Page], index: str, ordered: list[str]) -> None:
-    """Add an index page, and the pages of its own folder in the order of its links."""
+    """Add an index page, and its folder's pages in the order of links, the first page's before."""
     if index not in found or index in ordered:
         return
     ordered.append(index)
     folder = posixpath.dirname(index)
-    for _, link in found[index].links():
-        if "://" in link:
-            continue
-        name, _ = found[index].target(link)
+    for name in (*_linked(found, INDEX), *_linked(found, index)):
         if posixpath.basename(name) == INDEX and name.startswith(folder + "/"):
             _follow(found, name, ordered)
         elif name in found and posixpath.dirname(name) == folder and name not in ordered:
             ordered.append(name)
+
+
+def _linked(found: dict[str, Page], index: str) -> list[str]:
+    """Return the names that the links of an index page lead to, in their order."""
+    if index not in found:
+        return []
+    links = [link for _, link in found[index].links() if "://" not in link]
+    return [found[index].target(link)[0] for link in links]
 
 
 def _insert(ordered: list[str], name: str) -> None:

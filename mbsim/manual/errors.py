@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from mbsim.errors import Interrupted, MbsimError, PluginError, SolverError
+from mbsim.errors import MbsimError, PluginError, SolverError
 from mbsim.manual.book import PAGES
 
 #: What is told of errors that name no element with a page, by class: the file of a page.
 _BY_CLASS: dict[type[MbsimError], str] = {
     SolverError: "start/questions",
     PluginError: "reference/subroutines/index",
-    Interrupted: "reference/commands/run",
 }
 _STATEMENT = re.compile(r"\b([A-Z][A-Za-z]+_[A-Z][A-Za-z]+|Simulate|Stop)\b")
 #: Elements of Adams decks, which have no underscore: `PART/2`, `SFORCE[3]`.

@@ -38,6 +38,8 @@ _UP = dict(zip("0123456789+-=()nijkTxyz", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻⁼�
 _DOWN = dict(
     zip("0123456789+-=()aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉₊₋₌₍₎ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ", strict=True)
 )
+#: One symbol with a prime, as latex2mathml writes it.
+_PRIME = re.compile(r"<msup>(<mi>[^<]*</mi>)<mi>&#x02032;</mi></msup>")
 _ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}")
 
 
@@ -64,7 +66,9 @@ def to_mathml(block: str) -> str:
     """Return the formulas of a block as MathML, one display each."""
     from latex2mathml.converter import convert
 
-    return "\n".join(convert(formula, display="block") for formula in formulas(block))
+    found = "\n".join(convert(formula, display="block") for formula in formulas(block))
+    # a prime is raised by its own shape; as an index it would be lost above the line
+    return _PRIME.sub(r"<mrow>\1<mo>&#x02032;</mo></mrow>", found)
 
 
 def to_text(block: str) -> str:

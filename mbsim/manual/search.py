@@ -11,6 +11,9 @@ from mbsim.manual.book import Page, pages, plain
 _TITLE, _HEADING, _ROW, _TEXT = 40.0, 12.0, 6.0, 1.0
 _MOST = 8  # times that a word in the text counts
 _PART = 0.4  # of what a part of a longer word counts
+_TOGETHER = 60.0  # for a heading that has all words, where there are several
+#: Words that say nothing of a topic.
+_EMPTY = set("a an and are as at by do does for from how i in is it my of on the to what".split())
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class Hit:
 
 def words_of(topic: str) -> list[str]:
     """Return the words of a question, folded."""
-    return [word for word in re.split(r"[^\w.\-/]+", topic.lower()) if word]
+    words = [word for word in re.split(r"[^\w.\-/]+", topic.lower()) if word]
+    return [word for word in words if word not in _EMPTY] or words
 
 
 def titled(topic: str) -> list[Page]:
@@ -58,8 +62,11 @@ def _weight(word: str, text: str) -> float:
 def _hit(page: Page, words: list[str]) -> Hit | None:
     """Return what a page has of the words."""
     score = sum(_TITLE * _weight(word, page.title.lower()) for word in words)
-    for heading in page.headings[1:]:
-        score += sum(_HEADING * _weight(word, heading.text.lower()) for word in words)
+    for heading in page.headings:
+        weights = [_weight(word, heading.text.lower()) for word in words]
+        score += _HEADING * sum(weights) * (heading.level > 1)
+        if len(words) > 1 and all(weight == 1.0 for weight in weights):
+            score += _TOGETHER
     best, line, number = 0.0, "", 0
     counted = dict.fromkeys(words, 0.0)
     for k, text in enumerate(page.text.splitlines(), 1):
@@ -71,7 +78,7 @@ def _hit(page: Page, words: list[str]) -> Hit | None:
                 head = text.startswith(("|", "-")) and word in folded[: len(word) + 6]
                 here += weight * (_ROW if head else _TEXT)
                 counted[word] = min(_MOST, counted[word] + weight * (_ROW if head else _TEXT))
-        if here > best and not text.startswith("# "):
+        if here > best and not text.startswith(("# ", "<!--")):
             best, line, number = here, text, k
     score += sum(counted.values())
     if not score:

@@ -15,16 +15,16 @@ from mbsim.manual.markdown import for_terminal
 from mbsim.manual.search import Hit
 
 _WIDEST = 110  # columns; longer lines are hard to read
-_OTHERS = 5  # pages named under one that was found by a word
+_OTHERS = 4  # pages named above one that was found by a word
 _SHOWN = 20
 
 
-def show_page(page: Page, others: Sequence[Hit] = ()) -> None:
-    """Print a page; `others` are named below it."""
+def show_page(page: Page, others: Sequence[Page] = ()) -> None:
+    """Print a page; `others` are named above it."""
     parts: list[RenderableType] = [Markdown(for_terminal(page), hyperlinks=False)]
-    also = [hit.page.short for hit in others if hit.page != page][:_OTHERS]
+    also = list(dict.fromkeys(other.name for other in others if other != page))[:_OTHERS]
     if also:
-        parts.append(Text(f"\nAlso in: {', '.join(also)}", style="dim"))
+        parts.insert(0, Text(f"{page.name}; see also {', '.join(also)}\n", style="dim"))
     _print(parts)
 
 
@@ -33,7 +33,7 @@ def show_hits(topic: str, hits: Sequence[Hit]) -> None:
     parts: list[RenderableType] = [Text(f"{len(hits)} pages have {topic!r}; the best first:\n")]
     for hit in hits[:_SHOWN]:
         parts.append(_entry(hit.page))
-        parts.append(Text(f"    {hit.line}", style="dim", overflow="ellipsis", no_wrap=True))
+        parts.append(Text(f"    {hit.line}", style="dim"))
     if len(hits) > _SHOWN:
         parts.append(Text(f"... and {len(hits) - _SHOWN} more"))
     _print(parts)
@@ -45,7 +45,7 @@ def show_list() -> None:
 
 
 def _entry(page: Page) -> Text:
-    return Text.assemble((page.name, "bold"), f"  {page.title}", overflow="ellipsis", no_wrap=True)
+    return Text.assemble((page.name, "bold"), f"  {page.title}")
 
 
 def _print(parts: Sequence[RenderableType]) -> None:
@@ -57,4 +57,7 @@ def _print(parts: Sequence[RenderableType]) -> None:
     paged = sys.stdout.isatty() and lines > console.height
     with console.pager(styles=True) if paged else nullcontext():
         for part in parts:
-            console.print(part)
+            if isinstance(part, Text):
+                console.print(part, no_wrap=True, overflow="ellipsis")
+            else:
+                console.print(part)

@@ -83,7 +83,7 @@ def simulate(
         A name of `integrators.catalog.METHODS`; default: the deck's, else "AUTO", DOPRI5 and RADAU5
         while the model is stiff.
     tol : float, optional
-        Local error of a step, dimensionless (manual, error control); default: the deck's, else 1e-5,
+        Local error of a step, dimensionless (manual: tolerance); default: the deck's, else 1e-5,
         of Adams decks 1e-8.
     plugins : sequence of path
         Files with user subroutines.

@@ -1,4 +1,4 @@
-"""Errors of decks of `models/` against their references, as the manual lists them (trust/verification).
+"""Errors of decks of `models/` against their references, as the manual lists them.
 
 python -m pytest -m bench -s tests/bench/test_model_errors.py
 """

@@ -16,7 +16,7 @@ from mbsim.geometry.catalog import COUPLE, PAIRS
 #: Step of the differences, as a length and an angle; their error is some 1e-16 / STEP + STEP^2.
 STEP = 1e-6
 LEVER = 0.3
-#: Pairs whose patches of several points have no potential (manual, limits), alone where they touch at one.
+#: Pairs whose patches of several points have no potential, alone where they touch at one.
 PATCHES = ("CYLINDER-BOX", "FRUSTUM-BOX", "CYLINDER-CYLINDER", "FRUSTUM-CYLINDER")
 PATCHES += ("FRUSTUM-FRUSTUM",)
 

@@ -152,7 +152,7 @@ class Folder:
 
     def _console(self, block: Block, where: str) -> None:
         asked = commands(block)
-        mark = f'printf "\\n{_MARK}%d{_MARK}\\n" $?'
+        mark = f'code=$?; printf "\\n{_MARK}%d{_MARK}\\n" $code; (exit $code)'
         script = "".join(f"{each.text}\n{mark}\n" for each in asked)
         _, printed = self._execute(["bash", "-s"], script)
         pieces = re.split(f"\n{_MARK}(\\d+){_MARK}\n", printed)

@@ -191,10 +191,13 @@ def test_a_statement_is_described(statement):
 @pytest.mark.parametrize("statement", STATEMENTS, ids=lambda each: each.name)
 def test_a_statement_has_its_page(statement):
     name = f"reference/statements/{statement.name.lower()}"
-    if statement.note and not statement.attributes:
-        pytest.skip("it sets nothing: the table of statements says so")
-    assert name in pages()
-    assert f"<!-- table: attributes {statement.name} -->" in pages()[name].text
+    if name not in pages():  # several that set nothing have one page
+        assert statement.note
+        assert not statement.attributes
+        others = [p for p in pages().values() if p.name.startswith("reference/statements/")]
+        assert any(f"`{statement.name}`" in page.text for page in others)
+    elif statement.attributes:
+        assert f"<!-- table: attributes {statement.name} -->" in pages()[name].text
 
 
 @pytest.mark.parametrize("function", FUNCTIONS.values(), ids=lambda each: each.name)

@@ -116,7 +116,8 @@ def test_every_page_is_linked():
 
 
 def test_no_page_speaks_of_the_readme(page):
-    assert not re.search(r"README", page.text) or page.name.startswith("develop/")
+    said = page.name.startswith("develop/") or page.name == "changelog"
+    assert said or not re.search(r"README", page.text)
 
 
 def test_formulas_as_text():

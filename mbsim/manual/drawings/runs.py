@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import importlib
+import importlib.util
 import re
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from mbsim.errors import ModelError
 from mbsim.manual.book import PAGES
 
 MODELS = stiff.folder().parent
-_TESTS = Path(__file__).parents[3] / "tests"
+_REFERENCES = Path(__file__).parents[3] / "tests" / "helpers" / "reference.py"
 
 
 @functools.cache
@@ -42,10 +41,14 @@ def of_model(name: str, **settings: Any) -> Any:
     return mbsim.simulate(mbsim.read_model(MODELS / name), **settings)
 
 
+@functools.cache
 def references() -> Any:
-    """Return the tests' references (module `helpers.reference`): a checkout has them."""
-    if not _TESTS.is_dir():
+    """Return the module of the tests' references; a checkout has it."""
+    if not _REFERENCES.is_file():
         raise ModelError("references of decks are in the source folder's tests/")
-    if str(_TESTS) not in sys.path:
-        sys.path.insert(0, str(_TESTS))
-    return importlib.import_module("helpers.reference")
+    spec = importlib.util.spec_from_file_location("references_of_decks", _REFERENCES)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

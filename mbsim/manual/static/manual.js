@@ -80,8 +80,11 @@
         return sum + 40 * Math.min(1, times(each.title, word)) + 12 * Math.min(2, times(each.heads, word))
           + Math.min(8, times(each.low, word));
       }, 0);
+      const together = words.length > 1 && each.heads.split("\n").some(function (head) {
+        return words.every(function (word) { return head.includes(word); });
+      });
       const all = words.every(function (word) { return each.low.includes(word); });
-      return { each: each, score: all ? score : 0 };
+      return { each: each, score: all ? score + (together ? 60 : 0) : 0 };
     }).filter(function (hit) { return hit.score > 0; });
     hits.sort(function (a, b) { return b.score - a.score; });
     hits.slice(0, 30).forEach(function (hit) { found.appendChild(entry(hit.each, words[0])); });

@@ -60,7 +60,7 @@ def commands(_: str, page: Page) -> list[str]:
         ("command", "what it does"),
         (
             (
-                reference(page, name, f"`mbsim {name}`"),
+                reference(page, f"reference/commands/{name.split()[0]}", f"`{name}`"),
                 first_sentence((command.help or "").replace("<model>", "MODEL")),
             )
             for name, command in commands_of(program()).items()
