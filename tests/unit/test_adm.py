@@ -391,11 +391,11 @@ def test_a_name_that_only_ends_alike_is_not_suggested(tmp_path: Path) -> None:
         read(tmp_path, added("SOLVER/1"))
 
 
-def test_readme_has_a_deck_that_is_read(tmp_path: Path) -> None:
-    readme = ROOT / "README.md"
-    blocks = readme.read_text(encoding="utf-8").split("```")
+def test_the_manual_has_a_deck_that_is_read(tmp_path: Path) -> None:
+    page = ROOT / "mbsim" / "manual" / "pages" / "reference" / "adams.md"
+    blocks = page.read_text(encoding="utf-8").split("```")
     (text,) = [block for block in blocks if "a pendulum; the first line" in block]
-    model = read(tmp_path, text.lstrip("\n"))
+    model = read(tmp_path, text.partition("\n")[2])
     assert (list(model.joints), list(model.requests)) == ([1], [1, 2])
     assert model.requests[1].comment == "where the bob is"
 

@@ -161,10 +161,11 @@ def test_a_run_goes_on_with_it(tmp_path, monkeypatch):
         np.testing.assert_array_equal(resumed["bodies/2/position"], straight["bodies/2/position"])
 
 
-def test_the_function_of_the_readme_is_compiled(tmp_path):
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_function_of_the_manual_is_compiled(tmp_path):
+    page = ROOT / "mbsim" / "manual" / "pages" / "reference" / "subroutines" / "cnfsub.md"
+    text = page.read_text(encoding="utf-8")
     body = text[text.index("def CNFSUB(") :]
-    (tmp_path / "readme.py").write_text(body[: body.index("```")])
+    (tmp_path / "manual.py").write_text(body[: body.index("```")])
     said = []
-    run_deck(tmp_path, dropped(**USER, script_name="readme.py"), 0.4, notify=said.append)
-    assert "Force_Contact[301]: CNFSUB of readme.py, compiled" in said
+    run_deck(tmp_path, dropped(**USER, script_name="manual.py"), 0.4, notify=said.append)
+    assert "Force_Contact[301]: CNFSUB of manual.py, compiled" in said

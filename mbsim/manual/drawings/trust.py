@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import mbsim
 from mbsim.bench import stiff
 from mbsim.manual.drawings import runs
 from mbsim.manual.pictures import picture
+from mbsim.model.placement import place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
 Reference = Callable[[Any, Any], Any]
 #: Points drawn of a reference and of a run, in each of many panels.
-_DOTS, _LINE = 12, 80
+_DOTS, _LINE = 12, 70
 
 
 def _compare(axes: Axes, title: str, run: Any, signal: Any, reference: Any) -> None:
@@ -164,6 +166,67 @@ def more(figure: Figure) -> None:
         x = run["bodies/2/position/x"] * np.sqrt(2.0)
         exact = _only(run["time"], {float(run["time"][-1]): 5e-5})
         _compare(axes, f"{deck}: comes to rest at [m]", run, x, exact)
+
+
+@picture("verification-others.svg", height=7.2)
+def others(figure: Figure) -> None:
+    """Draw the ten decks that are left."""
+    known = runs.references()
+    panels = _grid(figure, 10)
+
+    run = runs.of_model("mesh_on_plane.xml")
+    mass = place(mbsim.read_model(runs.MODELS / "mesh_on_plane.xml")).bodies[2].mass
+    exact = known.drop_height(run["time"], 0.2, 0.1, mass, 1e6, 1.5, 100.0, 1e-3)
+    _compare(panels[0], "mesh_on_plane: height [m]", run, run["bodies/2/position/z"], exact)
+
+    run = runs.of_model("ellipsoid_on_box.xml")
+    exact = known.drop_height(run["time"], 0.18, 0.08, 3.0, 1e6, 1.5, 100.0, 1e-3)
+    _compare(panels[1], "ellipsoid_on_box: height [m]", run, run["bodies/2/position/z"], exact)
+
+    run = runs.of_model("chain_on_box.xml")
+    angles, law = np.radians([10.0, -20.0, 35.0]), (1e5, 1.5, 20.0, 1e-3)
+    nodes = known.falling_chain(run["time"], np.array([-0.4, 0.5]), angles, 0.3, 0.2, 0.03, law)
+    middle = (nodes[:, 1, 1] + nodes[:, 2, 1]) / 2
+    _compare(panels[2], "chain_on_box: link 2 [m]", run, run["bodies/3/position/z"], middle)
+
+    run = runs.of_model("sphere_pair.xml")
+    v = run["bodies/1/velocity/x"]
+    _compare(panels[3], "sphere_pair: speed [m/s]", run, v, _between(run, v[0], [-10.0]))
+
+    run = runs.of_model("contensou_disc.xml")
+    slip = np.linalg.norm(run["bodies/2/velocity"][:, :2], axis=1)
+    rim = 0.1 * np.abs(run["bodies/2/angular_velocity"][:, 2])
+    late = slip + rim < 3e-3
+    exact = np.where(np.arange(len(slip)) == int(np.argmax(late)), 0.6530017892, np.nan)
+    ratio = np.where(late.cumsum() <= 1, slip / np.maximum(rim, 1e-12), np.nan)
+    _compare(panels[4], "contensou_disc: v/(R w)", run, ratio, exact)
+
+    run = runs.of_model("free_top.xml")
+    q = run["bodies/2/quaternion"]
+    end = known.top_attitude((0.010, 0.020, 0.025), (0.01, 10, 0.02), 10, 300)
+    exact = _only(run["time"], {float(run["time"][-1]): float(end[0] * np.sign(end @ q[-1]))})
+    _compare(panels[5], "free_top: w of the attitude", run, q[:, 0], exact)
+
+    run = runs.of_model("cam_roller.xml", end_time=0.05)
+    law, rub = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    sizes = (20 * np.pi, 0.01, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23))
+    exact = known.roller_follower(run["time"], *sizes, law, rub, 0.0299757)[0]
+    _compare(panels[6], "cam_roller: height [m]", run, run["bodies/4/position/z"], exact)
+
+    farthest = {"belt_stick_slip": 1.0385164807, "belt_weakening": 1.133943658}
+    for axes, (deck, exact) in zip(panels[7:9], farthest.items(), strict=True):
+        run = runs.of_model(f"{deck}.xml")
+        x = run["bodies/2/position/x"]
+        top = _only(run["time"], {float(run["time"][np.argmax(x)]): exact})
+        _compare(axes, f"{deck}: farthest [m]", run, x, top)
+
+    run = runs.of_model("geneva.xml", end_time=1.0)
+    t, a, r, q = run["time"], 0.1, 0.1 / np.sqrt(2), run["bodies/3/quaternion"]
+    crank = np.mod(2 * np.pi * t + np.pi / 2, 2 * np.pi) - np.pi
+    rigid = np.arctan2(r * np.sin(crank), a - r * np.cos(crank)) + np.pi / 4
+    rigid = np.where(np.abs(crank) < np.pi / 4, rigid + np.floor(t + 1e-12) * np.pi / 2, np.nan)
+    angle = np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))
+    _compare(panels[9], "geneva: wheel [rad]", run, angle, rigid)
 
 
 @picture("verification-mechanisms.svg", height=4.6)
