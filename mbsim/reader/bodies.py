@@ -154,7 +154,7 @@ def _build_marker(entry: Entry) -> None:
 
 
 def _about_inertia(name: str) -> str:
-    a, b = name[-2:]
+    a, b = name[-2], name[-1]
     if a == b:
         return f"moment of inertia about the centre of mass, along {a} of im_id"
     return f"integral of {a} {b} dm"
