@@ -7,7 +7,7 @@ MbsimError
 ├── PluginError       4  a user subroutine failed while the run went on
 ├── ResultsError      5  results could not be written
 │   └── UnknownSignal 2  a name that a result file does not have
-└── Interrupted     130  the user stopped the run; results up to there are kept
+└── Interrupted     130  Ctrl-C (143: SIGTERM, 129: SIGHUP); results up to there are kept
 """
 
 from __future__ import annotations
@@ -78,6 +78,17 @@ class UnknownSignal(ResultsError):
 
 
 class Interrupted(MbsimError):
-    """The user stopped the run; everything recorded so far is kept."""
+    """A signal stopped the run; everything recorded so far is kept.
+
+    Parameters
+    ----------
+    message : str
+    signal : int
+        Its number; the exit code is 128 more, as a shell has it.
+    """
 
     exit_code = 130
+
+    def __init__(self, message: str, signal: int = 2) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + signal

@@ -47,7 +47,7 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 # entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 
-# second column of `Applied.late`: components 0 to 5 of a vector force, then
+# second column of `Applied.by_reactions`: components 0 to 5 of a vector force, then
 SCALAR, JOINT_FRICTION = 6, 7
 
 # what of a joint's rotation is free: `Tree.turn`
@@ -166,7 +166,7 @@ NOW, WITHIN, AGAIN = range(3)
 # columns of `Rows.incidents`: what was found, and what the force on it followed from besides y
 INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10, 13
 (
-    INC_SHARE,  # part of the normal force that this point has
+    INC_WEIGHT,  # part of the normal force that this point has
     INC_STEP,  # `h` of the evaluation
     INC_FROZEN,  # whether friction kept its mode
     INC_TOUCHES,  # points of its pair at the committed state
@@ -181,8 +181,11 @@ INC_COUPLE, INC_MEMORY = 21, 24
 #: xx, xy, yy (see geometry.catalog).
 INC_REGION = 4
 #: Of these, where friction is rigid: what holds along x and y, see laws.friction.stiction.
-INC_HELD = INC_MEMORY + 3
+INC_STICKING = INC_MEMORY + 3
 
+
+# entries of `Work.best`, of a pair: contact, energy at touch, the force behind it, inverse mass
+BEST_CONTACT, BEST_ENERGY, BEST_FORCE, BEST_INVERSE = range(4)
 
 # entries of `World.scale`
 SCALE_LENGTH, SCALE_SPEED, SCALE_ENERGY, TOLERANCE = range(4)

@@ -10,8 +10,12 @@ and the hook that an integrator called returns it.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 from mbsim.core.jitable import jitable
+
+if TYPE_CHECKING:
+    from mbsim.arrays.scene import Scene
 
 
 class Hook(IntEnum):
@@ -24,8 +28,8 @@ class Hook(IntEnum):
     WRENCH = 4  # a bushing or a vector force
     ELEMENT = 5  # a Force_Element by its residual
     JOINTS = 6  # what joints are asked for: `Joints`
-    HELD = 7  # contacts whose friction holds without give: `Held`
-    LATE = 8  # forces that follow from reactions: friction in joints, expressions of them
+    STICKING = 7  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 8  # forces by reactions: friction in joints, expressions of them
     EVALUATE = 9  # the whole rhs
     TANGENT = 10  # no hook: where the packed arrays of `compile_model.tangent` are
     BEND = 11  # how forces of equations turn with the bodies
@@ -60,7 +64,7 @@ class Dry(IntEnum):
     KEEP = 1  # what it is at a committed state; the answer is 0 or `HELD_OTHERWISE`
 
 
-class Held(IntEnum):
+class Sticking(IntEnum):
     """What contacts are asked for whose friction is rigid: see stiction.rigid_contact."""
 
     PLACE = 0  # where equations of what sticks act
@@ -83,14 +87,14 @@ class Memory(IntEnum):
 
 
 @jitable
-def note_failure(scene, code):
+def note_failure(scene: Scene, code: int) -> None:
     """Keep the first code where it cannot be returned: `failure_or` hands it on."""
     if code != 0 and scene.users.failed[0] == 0:
         scene.users.failed[0] = code
 
 
 @jitable
-def failure_or(scene, code):
+def failure_or(scene: Scene, code: int) -> int:
     """Return the code that was noted, which is forgotten, or `code` if there is none."""
     noted = scene.users.failed[0]
     scene.users.failed[0] = 0
@@ -98,7 +102,7 @@ def failure_or(scene, code):
 
 
 @jitable
-def answer_of(scene, answer):
+def answer_of(scene: Scene, answer: int) -> int:
     """Return what a hook answers; 0 where it failed, which is noted."""
     if answer < 0:
         note_failure(scene, -answer)

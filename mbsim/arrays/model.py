@@ -223,7 +223,7 @@ class Applied(NamedTuple):
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
     equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none
-    late: I2  # (nu, 3) what is settled with the reactions: row, component, program, -1 for friction
+    by_reactions: I2  # (nu, 3) settled with the reactions: row, component, program, -1 of friction
 
 
 @tags.constant

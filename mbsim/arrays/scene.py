@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mbsim.arrays.codes import *  # noqa: F403
 from mbsim.arrays.model import (
     Angles,
     Applied,
@@ -42,7 +41,6 @@ from mbsim.arrays.model import (
 )
 from mbsim.arrays.scratch import Rows, Sweep, Work
 from mbsim.arrays.state import Audit, Broadphase, Log, Pairs, State
-from mbsim.core.layout import BODY_SIZE as BODY_SIZE
 
 
 class Scene(NamedTuple):

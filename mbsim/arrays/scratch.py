@@ -44,13 +44,13 @@ class Work(NamedTuple):
     wrench: F1  # (8,)
     slopes: F2  # (12, 6)
     rub: F2  # (nf, 9) of friction: see forces.joint_friction
-    late: F2  # (nu, 5) of what is settled with the reactions, see forces.reaction_forces
+    by_reactions: F2  # (nu, 5) of what is settled with the reactions, see forces.reaction_forces
     secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     squares: tags.State[F1]  # (n,) V^2 of each group of bodies where an error was judged last
     trouble: I1  # (2,) worst body of the error norm, contact at fault
-    hold: F2  # (ns, 15) of slots that stick: contact point, n, x-axis, rates of point and n
-    held: F2  # (ns, 2) forces that hold these, along x and y
+    sticking_point: F2  # (ns, 15) of slots that stick: point, n, x-axis, rates of point and n
+    sticking_force: F2  # (ns, 2) forces that hold these, along x and y
     look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before; no rows
     # for the three where none is rigid
 

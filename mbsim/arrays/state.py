@@ -22,7 +22,7 @@ class Pairs(NamedTuple):
     left: F1  # (np,) what the motion since has left of it for certain
     active: I1  # (np,) places in use, ascending; those of large contacts behind all others
     free: I1  # (np,) places not in use, the next one last
-    count: I1  # (4,) live, free, live for good, places that a listing lacked
+    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, places that a listing lacked
 
 
 @tags.state
@@ -82,7 +82,7 @@ class State(NamedTuple):
     dry: F2  # (nf, 4) of dry friction, see codes
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
-    fastest: F1  # (n,) what the largest speed so far of a group counts: pipeline.scales
+    fastest: F1  # (n,) what the largest speed so far of a group counts: bodies.scales
     chattering: F1  # (2,) of contacts whose friction is rigid: as of sides, 1 where one asked for
     # another mode since the committed state: see events.switching
 

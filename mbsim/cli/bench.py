@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.bench.runner import Options, Report
 
@@ -89,13 +91,13 @@ def command(
     if as_json:
         print_json(_as_json(done, output, pictures))
     else:
-        click.echo(text, nl=False)
+        echo(text, nl=False)
     _say(f"{len(done.rows)} measurements in {output / 'bench.csv'}")
 
 
 def _say(text: str) -> None:
     """Print a line for people, not for pipes."""
-    click.echo(f"mbsim: {text}", err=True)
+    echo(f"mbsim: {text}", err=True)
 
 
 def _draw(options: Options, done: Report, output: Path) -> list[str]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
 
@@ -58,17 +60,17 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
 
     warn(deck.warnings)
     numbers = ", ".join(f"{count} {name}" for name, count in counts(deck).items())
-    click.echo(f"ok: {model}: {numbers}")
-    click.echo(f"  units {units_text(deck)}")
+    echo(f"ok: {model}: {numbers}")
+    echo(f"  units {units_text(deck)}")
     for contact_id in deck.contacts:
         for text in pair_texts(plans, contact_id):
-            click.echo(f"  Force_Contact[{contact_id}]: {text}")
+            echo(f"  Force_Contact[{contact_id}]: {text}")
     for element in _without_file(deck):
-        click.echo(f"  {element}: its subroutine names no file; a run needs --plugin FILE.py")
+        echo(f"  {element}: its subroutine names no file; a run needs --plugin FILE.py")
     if not deck.simulations:
         more = " and --print-interval" if is_adams(deck.file) else ""
-        click.echo(f"  no Simulate: a run needs --end-time{more}")
+        echo(f"  no Simulate: a run needs --end-time{more}")
     for line in sequence(deck):
-        click.echo(f"  {line}")
+        echo(f"  {line}")
     for note in (*deck.notes, *notes):
-        click.echo(f"  note: {note}")
+        echo(f"  note: {note}")

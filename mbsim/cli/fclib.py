@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from mbsim.cli.messages import echo, print_json
 
 if TYPE_CHECKING:
     from mbsim.errors import MbsimError
@@ -64,10 +65,10 @@ def info(files: tuple[Path, ...], as_json: bool) -> None:
         _print_list(found)
     else:
         for about in found:
-            click.echo(f"{about.pop('file')}")
+            echo(f"{about.pop('file')}")
             for name, value in about.items():
                 if value not in (None, ""):
-                    click.echo(f"  {name.replace('_', ' '):14s} {_text(value)}")
+                    echo(f"  {name.replace('_', ' '):14s} {_text(value)}")
     _end(faults)
 
 
@@ -89,7 +90,7 @@ def merit(files: tuple[Path, ...], as_json: bool) -> None:
         stored = [("solution", contents.solution)] if contents.solution is not None else []
         stored += [(f"guesses/{k}", guess) for k, guess in enumerate(contents.guesses, 1)]
         if not stored:
-            click.echo(f"mbsim: {file}: no solution and no guesses", err=True)
+            echo(f"mbsim: {file}: no solution and no guesses", err=True)
         for place, solution in stored:
             assert solution is not None
             figures = judge(contents.problem, solution, blocks)
@@ -98,9 +99,9 @@ def merit(files: tuple[Path, ...], as_json: bool) -> None:
         _print_list(found)
     else:
         for entry in found:
-            click.echo(f"{entry.pop('file')} {entry.pop('place')}")
+            echo(f"{entry.pop('file')} {entry.pop('place')}")
             for name, value in entry.items():
-                click.echo(f"  {name.replace('_', ' '):26s} {_text(value)}")
+                echo(f"  {name.replace('_', ' '):26s} {_text(value)}")
     _end(faults)
 
 
@@ -247,7 +248,7 @@ def compare(
     if as_json:
         _print_list([_finite(vars(row)) for row in rows])
     else:
-        click.echo(comparing.table(rows))
+        echo(comparing.table(rows))
     _say(f"{len(rows)} runs in {output / 'compare.csv'}")
 
 
@@ -285,7 +286,7 @@ def _end(faults: Sequence[MbsimError]) -> None:
 
 def _say(text: str) -> None:
     """Print a line for people, not for pipes."""
-    click.echo(f"mbsim: {text}", err=True)
+    echo(f"mbsim: {text}", err=True)
 
 
 def _tell_compiling() -> None:
@@ -299,7 +300,7 @@ def _tell_compiling() -> None:
 
 def _print_list(entries: Sequence[dict[str, Any]]) -> None:
     """Print the one JSON list that standard output shall hold."""
-    click.echo(json.dumps([_finite(entry) for entry in entries], allow_nan=False))
+    print_json([_finite(entry) for entry in entries])
 
 
 def _finite(entry: dict[str, Any]) -> dict[str, Any]:
@@ -424,11 +425,11 @@ def _show_solved(entry: dict[str, Any], reason: str) -> None:
     """Print two lines on a solution."""
     states = ", ".join(f"{count} {name}" for name, count in entry["states"].items())
     status = entry["status"].replace("_", " ")
-    click.echo(
+    echo(
         f"{entry['file']}: {status} by {entry['solver']} in {1e3 * entry['solve_s']:.3f} ms, "
         f"{entry['iterations']} iterations" + (f" ({reason})" if reason else "")
     )
-    click.echo(
+    echo(
         f"  error {entry['error']:.2e}, over |q| {entry['error_q']:.2e}, scale-free "
         f"{entry['scale_free']:.2e}, MERIT_1 {entry['merit1']:.2e}, "
         f"|r| {entry['impulse_norm']:.3g}, "

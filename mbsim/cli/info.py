@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
@@ -116,8 +118,8 @@ def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]
 
 def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     """Return user subroutines by element: function, file, and what they ask for under iflag."""
-    from mbsim.compile_model.acting import wanted
     from mbsim.model.names import element_name, is_adams
+    from mbsim.model.subroutines import wanted
     from mbsim.plugins.about import about
     from mbsim.plugins.contact_post import CONTACTPOST
     from mbsim.plugins.friction import friction_arguments
@@ -264,9 +266,10 @@ def _about_results(results: Results) -> dict[str, Any]:
 def _shorten(about: dict[str, Any], results: Results) -> None:
     """List signals as `plot` takes them, ids together, with parts and units; then the tables."""
     from mbsim.results.names import compact, parts_of
-    from mbsim.results.quantities import UnitSystem, quantity_of
+    from mbsim.results.quantities import quantity_of
+    from mbsim.results.units import UnitSystem
 
-    columns, units = results.signals(), UnitSystem.of(results)
+    columns, units = results.signals(), UnitSystem.of(results.attributes)
     about["signals"] = {}
     measured: dict[str, str] = {}
     for name in columns:
@@ -308,4 +311,4 @@ def _show(about: dict[str, Any]) -> None:
     for key, value in about.items():
         add(key, value, 0, 28)
     # in one piece: a pager that closes early breaks the pipe only once
-    click.echo("\n".join(lines))
+    echo("\n".join(lines))

@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from mbsim import __version__
-from mbsim.errors import DeckError, Interrupted, MbsimError, ResultsError
+from mbsim.cli.messages import echo, printable
+from mbsim.errors import DeckError, Interrupted, MbsimError, ModelError, ResultsError
 
 #: Subcommand -> module; each module has a click command named `command`.
 COMMANDS = {
@@ -43,16 +44,35 @@ class Commands(click.Group):
         command.epilog = f"More: mbsim manual {cmd_name}"
         return command
 
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Run a command line, standard streams that are closed being those of the null device.
+
+        A result file would else get their number, and what is printed.
+        """
+        for number in range(3):
+            try:
+                os.fstat(number)
+            except OSError:
+                os.open(os.devnull, os.O_RDWR)
+        for name in ("stdout", "stderr"):
+            if getattr(sys, name) is None:
+                setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        return super().main(*args, **options)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the subcommand; a message and the exit code of the class for every MbsimError."""
         try:
             return super().invoke(ctx)
+        except click.ClickException as error:
+            # it holds what was typed
+            vars(error)["message"] = printable(error.message)
+            raise
         except MbsimError as error:
             for line in _messages(error):
-                click.echo(f"mbsim: error: {line}", err=True)
+                echo(f"mbsim: error: {line}", err=True)
             if pages := pages_of(error):
                 line = "; ".join(f"mbsim manual {page}" for page in pages)
-                click.echo(f"mbsim: see: {line}", err=True)
+                echo(f"mbsim: see: {line}", err=True)
             ctx.exit(error.exit_code)
         except BrokenPipeError:
             # whoever read our output has seen enough; nothing is left to flush to it
@@ -60,11 +80,14 @@ class Commands(click.Group):
             ctx.exit(0)
         except OSError as error:
             # files of ours raise MbsimError: this is standard output, on a full disk say
-            click.echo(f"mbsim: error: standard output: {error.strerror}", err=True)
+            echo(f"mbsim: error: standard output: {error.strerror}", err=True)
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             ctx.exit(ResultsError.exit_code)
+        except MemoryError:
+            echo("mbsim: error: there is not enough memory", err=True)
+            ctx.exit(ModelError.exit_code)
         except KeyboardInterrupt:
-            click.echo("mbsim: error: interrupted", err=True)
+            echo("mbsim: error: interrupted", err=True)
             ctx.exit(Interrupted.exit_code)
 
 
@@ -95,7 +118,8 @@ def main() -> None:
     `mbsim manual` is the manual; `mbsim manual TOPIC` a page, or a search.
 
     Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
-    failed; 5 results could not be written; 130 interrupted, results up to there kept.
+    failed; 5 results could not be written; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: results up to
+    there kept.
     """
 
 

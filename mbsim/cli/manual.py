@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from mbsim.cli.messages import echo
+
 
 @click.command("manual")
 @click.argument("topic", nargs=-1)
@@ -30,7 +32,7 @@ def command(topic: tuple[str, ...], listed: bool, file: Path | None) -> None:
         from mbsim.manual.html import write
 
         write(file)
-        click.echo(f"{file}: {len(book.pages())} pages, {file.stat().st_size / 1e6:.2f} MB")
+        echo(f"{file}: {len(book.pages())} pages, {file.stat().st_size / 1e6:.2f} MB")
         return
     from mbsim.manual import terminal
 

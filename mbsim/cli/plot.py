@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.results.curves import Choice, Picture
     from mbsim.results.reading import Results
@@ -87,7 +89,7 @@ def command(
     else:
         count = sum(len(panel.curves) for panel in picture.panels)
         quantities = ", ".join(panel.axis for panel in picture.panels)
-        click.echo(f"{target}: {count} curve{'s' * (count > 1)}, {quantities}")
+        echo(f"{target}: {count} curve{'s' * (count > 1)}, {quantities}")
 
 
 def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.laws.slip_test import Conditions, Sample
 
@@ -93,7 +95,7 @@ def command(
         print_json({"picture": str(target), "laws": list(names), **at._asdict(), "set": {
             name: value for name, value in used.items() if math.isfinite(value)}})  # fmt: skip
     else:
-        click.echo(f"{target}: {', '.join(names)}")
+        echo(f"{target}: {', '.join(names)}")
 
 
 def _settings(given: Sequence[str]) -> tuple[dict[str, float], list[float]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-import click
+from mbsim.cli.messages import echo, printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -65,9 +65,9 @@ class Display:
         """Print a message above the line."""
         line = f"mbsim: {text}"
         if self._bar is None:
-            click.echo(line, err=True)
+            echo(line, err=True)
         else:
-            self._bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
+            self._bar.console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
 
     def stop(self) -> None:
         """Remove the line."""

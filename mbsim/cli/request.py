@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from mbsim.cli.messages import echo
+
 
 @click.command("request")
 @click.argument("result", type=click.Path(path_type=Path), metavar="RESULT.h5")
@@ -20,8 +22,13 @@ import click
     metavar="FILE.csv",
     help="Instead of standard output.",
 )
+@click.option(
+    "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of CSV.")
-def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: bool) -> None:
+def command(
+    result: Path, names: tuple[str, ...], output: Path | None, scripts: bool, as_json: bool
+) -> None:
     """Evaluate contact forces again at the output times of RESULT.h5.
 
     NAME is Force_Contact[ID].force (torque, penetration, slip_speed, incidents, area) or
@@ -32,13 +39,14 @@ def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: 
     """
     from mbsim.cli.messages import print_json
     from mbsim.errors import ModelError
+    from mbsim.plugins.permission import no_scripts
     from mbsim.results.files import replace_text
     from mbsim.results.reading import finite, open_results
     from mbsim.run.replay import request
 
     if output is not None and as_json:
         raise ModelError("-o goes with CSV: take either -o or --json")
-    with open_results(result) as results:
+    with open_results(result) as results, no_scripts(not scripts):
         time, columns = request(results, names)
     if as_json:
         print_json({"result_file": str(result), "time": time.tolist(), "signals": finite(columns)})
@@ -48,7 +56,7 @@ def command(result: Path, names: tuple[str, ...], output: Path | None, as_json: 
         sys.stdout.writelines(lines)
         return
     replace_text(output, "".join(lines))
-    click.echo(f"{output}: {len(columns)} columns, {len(time)} rows")
+    echo(f"{output}: {len(columns)} columns, {len(time)} rows")
 
 
 def _csv(time: list[float], columns: dict[str, list[Any]]) -> Iterator[str]:

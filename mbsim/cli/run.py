@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbsim.cli.messages import echo
 from mbsim.integrators.catalog import METHODS
 
 if TYPE_CHECKING:
@@ -71,7 +72,23 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     show_default=True,
     help="fcl: no closed forms.",
 )
+@click.option(
+    "--signals",
+    multiple=True,
+    metavar="NAME",
+    help="Record these only, e.g. bodies/2/position, 'contacts/*/force', joints; may be repeated. "
+    "Time, events and the deck's requests are always there.  [default: everything]",
+)
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
+@click.option(
+    "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
+)
+@click.option(
+    "--plugin-timeout",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="S",
+    help="End a call of an interpreted user function that takes longer.",
+)
 @click.option("--allow-overlap", is_flag=True, help="Start although shapes overlap deeply.")
 @click.option(
     "--dump-fclib",
@@ -130,7 +147,7 @@ def command(
 
 def _say(text: str) -> None:
     """Print a message for the user."""
-    click.echo(f"mbsim: {text}", err=True)
+    echo(f"mbsim: {text}", err=True)
 
 
 def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None:
@@ -147,7 +164,7 @@ def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None
                 _print_json(results, result_file)
             else:
                 kept = len(results["time"])
-                click.echo(f"mbsim: {kept} rows are kept in {result_file}", err=True)
+                echo(f"mbsim: {kept} rows are kept in {result_file}", err=True)
     except ResultsError:
         return
 
@@ -175,12 +192,12 @@ def _print_summary(results: Results, result_file: Path) -> None:
     """Print a few lines for people."""
     time, stats = results["time"], results.stats
     end = f"{time[-1]:.9g}" if len(time) else "-"
-    click.echo(f"{results.status} at time {end}, {len(time)} rows in {result_file}")
-    click.echo(
+    echo(f"{results.status} at time {end}, {len(time)} rows in {result_file}")
+    echo(
         f"{stats.get('steps', 0)} steps, {stats.get('rejected', 0)} rejected, "
         f"{stats.get('wall_s', 0.0):.2f} s"
         + (f" ({stats['compile_s']:.1f} s of it compiling)" if stats.get("compile_s") else "")
     )
     audit = results.audit
     if audit is not None:
-        click.echo(audit.line)
+        echo(audit.line)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.messages import echo
+
 if TYPE_CHECKING:
     from mbsim.warming.tasks import Task
 
@@ -54,8 +56,8 @@ def command(
     todo = tasks(everything, models)
     failed = _do_all(todo, refused)
     for line in failed:
-        click.echo(f"mbsim: warning: {line}", err=True)
-    click.echo(
+        echo(f"mbsim: warning: {line}", err=True)
+    echo(
         f"{jit.total - before} functions compiled in {time.perf_counter() - began:.0f} s; "
         f"they are in {jit.cache_root()}"
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Applied, Residuals, Sensors, States, Switching
 from mbsim.compile_model.applied import applied_forces
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
@@ -15,33 +15,14 @@ from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
 from mbsim.compile_model.switching import switching_table
-from mbsim.model.elements import Model, Subroutine
+from mbsim.model.elements import Model
 from mbsim.model.placement import place
+from mbsim.model.subroutines import wanted
 
 if TYPE_CHECKING:
     from mbsim.compile_model.subroutines import StateReader
     from mbsim.plugins.subroutine import UserSubroutine
     from mbsim.plugins.types import UserResidual
-
-
-def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
-    """Return statement, XML statement, id, subroutine and number of results of all users'."""
-    found = []
-    for force in model.scalar_forces.values():
-        if force.user is not None:
-            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
-    for variable in model.variables.values():
-        if variable.user is not None:
-            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
-    for statement, xml, table in (
-        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
-        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
-    ):
-        for vector in table.values():
-            if vector.user is not None:
-                count = sum(expr is not None for expr in vector.exprs)
-                found.append((statement, xml, vector.id, vector.user, count))
-    return found
 
 
 def _values(
@@ -78,20 +59,20 @@ class Acting:
     """What acts and what is asked for, as rows and programs, which are made in one order."""
 
     programs: ProgramTable
-    applied: a.Applied
+    applied: Applied
     applied_ids: list[tuple[str, int]]
     mechanism: Mechanism
-    states: a.States
-    sensors: a.Sensors
-    switching: a.Switching
+    states: States
+    sensors: Sensors
+    switching: Switching
     reader: StateReader | None
     pulls: list[Pull]
     values: list[tuple[int, int]]
-    residuals: a.Residuals | None
+    residuals: Residuals | None
 
 
 def _link_dry(
-    model: Model, mechanism: Mechanism, applied: a.Applied, applied_ids: list[tuple[str, int]]
+    model: Model, mechanism: Mechanism, applied: Applied, applied_ids: list[tuple[str, int]]
 ) -> None:
     """Let rigid dry frictions and their equations, know each other.
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Applied
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.forces.catalog import FORCES
@@ -26,16 +27,16 @@ from mbsim.model.elements import (
 )
 
 _FRICTIONS = {
-    "TRANSLATIONAL": a.SLIDE_FRICTION,
-    "REVOLUTE": a.TURN_FRICTION,
-    "CYLINDRICAL": a.SCREW_FRICTION,
-    "SPHERICAL": a.BALL_FRICTION,
+    "TRANSLATIONAL": codes.SLIDE_FRICTION,
+    "REVOLUTE": codes.TURN_FRICTION,
+    "CYLINDRICAL": codes.SCREW_FRICTION,
+    "SPHERICAL": codes.BALL_FRICTION,
 }
 
 
 def applied_forces(
     model: Model, markers: MarkerTable, programs: ProgramTable, laws: bool = True
-) -> tuple[a.Applied, list[tuple[str, int]]]:
+) -> tuple[Applied, list[tuple[str, int]]]:
     """Return the forces between markers, and for each row its element: (statement, id).
 
     Without `laws` those of friction and limits are left out, which would be compiled.
@@ -47,7 +48,7 @@ def applied_forces(
     ]
     n = len(given)
     found = [_law(element) if laws else (0, np.zeros(0)) for _, element in given]
-    made = a.Applied(
+    made = Applied(
         kind=np.zeros(n, dtype=np.int64),
         with_reactions=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
@@ -65,7 +66,7 @@ def applied_forces(
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
         equation=np.full(n, -1, dtype=np.int64),
-        late=np.zeros((0, 3), dtype=np.int64),
+        by_reactions=np.zeros((0, 3), dtype=np.int64),
     )
     for k, (statement, element) in enumerate(given):
         made.law[k], values = found[k]
@@ -93,16 +94,16 @@ def _add_spring(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     spring: SpringDamper,
 ) -> None:
     """Fill row k with a spring-damper."""
     made.i[k], made.j[k] = markers.row(spring.i_marker_id), markers.row(spring.j_marker_id)
     made.par[k, :4] = spring.stiffness, spring.damping, spring.length, spring.preload
-    made.kind[k] = a.LINE_FORCE
+    made.kind[k] = codes.LINE_FORCE
     if spring.type == "ROTATIONAL":
-        made.kind[k] = a.AXIS_TORQUE
+        made.kind[k] = codes.AXIS_TORQUE
         made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
 
 
@@ -110,7 +111,7 @@ def _add_scalar(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     force: ScalarForce,
 ) -> None:
@@ -118,37 +119,37 @@ def _add_scalar(
     made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
     made.program[k] = programs.add(force.expr, force, forces=True)
     made.alone[k] = int(force.action_only)
-    along = a.AXIS_FORCE if force.action_only else a.LINE_FORCE
-    made.kind[k] = a.AXIS_TORQUE if force.type == "ROTATIONAL" else along
+    along = codes.AXIS_FORCE if force.action_only else codes.LINE_FORCE
+    made.kind[k] = codes.AXIS_TORQUE if force.type == "ROTATIONAL" else along
 
 
 def _add_marker_force(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     force: MarkerForce,
 ) -> None:
     """Fill row k with a force of a kind of `forces.catalog`."""
     made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
-    made.kind[k] = a.MARKER_FORCE
+    made.kind[k] = codes.MARKER_FORCE
     kind = FORCES[force.kind]
     bounds = kind.bounds(kind.constants(force.values))
-    made.par[k] = (*bounds[: a.REST], *bounds.rest)
+    made.par[k] = (*bounds[: codes.REST], *bounds.rest)
 
 
 def _add_vector(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     force: VectorForce,
 ) -> None:
     """Fill row k with a vector force by expressions."""
     made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_floating_marker_id)
-    made.kind[k] = a.VECTOR_FORCE
+    made.kind[k] = codes.VECTOR_FORCE
     made.alone[k] = int(force.action_only)
     made.axes[k] = markers.row(force.ref_marker_id)
     for c, expression in enumerate(force.exprs):
@@ -177,7 +178,7 @@ def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:
     return abi.friction_address(friction), abi.friction_parameters(friction, element)
 
 
-def _place(model: Model, markers: MarkerTable, made: a.Applied, k: int, joint_id: int) -> None:
+def _place(model: Model, markers: MarkerTable, made: Applied, k: int, joint_id: int) -> None:
     """Put row k between the markers of its joint."""
     joint = model.joints[joint_id]
     made.i[k], made.j[k] = markers.row(joint.i_marker_id), markers.row(joint.j_marker_id)
@@ -187,7 +188,7 @@ def _add_friction(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     friction: JointFriction,
 ) -> None:
@@ -204,13 +205,13 @@ def _add_limit(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     limit: JointLimit,
 ) -> None:
     """Fill row k with a limit of a joint."""
     _place(model, markers, made, k, limit.joint_id)
-    made.kind[k] = a.TURN_LIMIT if limit.direction == "R" else a.SLIDE_LIMIT
+    made.kind[k] = codes.TURN_LIMIT if limit.direction == "R" else codes.SLIDE_LIMIT
     made.bounds[k, 0] = -math.inf if limit.lower is None else limit.lower
     made.bounds[k, 1] = math.inf if limit.upper is None else limit.upper
     if limit.direction == "R":
@@ -221,7 +222,7 @@ def _add_dry(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     friction: DryFriction,
 ) -> None:
@@ -229,9 +230,9 @@ def _add_dry(
     made.i[k], made.j[k] = markers.row(friction.i_marker_id), markers.row(friction.j_marker_id)
     axis = "XYZ".index(friction.type[1])
     made.axes[k] = markers.turned(int(made.j[k]), axis)
-    made.kind[k] = a.DRY_SLIDE
+    made.kind[k] = codes.DRY_SLIDE
     if friction.type[0] == "R":
-        made.kind[k] = a.DRY_TURN
+        made.kind[k] = codes.DRY_TURN
         made.angle[k] = markers.angle(markers.turned(int(made.i[k]), axis), int(made.axes[k]))
     static = friction.friction_static
     made.par[k, 0] = friction.friction / friction.dx if friction.dx > 0.0 else 0.0
@@ -243,7 +244,7 @@ def _add_element(
     model: Model,
     markers: MarkerTable,
     programs: ProgramTable,
-    made: a.Applied,
+    made: Applied,
     k: int,
     element: ForceElement,
 ) -> None:
@@ -251,7 +252,7 @@ def _add_element(
     from mbsim.compile_model.force_elements import force_program
 
     made.i[k], made.j[k] = markers.row(element.i_marker_id), markers.row(element.j_marker_id)
-    made.kind[k], made.axes[k] = a.RESIDUAL, made.j[k]
+    made.kind[k], made.axes[k] = codes.RESIDUAL, made.j[k]
     made.par[k, 0] = list(model.force_elements).index(element.id)
     for at, direction in enumerate(element.directions):
         c = 3 * "TR".index(direction[0]) + "XYZ".index(direction[1])

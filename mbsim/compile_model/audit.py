@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Applied, Connections, Equations, Markers
+from mbsim.arrays.state import Audit
 from mbsim.laws.catalog import friction_law_of
 from mbsim.model.elements import Contact
 
@@ -29,7 +31,7 @@ def _cone(contact: Contact, with_user: bool) -> float:
 
 
 def _ties(
-    connections: a.Connections, equations: a.Equations, applied: a.Applied, body: Rows
+    connections: Connections, equations: Equations, applied: Applied, body: Rows
 ) -> list[tuple[int, ...]]:
     """Return the bodies between which joints, equations and forces act, ground being the last."""
     ground = int(body[0]) if len(body) else 0
@@ -52,9 +54,9 @@ def audit(
     contacts: list[Contact],
     with_user: set[int],
     group: Rows,
-    mechanism: tuple[a.Connections, a.Equations, a.Applied, a.Markers],
+    mechanism: tuple[Connections, Equations, Applied, Markers],
     pulled: bool,
-) -> a.Audit:
+) -> Audit:
     """Return what a run keeps to judge itself.
 
     Parameters
@@ -77,11 +79,11 @@ def audit(
         if nb in tie:
             tied[[group[b] for b in tie if b < nb]] = 1
     nc = len(contacts)
-    tally = np.zeros(a.TALLIES)
-    tally[a.ANEW] = 1.0
+    tally = np.zeros(codes.TALLIES)
+    tally[codes.ANEW] = 1.0
     # below 0: never looked at
-    found = np.tile([-1.0, 1.0, 0.0, -1.0], (a.AUDITS, 1))
-    return a.Audit(
+    found = np.tile([-1.0, 1.0, 0.0, -1.0], (codes.AUDITS, 1))
+    return Audit(
         tied,
         np.array([_cone(contact, contact.id in with_user) for contact in contacts]),
         np.array([1.0, 0.0, math.inf]),

@@ -14,8 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
 from mbsim.arrays.hooks import Hook
+from mbsim.arrays.model import Bodies, Programs, Residuals, Scales, World
+from mbsim.arrays.scene import Scene
+from mbsim.arrays.scratch import Rows
 from mbsim.compile_model.acting import Acting, acting
 from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import ContactTables, contact_tables, kinds_table
@@ -28,7 +31,7 @@ from mbsim.compile_model.rigid_slots import rigid_slots
 from mbsim.compile_model.scratch import Sizes, empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
-from mbsim.core.layout import AT_Q, AT_V, AT_W
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
@@ -56,7 +59,7 @@ class System:
 
     model: Model
     placement: Placement
-    scene: a.Scene
+    scene: Scene
     y0: np.ndarray[Any, Any]
     body_ids: list[int]  # moving bodies, row by row
     graphic_ids: list[int]
@@ -113,11 +116,11 @@ class System:
         return element_name(self.model.file, "Body_Rigid", self.body_ids[row])
 
 
-def _bodies(placement: Placement) -> a.Bodies:
+def _bodies(placement: Placement) -> Bodies:
     """Return the moving bodies' constants."""
     bodies = list(placement.bodies.values())
     inertia = np.array([body.inertia for body in bodies], dtype=np.float64).reshape(-1, 3, 3)
-    return a.Bodies(
+    return Bodies(
         np.array([body.mass for body in bodies], dtype=np.float64),
         np.ascontiguousarray(inertia),
         np.ascontiguousarray(np.linalg.inv(inertia)) if bodies else np.zeros((0, 3, 3)),
@@ -152,9 +155,9 @@ def _accumulators(works: bool, damps: bool, at: int) -> np.ndarray[Any, Any]:
 def _initial_y(placement: Placement, others: int) -> np.ndarray[Any, Any]:
     """Return the ODE vector at the start: X, work and dissipated energy are 0."""
     bodies = list(placement.bodies.values())
-    y = np.zeros(a.BODY_SIZE * len(bodies) + others)
+    y = np.zeros(BODY_SIZE * len(bodies) + others)
     for k, body in enumerate(bodies):
-        row = y[a.BODY_SIZE * k : a.BODY_SIZE * (k + 1)]
+        row = y[BODY_SIZE * k : BODY_SIZE * (k + 1)]
         row[0:3] = body.p
         row[AT_Q:AT_V] = body.q
         row[AT_V:AT_W] = body.v
@@ -186,12 +189,12 @@ def _varies(pulls: Sequence[Pull]) -> bool:
 
 def _start(
     model: Model, placement: Placement, carried: int, acts: Acting, judged: _Judged
-) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], a.Residuals]:
+) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], Residuals]:
     """Return y at the start, where in it work and damped energy stand, and the residuals.
 
     Behind the bodies are the numbers `carried` by laws of contacts, the states, the accumulators.
     """
-    states, first_state = acts.states, a.BODY_SIZE * len(placement.bodies) + carried
+    states, first_state = acts.states, BODY_SIZE * len(placement.bodies) + carried
     nz, damps = len(states.program), len(acts.applied_ids) > 0 or _varies(acts.pulls)
     accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(accumulators >= 0)) + max(1, len(model.contacts))
@@ -226,7 +229,7 @@ def _sizes(
         contacts=len(contacts.listed),
         connections=len(acts.mechanism.elements),
         forces=len(acts.applied_ids),
-        late=len(acts.applied.late),
+        by_reactions=len(acts.applied.by_reactions),
         sensors=len(acts.sensors.id),
         dry_frictions=len(model.dry_frictions),
         switching=len(acts.switching.program),
@@ -234,16 +237,16 @@ def _sizes(
         memory=contacts.memory,
         looked=looked,
         ahead=y if looked and contacts.laws.carried.any() else 0,
-        points=int((pairs.last - pairs.slot).max(initial=0)),
+        points=int((pairs.last - pairs.slot).max(initial=0)) if contacts.laws.rigid.any() else 0,
         groups=groups,
-        region=a.INC_REGION if any(kind.region for kind in plans.kinds) else 0,
+        region=codes.INC_REGION if any(kind.region for kind in plans.kinds) else 0,
     )
 
 
-def _world(acts: Acting, judged: _Judged, accumulators: np.ndarray[Any, Any]) -> a.World:
+def _world(acts: Acting, judged: _Judged, accumulators: np.ndarray[Any, Any]) -> World:
     """Return what holds for the whole model."""
     pulls = acts.pulls
-    return a.World(
+    return World(
         pulls[0].constant.copy(),
         np.array([pulls[0].program, *(pull.program for pull in pulls)]),
         _scales(judged.groups, judged.length, judged.speed),
@@ -254,9 +257,9 @@ def _world(acts: Acting, judged: _Judged, accumulators: np.ndarray[Any, Any]) ->
     )
 
 
-def _group_scales(groups: Groups) -> a.Scales:
+def _group_scales(groups: Groups) -> Scales:
     """Return by what errors of each group of connected bodies are judged."""
-    return a.Scales(
+    return Scales(
         np.array(groups.of_body, dtype=np.int64),
         np.array(groups.length),
         np.array(groups.speed),
@@ -266,7 +269,7 @@ def _group_scales(groups: Groups) -> a.Scales:
     )
 
 
-def _programs(model: Model, acts: Acting, contact_ids: list[int]) -> a.Programs:
+def _programs(model: Model, acts: Acting, contact_ids: list[int]) -> Programs:
     """Return the programs of all expressions."""
     made = acts.programs.arrays(acts.mechanism.elements, acts.applied_ids, contact_ids)
     if any(s.analysis_type == "STATIC" for s in model.simulations):
@@ -275,7 +278,7 @@ def _programs(model: Model, acts: Acting, contact_ids: list[int]) -> a.Programs:
     return made
 
 
-def _rows(n: Sizes, one_at_a_time: bool) -> a.Rows:
+def _rows(n: Sizes, one_at_a_time: bool) -> Rows:
     """Return the tables of output rows.
 
     One row at a time: CONTACTPOST sees which graphics a slot serves at that time.
@@ -293,7 +296,7 @@ def _scene(
     judged: _Judged,
     table: MarkerTable,
     acts: Acting,
-) -> tuple[a.Scene, np.ndarray[Any, Any]]:
+) -> tuple[Scene, np.ndarray[Any, Any]]:
     """Return all arrays of a model, and y at the start."""
     y0, accumulators, residuals = _start(model, placement, contacts.carried, acts, judged)
     markers, angles = table.arrays()
@@ -307,7 +310,7 @@ def _scene(
         len(placement.bodies),
         len(judged.groups.length),
     )
-    scene = a.Scene(
+    scene = Scene(
         bodies=_bodies(placement),
         graphics=contacts.graphics,
         kinds=kinds_table(plans.kinds, contacts.contact_row),
@@ -381,7 +384,7 @@ def build(
     acts = acting(
         model,
         table,
-        a.BODY_SIZE * len(placement.bodies) + contacts.carried,
+        BODY_SIZE * len(placement.bodies) + contacts.carried,
         code.subroutines,
         code.looks,
         residuals=code.residuals,

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Applied, Contacts, Programs
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.acting import acting
 from mbsim.compile_model.build import System
 from mbsim.compile_model.contacts import contacts_table
@@ -26,9 +27,9 @@ _OF_APPLIED = ("par", "bounds", "law_par")
 class Parameters:
     """All that changes may change, for one simulation."""
 
-    contacts: a.Contacts
-    applied: a.Applied
-    programs: a.Programs
+    contacts: Contacts
+    applied: Applied
+    programs: Programs
 
 
 def _refused(system: System, changes: tuple[Change, ...], why: str) -> DeckError:
@@ -74,27 +75,28 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     ):
         raise _refused(system, changes, "asks for another law than before: not built yet")
     if rows.applied_ids != system.applied or not all(
-        np.array_equal(getattr(applied, n), getattr(scene.applied, n)) for n in ("kind", "late")
+        np.array_equal(getattr(applied, n), getattr(scene.applied, n))
+        for n in ("kind", "by_reactions")
     ):
         raise _refused(system, changes, "follows from other forces than before: not built yet")
     programs = rows.programs.arrays(rows.mechanism.elements, rows.applied_ids, system.contact_ids)
     return Parameters(contacts, applied, programs)
 
 
-def make_room(scene: a.Scene, stages: list[Parameters]) -> a.Scene:
+def make_room(scene: Scene, stages: list[Parameters]) -> Scene:
     """Return the scene with programs long enough for those of every simulation."""
     every = [scene.programs, *(stage.programs for stage in stages)]
     made = []
-    for name, own in zip(a.Programs._fields, scene.programs, strict=True):
+    for name, own in zip(Programs._fields, scene.programs, strict=True):
         size = max(len(getattr(programs, name)) for programs in every)
         # one number more than any program has, for TIME where it stands still
         wide = np.zeros((size + (name == "number"), *own.shape[1:]), dtype=own.dtype)
         wide[: len(own)] = own
         made.append(wide)
-    return scene._replace(programs=a.Programs(*made))
+    return scene._replace(programs=Programs(*made))
 
 
-def apply(scene: a.Scene, stage: Parameters) -> None:
+def apply(scene: Scene, stage: Parameters) -> None:
     """Let the parameters of one simulation hold."""
     for to, from_ in _pairs(scene, stage):
         to[...] = from_
@@ -102,7 +104,7 @@ def apply(scene: a.Scene, stage: Parameters) -> None:
         whole[: len(used)] = used
 
 
-def _pairs(scene: a.Scene, stage: Parameters) -> Iterator[tuple[Array, Array]]:
+def _pairs(scene: Scene, stage: Parameters) -> Iterator[tuple[Array, Array]]:
     """Yield arrays of the scene with what they shall be."""
     for name in _OF_CONTACTS:
         yield getattr(scene.contacts, name), getattr(stage.contacts, name)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Contacts, Graphics, Kinds, Slots
+from mbsim.arrays.state import Broadphase, Pairs
 from mbsim.compile_model.pairing import (
     Kind,
     Plans,
@@ -21,6 +23,7 @@ from mbsim.compile_model.pairing import (
     thinnest,
 )
 from mbsim.core import jit
+from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
@@ -71,10 +74,10 @@ def pair_address(pair: Pair) -> int:
 
 def graphics_table(
     model: Model, placement: Placement, ids: list[int], row: dict[int, int], shapes: list[str]
-) -> a.Graphics:
+) -> Graphics:
     """Return the shapes in their bodies' cg axes; `row` is the body row by body id."""
     n = len(ids)
-    made = a.Graphics(
+    made = Graphics(
         body=np.zeros(n, dtype=np.int64),
         p=np.zeros((n, 3)),
         R=np.zeros((n, 3, 3)),
@@ -104,9 +107,9 @@ def graphics_table(
     return made
 
 
-def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> a.Kinds:
+def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
-    return a.Kinds(
+    return Kinds(
         contact=np.array([contacts[k.contact] for k in kinds], dtype=np.int64),
         kernel=np.array([kernel_address(k) for k in kinds], dtype=np.int64),
         slots=np.array([k.slots for k in kinds], dtype=np.int64),
@@ -129,7 +132,7 @@ def _broadphase_rows(plans: Plans) -> tuple[int, int]:
     )
 
 
-def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[a.Pairs, int]:
+def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[Pairs, int]:
     """Return the places for pairs and the number of their slots; `rows`: graphic row by id.
 
     Listed pairs come first and stay; the places of large contacts have slots for any of their
@@ -142,7 +145,7 @@ def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[
     listed = np.array([plan.kind.slots for plan in plans.pairs], dtype=np.int64)
     ends = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(listed)])
     broadphase_slots = ends[-1] + wide * np.arange(places + 1)
-    made = a.Pairs(
+    made = Pairs(
         kind=np.zeros(n, dtype=np.int64),
         graphic_i=np.zeros(n, dtype=np.int64),
         graphic_j=np.zeros(n, dtype=np.int64),
@@ -165,17 +168,17 @@ def broadphase_table(
     plans: Plans,
     kinds: list[Kind],
     rows: dict[int, int],
-    graphics: a.Graphics,
+    graphics: Graphics,
     shapes: list[str],
     contacts: dict[int, int],
     places: int,
     slots: int,
     memory: int,
-) -> a.Broadphase:
+) -> Broadphase:
     """Return the contacts whose near pairs are found as they move."""
     n, ng = len(plans.broadphase), len(graphics.body)
     row_of = {kind: k for k, kind in enumerate(kinds)}
-    made = a.Broadphase(
+    made = Broadphase(
         contact=np.array(
             [contacts[contact_set.contact] for contact_set in plans.broadphase], dtype=np.int64
         ),
@@ -194,7 +197,7 @@ def broadphase_table(
         head=np.zeros(ng if n else 0, dtype=np.int64),
         next=np.zeros(places if n else 0, dtype=np.int64),
         moved=np.zeros((places if n else 0, 5), dtype=np.int64),
-        spare=np.zeros((slots if n else 0, a.SPARE + 2 * memory)),
+        spare=np.zeros((slots if n else 0, codes.SPARE + 2 * memory)),
     )
     at = 0
     for k, contact_set in enumerate(plans.broadphase):
@@ -231,7 +234,7 @@ def contacts_table(
     contacts: list[Contact],
     user: dict[int, UserFriction],
     user_normal: Mapping[int, UserNormal],
-) -> tuple[a.Contacts, np.ndarray[Any, Any]]:
+) -> tuple[Contacts, np.ndarray[Any, Any]]:
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
@@ -269,7 +272,7 @@ def contacts_table(
         else (0, np.zeros(0))
         for c in contacts
     ]
-    made = a.Contacts(
+    made = Contacts(
         id=np.array([contact.id for contact in contacts], dtype=np.int64),
         normal_law=np.array([address for address, _ in normal], dtype=np.int64),
         normal_par=table([values for _, values in normal]),
@@ -303,12 +306,12 @@ def contacts_table(
 
 def slots_table(
     plans: Plans,
-    pairs: a.Pairs,
-    laws: a.Contacts,
+    pairs: Pairs,
+    laws: Contacts,
     uses_x: np.ndarray[Any, Any],
     rows: dict[int, int],
     first: int,
-) -> tuple[a.Slots, int]:
+) -> tuple[Slots, int]:
     """Return the slots, and how many numbers of y their laws carry, from `first` on.
 
     X and integrated memory go behind the bodies in y, slot by slot, for the laws that need them;
@@ -327,7 +330,7 @@ def slots_table(
     begins = first + np.concatenate([[0], np.cumsum(wide.ravel())])
     x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)
-    return a.Slots(slot_pair, x, z), int(begins[-1]) - first
+    return Slots(slot_pair, x, z), int(begins[-1]) - first
 
 
 @dataclass(frozen=True)
@@ -337,11 +340,11 @@ class ContactTables:
     listed: list[Contact]  # with their radii
     graphic_row: dict[int, int]  # by id, of those that are in a contact
     contact_row: dict[int, int]  # by id
-    graphics: a.Graphics
-    pairs: a.Pairs
-    broadphase: a.Broadphase
-    laws: a.Contacts
-    slots: a.Slots
+    graphics: Graphics
+    pairs: Pairs
+    broadphase: Broadphase
+    laws: Contacts
+    slots: Slots
     carried: int  # numbers of y that laws carry, behind the bodies
 
     @property
@@ -368,7 +371,7 @@ def contact_tables(
     graphics = graphics_table(model, placement, list(graphic_row), body_row, shapes)
     pairs, ns = pairs_table(plans, plans.kinds, graphic_row)
     laws, uses_x = contacts_table(contacts, user, user_normal)
-    first = a.BODY_SIZE * len(placement.bodies)
+    first = BODY_SIZE * len(placement.bodies)
     slots, carried = slots_table(plans, pairs, laws, uses_x, contact_row, first)
     broadphase = broadphase_table(
         plans,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Equations
 
 
 @dataclass
@@ -44,21 +44,22 @@ class Sums:
         self.level.append(level)
         self.general.append(general)
         self.constant.append(constant)
-        self.start.append(tuple(np.nan if value is None else value for value in start))
+        position, rate = (np.nan if value is None else value for value in start)
+        self.start.append((position, rate))
         self.unit.append(unit)
         self.connection.append(connection)
         self.dry.append(-1)
         self.slot.append(-1)
         self.names.append(name)
 
-    def arrays(self) -> a.Equations:
+    def arrays(self) -> Equations:
         """Return the equations as arrays, all in use."""
         n = len(self.program)
 
         def ints(values: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
             return np.array(list(values), dtype=np.int64)
 
-        return a.Equations(
+        return Equations(
             first=ints(self.first),
             program=ints(self.program),
             level=ints(self.level),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Residuals, States
 from mbsim.compile_model.instructions import USER, Instruction
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
@@ -44,8 +44,8 @@ def residuals_table(
     markers: MarkerTable,
     programs: ProgramTable,
     users: Mapping[int, UserResidual],
-    states: a.States,
-) -> tuple[a.Residuals, a.States]:
+    states: States,
+) -> tuple[Residuals, States]:
     """Return the elements' rows, and the states with theirs behind the others.
 
     Scales that nobody gave are NaN until `fill_scales`.
@@ -70,7 +70,7 @@ def residuals_table(
     def whole(values: object) -> np.ndarray:
         return np.array(values, dtype=np.int64)
 
-    table = a.Residuals(
+    table = Residuals(
         id=whole(list(users)),
         i=whole([markers.row(e.i_marker_id) for e in elements]),
         j=whole([markers.row(e.j_marker_id) for e in elements]),
@@ -109,7 +109,7 @@ def residuals_table(
         for element, (id, user) in zip(elements, users.items(), strict=True)
         for k in range(len(user.states))
     ]
-    return table, a.States(
+    return table, States(
         np.append(states.program, whole(made)),
         np.append(states.place, table.place[is_state]),
         np.append(states.scale, table.scale[is_state]),
@@ -150,7 +150,7 @@ def unknown_programs(
     ]
 
 
-def fill_scales(residuals: a.Residuals, states: a.States, load: float, length: float) -> None:
+def fill_scales(residuals: Residuals, states: States, load: float, length: float) -> None:
     """Fill scales that nobody gave: a usual force or torque, and 1 for what is no force."""
     for e in range(len(residuals.id)):
         first, count = residuals.begin[e], residuals.first[e + 1] - residuals.first[e]

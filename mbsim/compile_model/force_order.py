@@ -1,8 +1,9 @@
-"""Forces by expressions of other forces: in which order they are evaluated, and which come late.
+"""Forces by expressions of other forces: in which order, and which depend on reactions.
 
 A force that needs other applied forces stands behind them. One that needs a reaction, of a joint
-or a motion, is *late*, and so is what needs it: these, with the friction in joints, are settled
-together when accelerations are known (`forces.reaction_forces`). Contacts are known before all.
+or a motion, depends on reactions, and so does what needs it: these, with the friction in joints,
+are settled together when accelerations are known (`forces.reaction_forces`). Contacts are known
+before all.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Applied, Connections, States
 from mbsim.compile_model.instructions import ELEMENT, NET
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError, Fault
@@ -37,15 +39,15 @@ class _Needs:
 
 def in_order(
     model: Model,
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
-) -> tuple[a.Applied, list[tuple[str, int]]]:
+) -> tuple[Applied, list[tuple[str, int]]]:
     """Return the applied forces and their elements in an order in which each can be evaluated.
 
-    Late ones are marked in `Applied.with_reactions`, and listed in `Applied.late`.
+    Those by reactions are marked in `Applied.with_reactions`, and listed in `Applied.by_reactions`.
 
     Raises
     ------
@@ -56,25 +58,25 @@ def in_order(
     if not any(needs.rows) and not any(needs.reaction):
         return applied, elements
     order = _order(model, elements, needs)
-    late = np.zeros(len(elements), dtype=bool)
+    by_reactions = np.zeros(len(elements), dtype=bool)
     for row in order:
-        late[row] = needs.reaction[row] or any(late[k] for k in needs.rows[row])
+        by_reactions[row] = needs.reaction[row] or any(by_reactions[k] for k in needs.rows[row])
     at = np.array(order, dtype=np.int64)
-    rows = {name: array[at] for name, array in applied._asdict().items() if name != "late"}
-    rows["with_reactions"] = np.maximum(applied.with_reactions, late)[at]
+    rows = {name: array[at] for name, array in applied._asdict().items() if name != "by_reactions"}
+    rows["with_reactions"] = np.maximum(applied.with_reactions, by_reactions)[at]
     made = applied._replace(**rows)
-    return made._replace(late=_late(made)), [elements[k] for k in order]
+    return made._replace(by_reactions=_by_reactions(made)), [elements[k] for k in order]
 
 
-def _programs(applied: a.Applied, row: int) -> list[int]:
+def _programs(applied: Applied, row: int) -> list[int]:
     """Return the programs of an applied force."""
     return [int(p) for p in (applied.program[row], *applied.components[row]) if p >= 0]
 
 
 def _needs(
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> _Needs:
@@ -91,9 +93,9 @@ def _needs(
 
 def _needed(
     wanted: list[int],
-    applied: a.Applied,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> tuple[set[int], bool]:
@@ -118,7 +120,7 @@ def _needed(
     return rows - joint_friction, reaction or bool(joint_friction)
 
 
-def _between(i: int, j: int, applied: a.Applied) -> set[int]:
+def _between(i: int, j: int, applied: Applied) -> set[int]:
     """Return the rows of what acts between two markers, and of what acts on i alone without j."""
     found = set()
     for k in range(len(applied.kind)):
@@ -133,10 +135,10 @@ def _between(i: int, j: int, applied: a.Applied) -> set[int]:
 
 def check_states(
     model: Model,
-    states: a.States,
-    applied: a.Applied,
+    states: States,
+    applied: Applied,
     elements: list[tuple[str, int]],
-    connections: a.Connections,
+    connections: Connections,
     connection_ids: Sequence[tuple[str, int]],
     programs: ProgramTable,
 ) -> None:
@@ -198,16 +200,16 @@ def _circle(model: Model, ring: list[tuple[str, int]]) -> DeckError:
     return DeckError([Fault(source.file, source.line, name, f"{what}: {' -> '.join(names)}")])
 
 
-def _late(applied: a.Applied) -> np.ndarray[Any, Any]:
+def _by_reactions(applied: Applied) -> np.ndarray[Any, Any]:
     """Return the unknowns that are settled together: row, component and program of each."""
     found = []
     for row in range(len(applied.kind)):
         if applied.with_reactions[row] == 1:
             if applied.program[row] >= 0:
-                found.append((row, a.SCALAR, int(applied.program[row])))
+                found.append((row, codes.SCALAR, int(applied.program[row])))
             components = enumerate(applied.components[row])
             found += [(row, c, int(program)) for c, program in components if program >= 0]
     if found:
         joint_friction = np.flatnonzero(applied.connection >= 0)
-        found += [(int(row), a.JOINT_FRICTION, -1) for row in joint_friction]
+        found += [(int(row), codes.JOINT_FRICTION, -1) for row in joint_friction]
     return np.array(found, dtype=np.int64).reshape(-1, 3)

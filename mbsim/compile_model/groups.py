@@ -50,7 +50,7 @@ OF_GYRATION = 2.0 * math.sqrt(3.0 / 0.6)
 
 @dataclass(frozen=True)
 class Groups:
-    """What errors are judged by: see `arrays.scene.Scales`, whose rows these are."""
+    """What errors are judged by: see `arrays.model.Scales`, whose rows these are."""
 
     of_body: list[int]
     length: list[float]

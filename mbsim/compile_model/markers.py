@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Angles, Markers
 from mbsim.model.elements import Array, Model
 from mbsim.model.placement import Placement
 
@@ -97,12 +97,12 @@ class MarkerTable:
         found = [self.start_angle(i, j) for i, j in self.angle_rows]
         return np.array(found + [0.0] * self.spare_angles, dtype=np.float64)
 
-    def arrays(self) -> tuple[a.Markers, a.Angles]:
+    def arrays(self) -> tuple[Markers, Angles]:
         """Return the tables as they are now."""
         body, p, R = zip(*self.frames, strict=True)
         rows = [*self.angle_rows, *[(0, 0)] * self.spare_angles]
         pairs = np.array(rows, dtype=np.int64).reshape(-1, 2)
         return (
-            a.Markers(np.array(body, dtype=np.int64), np.array(p), np.array(R)),
-            a.Angles(pairs[:, 0].copy(), pairs[:, 1].copy()),
+            Markers(np.array(body, dtype=np.int64), np.array(p), np.array(R)),
+            Angles(pairs[:, 0].copy(), pairs[:, 1].copy()),
         )

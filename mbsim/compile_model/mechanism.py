@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Connections, Equations, Tree
+from mbsim.arrays.scratch import Sweep
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
@@ -26,12 +28,12 @@ from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
 
 _KINDS = {
-    "offset": a.OFFSET,
-    "perp": a.PERP,
-    "angle": a.ANGLE,
-    "spin": a.ANGLE,
-    "distance": a.DISTANCE,
-    "twist": a.TWIST,
+    "offset": codes.OFFSET,
+    "perp": codes.PERP,
+    "angle": codes.ANGLE,
+    "spin": codes.ANGLE,
+    "distance": codes.DISTANCE,
+    "twist": codes.TWIST,
 }
 #: A joint that holds less than this is cheaper as equations than as a joint of the tree of the
 #: tree.
@@ -61,9 +63,9 @@ class Mechanism:
     `names` says for each equation which it is, for messages.
     """
 
-    tree: a.Tree
-    equations: a.Equations
-    connections: a.Connections
+    tree: Tree
+    equations: Equations
+    connections: Connections
     elements: list[tuple[str, int]]
     names: list[str]
 
@@ -161,7 +163,7 @@ class _Builder:
         connection = self.connect(statement, joint.id, i, j)
         self.joints[connection] = joint
         tree_joint = limb_of(connection, i, j, JOINTS[joint.type].equations)
-        if tree_joint is not None and tree_joint.turn == a.TURN_CROSS:
+        if tree_joint is not None and tree_joint.turn == codes.TURN_CROSS:
             self.check_cross(statement, joint, tree_joint)
         if tree_joint is not None and tree_joint.held >= _LEAST_ROWS:
             self.tree_joints[connection] = tree_joint
@@ -236,7 +238,7 @@ class _Builder:
         i, j = ([*bodies.values(), fixed, 0])[:2]
         connection = self.connect("GCON", constraint.id, i, j)
         for row in bodies.values():
-            self.sums.terms.append((a.GENERAL, row, 0, 0, 0, 1.0, -1))
+            self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
     def add_dry(self, friction: DryFriction) -> None:
@@ -254,7 +256,7 @@ class _Builder:
     def add_rigid_slot(self, grip: RigidSlot) -> None:
         """Add the two velocities that rigid friction of a slot holds while it sticks."""
         for way in range(2):
-            self.sums.terms.append((a.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
+            self.sums.terms.append((codes.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
             self.sums.close(-1, f"Force_Contact[{grip.contact}]", 0.0, self.length, level=1)
             self.sums.slot[-1] = grip.slot
 
@@ -302,7 +304,7 @@ class _Builder:
     def _body(self, row: int) -> int:
         return self.markers.frames[row][0]
 
-    def tree(self, others: list[int]) -> tuple[a.Tree, dict[int, tuple[int, bool]]]:
+    def tree(self, others: list[int]) -> tuple[Tree, dict[int, tuple[int, bool]]]:
         """Return the tree; for each connection in it its place and whether I is on the parent."""
         ground = self.markers.ground
         hung = self.grow(others)
@@ -329,7 +331,7 @@ class _Builder:
             made.root[k] = place[root_of[body]]
             made.end[made.root[k]] = k + 1
             if tree_joint is None:
-                made.turn[k], made.free[k] = a.TURN_ROOT, 6
+                made.turn[k], made.free[k] = codes.TURN_ROOT, 6
                 continue
             of_connection[tree_joint.connection] = (k, flip)
             child_row, parent_row = (
@@ -394,7 +396,7 @@ def constrain(
         builder.add_rigid_slot(grip)
     n = len(builder.pairs)
     pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
-    connections = a.Connections(
+    connections = Connections(
         i=pairs[:, 0].copy(),
         j=pairs[:, 1].copy(),
         tree=np.array([places.get(c, (-1, False))[0] for c in range(n)], dtype=np.int64),
@@ -403,11 +405,11 @@ def constrain(
     return Mechanism(tree, builder.sums.arrays(), connections, builder.elements, builder.sums.names)
 
 
-def sweep(mechanism: Mechanism) -> a.Sweep:
+def sweep(mechanism: Mechanism) -> Sweep:
     """Return scratch for the recursion and the equations."""
     nt, ne = len(mechanism.tree.body), len(mechanism.equations.program)
     nh = int((mechanism.equations.slot >= 0).sum())
-    return a.Sweep(
+    return Sweep(
         H=np.zeros((nt, 6, 6)),
         S=np.zeros((nt, 6, 6)),
         W=np.zeros((nt, 6, 6)),
@@ -438,6 +440,6 @@ def sweep(mechanism: Mechanism) -> a.Sweep:
         jet=np.zeros(12),
         share=np.zeros((nh, nh)),
         mix=np.zeros((nh, nh)),
-        cone=np.zeros((a.CONE_ROWS, nh)),
+        cone=np.zeros((codes.CONE_ROWS, nh)),
         kept_p=np.zeros((nt if nh else 0, 6)),
     )

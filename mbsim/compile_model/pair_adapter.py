@@ -12,6 +12,7 @@ from typing import Any
 from numba import types
 
 from mbsim.core.address import table_at, vector_at
+from mbsim.core.arrays import Pointer
 from mbsim.geometry.catalog import POINT, REGION_ROWS
 from mbsim.geometry.region import sum_points
 
@@ -22,7 +23,9 @@ SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER, _POINTER, _POINTER)
 def adapt_pair(points: Callable[..., int], slots: int) -> Any:
     """Return a pair function as a C function of plain pointers."""
 
-    def entry(frame_i, size_i, frame_j, size_j, out):
+    def entry(
+        frame_i: Pointer, size_i: Pointer, frame_j: Pointer, size_j: Pointer, out: Pointer
+    ) -> int:
         return points(
             vector_at(frame_i, 12),
             vector_at(size_i, 3),
@@ -37,7 +40,9 @@ def adapt_pair(points: Callable[..., int], slots: int) -> Any:
 def adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
     """Return a pair function with area as a C function that writes its one incident ahead."""
 
-    def entry(frame_i, size_i, frame_j, size_j, out):
+    def entry(
+        frame_i: Pointer, size_i: Pointer, frame_j: Pointer, size_j: Pointer, out: Pointer
+    ) -> int:
         rows = table_at(out, slots, POINT)
         count, area = region(
             vector_at(frame_i, 12),

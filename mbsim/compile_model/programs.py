@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Programs
 from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,
@@ -157,7 +157,7 @@ class ProgramTable:
         connections: Sequence[tuple[str, int]] = (),
         applied: Sequence[tuple[str, int]] = (),
         contacts: Sequence[int] = (),
-    ) -> a.Programs:
+    ) -> Programs:
         """Return the programs; force measures find their rows by (statement, id) in these lists."""
         rows = {element: (1, k) for k, element in enumerate(applied)}
         rows.update({element: (0, k) for k, element in enumerate(connections)})
@@ -167,7 +167,7 @@ class ProgramTable:
         shortened = [quicken(program) for program in self.programs]
         quick_start, quick = _table(shortened, rows, numbers)
         deepest = max(map(stack_depth, self.programs), default=0)
-        return a.Programs(
+        return Programs(
             start,
             code,
             np.array(list(numbers), dtype=np.float64),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.model import Graphics
+from mbsim.arrays.state import Pairs
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.mechanism import RigidSlot
 from mbsim.compile_model.pairing import MOST_LISTED, Plans
@@ -27,7 +28,7 @@ def _refuse(model: Model, contact: Contact, why: str) -> DeckError:
 
 
 def rigid_slots(
-    model: Model, plans: Plans, pairs: a.Pairs, graphics: a.Graphics, table: MarkerTable
+    model: Model, plans: Plans, pairs: Pairs, graphics: Graphics, table: MarkerTable
 ) -> list[RigidSlot]:
     """Return the slots of rigid contacts, each with markers on its bodies.
 

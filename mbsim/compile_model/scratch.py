@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Graphics, Residuals
+from mbsim.arrays.scratch import Rows, Work
+from mbsim.arrays.state import Log, State
 from mbsim.geometry.catalog import POINT
 from mbsim.laws import abi
 
@@ -27,7 +30,7 @@ class Sizes:
     contacts: int
     connections: int
     forces: int
-    late: int  # forces that depend on reactions
+    by_reactions: int  # forces that depend on reactions
     sensors: int
     dry_frictions: int
     switching: int  # programs with branches
@@ -41,18 +44,18 @@ class Sizes:
 
 
 def start_state(
-    n: Sizes, graphics: a.Graphics, angle: np.ndarray[Any, Any], residuals: a.Residuals
-) -> a.State:
+    n: Sizes, graphics: Graphics, angle: np.ndarray[Any, Any], residuals: Residuals
+) -> State:
     """Return the incident table before anything touched."""
     nb, ng, ns, memory = n.bodies, len(graphics.body), n.slots, n.memory
     dry = np.zeros((n.forces, 4))
     # dry friction begins without force where the first committed state is
-    dry[:, [a.SLIDER, a.SLIDER_BEFORE]] = np.nan
+    dry[:, [codes.SLIDER, codes.SLIDER_BEFORE]] = np.nan
     sensed = np.zeros((n.sensors, 5))
-    sensed[:, a.EXCESS] = np.nan
+    sensed[:, codes.EXCESS] = np.nan
     q = np.zeros((nb + 1, 4))
     q[:, 0] = 1.0
-    return a.State(
+    return State(
         q=q,
         w=np.zeros((nb + 1, 3)),
         since=np.zeros(1),
@@ -80,20 +83,20 @@ def start_state(
     )
 
 
-def empty_log(nc: int) -> a.Log:
+def empty_log(nc: int) -> Log:
     """Return empty counters and peaks."""
-    contacts = np.zeros((nc, a.LOG_COLUMNS))
-    contacts[:, a.FIRST_TOUCH] = np.nan
-    contacts[:, a.REBOUND] = np.nan
-    contacts[:, a.PEAK_FORCE_TIME] = np.nan
-    return a.Log(
+    contacts = np.zeros((nc, codes.LOG_COLUMNS))
+    contacts[:, codes.FIRST_TOUCH] = np.nan
+    contacts[:, codes.REBOUND] = np.nan
+    contacts[:, codes.PEAK_FORCE_TIME] = np.nan
+    return Log(
         contacts,
-        np.zeros(a.COUNTERS, dtype=np.int64),
+        np.zeros(codes.COUNTERS, dtype=np.int64),
         np.zeros((nc + 1, 4), dtype=np.int64),
     )
 
 
-def place_fixed(work: a.Work, graphics: a.Graphics) -> None:
+def place_fixed(work: Work, graphics: Graphics) -> None:
     """Fill what no evaluation fills: rows of ground, of shapes on it, and the axes of spheres."""
     work.R[-1] = np.eye(3)
     work.v[-1] = work.w[-1] = 0.0
@@ -105,11 +108,11 @@ def place_fixed(work: a.Work, graphics: a.Graphics) -> None:
     work.speed[fixed] = 0.0
 
 
-def scratch(n: Sizes, graphics: a.Graphics) -> a.Work:
+def scratch(n: Sizes, graphics: Graphics) -> Work:
     """Return scratch, with what stands still in its place."""
     nb, ns, nf, memory, points = n.bodies, n.slots, n.forces, n.memory, n.points
     ng = len(graphics.body)
-    work = a.Work(
+    work = Work(
         R=np.full((nb + 1, 3, 3), np.nan),
         v=np.full((nb + 1, 3), np.nan),
         w=np.full((nb + 1, 3), np.nan),
@@ -123,7 +126,7 @@ def scratch(n: Sizes, graphics: a.Graphics) -> a.Work:
         touching=np.zeros(ns, dtype=np.int64),
         hit=np.zeros(ns + 1, dtype=np.int64),
         t=np.zeros((ns, 3)),
-        slot=np.zeros((ns, a.SLOT_COLUMNS)),
+        slot=np.zeros((ns, codes.SLOT_COLUMNS)),
         memory=np.zeros((ns, memory)),
         kept=np.zeros((ns if n.ahead else 0, 3 + memory)),
         grip=np.zeros((ns, 4)),
@@ -141,35 +144,35 @@ def scratch(n: Sizes, graphics: a.Graphics) -> a.Work:
         wrench=np.zeros(8),
         slopes=np.zeros((12, 6)),
         rub=np.zeros((nf, 9)),
-        late=np.zeros((n.late, 5)),
-        secant=np.zeros((n.late, n.late)),
+        by_reactions=np.zeros((n.by_reactions, 5)),
+        secant=np.zeros((n.by_reactions, n.by_reactions)),
         reaction=np.zeros(6 * n.connections),
         squares=np.full(n.groups, np.nan),
         trouble=np.full(2, -1, dtype=np.int64),
-        hold=np.zeros((ns if points else 0, 15)),
-        held=np.zeros((ns if points else 0, 2)),
+        sticking_point=np.zeros((ns if points else 0, 15)),
+        sticking_force=np.zeros((ns if points else 0, 2)),
         look=np.zeros((3, points, POINT)),
     )
     place_fixed(work, graphics)
     return work
 
 
-def empty_rows(n: Sizes) -> a.Rows:
+def empty_rows(n: Sizes) -> Rows:
     """Return the tables in which compiled code leaves its output rows."""
     ns = n.slots
     events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.dry_frictions
-    return a.Rows(
+    return Rows(
         time=np.zeros(ROWS),
         y=np.zeros((ROWS, n.y)),
         accel=np.zeros((ROWS, 6 * n.bodies)),
-        contact=np.zeros((ROWS, a.CONTACT_COLUMNS * n.contacts)),
+        contact=np.zeros((ROWS, codes.CONTACT_COLUMNS * n.contacts)),
         energy=np.zeros((ROWS, 4)),
         joint=np.zeros((ROWS, 6 * n.connections)),
         applied=np.zeros((ROWS, 6 * n.forces)),
         value=np.zeros((ROWS, n.values)),
         incident_count=np.zeros(ROWS, dtype=np.int64),
         incidents=np.zeros(
-            (min(ROWS * ns, 2 * ns + INCIDENTS), a.INC_MEMORY + n.memory + n.region)
+            (min(ROWS * ns, 2 * ns + INCIDENTS), codes.INC_MEMORY + n.memory + n.region)
         ),
         events=np.zeros((events, 4)),
         used=np.zeros(3, dtype=np.int64),

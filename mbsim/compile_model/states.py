@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Sensors, States
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.model.elements import Model
 
 
-def states_table(model: Model, programs: ProgramTable) -> a.States:
+def states_table(model: Model, programs: ProgramTable) -> States:
     """Return the states, whose slopes become programs."""
     states = model.differentials.values()
-    return a.States(
+    return States(
         np.array(
             [programs.add(state.expr, state, forces=True) for state in states], dtype=np.int64
         ),
@@ -22,18 +23,18 @@ def states_table(model: Model, programs: ProgramTable) -> a.States:
 
 
 _COMPARE = {
-    "GE": a.NOT_LESS,
-    "LE": a.NOT_MORE,
-    "GT": a.MORE,
-    "LT": a.LESS,
-    "EQ": a.EQUAL,
+    "GE": codes.NOT_LESS,
+    "LE": codes.NOT_MORE,
+    "GT": codes.MORE,
+    "LT": codes.LESS,
+    "EQ": codes.EQUAL,
 }
 
 
-def sensors_table(model: Model, programs: ProgramTable) -> a.Sensors:
+def sensors_table(model: Model, programs: ProgramTable) -> Sensors:
     """Return the sensors, with the programs of what they watch and evaluate."""
     sensors = model.sensors.values()
-    return a.Sensors(
+    return Sensors(
         np.array([sensor.id for sensor in sensors], dtype=np.int64),
         np.array([programs.add(sensor.expr, sensor) for sensor in sensors], dtype=np.int64),
         np.array(

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays import scene as a
 from mbsim.arrays.hooks import Hook
-from mbsim.compile_model.acting import wanted
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import ANGLE, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.core.address import pack
@@ -26,6 +25,7 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Model
+from mbsim.model.subroutines import wanted
 from mbsim.plugins.guard import PassedOn
 from mbsim.plugins.helpers import host
 from mbsim.plugins.source.script import Scripts
@@ -35,7 +35,7 @@ from mbsim.plugins.subroutine import UserSubroutine, load_subroutine
 SPARE_ANGLES = 32
 
 #: What py_sysary gives: functions and how many of the ids each takes.
-ARRAYS = {
+ARRAYS: dict[str, tuple[tuple[str, int], ...]] = {
     "TDISP": (("DX", 3), ("DY", 3), ("DZ", 3)),
     "RDISP": (("PSI", 2), ("THETA", 2), ("PHI", 2)),
     "TVEL": (("VX", 4), ("VY", 4), ("VZ", 4)),
@@ -77,13 +77,13 @@ class StateReader:
         self.open_programs: list[int] = []
         self.known: dict[tuple[Any, ...], bytes | int | None] = {}
 
-    def open(self, scene: a.Scene) -> None:
+    def open(self, scene: Scene) -> None:
         """Look at this scene from now on."""
         self.scene = scene
         at = int(scene.programs.quick_start[self.spare])
         self.place = scene.programs.quick[at].ctypes.data
         self.words = scene.programs.quick.shape[1]
-        self.values = memoryview(scene.programs.values)
+        self.values = scene.programs.values.data
         self.shown = b""
         self.run: Callable[..., float] | None = None
         host.sysfnc, host.sysary = self.sysfnc, self.sysary

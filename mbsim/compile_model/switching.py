@@ -23,7 +23,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Applied, Switching
 from mbsim.compile_model.instructions import ELEMENT, NET, USER, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.expressions.elementary import NUMBER
@@ -135,8 +136,8 @@ def has_modes(model: Model) -> bool:
 
 
 def switching_table(
-    model: Model, programs: ProgramTable, applied: a.Applied, modes: Sequence[int] = ()
-) -> a.Switching:
+    model: Model, programs: ProgramTable, applied: Applied, modes: Sequence[int] = ()
+) -> Switching:
     """Return what is watched: a program for each expression, limits, dry friction, modes.
 
     `modes` are programs that tell the modes of users' elements.
@@ -155,10 +156,10 @@ def switching_table(
     if not any_found:
         rows = []
     rows += modes
-    watched = (a.SLIDE_LIMIT, a.TURN_LIMIT, a.DRY_SLIDE, a.DRY_TURN)
+    watched = (codes.SLIDE_LIMIT, codes.TURN_LIMIT, codes.DRY_SLIDE, codes.DRY_TURN)
     limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
     last = [-1] if has_modes(model) else []
-    return a.Switching(
+    return Switching(
         np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),
         np.array([*(-1 for _ in rows), *limits, *last], dtype=np.int64),
     )

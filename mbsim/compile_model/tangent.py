@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbsim.arrays.codes import TURN_ROOT
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import TURN_ROOT, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core import tags
 from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
 
@@ -36,7 +37,7 @@ class Pattern(NamedTuple):
     order: I1  # (nb,) bodies
     start: I1  # (nb + 1,) first neighbour of each step
     neighbour: I1  # (blocks,) bodies that are eliminated later
-    count: I1  # (3,) couplings, blocks, 1 where the order is to be found anew
+    count: I1  # type: ignore[assignment]  # (3,) couplings, blocks, 1 where the order is to be found anew
     joint: tags.Constant[I1]  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
     parent: tags.Constant[I1]  # (nb,) body row, -1 for ground
     children: tags.Constant[I1]  # (nb,) that hang on it
@@ -188,13 +189,19 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
     linear = Linear(
         np.zeros((nb, 3, 3)),
         np.zeros((nb, 4)),
-        *(np.zeros((nb, 3)) for _ in range(5)),
+        np.zeros((nb, 3)),
+        np.zeros((nb, 3)),
+        np.zeros((nb, 3)),
+        np.zeros((nb, 3)),
+        np.zeros((nb, 3)),
         np.zeros((nt, 6, 6)),
         np.zeros((nt, 12, 6)),
         np.zeros((nt, 6)),
         np.zeros((blocks, 6, 6)),
         np.zeros((blocks, 6, 6)),
-        *(np.zeros((m, nb, 6)) for _ in range(3)),
+        np.zeros((m, nb, 6)),
+        np.zeros((m, nb, 6)),
+        np.zeros((m, nb, 6)),
         np.zeros(m, dtype=np.int64),
         np.zeros((nz, nz)),
         np.zeros((2, 9, 6)),
@@ -213,9 +220,9 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((2, 5 + wide)),
     )
     sizes = nb, m, n, blocks, slots + 1, wide
-    real = Real(*_factor_arrays(*sizes, np.float64), np.array([Hook.MEMORY]))
+    real = Real(*_factor_arrays(sizes, np.float64, Hook.MEMORY))
     sizes = sizes if pair else (0, 0, 0, 0, 0, 0)
-    both = Pair(*_factor_arrays(*sizes, np.complex128), np.array([Hook.MEMORY_PAIR]))
+    both = Pair(*_factor_arrays(sizes, np.complex128, Hook.MEMORY_PAIR))
     return Tangent(pattern, linear, keeps, depends, real, both)
 
 
@@ -228,9 +235,10 @@ def _carried(scene: Scene) -> tuple[int, int]:
 
 
 def _factor_arrays(
-    nb: int, m: int, n: int, blocks: int, slots: int, wide: int, kind: type
+    sizes: tuple[int, int, int, int, int, int], kind: type, hook: Hook
 ) -> tuple[np.ndarray, ...]:
     """Return the arrays of a factorisation."""
+    nb, m, n, blocks, slots, wide = sizes
     return (
         np.zeros((blocks, 6, 6), dtype=kind),
         np.zeros((nb, 6, 6), dtype=kind),
@@ -246,6 +254,7 @@ def _factor_arrays(
         np.zeros((1, 4), dtype=kind),
         np.zeros((2, n), dtype=kind),
         np.zeros((slots, wide, wide), dtype=kind),
+        np.array([hook]),
     )
 
 

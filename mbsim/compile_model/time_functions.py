@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbsim.arrays import scene as a
-from mbsim.arrays.scene import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import AXIS_TORQUE, EQUAL, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import SPLINE
 from mbsim.expressions.elementary import CODES, FIRST_MEASURE, IF, NUMBER, SIGN, TIME
 
@@ -62,7 +62,7 @@ class _Part(NamedTuple):
     mixed: bool  # it looks at TIME and at what is not known ahead
 
 
-def _program(scene: a.Scene, program: int) -> Iterator[Code]:
+def _program(scene: Scene, program: int) -> Iterator[Code]:
     """Yield the instructions of a program."""
     programs = scene.programs
     for row in programs.code[programs.start[program] : programs.start[program + 1]]:
@@ -74,7 +74,7 @@ def _program(scene: a.Scene, program: int) -> Iterator[Code]:
             yield Code(op, rows[:count])
 
 
-def parts(scene: a.Scene, program: int) -> tuple[list[tuple[Code, ...]], bool, bool]:
+def parts(scene: Scene, program: int) -> tuple[list[tuple[Code, ...]], bool, bool]:
     """Return what of a program looks at TIME alone, whether that is all of it, and what is left.
 
     The last says whether TIME is mixed with what is not known ahead, so that pulses of both may
@@ -108,9 +108,9 @@ def parts(scene: a.Scene, program: int) -> tuple[list[tuple[Code, ...]], bool, b
             lone = chosen is not None and not any(part.mixed for part in given)
             blind |= seen and not lone and not _is_quotient(code, given)
         stack.append(_Part((), _OTHER, seen))
-    (whole,) = stack
-    if whole.looks == _OF_TIME:
-        return [whole.code], True, False
+    (all_of_it,) = stack
+    if all_of_it.looks == _OF_TIME:
+        return [all_of_it.code], True, False
     return list(found), False, blind
 
 
@@ -134,7 +134,7 @@ def _chosen(code: Code, given: Sequence[_Part]) -> tuple[Code, ...] | None:
     return (*made, code)
 
 
-def _lever(scene: a.Scene, marker: int, tol_v: float, tol_l: float, turning: bool) -> Any:
+def _lever(scene: Scene, marker: int, tol_v: float, tol_l: float, turning: bool) -> Any:
     """Return the factors of a force or torque on the body of a marker."""
     body = int(scene.markers.body[marker])
     bodies = scene.bodies
@@ -150,21 +150,21 @@ def _lever(scene: a.Scene, marker: int, tol_v: float, tol_l: float, turning: boo
     return np.array([0.0, 0.0, rate / tol_v, rate / tol_l])
 
 
-def _forces(scene: a.Scene, tol_v: float, tol_l: float) -> Iterator[tuple[int, int, Any]]:
+def _forces(scene: Scene, tol_v: float, tol_l: float) -> Iterator[tuple[int, int, Any]]:
     """Yield program, role and factors of the applied forces."""
     applied = scene.applied
     for f in range(len(applied.kind)):
         ends = (int(applied.i[f]), int(applied.j[f]))
         whole = int(applied.program[f])
         if whole >= 0:
-            turning = applied.kind[f] == a.AXIS_TORQUE
+            turning = applied.kind[f] == AXIS_TORQUE
             yield whole, 0, sum(_lever(scene, m, tol_v, tol_l, turning) for m in ends)
         for c, program in enumerate(applied.components[f]):
             if program >= 0:
                 yield int(program), 0, sum(_lever(scene, m, tol_v, tol_l, c >= 3) for m in ends)
 
 
-def _acting(scene: a.Scene, tol: float) -> Iterator[tuple[int, int, Any]]:
+def _acting(scene: Scene, tol: float) -> Iterator[tuple[int, int, Any]]:
     """Yield program, role and factors of all that moves something."""
     length, speed = float(scene.world.scale[SCALE_LENGTH]), float(scene.world.scale[SCALE_SPEED])
     tol_v, tol_l = PART * tol * speed, PART * tol * length
@@ -186,19 +186,19 @@ def _acting(scene: a.Scene, tol: float) -> Iterator[tuple[int, int, Any]]:
         yield int(program), level, sizes
 
 
-def _sensed(scene: a.Scene) -> Iterator[tuple[tuple[Code, ...], float, int]]:
+def _sensed(scene: Scene) -> Iterator[tuple[tuple[Code, ...], float, int]]:
     """Yield what sensors of TIME alone watch, each value where one turns on or off, the role."""
     sensors = scene.sensors
     for k, program in enumerate(sensors.program):
         found, whole, _ = parts(scene, int(program))
         if whole:
             width = float(sensors.width[k])
-            for edge in {width, -width, 0.0} if sensors.compare[k] == a.EQUAL else {width, -width}:
+            for edge in {width, -width, 0.0} if sensors.compare[k] == EQUAL else {width, -width}:
                 role = WATCHED if sensors.located[k] == 1 else GLANCED
                 yield found[0], float(sensors.value[k]) + edge, role
 
 
-def functions(scene: a.Scene, tol: float) -> tuple[list[Function], bool]:
+def functions(scene: Scene, tol: float) -> tuple[list[Function], bool]:
     """Return the functions of TIME that something follows, and whether pulses may be missed."""
     found: dict[tuple[Any, int], Any] = {}
     blind = False

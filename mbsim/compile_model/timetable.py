@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import SPLINE
 from mbsim.compile_model.time_functions import GLANCED, PART, Function, functions
 from mbsim.expressions import bounds, intervals
@@ -64,7 +64,7 @@ class _Group:
         self.numbers = {k: np.array([member.code[k].value for member in members]) for k in places}
         self.role = np.array([member.role for member in members])
         self.sizes = np.array([member.sizes for member in members])
-        self.known = self.sizes.any(axis=1)
+        self.known: Any = self.sizes.any(axis=1)
         self.count = len(members)
 
     def bound(self, member: Any, lo: Any, hi: Any) -> Bound:
@@ -326,7 +326,7 @@ def _least(t: Any, end: float) -> Any:
     return 4.4e-16 * np.maximum(np.abs(t), 1e-3 * abs(end))
 
 
-def follows_time(scene: a.Scene) -> bool:
+def follows_time(scene: Scene) -> bool:
     """Return whether an expression names TIME."""
     return bool(np.any(scene.programs.code[:, 0] == TIME))
 

@@ -7,19 +7,26 @@ from itertools import product
 
 import numpy as np
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Tree
 from mbsim.joints.catalog import Row
 from mbsim.model.elements import Array
 
 #: Directions free at each kind of turn.
-FREE_TURNS = {a.TURN_LOCKED: 0, a.TURN_AXIS: 1, a.TURN_CROSS: 2, a.TURN_FREE: 3, a.TURN_ROOT: 6}
+FREE_TURNS = {
+    codes.TURN_LOCKED: 0,
+    codes.TURN_AXIS: 1,
+    codes.TURN_CROSS: 2,
+    codes.TURN_FREE: 3,
+    codes.TURN_ROOT: 6,
+}
 
 AXES = "xyz"
 #: What of a rotation is left free by these cosines held at 0 (axis of I, axis of J).
 _TURNS = {
-    frozenset[tuple[str, str]](): a.TURN_FREE,
-    frozenset({("z", "x"), ("z", "y")}): a.TURN_AXIS,
-    frozenset({("z", "x"), ("z", "y"), ("x", "y")}): a.TURN_LOCKED,
+    frozenset[tuple[str, str]](): codes.TURN_FREE,
+    frozenset({("z", "x"), ("z", "y")}): codes.TURN_AXIS,
+    frozenset({("z", "x"), ("z", "y"), ("x", "y")}): codes.TURN_LOCKED,
 }
 
 
@@ -43,7 +50,7 @@ class TreeJoint:
     @property
     def both_ways(self) -> bool:
         """Whether I's body may be the parent: slides are then along I's axes as well."""
-        return self.turn in (a.TURN_LOCKED, a.TURN_AXIS) or sum(self.slide) in (0, 3)
+        return self.turn in (codes.TURN_LOCKED, codes.TURN_AXIS) or sum(self.slide) in (0, 3)
 
 
 def nearest_flip(turn: int, relative: Array) -> Array:
@@ -51,9 +58,9 @@ def nearest_flip(turn: int, relative: Array) -> Array:
 
     Cosines held at 0 do not tell an axis from its opposite.
     """
-    if turn == a.TURN_AXIS:
+    if turn == codes.TURN_AXIS:
         return np.eye(3) if relative[2, 2] >= 0.0 else np.diag([1.0, -1.0, -1.0])
-    if turn == a.TURN_LOCKED:
+    if turn == codes.TURN_LOCKED:
         flips = [np.diag([x, y, x * y]) for x, y in product((1.0, -1.0), repeat=2)]
         return max(flips, key=lambda flip: float(np.trace(relative @ flip)))
     return np.eye(3)
@@ -74,18 +81,18 @@ def limb_of(
     slide = (int("x" not in held), int("y" not in held), int("z" not in held))
     if len(cosines) == 1:
         axis_i, axis_j = (AXES.index(axis) for axis in cosines[0])
-        return TreeJoint(connection, i, j, a.TURN_CROSS, slide, axis_i, axis_j)
+        return TreeJoint(connection, i, j, codes.TURN_CROSS, slide, axis_i, axis_j)
     turn = _TURNS.get(frozenset(cosines))
     return None if turn is None else TreeJoint(connection, i, j, turn, slide)
 
 
-def empty_tree(ground: int, n: int) -> a.Tree:
+def empty_tree(ground: int, n: int) -> Tree:
     """Return a tree of n places to be filled."""
 
     def ints(*shape: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
         return np.zeros(shape, dtype=np.int64)
 
-    return a.Tree(
+    return Tree(
         body=ints(n),
         parent=ints(n),
         of_body=np.full(ground + 1, -1, dtype=np.int64),

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.arrays import scene as a
-from mbsim.model.elements import Model
+from mbsim.arrays.model import Residuals, Users
+from mbsim.model.elements import Model, Variable
+from mbsim.model.forces import ScalarForce, VectorForce
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -34,7 +35,8 @@ class UserCode:
     @property
     def laws_look(self) -> bool:
         """Whether a law of a contact looks at the state."""
-        return any(law.looks for law in (*self.friction.values(), *self.normal.values()))
+        friction = any(law.looks for law in self.friction.values())
+        return friction or any(law.looks for law in self.normal.values())
 
     @property
     def looks(self) -> bool:
@@ -108,7 +110,7 @@ def _load_subroutines(
     scripts: dict[Path, Script],
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Load the users' subroutines of forces and variables."""
-    elements = (
+    elements: tuple[ScalarForce | Variable | VectorForce, ...] = (
         *model.scalar_forces.values(),
         *model.variables.values(),
         *model.vector_forces.values(),
@@ -123,10 +125,10 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
-def no_residuals() -> a.Residuals:
+def no_residuals() -> Residuals:
     """Return the rows of a model without elements of users' residuals."""
-    kinds = typing.get_type_hints(a.Residuals, include_extras=True).values()
-    return a.Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
+    kinds = typing.get_type_hints(Residuals, include_extras=True).values()
+    return Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
 
 
 def _load_residuals(
@@ -172,7 +174,7 @@ def load_user_code(
     )
 
 
-def users_table(code: UserCode, model: Model, n: int) -> a.Users:
+def users_table(code: UserCode, model: Model, n: int) -> Users:
     """Return the rows of user subroutines and of residuals behind them; `n`: numbers of y."""
     users, made = code.subroutines, code.residuals
     counts = [user.count for user in users.values()]
@@ -181,7 +183,7 @@ def users_table(code: UserCode, model: Model, n: int) -> a.Users:
 
         counts += [results_of(model.force_elements[id], user) for id, user in made.items()]
     addresses = [user.address for user in users.values()]
-    return a.Users(
+    return Users(
         np.array([*addresses, *(0 for _ in made)], dtype=np.int64),
         np.array([*(-1 for _ in users), *range(len(made))], dtype=np.int64),
         np.zeros((len(counts), max(counts, default=1))),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import typing
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ from mbsim.core.array_items import DATA, describe
 from mbsim.core.memory import floats_at
 
 _WORD = ir.IntType(64)
+#: An intrinsic is called without the typing context that it is declared with.
+_intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = intrinsic
 
 
 class GroupType(types.Type):
@@ -113,7 +116,7 @@ def pack(group: NamedTuple) -> np.ndarray[Any, np.dtype[np.int64]]:
     return np.array(words, dtype=np.int64)
 
 
-@intrinsic
+@_intrinsic
 def view(typingctx: Any, address: Any, group: Any) -> Any:
     """Return the group that `pack` wrote at `address`; `group` is the NamedTuple class."""
     target = GroupType(group.instance_class)
@@ -139,13 +142,13 @@ def _call(result: Any, result_ir: Any, arguments: Any) -> Any:
     return signature, codegen
 
 
-@intrinsic
+@_intrinsic
 def call_int(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Call the C function at `address` with a tuple of arguments; it returns an int64."""
     return _call(types.int64, ir.IntType(64), arguments)
 
 
-@intrinsic
+@_intrinsic
 def call_float(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Call the C function at `address` with a tuple of arguments; it returns a double."""
     return _call(types.float64, ir.DoubleType(), arguments)
@@ -167,14 +170,14 @@ def _at(kind: Any) -> Any:
     )
 
 
-@intrinsic
+@_intrinsic
 def vector_at(typingctx: Any, pointer: Any, count: Any) -> Any:
     """Return `count` numbers at a pointer as an array that shares them."""
     kind = types.Array(pointer.dtype, 1, "C")
     return kind(pointer, types.int64), _at(kind)
 
 
-@intrinsic
+@_intrinsic
 def table_at(typingctx: Any, pointer: Any, rows: Any, columns: Any) -> Any:
     """Return the numbers at a pointer as an array of rows and columns that shares them."""
     kind = types.Array(pointer.dtype, 2, "C")

@@ -59,12 +59,24 @@ def _is_plain(context: Any, kind: Any, indices: Any) -> bool:
     )
 
 
+def _is_from_begin(index: Any) -> bool:
+    """Return whether an index is known not to be counted from an array's end."""
+    return (
+        isinstance(index, ir.Constant) and isinstance(index.constant, int) and index.constant >= 0
+    )
+
+
 def _place(context: Any, builder: Any, kind: Any, array: Any, kinds: Any, indices: Any) -> Any:
     """Return the pointer to what indices name, and the array's lengths behind them."""
     lengths = [builder.extract_value(array, [_SHAPE, k]) for k in range(kind.ndim)]
     place = None
     for k, (index_kind, given) in enumerate(zip(kinds, indices, strict=True)):
-        index = arrayobj.fix_integer_index(context, builder, index_kind, given, lengths[k])
+        index = context.cast(builder, given, index_kind, types.intp)
+        if (
+            not (isinstance(index, ir.Constant) and isinstance(index.constant, int))
+            or index.constant < 0
+        ):
+            index = arrayobj.fix_integer_index(context, builder, index_kind, given, lengths[k])
         if k + 1 < kind.ndim:
             step = lengths[k + 1]
             for length in lengths[k + 2 :]:

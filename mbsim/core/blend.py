@@ -6,7 +6,7 @@ from mbsim.core.jitable import jitable
 
 
 @jitable
-def step(x, x0, h0, x1, h1):
+def step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
     """Return the cubic blend from h0 (x <= x0) to h1 (x >= x1), slope 0 at both ends."""
     if x <= x0:
         return h0
@@ -17,7 +17,7 @@ def step(x, x0, h0, x1, h1):
 
 
 @jitable
-def step_derivative(x, x0, h0, x1, h1, order):
+def step_derivative(x: float, x0: float, h0: float, x1: float, h1: float, order: int) -> float:
     """Return the derivative of `step` of order 0, 1 or 2 with respect to x."""
     if order == 0:
         return step(x, x0, h0, x1, h1)
@@ -31,7 +31,7 @@ def step_derivative(x, x0, h0, x1, h1, order):
 
 
 @jitable
-def step5_derivative(x, x0, h0, x1, h1, order):
+def step5_derivative(x: float, x0: float, h0: float, x1: float, h1: float, order: int) -> float:
     """Return the quintic blend s^3 (10 - 15 s + 6 s^2) or its derivative of order 1 or 2."""
     if x <= x0:
         return h0 if order == 0 else 0.0

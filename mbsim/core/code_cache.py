@@ -29,6 +29,7 @@ from numba.core.caching import (
 )
 
 from mbsim.core import linking, processors
+from mbsim.errors import ModelError
 
 PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(
@@ -50,6 +51,63 @@ def cache_root() -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "mbsim"
+
+
+def _say_unkept(line: str) -> None:
+    """Tell the user that compiled code is not kept."""
+    sys.stderr.write(f"mbsim: {line}\n")
+
+
+#: Called once with why compiled code is not kept.
+on_unkept: Callable[[str], None] = _say_unkept
+_unkept: set[str] = set()
+
+
+def _note_unkept(folder: Path, error: OSError) -> None:
+    """Say once that a folder does not take compiled code; the run goes on."""
+    if not _unkept:
+        _unkept.add(str(folder))
+        on_unkept(f"{folder}: compiled code is not kept for later runs: {error.strerror or error}")
+
+
+@functools.cache
+def trusted_root() -> Path:
+    """Return `cache_root()`, made for the user alone if it is not there.
+
+    Raises
+    ------
+    ModelError
+        If others could put code there, which would run with the user's rights.
+    """
+    root = cache_root()
+    try:
+        root.parent.mkdir(parents=True, exist_ok=True)
+        root.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        _note_unkept(root, error)
+    check_trusted(root)
+    return root
+
+
+def check_trusted(folder: Path) -> None:
+    """Raise `ModelError` where somebody else than the user, or root, can write into a folder."""
+    if not hasattr(os, "geteuid"):
+        return
+    try:
+        found = folder.stat()
+    except OSError:
+        return  # what is not there, or cannot be looked into, gives no code
+    remedy = "give another folder by MBSIM_CACHE_DIR"
+    if found.st_uid not in (0, os.geteuid()):
+        raise ModelError(
+            f"{folder}: the folder of compiled code belongs to another user, whose code would "
+            f"run; {remedy}"
+        )
+    if found.st_mode & 0o022:
+        raise ModelError(
+            f"{folder}: the folder of compiled code can be written by others, whose code would "
+            f"run; chmod go-w {folder}, or {remedy}"
+        )
 
 
 @functools.cache
@@ -112,7 +170,13 @@ class _ContentLocator(_CacheLocator):
         self.digest = digest
 
     def get_cache_path(self) -> str:
-        return str(cache_root() / _VERSION / self.digest)
+        return str(trusted_root() / _VERSION / self.digest)
+
+    def ensure_cache_path(self) -> None:
+        path = Path(self.get_cache_path())
+        for folder in (path.parent, path):
+            folder.mkdir(mode=0o700, exist_ok=True)
+            check_trusted(folder)
 
     def get_source_stamp(self) -> str:
         return "content"  # the folder's name already says it
@@ -151,12 +215,15 @@ class CodeCache(FunctionCache):
     def _save_overload(self, sig: Any, data: Any) -> None:
         try:
             super()._save_overload(sig, data)
-        except OSError:
-            pass  # a folder that cannot be written, or is full, keeps nothing
+        except OSError as error:  # a folder that cannot be written, or is full
+            _note_unkept(cache_root(), error)
 
     def _find(self, key: Any) -> Any:
         """Return what is stored of a root, None where nothing is."""
         signature, (triple, *_), code = key
+        own = Path(self._impl.locator.get_cache_path())
+        for folder in (own.parent, own):
+            check_trusted(folder)
         for file, family in [(self._cache_file, ""), *self._shipped()]:
             wanted = key
             if family:

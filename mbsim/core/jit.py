@@ -15,7 +15,7 @@ import functools
 import gc
 import time
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import event, sigutils
@@ -131,19 +131,19 @@ def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     change.
     """
     _register()
-    made = numba.njit(error_model="numpy")(py_func)
+    made: Any = numba.njit(error_model="numpy")(py_func)
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
-    return made
+    return cast(Callable[..., Any], made)
 
 
 def awaited(py_func: Callable[..., Any]) -> Callable[..., Any]:
     """Return `function(py_func)`, counted (`planned`) as what is called soon."""
-    made = function(py_func)
-    if _missing is not None and isinstance(made._cache, CodeCache):  # type: ignore[attr-defined]
-        if not made.overloads and made._cache.is_empty():  # type: ignore[attr-defined]
+    made: Any = function(py_func)
+    if _missing is not None and isinstance(made._cache, CodeCache):
+        if not made.overloads and made._cache.is_empty():
             _missing.append(py_func.__qualname__)
-    return made
+    return cast(Callable[..., Any], made)
 
 
 _kept: dict[Any, Any] = {}
@@ -158,7 +158,8 @@ def address(py_func: Callable[..., Any], signature: Any) -> int:
     if key in _kept:
         return int(_kept[key].address)
     _register()
-    made = CFunc(py_func, sigutils.normalize_signature(signature), {}, {"error_model": "numpy"})
+    typed = sigutils.normalize_signature(signature)
+    made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy"})
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
     try:

@@ -18,13 +18,13 @@ import numba
 from numba.core import codegen, environment
 from numba.core.registry import cpu_target
 
-from mbsim.core import numba_costs
+from mbsim.core import numba_costs, plain_code
 
 #: Versions of Numba whose private methods are as this module takes them to be.
 TESTED = ("0.68.1",)
 
 #: Part of the name of the cache's folder: code of another policy is not mixed with it.
-POLICY = "roots1" if numba.__version__ in TESTED else "all"
+POLICY = "roots2" if numba.__version__ in TESTED else "all"
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _RECURSIVE = codegen.RuntimeLinker.PREFIX
@@ -42,6 +42,11 @@ class RootLibrary(codegen.JITCodeLibrary):
     def add_linking_library(self, library: Any) -> None:
         """Remember what this function calls, without optimising or emitting it."""
         self._linking_libraries.append(library)
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Take what was lowered, without what nobody uses of it."""
+        plain_code.leave_out_unused(ir_module)
+        super().add_ir_module(ir_module)
 
     def lowered(self) -> Any:
         """Return the code as it was lowered, its symbols such that many roots may hold them."""
@@ -146,3 +151,4 @@ def install() -> None:
     generator._library_class = RootLibrary
     generator.set_env = set_where_emitted
     numba_costs.install()
+    plain_code.install()

@@ -15,4 +15,5 @@ def floats_at(address: float, count: float) -> np.ndarray[Any, np.dtype[np.float
     the address keeps the memory alive. `core.address` has the compiled form.
     """
     kind = ctypes.c_double * int(count)
-    return np.frombuffer(kind.from_address(int(address)), dtype=np.float64)
+    shared: Any = kind.from_address(int(address))
+    return np.frombuffer(shared, dtype=np.float64)

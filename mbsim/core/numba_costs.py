@@ -7,14 +7,19 @@ Each function here gives what Numba's own gives, in less time. They are put in p
 from __future__ import annotations
 
 import functools
+from types import FunctionType
 from typing import Any
 
+from llvmlite import ir as llvm
 from numba import stencil
 from numba.core import (
+    analysis,
+    base,
     compiler_machinery,
     errors,
     event,
     inline_closurecall,
+    interpreter,
     ir,
     lowering,
     postproc,
@@ -86,6 +91,65 @@ def _variables(self: Any, part: Any) -> list[Any]:
     for inner in part.values() if role == _MAPPING else part:
         found.extend(_variables(self, inner))
     return found
+
+
+def _names_in(value: Any) -> Any:
+    """Return the names of the variables in what is assigned."""
+    kind = type(value)
+    if kind is ir.Var:
+        return (value.name,)
+    if kind is not ir.Expr:
+        return [variable.name for variable in _variables(None, value)]
+    names = []
+    for part in value._kws.values():
+        if type(part) is ir.Var:
+            names.append(part.name)
+        elif _role(type(part)) != _NONE:
+            names.extend(variable.name for variable in _variables(None, part))
+    return names
+
+
+def _uses_and_definitions(blocks: Any) -> Any:
+    """Find the variables that each block reads before it sets them, and those that it sets."""
+    used: dict[Any, set[str]] = {}
+    defined: dict[Any, set[str]] = {}
+    for at, block in blocks.items():
+        reads, sets = used.setdefault(at, set()), defined.setdefault(at, set())
+        for statement in block.body:
+            if type(statement) in analysis.ir_extension_usedefs:
+                analysis.ir_extension_usedefs[type(statement)](statement, reads, sets)
+                continue
+            if isinstance(statement, ir.Assign):
+                names = _names_in(statement.value)
+                if statement.target.name not in names:
+                    sets.add(statement.target.name)
+            else:
+                names = [variable.name for variable in statement.list_vars()]
+            reads.update(name for name in names if name not in sets)
+    return analysis._use_defs_result(usemap=used, defmap=defined)
+
+
+_delete_exit = interpreter.peep_hole_delete_with_exit
+
+
+def _delete_exit_of_with(func_ir: Any) -> Any:
+    """Look for what a `with` leaves behind where a function has one."""
+    for block in func_ir.blocks.values():
+        for assign in block.find_insts(ir.Assign):
+            if assign.target.name.startswith("$setup_with_exitfn"):
+                return _delete_exit(func_ir)
+    return func_ir
+
+
+_has_location = base._has_loc
+
+
+def _takes_location(function: Any) -> bool:
+    """Return whether a function has an argument `loc`: its code says it, without a signature."""
+    if type(function) is not FunctionType or hasattr(function, "__wrapped__"):
+        return bool(_has_location(function))
+    code = function.__code__
+    return "loc" in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
 
 
 _array_operator = npydecl.NumpyRulesArrayOperator.generic
@@ -168,6 +232,11 @@ def _counted(context: Any, kind: Any) -> Any:
     return model if counted else None
 
 
+def is_counted(context: Any, kind: Any) -> bool:
+    """Return whether there may be reference counts in values of a type."""
+    return _counted(context, kind) is not None
+
+
 def _count_where_counted(self: Any, builder: Any, typ: Any, value: Any, name: str) -> None:
     """Count references only to what may have some."""
     if _counted(self._context, typ) is not None:
@@ -175,11 +244,15 @@ def _count_where_counted(self: Any, builder: Any, typ: Any, value: Any, name: st
 
 
 def _references(self: Any, builder: Any, ty: Any, val: Any) -> list[Any]:
-    """Return (type, reference count) of all in a value, taking out of it no more than these."""
+    """Return (type, reference count) of all in a value that may have one."""
     model = _counted(self._context, ty)
     if model is None:
         return []
-    found = [(ty, model.get_nrt_meminfo(builder, val))] if model.has_nrt_meminfo() else []
+    found = []
+    if model.has_nrt_meminfo():
+        count = model.get_nrt_meminfo(builder, val)
+        if not (isinstance(count, llvm.Constant) and count.constant is None):
+            found.append((ty, count))
     for kind, taken in model.traverse(builder):
         if _counted(self._context, kind) is not None:
             found.extend(_references(self, builder, kind, taken(val)))
@@ -316,6 +389,10 @@ def install() -> None:
     targetconfig.TargetConfig.__eq__ = _same_options  # type: ignore[method-assign,assignment]
     targetconfig.TargetConfig.__hash__ = _hash_of_options  # type: ignore[method-assign]
     ir.Inst._rec_list_vars = _variables
+    for module in (analysis, inline_closurecall, transforms):
+        module.compute_use_defs = _uses_and_definitions
+    interpreter.peep_hole_delete_with_exit = _delete_exit_of_with
+    base._has_loc = _takes_location
     npydecl.NumpyRulesArrayOperator.generic = _operator_on_arrays
     postproc.PostProcessor.run = _with_lifetimes_on_demand
     NRTContext._call_incref_decref = _count_where_counted

@@ -3,7 +3,7 @@
     int64  hook(int64 context, double t, double h, double *a, double *b)
     double hook(the same), of those that measure: norm, check, inner, limit, stable
 
-A mechanism (`pipeline.hooks`) and a scalar test equation (the tests) look the same, and a
+A mechanism (`pipeline.problem`) and a scalar test equation (the tests) look the same, and a
 method is compiled once for all. A hook that acts returns 0, or the code of its failure; one that
 answers returns its answer, or less the code. A trial point whose rhs fails is tried again nearer
 to the committed one before the run ends, but for codes from AT_ONCE on.

@@ -8,35 +8,36 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3, V4
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def add(a, b):
+def add(a: V3, b: V3) -> V3:
     """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @jitable
-def sub(a, b):
+def sub(a: V3, b: V3) -> V3:
     """Return a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @jitable
-def scale(s, a):
+def scale(s: float, a: V3) -> V3:
     """Return s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @jitable
-def dot(a, b):
+def dot(a: V3, b: V3) -> float:
     """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @jitable
-def cross(a, b):
+def cross(a: V3, b: V3) -> V3:
     """Return a x b."""
     return (
         a[1] * b[2] - a[2] * b[1],
@@ -46,19 +47,19 @@ def cross(a, b):
 
 
 @jitable
-def norm(a):
+def norm(a: V3) -> float:
     """Return |a|."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @jitable
-def vector(array):
+def vector(array: F1) -> V3:
     """Return the first three numbers of an array as a tuple."""
     return (array[0], array[1], array[2])
 
 
 @jitable
-def rotate(R, a):
+def rotate(R: F2, a: V3) -> V3:
     """Return R a for a 3x3 array."""
     return (
         R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2],
@@ -68,7 +69,7 @@ def rotate(R, a):
 
 
 @jitable
-def unrotate(R, a):
+def unrotate(R: F2, a: V3) -> V3:
     """Return R' a for a 3x3 array."""
     return (
         R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
@@ -78,7 +79,7 @@ def unrotate(R, a):
 
 
 @jitable
-def matrix_from_quaternion(q, R):
+def matrix_from_quaternion(q: F1, R: F2) -> None:
     """Write the rotation of quaternion q (array or tuple, any length but 0) into R."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     # dividing by |q|^2 makes R orthonormal for the stages, whose q is not quite unit
@@ -95,7 +96,7 @@ def matrix_from_quaternion(q, R):
 
 
 @jitable
-def turn_about(q, q0, w, w0, n, n0, h):
+def turn_about(q: V4, q0: F1, w: V3, w0: V3, n: V3, n0: V3, h: float) -> float:
     """Return the angle by which a body turned about a unit vector on its way: the integral of w.n.
 
     From q0, w0, n0 to q, w, n in a time h, w the angular velocity in the global frame. The rotation
@@ -117,7 +118,7 @@ def turn_about(q, q0, w, w0, n, n0, h):
 
 
 @jitable
-def turn_with_normal(t, n0, n):
+def turn_with_normal(t: V3, n0: V3, n: V3) -> V3:
     """Return the tangent t at unit normal n0 carried to unit normal n by the shortest rotation."""
     # R = I + [c]x + [c]x^2 / (1 + n0.n), c = n0 x n
     c = cross(n0, n)
@@ -133,14 +134,14 @@ def turn_with_normal(t, n0, n):
 
 
 @jitable
-def spin(t, n, angle):
+def spin(t: V3, n: V3, angle: float) -> V3:
     """Return the tangent t turned by `angle` about the unit normal n."""
     c, s = math.cos(angle), math.sin(angle)
     return add(scale(c, t), scale(s, cross(n, t)))
 
 
 @jitable
-def any_tangent(n):
+def any_tangent(n: V3) -> V3:
     """Return some unit vector at right angles to n."""
     if abs(n[0]) < 0.6:
         t = (0.0, n[2], -n[1])

@@ -110,7 +110,8 @@ def layout(group: type, tag: Tag, path: str = "") -> dict[str, str]:
 
 def arrays(whole: Any, tag: Tag, path: str = "") -> Iterator[tuple[str, Array]]:
     """Yield path and array of all fields with a tag, in a group or a group of groups."""
-    for name, what, _ in _fields(type(whole)):
+    group: Any = type(whole)
+    for name, what, _ in _fields(group):
         field = getattr(whole, name)
         if isinstance(what, type):
             yield from arrays(field, tag, f"{path}{name}/")

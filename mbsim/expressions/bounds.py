@@ -189,8 +189,8 @@ def over(u: Bound, v: Bound) -> Bound:
     steady = np.all((v.value.lo == v.value.hi) & (v.slope.lo == 0.0) & (v.slope.hi == 0.0))
     if steady and np.all(v.value.lo != 0.0):
         c = 1.0 / v.value.lo
-        parts = (scaled_range(part, c) for part in u[:3])
-        return Bound(*parts, np.minimum(u.level, v.level))
+        value, slope, bend = (scaled_range(part, c) for part in u[:3])
+        return Bound(value, slope, bend, np.minimum(u.level, v.level))
     return times(u, _inverse(v))
 
 

@@ -83,8 +83,8 @@ class Curve:
         pairs = np.column_stack((first, np.maximum(last, first + 1))).ravel()
         lowest = np.minimum.reduceat(np.append(self.levels, [SMOOTH, SMOOTH]), pairs)[::2]
         level = np.where(first == last, SMOOTH, lowest)
-        shaped = [Range(r.lo.reshape(shape), r.hi.reshape(shape)) for r in parts]
-        return chain(x, *shaped, level.reshape(shape))
+        value, slope, bend = (Range(r.lo.reshape(shape), r.hi.reshape(shape)) for r in parts)
+        return chain(x, value, slope, bend, level.reshape(shape))
 
     def _between(self, first: Array, last: Array, found: Range, k: int) -> Range:
         """Return the bounds with all whole pieces between the first and the last."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub
 from mbsim.expressions.functions import FUNCTIONS, Kind
@@ -40,37 +41,37 @@ LN10 = math.log(10.0)
 
 
 @jitable
-def constant(c):
+def constant(c: float) -> V3:
     """Return a number as a jet."""
     return (c, 0.0, 0.0)
 
 
 @jitable
-def get(stack, row):
+def get(stack: F2, row: int) -> V3:
     """Return a row of the stack."""
     return (stack[row, 0], stack[row, 1], stack[row, 2])
 
 
 @jitable
-def put(stack, row, u):
+def put(stack: F2, row: int, u: V3) -> None:
     """Write a row of the stack."""
     stack[row, 0], stack[row, 1], stack[row, 2] = u[0], u[1], u[2]
 
 
 @jitable
-def chain(u, f, f1, f2):
+def chain(u: V3, f: float, f1: float, f2: float) -> V3:
     """Return the jet of f(u) from the values of f and its derivatives at u."""
     return (f, f1 * u[1], f2 * u[1] * u[1] + f1 * u[2])
 
 
 @jitable
-def times(u, v):
+def times(u: V3, v: V3) -> V3:
     """Return u v."""
     return (u[0] * v[0], u[1] * v[0] + u[0] * v[1], u[2] * v[0] + 2.0 * u[1] * v[1] + u[0] * v[2])
 
 
 @jitable
-def over(u, v):
+def over(u: V3, v: V3) -> V3:
     """Return u / v: from u = q v, q' = (u' - q v')/v and q'' = (u'' - 2 q' v' - q v'')/v."""
     q = u[0] / v[0]
     q1 = (u[1] - q * v[1]) / v[0]
@@ -78,21 +79,21 @@ def over(u, v):
 
 
 @jitable
-def sine(u):
+def sine(u: V3) -> V3:
     """Return sin u."""
     s, c = math.sin(u[0]), math.cos(u[0])
     return chain(u, s, c, -s)
 
 
 @jitable
-def cosine(u):
+def cosine(u: V3) -> V3:
     """Return cos u."""
     s, c = math.sin(u[0]), math.cos(u[0])
     return chain(u, c, -s, -c)
 
 
 @jitable
-def root(u):
+def root(u: V3) -> V3:
     """Return the square root of u; at 0 its derivatives are 0."""
     r = math.sqrt(u[0])
     if r == 0.0:
@@ -101,7 +102,7 @@ def root(u):
 
 
 @jitable
-def power(u, v):
+def power(u: V3, v: V3) -> V3:
     """Return u^v."""
     n = v[0]
     if v[1] == 0.0 and v[2] == 0.0:
@@ -123,7 +124,7 @@ def power(u, v):
 
 
 @jitable
-def tangent(u):
+def tangent(u: V3) -> V3:
     """Return tan u."""
     t = math.tan(u[0])
     slope = 1.0 + t * t
@@ -131,7 +132,7 @@ def tangent(u):
 
 
 @jitable
-def arc_sine(u):
+def arc_sine(u: V3) -> V3:
     """Return asin u, its derivatives (1 - u^2)^-1/2 and u (1 - u^2)^-3/2."""
     c = 1.0 - u[0] * u[0]
     if c <= 0.0:
@@ -141,7 +142,7 @@ def arc_sine(u):
 
 
 @jitable
-def arc_tangent2(u, v):
+def arc_tangent2(u: V3, v: V3) -> V3:
     """Return atan2(u, v): a' = (u' v - u v') / (u^2 + v^2); 0 where both are 0."""
     square = u[0] * u[0] + v[0] * v[0]
     if square == 0.0:
@@ -153,19 +154,19 @@ def arc_tangent2(u, v):
 
 
 @jitable
-def towards_zero(x):
+def towards_zero(x: float) -> float:
     """Return x without its fraction, as a float for any size."""
     return math.copysign(float(math.floor(abs(x))), x)
 
 
 @jitable
-def absolute(u):
+def absolute(u: V3) -> V3:
     """Return |u|."""
     return scale(-1.0, u) if u[0] < 0.0 else u
 
 
 @jitable
-def blend(x, x0, h0, x1, h1, fifth):
+def blend(x: V3, x0: V3, h0: V3, x1: V3, h1: V3, fifth: bool) -> V3:
     """Return STEP (s^2 (3 - 2 s)) or, if `fifth`, STEP5 (s^3 (10 - 15 s + 6 s^2)) of jets."""
     if x[0] <= x0[0]:
         return h0
@@ -186,7 +187,7 @@ def blend(x, x0, h0, x1, h1, fifth):
 
 
 @jitable
-def haversine(x, x0, h0, x1, h1):
+def haversine(x: V3, x0: V3, h0: V3, x1: V3, h1: V3) -> V3:
     """Return HAVSIN: half a period of a sine from h0 to h1."""
     if x[0] <= x0[0]:
         return h0
@@ -198,7 +199,7 @@ def haversine(x, x0, h0, x1, h1):
 
 
 @jitable
-def stop(depth, rate, stiffness, exponent, damping, dmax):
+def stop(depth: V3, rate: V3, stiffness: V3, exponent: V3, damping: V3, dmax: V3) -> V3:
     """Return max(0, k d^e + STEP(d, 0, 0, dmax, c) d'), 0 without depth."""
     zero = constant(0.0)
     if depth[0] <= 0.0:
@@ -209,7 +210,7 @@ def stop(depth, rate, stiffness, exponent, damping, dmax):
 
 
 @jitable
-def two_stops(stack, at):
+def two_stops(stack: F2, at: int) -> V3:
     """Return BISTOP(x, x', x1, x2, k, e, c, d): free between x1 and x2."""
     x, rate = get(stack, at), get(stack, at + 1)
     k, e, c, d = get(stack, at + 4), get(stack, at + 5), get(stack, at + 6), get(stack, at + 7)
@@ -219,7 +220,7 @@ def two_stops(stack, at):
 
 
 @jitable
-def chirp(stack, at):
+def chirp(stack: F2, at: int) -> V3:
     """Return SWEEP(x, a, x0, f0, x1, f1, dx) = STEP5(x, x0, 0, x0 + dx, 1) a sin(2 pi h(x)).
 
     h = f0 x up to x0, then h' goes from f0 to f1 along a line, and h' = f1 from x1 on. Source: MSC
@@ -241,7 +242,7 @@ def chirp(stack, at):
 
 
 @jitable
-def polynomial(stack, at, count):
+def polynomial(stack: F2, at: int, count: int) -> V3:
     """Return POLY(x, x0, a0, a1..): the sum of a_j (x - x0)^j."""
     x = sub(get(stack, at), get(stack, at + 1))
     total = get(stack, at + count - 1)
@@ -251,7 +252,7 @@ def polynomial(stack, at, count):
 
 
 @jitable
-def chebyshev(stack, at, count):
+def chebyshev(stack: F2, at: int, count: int) -> V3:
     """Return CHEBY(x, x0, a0, a1..): the sum of a_j T_j(x - x0), T_j+1 = 2 x T_j - T_j-1."""
     x = sub(get(stack, at), get(stack, at + 1))
     before, now = x, constant(1.0)  # T_-1 = T_1
@@ -263,7 +264,7 @@ def chebyshev(stack, at, count):
 
 
 @jitable
-def fourier(stack, at, count, sines):
+def fourier(stack: F2, at: int, count: int, sines: bool) -> V3:
     """Return FORSIN or FORCOS (x, x0, w, a0, a1..): a0 + the sum of a_j sin, cos(j w (x - x0))."""
     angle = times(get(stack, at + 2), sub(get(stack, at), get(stack, at + 1)))
     total = get(stack, at + 3)
@@ -275,7 +276,7 @@ def fourier(stack, at, count, sines):
 
 
 @jitable
-def harmonic(stack, at, count):
+def harmonic(stack: F2, at: int, count: int) -> V3:
     """Return SHF(x, x0, a, w, phi, b) = a sin(w (x - x0) - phi) + b; phi and b may be absent."""
     angle = times(get(stack, at + 3), sub(get(stack, at), get(stack, at + 1)))
     if count > 4:
@@ -285,7 +286,7 @@ def harmonic(stack, at, count):
 
 
 @jitable
-def extreme(stack, at, count, sign):
+def extreme(stack: F2, at: int, count: int, sign: float) -> V3:
     """Return the largest (sign 1) or smallest (-1) of `count` jets."""
     best = at
     for k in range(at + 1, at + count):
@@ -295,8 +296,11 @@ def extreme(stack, at, count, sign):
 
 
 @jitable
-def of_one(op, u):
-    """Return a function of one jet."""
+def of_one(op: int, u: V3) -> V3:  # noqa: C901
+    """Return a function of one jet.
+
+    Many branches because of a chain of equalities a table of jumps is made.
+    """
     x = u[0]
     if op == NEG:
         return scale(-1.0, u)
@@ -338,7 +342,7 @@ def of_one(op, u):
 
 
 @jitable
-def of_two(op, u, v):
+def of_two(op: int, u: V3, v: V3) -> V3:
     """Return a function of two jets."""
     if op == ADD:
         return add(u, v)
@@ -363,7 +367,7 @@ def of_two(op, u, v):
 
 
 @jitable
-def of_many(op, stack, at, count):
+def of_many(op: int, stack: F2, at: int, count: int) -> V3:
     """Return a function of `count` jets that stand from row `at` on."""
     if op == MIN:
         return extreme(stack, at, count, -1.0)
@@ -399,7 +403,7 @@ def of_many(op, stack, at, count):
 
 
 @jitable
-def apply(op, count, stack, top):
+def apply(op: int, count: int, stack: F2, top: int) -> int:
     """Replace the `count` topmost of `top` jets by a function of them; return the new top."""
     at = top - count
     if op == MIN or op == MAX or count > 2:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.expressions.elementary import (
     ABS,
@@ -53,13 +54,13 @@ from mbsim.expressions.elementary import (
 
 
 @jitable
-def power_value(x, n):
+def power_value(x: float, n: float) -> float:
     """Return x^n."""
     return x * x if n == 2.0 else math.pow(x, n)
 
 
 @jitable
-def blend_value(x, x0, h0, x1, h1, fifth):
+def blend_value(x: float, x0: float, h0: float, x1: float, h1: float, fifth: bool) -> float:
     """Return STEP or, if `fifth`, STEP5."""
     if x <= x0:
         return h0
@@ -72,7 +73,7 @@ def blend_value(x, x0, h0, x1, h1, fifth):
 
 
 @jitable
-def haversine_value(x, x0, h0, x1, h1):
+def haversine_value(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
     """Return HAVSIN."""
     if x <= x0:
         return h0
@@ -83,7 +84,9 @@ def haversine_value(x, x0, h0, x1, h1):
 
 
 @jitable
-def stop_value(depth, rate, stiffness, exponent, damping, dmax):
+def stop_value(
+    depth: float, rate: float, stiffness: float, exponent: float, damping: float, dmax: float
+) -> float:
     """Return max(0, k d^e + STEP(d, 0, 0, dmax, c) d'), 0 without depth."""
     if depth <= 0.0:
         return 0.0
@@ -93,7 +96,7 @@ def stop_value(depth, rate, stiffness, exponent, damping, dmax):
 
 
 @jitable
-def two_stops_value(s, at):
+def two_stops_value(s: F1, at: int) -> float:
     """Return BISTOP."""
     low = stop_value(s[at + 2] - s[at], -s[at + 1], s[at + 4], s[at + 5], s[at + 6], s[at + 7])
     high = stop_value(s[at] - s[at + 3], s[at + 1], s[at + 4], s[at + 5], s[at + 6], s[at + 7])
@@ -101,7 +104,7 @@ def two_stops_value(s, at):
 
 
 @jitable
-def polynomial_value(s, at, count):
+def polynomial_value(s: F1, at: int, count: int) -> float:
     """Return POLY."""
     x, total = s[at] - s[at + 1], s[at + count - 1]
     for k in range(count - 2, 1, -1):
@@ -110,7 +113,7 @@ def polynomial_value(s, at, count):
 
 
 @jitable
-def chebyshev_value(s, at, count):
+def chebyshev_value(s: F1, at: int, count: int) -> float:
     """Return CHEBY."""
     x = s[at] - s[at + 1]
     before, now, total = x, 1.0, 0.0
@@ -121,7 +124,7 @@ def chebyshev_value(s, at, count):
 
 
 @jitable
-def fourier_value(s, at, count, sines):
+def fourier_value(s: F1, at: int, count: int, sines: bool) -> float:
     """Return FORSIN or FORCOS."""
     angle, total = s[at + 2] * (s[at] - s[at + 1]), s[at + 3]
     for k in range(4, count):
@@ -131,7 +134,7 @@ def fourier_value(s, at, count, sines):
 
 
 @jitable
-def harmonic_value(s, at, count):
+def harmonic_value(s: F1, at: int, count: int) -> float:
     """Return SHF."""
     angle = s[at + 3] * (s[at] - s[at + 1])
     if count > 4:
@@ -141,7 +144,7 @@ def harmonic_value(s, at, count):
 
 
 @jitable
-def chirp_value(s, at):
+def chirp_value(s: F1, at: int) -> float:
     """Return SWEEP."""
     x, x0, f0, x1, f1 = s[at], s[at + 2], s[at + 3], s[at + 4], s[at + 5]
     if x <= x0:
@@ -156,7 +159,7 @@ def chirp_value(s, at):
 
 
 @jitable
-def extreme_value(s, at, count, sign):
+def extreme_value(s: F1, at: int, count: int, sign: float) -> float:
     """Return the largest (sign 1) or smallest (-1) of `count` numbers."""
     best = s[at]
     for k in range(at + 1, at + count):
@@ -166,8 +169,11 @@ def extreme_value(s, at, count, sign):
 
 
 @jitable
-def value_of_one(op, x):
-    """Return a function of one number."""
+def value_of_one(op: int, x: float) -> float:  # noqa: C901
+    """Return a function of one number.
+
+    Many branches because of a chain of equalities a table of jumps is made.
+    """
     if op == NEG:
         return -x
     if op == ABS:
@@ -204,7 +210,7 @@ def value_of_one(op, x):
 
 
 @jitable
-def value_of_two(op, x, y):
+def value_of_two(op: int, x: float, y: float) -> float:
     """Return a function of two numbers that is neither a sum nor a product."""
     if op == POW:
         return power_value(x, y)
@@ -219,7 +225,7 @@ def value_of_two(op, x, y):
 
 
 @jitable
-def value_of_many(op, s, at, count):
+def value_of_many(op: int, s: F1, at: int, count: int) -> float:
     """Return a function of the `count` numbers that stand from `at` on."""
     if op == STEP or op == STEP5:
         return blend_value(s[at], s[at + 1], s[at + 2], s[at + 3], s[at + 4], op == STEP5)
@@ -251,7 +257,7 @@ def value_of_many(op, s, at, count):
 
 
 @jitable
-def apply_value(op, count, s, top):
+def apply_value(op: int, count: int, s: F1, top: int) -> int:
     """Replace the `count` topmost of `top` numbers by a function of them; return the new top."""
     at = top - count
     if op == ADD:

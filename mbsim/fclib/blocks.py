@@ -215,6 +215,35 @@ def _largest_of_three(a: float, b: float, c: float, e: float, f: float, g: float
 
 
 @jitable
+def _largest_of_many(block: Vector, trace: float, power: Vector, square: Vector) -> float:
+    """Return nearly the largest eigenvalue of a block's symmetric part, over the trace.
+
+    `power` is that part over the trace; it and `square` are overwritten.
+    """
+    d = len(power)
+    for _ in range(5):
+        size = 0.0
+        for s in range(d):
+            for t in range(d):
+                square[s, t] = 0.0
+                for k in range(d):
+                    square[s, t] += power[s, k] * power[k, t]
+            size += square[s, s]
+        for s in range(d):
+            for t in range(d):
+                power[s, t] = square[s, t] / size
+    best = 0
+    for s in range(1, d):
+        best = s if power[s, s] > power[best, best] else best
+    along, length = 0.0, 0.0
+    for s in range(d):
+        length += power[s, best] ** 2
+        for t in range(d):
+            along += power[s, best] * block[s, t] * power[t, best]
+    return along / (length * trace)
+
+
+@jitable
 def own_units(val: Vector, diagonal: Indices) -> Vector:
     """Return rho (contacts,), 1 / lambda_max of the symmetric part of each diagonal block.
 
@@ -246,26 +275,7 @@ def own_units(val: Vector, diagonal: Indices) -> Vector:
                 power[0, 0], power[1, 1], power[2, 2], power[0, 1], power[0, 2], power[1, 2]
             )
         else:
-            for _ in range(5):
-                size = 0.0
-                for s in range(d):
-                    for t in range(d):
-                        square[s, t] = 0.0
-                        for k in range(d):
-                            square[s, t] += power[s, k] * power[k, t]
-                    size += square[s, s]
-                for s in range(d):
-                    for t in range(d):
-                        power[s, t] = square[s, t] / size
-            best = 0
-            for s in range(1, d):
-                best = s if power[s, s] > power[best, best] else best
-            along, length = 0.0, 0.0
-            for s in range(d):
-                length += power[s, best] ** 2
-                for t in range(d):
-                    along += power[s, best] * block[s, t] * power[t, best]
-            largest = along / (length * trace)
+            largest = _largest_of_many(block, trace, power, square)
         if largest > 0.0:
             rho[a] = 1.0 / (largest * trace)
             total += rho[a]

@@ -295,8 +295,11 @@ def _subtract(matrix: Vector, begin: int, end: int) -> None:
 
 
 @jitable
-def solve(d: int, analysis: Analysis, factors: Factors, x: Vector) -> None:
-    """Overwrite the right side x by the solution."""
+def solve(d: int, analysis: Analysis, factors: Factors, x: Vector) -> None:  # noqa: C901
+    """Overwrite the right side x by the solution.
+
+    Many branches because both sweeps go over the same fronts with the same scratch.
+    """
     front_ptr, nodes, pivots = analysis.front_ptr, analysis.nodes, analysis.pivots
     factor_ptr, values = analysis.factor_ptr, factors.values
     exchange, part = factors.exchange, factors.part

@@ -19,6 +19,7 @@ from numba import types
 
 from mbsim.core import jit
 from mbsim.core.address import table_at, vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.forces.catalog import FORCES, Motion
 
@@ -29,7 +30,7 @@ _SLOPES: dict[int, Any] = {}
 
 
 @jitable
-def motion_in(a):
+def motion_in(a: F1) -> Motion:
     """Return the `Motion` that lies in the numbers of array `a`."""
     return Motion((a[0], a[1], a[2]), (a[3], a[4], a[5]), (a[6], a[7], a[8]), (a[9], a[10], a[11]))
 
@@ -37,7 +38,7 @@ def motion_in(a):
 def _adapt_wrench(wrench: Callable[..., Any], count: int) -> Any:
     """Return a formula of `count` constants as a C function."""
 
-    def entry(motion, par, out):
+    def entry(motion: Pointer, par: Pointer, out: Pointer) -> int:
         result = vector_at(out, 8)
         force, torque, stored, lost = wrench(
             motion_in(vector_at(motion, 12)), vector_at(par, count)
@@ -55,7 +56,7 @@ def _adapt_wrench(wrench: Callable[..., Any], count: int) -> Any:
 def _adapt_slopes(slopes: Callable[..., Any], count: int) -> Any:
     """Return slopes of `count` constants as a C function."""
 
-    def entry(motion, par, out):
+    def entry(motion: Pointer, par: Pointer, out: Pointer) -> int:
         both = table_at(out, 12, 6)
         for i in range(12):
             for k in range(6):

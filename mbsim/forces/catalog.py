@@ -41,7 +41,7 @@ class Parameter(NamedTuple):
     default: Any = 0.0  # None: it must be given
     positive: bool = False  # else it may be 0 as well
     signed: bool = False  # else it may not be negative
-    count: int = 1
+    count: int = 1  # type: ignore[assignment]  # hides a method of tuples
     alias: str = ""
     about: str = ""  # its meaning, for the manual
     unit: str = ""

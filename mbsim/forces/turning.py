@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale
 
@@ -20,7 +21,7 @@ _SMALL = 1e-3
 
 
 @jitable
-def turned_back(theta, a):
+def turned_back(theta: V3, a: V3) -> V3:
     """Return J(theta)^-T a; of -theta it is J(theta)^-1 a."""
     square = dot(theta, theta)
     if square < _SMALL * _SMALL:
@@ -33,6 +34,6 @@ def turned_back(theta, a):
 
 
 @jitable
-def turning_torque(theta, k):
+def turning_torque(theta: V3, k: V3) -> V3:
     """Return J(theta)^-T k theta, `k` the three stiffnesses about J's axes."""
     return turned_back(theta, (k[0] * theta[0], k[1] * theta[1], k[2] * theta[2]))

@@ -9,12 +9,12 @@ arrays:
   polyhedron (`model.hull`);
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
-  its share of the law's force (1 unless a manifold splits the force of one corner over
+  its weight of the law's force (1 unless a manifold splits the force of one corner over
   several points, so that the sum does not jump when a corner passes over an edge), and the
-  couple on I for a unit of the law's energy where the share turns with the shapes
+  couple on I for a unit of the law's energy where the weight turns with the shapes
   (`geometry.crossing`), else 0.
 
-The elastic energy of a pair is the sum of share E(depth) over its points: forces and couples are
+The elastic energy of a pair is the sum of weight E(depth) over its points: forces and couples are
 its slopes.
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
@@ -29,15 +29,17 @@ the normal; it is in a second registry.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
 
-#: Numbers of one candidate: depth, point, normal, share, couple.
+#: Numbers of one candidate: depth, point, normal, weight, couple.
 POINT = 11
-COUPLE = 8
+#: Where they begin.
+AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
 #: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
 #: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
 #: points' part of the force about the incident, in `plane_axes`.
@@ -56,20 +58,24 @@ class Pair(NamedTuple):
 
 
 class Region(NamedTuple):
-    """How a pair gives its points and the area of contact, and the shares of a flat face."""
+    """How a pair gives its points and the area of contact, and the weights of a flat face."""
 
     points: Callable[..., tuple[int, float]]
     whole: float
 
 
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
-def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
+def pair(
+    shape_i: str, shape_j: str, slots: int, regroups: bool = False
+) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
-    def register(points: Callable[..., int]) -> Callable[..., int]:
+    def register(points: Kernel) -> Kernel:
         name = f"{shape_i}-{shape_j}"
         PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
         return points
@@ -77,10 +83,10 @@ def pair(shape_i: str, shape_j: str, slots: int, regroups: bool = False) -> Any:
     return register
 
 
-def region(shape_i: str, shape_j: str, whole: float) -> Any:
+def region(shape_i: str, shape_j: str, whole: float) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of a pair with its area."""
 
-    def register(function: Callable[..., Any]) -> Callable[..., Any]:
+    def register(function: Kernel) -> Kernel:
         REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
         return function
 
@@ -88,23 +94,23 @@ def region(shape_i: str, shape_j: str, whole: float) -> Any:
 
 
 @jitable
-def put_point(row, depth, p, n, share=1.0):
+def put_point(row: F1, depth: float, p: V3, n: V3, weight: float = 1.0) -> None:
     """Write one candidate into a row of `points`."""
-    row[0] = depth
-    row[1], row[2], row[3] = p[0], p[1], p[2]
-    row[4], row[5], row[6] = n[0], n[1], n[2]
-    row[7] = share
-    row[8] = row[9] = row[10] = 0.0
+    row[AT_DEPTH] = depth
+    row[AT_POINT], row[AT_POINT + 1], row[AT_POINT + 2] = p[0], p[1], p[2]
+    row[AT_NORMAL], row[AT_NORMAL + 1], row[AT_NORMAL + 2] = n[0], n[1], n[2]
+    row[AT_WEIGHT] = weight
+    row[COUPLE] = row[COUPLE + 1] = row[COUPLE + 2] = 0.0
 
 
 @jitable
-def put_couple(row, couple):
+def put_couple(row: F1, couple: V3) -> None:
     """Give a candidate the couple on I for a unit of its energy."""
-    row[8], row[9], row[10] = couple[0], couple[1], couple[2]
+    row[COUPLE], row[COUPLE + 1], row[COUPLE + 2] = couple[0], couple[1], couple[2]
 
 
 @jitable
-def plane_axes(n):
+def plane_axes(n: V3) -> tuple[V3, V3]:
     """Return two unit vectors x, y square to n; the same for n and -n, and x * y is one of both."""
     k = 0
     for c in range(1, 3):
@@ -116,6 +122,6 @@ def plane_axes(n):
 
 
 @jitable
-def axis(frame, k):
+def axis(frame: F1, k: int) -> V3:
     """Return axis k (column k of the rotation) of a frame."""
     return (frame[3 + k], frame[6 + k], frame[9 + k])

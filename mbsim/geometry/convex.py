@@ -19,21 +19,24 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis
 
 BOX, ROTOR, ELLIPSOID = 0, 1, 2
 
+Shape = tuple[int, V3, V3, V3, V3, V3]
+
 
 @jitable
-def placed(kind, frame, size):
+def placed(kind: int, frame: F1, size: V3) -> Shape:
     """Return a shape as a tuple; `size` is a tuple of three."""
     return (kind, vector(frame), axis(frame, 0), axis(frame, 1), axis(frame, 2), size)
 
 
 @jitable
-def far(shape, d):
+def far(shape: Shape, d: V3) -> V3:
     """Return the farthest point of a shape in the unit direction d."""
     kind, centre, x, y, z, size = shape
     a, b, c = dot(d, x), dot(d, y), dot(d, z)
@@ -55,14 +58,14 @@ def far(shape, d):
 
 
 @jitable
-def overlap(i, j, n):
+def overlap(i: Shape, j: Shape, n: V3) -> tuple[float, V3]:
     """Return f(n) and the difference of farthest points far_J(n) - far_I(-n)."""
     d = sub(far(j, n), far(i, scale(-1.0, n)))
     return dot(n, d), d
 
 
 @jitable
-def bend(shape, d, t, s):
+def bend(shape: Shape, d: V3, t: V3, s: V3) -> float:
     """Return t . (d far / dd) s: how the farthest point moves, for tangents t, s of d.
 
     Ellipsoid with A = R diag(size) R': At.As/|Ad| - (At.Ad)(As.Ad)/|Ad|^3; rim of radius r:
@@ -88,7 +91,7 @@ def bend(shape, d, t, s):
 
 
 @jitable
-def between_round(i, j, n, far_apart):
+def between_round(i: Shape, j: Shape, n: V3, far_apart: float) -> tuple[float, V3]:
     """Return (f, n) of least overlap near n by Newton on the unit sphere.
 
     In tangents t, s of n the gradient of f is (t.d, s.d) and its curvature
@@ -148,13 +151,15 @@ def between_round(i, j, n, far_apart):
 
 
 @jitable
-def on_circle(base, u, v, k, p):
+def on_circle(base: V3, u: V3, v: V3, k: float, p: float) -> V3:
     """Return base + k (u cos p + v sin p)."""
     return add(base, add(scale(k * math.cos(p), u), scale(k * math.sin(p), v)))
 
 
 @jitable
-def slope_at(i, j, base, u, v, k, p):
+def slope_at(
+    i: Shape, j: Shape, base: V3, u: V3, v: V3, k: float, p: float
+) -> tuple[V3, float, float]:
     """Return n(p), f and f'(p) = n'.d on a circle of normals."""
     n = on_circle(base, u, v, k, p)
     f, d = overlap(i, j, n)
@@ -162,7 +167,7 @@ def slope_at(i, j, base, u, v, k, p):
 
 
 @jitable
-def bracket_near(i, j, base, u, v, k):
+def bracket_near(i: Shape, j: Shape, base: V3, u: V3, v: V3, k: float) -> tuple[bool, float, float]:
     """Return (found, a, b): places on a circle of normals around a minimum of f, from 0 downhill.
 
     Shapes that barely overlap have one valley, and its floor is near what is known.
@@ -180,7 +185,7 @@ def bracket_near(i, j, base, u, v, k):
 
 
 @jitable
-def bracket_all(i, j, base, u, v, k):
+def bracket_all(i: Shape, j: Shape, base: V3, u: V3, v: V3, k: float) -> tuple[bool, float, float]:
     """Return (True, a, b): the neighbours of the lowest of twelve places on a circle."""
     best, low = 0, math.inf
     width = math.pi / 6.0
@@ -192,7 +197,7 @@ def bracket_all(i, j, base, u, v, k):
 
 
 @jitable
-def valley_bound(f, fa, g, fb, w):
+def valley_bound(f: float, fa: float, g: float, fb: float, w: float) -> float:
     """Return a lower bound of f between two places w apart with values f, g and slopes fa, fb.
 
     On an edge's circle f is a support function: f(p + s) >= f cos s + f' sin s from both sides,
@@ -207,7 +212,9 @@ def valley_bound(f, fa, g, fb, w):
 
 
 @jitable
-def along_circle(i, j, c, gamma, known, n_known):
+def along_circle(
+    i: Shape, j: Shape, c: V3, gamma: float, known: float, n_known: V3
+) -> tuple[float, V3]:
     """Return the better of (known, n_known) and the least overlap on the circle n.c = gamma.
 
     n(p) = gamma c + sqrt(1 - gamma^2) (u cos p + v sin p). The minimum is bracketed, then the
@@ -266,14 +273,14 @@ def along_circle(i, j, c, gamma, known, n_known):
 
 
 @jitable
-def slant(size):
+def slant(size: V3) -> float:
     """Return n.a of the straight side of a solid of revolution: (r_bottom - r_top) / slant."""
     fall = size[0] - size[1]
     return fall / math.sqrt(fall * fall + 4.0 * size[2] * size[2])
 
 
 @jitable
-def flat(i, j, shape, sign, f, n):
+def flat(i: Shape, j: Shape, shape: Shape, sign: float, f: float, n: V3) -> tuple[float, V3]:
     """Return the better of (f, n) and the normals of the faces or end discs of `shape`.
 
     `sign` is 1 where the shape is J (its outward normal is n), -1 where it is I.
@@ -299,7 +306,9 @@ def flat(i, j, shape, sign, f, n):
 
 
 @jitable
-def meeting(i, j, a, ga, b, gb, f, n):
+def meeting(
+    i: Shape, j: Shape, a: V3, ga: float, b: V3, gb: float, f: float, n: V3
+) -> tuple[float, V3]:
     """Return the better of (f, n) and the unit vectors m with m.a = ga and m.b = gb."""
     across = cross(a, b)
     square = dot(across, across)
@@ -313,15 +322,15 @@ def meeting(i, j, a, ga, b, gb, f, n):
         m = add(scale(ga, a), scale(math.sqrt(1.0 - ga * ga) / length, w))
         g, _ = overlap(i, j, m)
         return (g, m) if g < f else (f, n)
-    # m = p a + q b +- w across
+    # m = p a + q b +- size across
     ab = dot(a, b)
     p, q = (ga - gb * ab) / square, (gb - ga * ab) / square
     rest = 1.0 - (p * ga + q * gb)
     if rest < 0.0:
         return f, n
-    w = math.sqrt(rest / square)
+    size = math.sqrt(rest / square)
     for k in range(2):
-        m = add(add(scale(p, a), scale(q, b)), scale(w if k == 0 else -w, across))
+        m = add(add(scale(p, a), scale(q, b)), scale(size if k == 0 else -size, across))
         m = scale(1.0 / norm(m), m)
         g, _ = overlap(i, j, m)
         if g < f:
@@ -330,7 +339,7 @@ def meeting(i, j, a, ga, b, gb, f, n):
 
 
 @jitable
-def shallow(i, j):
+def shallow(i: Shape, j: Shape) -> float:
     """Return the overlap up to which a direction of locally least overlap is the least of all.
 
     A twentieth of the smallest size: another one as shallow needs shapes that thin.
@@ -345,7 +354,7 @@ def shallow(i, j):
 
 
 @jitable
-def line_of_centres(i, j):
+def line_of_centres(i: Shape, j: Shape) -> V3:
     """Return the unit vector from the centre of J to that of I, any where they coincide."""
     apart = sub(i[1], j[1])
     length = norm(apart)
@@ -353,7 +362,7 @@ def line_of_centres(i, j):
 
 
 @jitable
-def point_in_solid(centre, a, size, p):
+def point_in_solid(centre: V3, a: V3, size: V3, p: V3) -> tuple[float, V3, float, float]:
     """Return (distance, unit normal, r, z) of point p to a solid of revolution.
 
     In the half plane through the axis the solid is a trapezoid: outside, the nearest of

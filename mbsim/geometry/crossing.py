@@ -1,9 +1,9 @@
-"""Where an edge of one polyhedron crosses an edge of another: its share, its place, its couple.
+"""Where an edge of one polyhedron crosses an edge of another: its weight, its place, its couple.
 
 Seen along n the faces that look at each other have a polygon in common. A crossing of two edges
-has the polygon's exterior angle over a right angle as its share x; with the neighbouring face
+has the polygon's exterior angle over a right angle as its weight x; with the neighbouring face
 of one polyhedron in place of the face the same crossing has 2 - x. With `t` from 0 to 1/2, how
-far each face has given way to that neighbour, and o = t_i + t_j - 2 t_i t_j, the share is
+far each face has given way to that neighbour, and o = t_i + t_j - 2 t_i t_j, the weight is
 
     s = (1 - o) x + o (2 - x)
 
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V3
 from mbsim.core.blend import step, step_derivative
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub
@@ -26,12 +27,12 @@ FACE_OF_J, FACE_OF_I, EDGES_MEET = range(3)
 ALONE = 0.11
 #: The place of a crossing is at most this many depths along the edge from where it is seen.
 FARTHEST = 10.0
-#: A point with a smaller share is none: it would be an incident without force.
-LEAST_SHARE = 1e-6
+#: A point with a smaller weight is none: it would be an incident without force.
+LEAST_WEIGHT = 1e-6
 
 
 @jitable
-def turning(kind, n, u, e):
+def turning(kind: int, n: V3, u: V3, e: V3) -> tuple[int, V3, V3]:
     """Return how n turns as I turns: for `carried`; u, e are the edges whose normal n is."""
     if kind != EDGES_MEET:
         return kind, u, e
@@ -41,7 +42,7 @@ def turning(kind, n, u, e):
 
 
 @jitable
-def carried(q, n, turn):
+def carried(q: V3, n: V3, turn: tuple[int, V3, V3]) -> V3:
     """Return the vector a with a.w = q.dn, dn the change of n as I turns by w and J stays."""
     kind, first, second = turn
     if kind == FACE_OF_J:
@@ -52,7 +53,7 @@ def carried(q, n, turn):
 
 
 @jitable
-def given_way(out, m, side, beyond):
+def given_way(out: V3, m: V3, side: V3, beyond: V3) -> tuple[float, float, V3]:
     """Return t, dt/d(tilt) and x with d(tilt) = x.d(out) for a face seen along -out.
 
     `m` is the face's outward normal, `side` the way across its edge in its plane, `beyond` the
@@ -70,8 +71,16 @@ def given_way(out, m, side, beyond):
 
 
 @jitable
-def share_of_crossing(u, e, n, ends, face_i, face_j, turn):
-    """Return the share of a crossing and the couple on I for a unit of energy.
+def weight_of_crossing(
+    u: V3,
+    e: V3,
+    n: V3,
+    ends: bool,
+    face_i: tuple[V3, V3],
+    face_j: tuple[V3, V3],
+    turn: tuple[int, V3, V3],
+) -> tuple[float, V3]:
+    """Return the weight of a crossing and the couple on I for a unit of energy.
 
     Parameters
     ----------
@@ -97,9 +106,9 @@ def share_of_crossing(u, e, n, ends, face_i, face_j, turn):
     t_i, slope_i, x_i = given_way(scale(-1.0, n), face_i[0], side_i, face_i[1])
     t_j, slope_j, x_j = given_way(n, face_j[0], side_j, face_j[1])
     other = t_i + t_j - 2.0 * t_i * t_j
-    share = (1.0 - other) * x + other * (2.0 - x)
-    if share <= LEAST_SHARE or not within:
-        return share, (0.0, 0.0, 0.0)
+    weight = (1.0 - other) * x + other * (2.0 - x)
+    if weight <= LEAST_WEIGHT or not within:
+        return weight, (0.0, 0.0, 0.0)
 
     # how sin and cos change with a turn of I
     by_sin = add(cross(u, cross(e, n)), carried(ue, n, turn))
@@ -113,11 +122,11 @@ def share_of_crossing(u, e, n, ends, face_i, face_j, turn):
     if slope_j > 0.0:
         part = (2.0 - 2.0 * x) * (1.0 - 2.0 * t_i) * slope_j
         change = add(change, scale(part, carried(x_j, n, turn)))
-    return share, scale(-1.0, change)
+    return weight, scale(-1.0, change)
 
 
 @jitable
-def middle_of_lines(p, u, e, g, way, d):
+def middle_of_lines(p: V3, u: V3, e: V3, g: V3, way: V3, d: float) -> V3:
     """Return the middle of two lines where they are nearest to each other.
 
     The line along u goes through p, that along e through p + `way`; they are d apart along their

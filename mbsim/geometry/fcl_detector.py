@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.core.codes import Code
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, COUPLE
 from mbsim.geometry.hull_overlap import Hull, Solid, hull_of, least_overlap, touching_point
 from mbsim.geometry.mesh_contact import (
     against_convex,
@@ -188,10 +189,10 @@ class FclDetector:
                 slot = first
             else:
                 slot = self._slot_of(p, first, last)
-            points[slot, 0] = depth
-            points[slot, 1:4] = p
-            points[slot, 4:7] = sign * n
-            points[slot, 7], points[slot, 8:] = 1.0, 0.0
+            points[slot, AT_DEPTH] = depth
+            points[slot, AT_POINT:AT_NORMAL] = p
+            points[slot, AT_NORMAL:AT_WEIGHT] = sign * n
+            points[slot, AT_WEIGHT], points[slot, COUPLE:] = 1.0, 0.0
 
     def _surface(self, g: int) -> Surface:
         """Return the mesh of graphic g with its normals and neighbours."""
@@ -220,15 +221,15 @@ class FclDetector:
         size = self._scene.graphics.size[other]
         solid = Solid(shape, size, R.T @ (p_o - p), R.T @ R_o)
         depth, n = least_overlap(hull, solid)
-        row[0], row[7], row[8:] = max(depth, -0.0), 1.0, 0.0
+        row[AT_DEPTH], row[AT_WEIGHT], row[COUPLE:] = max(depth, -0.0), 1.0, 0.0
         if depth > 0.0:
-            row[1:4] = p + R @ touching_point(hull, solid, depth, n)
-            row[4:7] = -(R @ n) if turned else R @ n
+            row[AT_POINT:AT_NORMAL] = p + R @ touching_point(hull, solid, depth, n)
+            row[AT_NORMAL:AT_WEIGHT] = -(R @ n) if turned else R @ n
         return True
 
     def _put_mesh(self, i: int, j: int, contacts: list[Any], row: Any) -> None:
         """Fill the row of a pair with a mesh from the triangles in contact."""
-        row[0] = -0.0
+        row[AT_DEPTH] = -0.0
         shapes = (self._graphics[i].shape, self._graphics[j].shape)
         if not contacts and "PLANE" not in shapes:
             return
@@ -240,10 +241,10 @@ class FclDetector:
             depth, at, n = self._on_mesh(i, j, contacts)
         else:
             depth, at, n = self._on_other(mesh, other, contacts)
-        row[0] = depth if depth > 0.0 else -0.0
-        row[1:4] = p + R @ at
-        row[4:7] = -(R @ n) if turned else R @ n
-        row[7], row[8:] = 1.0, 0.0
+        row[AT_DEPTH] = depth if depth > 0.0 else -0.0
+        row[AT_POINT:AT_NORMAL] = p + R @ at
+        row[AT_NORMAL:AT_WEIGHT] = -(R @ n) if turned else R @ n
+        row[AT_WEIGHT], row[COUPLE:] = 1.0, 0.0
 
     def _on_mesh(self, i: int, j: int, contacts: list[Any]) -> tuple[float, Any, Any]:
         """Return (depth, point, normal) of two meshes in J's axes."""
@@ -359,7 +360,7 @@ class FclDetector:
         state, points = self._scene.state, self._scene.work.points
         best, nearest = -1, np.inf
         for s in range(first, last):
-            if points[s, 0] > 0.0:
+            if points[s, AT_DEPTH] > 0.0:
                 continue
             away = float(np.linalg.norm(p - state.p[s])) if state.touching[s] else 1e300
             if away < nearest:

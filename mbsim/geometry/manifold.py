@@ -2,8 +2,8 @@
 
 What carries is spread by the exterior angle of the patch's border: an arc has its own angle,
 a corner the angle by which the border turns there. Their sum is 2 pi for every convex patch,
-so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 shares, a
-polygon of 4 corners 4. A line has 2 shares, fading to 1 as it shrinks to a point.
+so nothing jumps where a face's edge begins to cut a disc. A whole disc has 3 weights, a
+polygon of 4 corners 4. A line has 2 weights, fading to 1 as it shrinks to a point.
 What is tilted until no more than one place of it touches is no patch: there one point carries, at
 the depth of the least overlap, whose slope its force is. `share_with_one` leads over to that.
 """
@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub
-from mbsim.geometry.catalog import put_point
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, put_point
 
 TURN = 2.0 * math.pi
 #: Shares below this are no incident.
@@ -24,28 +25,28 @@ ARC_ROWS = 6
 
 
 @jitable
-def put_apart(points, first, last, depth, p, n):
+def put_apart(points: F2, first: int, last: int, depth: float, p: V3, n: V3) -> None:
     """Write rows that do not touch."""
     for row in range(first, last):
         put_point(points[row], depth, p, n)
 
 
 @jitable
-def put_share(row, depth, p, n, share):
+def put_weighted(row: F1, depth: float, p: V3, n: V3, weight: float) -> None:
     """Write one candidate, unless it carries nothing."""
-    if share > SMALL:
-        put_point(row, depth, p, n, share)
+    if weight > SMALL:
+        put_point(row, depth, p, n, weight)
 
 
 @jitable
-def fade(x):
+def fade(x: float) -> float:
     """Return the smooth step 3 x^2 - 2 x^3 from 0 to 1, constant outside."""
     x = min(1.0, max(0.0, x))
     return x * x * (3.0 - 2.0 * x)
 
 
 @jitable
-def half_sector(arcs, count, begin, sign):
+def half_sector(arcs: F2, count: int, begin: float, sign: float) -> V3:
     """Return (angle, c, s) of what arcs leave of the 60 degrees from `begin` on.
 
     `sign` 1 looks to the left, -1 to the right; c, s are cosine and sine of the place that stands
@@ -81,7 +82,17 @@ def half_sector(arcs, count, begin, sign):
 
 
 @jitable
-def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
+def put_arcs(
+    points: F2,
+    first: int,
+    arcs: F2,
+    count: int,
+    disc: tuple[V3, V3, V3, float, float, float],
+    n: V3,
+    side: float,
+    reference: float,
+    weight: float,
+) -> None:
     """Write three points for what is left of a rim.
 
     The rim is cut into three sectors around `reference` and +-120 degrees. A sector's
@@ -110,12 +121,24 @@ def put_arcs(points, first, arcs, count, disc, n, side, reference, weight):
         x, y = r * (x + c) / angle, r * (y + s) / angle
         depth = depth0 + rise * x
         p = add(centre, add(scale(x, u), scale(y, v)))
-        share = weight * angle / TURN
-        put_share(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, share)
+        arc = weight * angle / TURN
+        put_weighted(points[first + k], depth, add(p, scale(0.5 * side * depth, n)), n, arc)
 
 
 @jitable
-def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepest):
+def put_rim(
+    points: F2,
+    first: int,
+    arcs: F2,
+    count: int,
+    disc: tuple[V3, V3, V3, float, float, float],
+    n: V3,
+    side: float,
+    total: float,
+    own: float,
+    weight: float,
+    deepest: float,
+) -> None:
     """Write up to six points for what is left of a rim, `total` [rad] in all.
 
     Tilted, the sectors are set around the deepest point (u), so that it carries wherever the
@@ -132,19 +155,19 @@ def put_rim(points, first, arcs, count, disc, n, side, total, own, weight, deepe
 
 
 @jitable
-def turn_of(ax, ay, bx, by):
+def turn_of(ax: float, ay: float, bx: float, by: float) -> float:
     """Return the angle from a to b where it is to the left, else 0."""
     return max(0.0, math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 @jitable
-def line_share(length, radius):
-    """Return the share of each end of a line contact: 1, fading to 1/2 as it shrinks to a point."""
+def line_weight(length: float, radius: float) -> float:
+    """Return the weight of each end of a line contact: 1, fading to 1/2 as it becomes a point."""
     return 0.5 + 0.5 * fade(5.0 * length / radius)
 
 
 @jitable
-def disc_lies(width, tilt, f):
+def disc_lies(width: float, tilt: float, f: float) -> float:
     """Return the part that a patch carries: 1, and 0 where it is tilted to one place.
 
     `width` is how far it reaches along the tilt from its middle, `tilt` a tangent, f the depth.
@@ -154,19 +177,21 @@ def disc_lies(width, tilt, f):
 
 
 @jitable
-def line_lies(depth_a, depth_b, f):
+def line_lies(depth_a: float, depth_b: float, f: float) -> float:
     """Return the part that a line carries: 1, and 0 where one end is far above what touches."""
     return fade(2.0 - abs(depth_a - depth_b) / f)
 
 
 @jitable
-def side_faces(n, out):
+def side_faces(n: V3, out: V3) -> float:
     """Return the part that a side of normal `out` carries along n: none where its rim presses."""
     return fade(1.0 - 10.0 * norm(add(n, out)))
 
 
 @jitable
-def share_with_one(points, count, part, crossed, f, p, n):
+def share_with_one(
+    points: F2, count: int, part: float, crossed: bool, f: float, p: V3, n: V3
+) -> None:
     """Leave a part of the force to the first `count` rows, the rest to one point p, the next row.
 
     No row is deeper than f, the least overlap. Rows that carry less than one point would leave the
@@ -174,18 +199,28 @@ def share_with_one(points, count, part, crossed, f, p, n):
     """
     carried = 0.0
     for row in range(count):
-        points[row, 0] = min(points[row, 0], f)
-        carried += points[row, 7] * max(0.0, points[row, 0]) / f
+        points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
+        carried += points[row, AT_WEIGHT] * max(0.0, points[row, AT_DEPTH]) / f
     part = max(0.0, part) if crossed else max(0.0, part) * fade(2.0 * carried - 1.0)
     for row in range(count):
-        points[row, 7] *= part
-        if points[row, 7] <= SMALL:
-            points[row, 0], points[row, 7] = min(points[row, 0], -f), 1.0
-    put_share(points[count], f, p, n, 1.0 - part)
+        points[row, AT_WEIGHT] *= part
+        if points[row, AT_WEIGHT] <= SMALL:
+            points[row, AT_DEPTH], points[row, AT_WEIGHT] = min(points[row, AT_DEPTH], -f), 1.0
+    put_weighted(points[count], f, p, n, 1.0 - part)
 
 
 @jitable
-def segment_on_disc(points, first, a, b, disc, o, n, side, f):
+def segment_on_disc(
+    points: F2,
+    first: int,
+    a: V3,
+    b: V3,
+    disc: tuple[V3, float],
+    o: V3,
+    n: V3,
+    side: float,
+    f: float,
+) -> float:
     """Write the ends of the part of segment a-b that lies over an end disc.
 
     Returns the part of the force that they carry, -1 where nothing lies over it.
@@ -208,17 +243,17 @@ def segment_on_disc(points, first, a, b, disc, o, n, side, f):
     low, high = max(0.0, (-qw - root) / ww), min(1.0, (root - qw) / ww)
     if low >= high:
         return -1.0
-    share = line_share((high - low) * math.sqrt(ww), r)
+    weight = line_weight((high - low) * math.sqrt(ww), r)
     for k in range(2):
         s = low if k == 0 else high
         depth = depth_a + s * (depth_b - depth_a)
         x = add(a, scale(s, sub(b, a)))
-        put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, share)
+        put_point(points[first + k], depth, sub(x, scale(0.5 * side * depth, n)), n, weight)
     return line_lies(low * (depth_b - depth_a), high * (depth_b - depth_a), f)
 
 
 @jitable
-def crossing_of(a, b, p, q, n):
+def crossing_of(a: V3, b: V3, p: V3, q: V3, n: V3) -> float:
     """Return the place 0..1 on p-q where it crosses the line a-b, seen along n; 1/2 if parallel."""
     across = cross(sub(b, a), n)
     along = dot(sub(q, p), across)

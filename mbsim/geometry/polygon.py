@@ -8,13 +8,14 @@ each other and rounding change which vertices there are, never how the exterior 
 
 from __future__ import annotations
 
+from mbsim.core.arrays import F2
 from mbsim.core.jitable import jitable
 
 X, Y, TAG = range(3)
 
 
 @jitable
-def clip(polygon, count, out, nx, ny, limit, tag):
+def clip(polygon: F2, count: int, out: F2, nx: float, ny: float, limit: float, tag: float) -> int:
     """Write the part of a polygon with nx x + ny y <= limit into `out`; return its vertices.
 
     Parameters

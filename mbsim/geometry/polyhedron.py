@@ -5,7 +5,7 @@ Along J's outward face normal, I's reversed one, or the common normal of two edg
 meet (their arcs on the unit sphere of normals cross), the polyhedra overlap by how far the
 support of J lies above that of I. The least overlap says which faces look at each other: the
 face itself, and of the other polyhedron the face at the supporting corner or edge that
-looks most against it. Points, depths and shares then follow as for boxes (`pairs.box_box`):
+looks most against it. Points, depths and weights then follow as for boxes (`pairs.box_box`):
 the vertices of the faces' common polygon seen along n, each with the normal and the depth of
 its own features.
 """
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, put_couple, put_point
@@ -24,10 +25,10 @@ from mbsim.geometry.crossing import (
     EDGES_MEET,
     FACE_OF_I,
     FACE_OF_J,
-    LEAST_SHARE,
+    LEAST_WEIGHT,
     middle_of_lines,
-    share_of_crossing,
     turning,
+    weight_of_crossing,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.model.hull import (
@@ -72,7 +73,7 @@ CUBE = _cube()
 
 
 @jitable
-def moved(hull, frame_i, frame_j):
+def moved(hull: F1, frame_i: F1, frame_j: F1) -> F1:
     """Return a polyhedron's packed numbers in J's axes."""
     out = hull.copy()
     shift = sub(vector(frame_i), vector(frame_j))
@@ -94,7 +95,7 @@ def moved(hull, frame_i, frame_j):
 
 
 @jitable
-def to_global(frame, d):
+def to_global(frame: F1, d: V3) -> V3:
     """Return a vector of a frame's axes in global axes."""
     return add(
         scale(d[0], axis(frame, 0)), add(scale(d[1], axis(frame, 1)), scale(d[2], axis(frame, 2)))
@@ -102,19 +103,19 @@ def to_global(frame, d):
 
 
 @jitable
-def corner(hull, k):
+def corner(hull: F1, k: int) -> V3:
     """Return corner k."""
     return vector(hull[int(hull[AT_CORNERS]) + 3 * int(k) :])
 
 
 @jitable
-def plane(hull, f):
+def plane(hull: F1, f: float) -> V3:
     """Return the outward normal of face f."""
     return vector(hull[int(hull[AT_PLANES]) + 4 * int(f) :])
 
 
 @jitable
-def faces_overlap(a, b):
+def faces_overlap(a: F1, b: F1) -> tuple[float, int, int]:
     """Return (overlap, face, corner): b's lowest corner below the faces of a, the least."""
     least, face, low = math.inf, 0, 0
     at, first, count = int(a[AT_PLANES]), int(b[AT_CORNERS]), int(b[CORNERS])
@@ -131,7 +132,7 @@ def faces_overlap(a, b):
 
 
 @jitable
-def edges_overlap(a, b):
+def edges_overlap(a: F1, b: F1) -> tuple[float, int, int, V3]:
     """Return (overlap, edge of a, edge of b, normal from b into a), the least of those that meet.
 
     With normals m0, m1 of the faces at an edge of a and n0, n1 at one of b, the edges meet in
@@ -168,7 +169,7 @@ def edges_overlap(a, b):
 
 
 @jitable
-def face_at_corner(hull, k, n):
+def face_at_corner(hull: F1, k: int, n: V3) -> int:
     """Return the face at corner k that looks most along n."""
     best, face = -math.inf, 0
     starts, loops = int(hull[AT_STARTS]), int(hull[AT_LOOPS])
@@ -182,7 +183,7 @@ def face_at_corner(hull, k, n):
 
 
 @jitable
-def face_at_edge(hull, k, n):
+def face_at_edge(hull: F1, k: int, n: V3) -> int:
     """Return the face at edge k that looks most along n."""
     at = int(hull[AT_EDGES]) + 4 * k
     f, g = int(hull[at + 2]), int(hull[at + 3])
@@ -190,7 +191,7 @@ def face_at_edge(hull, k, n):
 
 
 @jitable
-def overlapping(a, hull_j, frame_j, points):
+def overlapping(a: F1, hull_j: F1, frame_j: F1, points: F2) -> float:
     """Write the points of two polyhedra (a is I in J's axes); return a gap, or 0 in overlap."""
     least, fj, low = faces_overlap(hull_j, a)
     if least <= 0.0:
@@ -225,7 +226,9 @@ def overlapping(a, hull_j, frame_j, points):
 
 
 @jitable
-def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
+def common_polygon(
+    a: F1, fi: int, b: F1, fj: int, n: V3, turn: tuple[int, V3, V3], frame_j: F1, points: F2
+) -> None:
     """Write the vertices of two faces' common polygon, seen along n, into their rows.
 
     `turn` says how n turns with I. Long because all three kinds of vertices (a corner of I, one of
@@ -280,13 +283,13 @@ def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
             name = int(b[loops_j + 2 * (first_j + after - count_i)])
             data = int(b[AT_DATA]) + 3 * name
             row = 2 * int(a[COLOURS]) + int(b[data + 1])
-            g, share = scale(-1.0, m), b[data]
+            g, weight = scale(-1.0, m), b[data]
             d = depth * dot(g, n)
             middle = sub(on_j, scale(0.5 * d, g))
         elif before < count_i and after < count_i:
             data = int(a[AT_DATA]) + 3 * name_i
             row = 2 * int(a[data + 1])
-            g, share = nj, a[data]
+            g, weight = nj, a[data]
             d = depth * dot(g, n)
             middle = add(on_i, scale(0.5 * d, g))
         else:
@@ -309,7 +312,7 @@ def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
                 int(a[loops_i + 2 * start + 1]),
                 int(b[loops_j + 2 * (first_j + side) + 1]),
             )
-            share, couple = share_of_crossing(
+            weight, couple = weight_of_crossing(
                 u,
                 e,
                 n,
@@ -327,21 +330,21 @@ def common_polygon(a, fi, b, fj, n, turn, frame_j, points):
             d = depth * dot(g, n)
             middle = middle_of_lines(on_i, u, e, g, scale(depth, n), d)
         before = after
-        if share <= LEAST_SHARE:
+        if weight <= LEAST_WEIGHT:
             continue
         p = add(vector(frame_j), to_global(frame_j, middle))
-        put_point(points[row], d, p, to_global(frame_j, g), share)
+        put_point(points[row], d, p, to_global(frame_j, g), weight)
         put_couple(points[row], to_global(frame_j, couple))
 
 
 @jitable
-def hull_slots(a, b):
+def hull_slots(a: F1, b: F1) -> int:
     """Return the rows of two polyhedra: two a colour of I, one a colour of J."""
     return 2 * int(a[COLOURS]) + int(b[COLOURS])
 
 
 @jitable
-def nearest_on_face(hull, f, c):
+def nearest_on_face(hull: F1, f: int, c: V3) -> V3:
     """Return the point of face f that is nearest to c."""
     m = plane(hull, f)
     height = dot(m, c) - hull[int(hull[AT_PLANES]) + 4 * f + 3]
@@ -364,7 +367,7 @@ def nearest_on_face(hull, f, c):
 
 
 @jitable
-def way_out(hull, c):
+def way_out(hull: F1, c: V3) -> tuple[float, V3]:
     """Return the signed distance of point c from a polyhedron (< 0 inside) and the unit way out."""
     top, face = -math.inf, 0
     at = int(hull[AT_PLANES])

@@ -1,14 +1,14 @@
 """One incident for all that a pair touches with: what its points sum up to, and the area.
 
 The rows of such a pair (`contact_points="REGION"`) are the incident, the area, then the points
-that the pair has else. With d_i the depth of a point, w_i its share and S the shares of a face
+that the pair has else. With d_i the depth of a point, w_i its weight and S the weights of a face
 that lies flat (`whole`),
 
     depth^2 = sum w_i d_i^2 / S         place = sum w_i d_i p_i / sum w_i d_i
     force   = law(depth) sum w_i d_i / depth
 
 over points with d_i > 0. Its elastic energy is S U(depth), so force and place follow from a
-potential: what a tilt moves the place by, the torque of the points does too. Where shares turn
+potential: what a tilt moves the place by, the torque of the points does too. Where weights turn
 with the shapes (`geometry.crossing`), or normals differ, a couple is left, for a unit of the
 law's force. Of a linear law
 force and torque are those of the points in every pose; of others they are where the depth is
@@ -26,10 +26,15 @@ import math
 
 import numpy as np
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
     AREA,
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
     COUPLE,
     MOMENT_XX,
     MOMENT_XY,
@@ -50,7 +55,7 @@ _NARROW = 1e-3
 
 
 @jitable
-def sum_points(rows, whole, area):
+def sum_points(rows: F2, whole: float, area: float) -> None:
     """Write the incident and its area before the points that it stands for.
 
     Parameters
@@ -65,16 +70,16 @@ def sum_points(rows, whole, area):
     square, weight, deepest = 0.0, 0.0, REGION_ROWS
     p, push, couple = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(REGION_ROWS, len(rows)):
-        depth = rows[k, 0]
-        if depth > rows[deepest, 0]:
+        depth = rows[k, AT_DEPTH]
+        if depth > rows[deepest, AT_DEPTH]:
             deepest = k
         if depth > 0.0:
-            w = rows[k, 7] * depth
+            w = rows[k, AT_WEIGHT] * depth
             square += w * depth
             weight += w
-            p = add(p, scale(w, vector(rows[k, 1:4])))
-            push = add(push, scale(w, vector(rows[k, 4:7])))
-            couple = add(couple, scale(0.5 * rows[k, 0] ** 2, vector(rows[k, COUPLE:])))
+            p = add(p, scale(w, vector(rows[k, AT_POINT:])))
+            push = add(push, scale(w, vector(rows[k, AT_NORMAL:])))
+            couple = add(couple, scale(0.5 * rows[k, AT_DEPTH] ** 2, vector(rows[k, COUPLE:])))
     if square <= 0.0:
         for c in range(POINT):
             rows[0, c] = rows[1, c] = rows[deepest, c]
@@ -86,21 +91,24 @@ def sum_points(rows, whole, area):
     # where normals differ the forces may have a torque about p; a force along n has none there
     torque = (0.0, 0.0, 0.0)
     for k in range(REGION_ROWS, len(rows)):
-        if rows[k, 0] > 0.0:
-            part = scale(rows[k, 7] * rows[k, 0], vector(rows[k, 4:7]))
-            torque = add(torque, cross(sub(vector(rows[k, 1:4]), p), part))
+        if rows[k, AT_DEPTH] > 0.0:
+            part = scale(rows[k, AT_WEIGHT] * rows[k, AT_DEPTH], vector(rows[k, AT_NORMAL:]))
+            torque = add(torque, cross(sub(vector(rows[k, AT_POINT:]), p), part))
     p = add(p, scale(1.0 / force, cross(n, torque)))
     depth = math.sqrt(square / whole)
     put_point(rows[0], depth, p, n, force / depth)
-    # where shares turn with the shapes, and what the place cannot take
+    # where weights turn with the shapes, and what the place cannot take
     couple = add(couple, scale(dot(torque, n), n))
     put_couple(rows[0], scale(1.0 / depth, couple))
     put_point(rows[1], 0.0, (0.0, 0.0, 0.0), n, 0.0)
     rows[1, AREA] = area
     x, y = plane_axes(n)
     for k in range(REGION_ROWS, len(rows)):
-        if rows[k, 0] > 0.0:
-            part, q = rows[k, 7] * rows[k, 0] / depth, sub(vector(rows[k, 1:4]), p)
+        if rows[k, AT_DEPTH] > 0.0:
+            part, q = (
+                rows[k, AT_WEIGHT] * rows[k, AT_DEPTH] / depth,
+                sub(vector(rows[k, AT_POINT:]), p),
+            )
             a, b = dot(q, x), dot(q, y)
             rows[1, MOMENT_XX] += part * a * a
             rows[1, MOMENT_XY] += part * a * b
@@ -108,7 +116,7 @@ def sum_points(rows, whole, area):
 
 
 @jitable
-def _signs(k, sign, corner):
+def _signs(k: int, sign: float, corner: int) -> V3:
     """Return the signs along x, y, z of a corner of a box's face, round to the left for sign 1.
 
     The face has the normal sign times axis k; its corners are (+, +), (-, +), (-, -), (+, -) of
@@ -122,7 +130,7 @@ def _signs(k, sign, corner):
 
 
 @jitable
-def box_cut(frame, half, origin, n):
+def box_cut(frame: F1, half: F1, origin: V3, n: V3) -> float:
     """Return the area of the cut of a box with a plane.
 
     Every face that the plane crosses has one side of the cut, from where its border comes up
@@ -157,7 +165,7 @@ def box_cut(frame, half, origin, n):
 
 
 @jitable
-def disc_beyond(x, r):
+def disc_beyond(x: float, r: float) -> float:
     """Return the area of a disc of radius r beyond the chord at distance x of its centre."""
     if x >= r:
         return 0.0
@@ -168,13 +176,13 @@ def disc_beyond(x, r):
 
 
 @jitable
-def chord(x, r):
+def chord(x: float, r: float) -> float:
     """Return the length of the chord of a disc at distance x of its centre."""
     return 2.0 * math.sqrt(max(0.0, (r - x) * (r + x)))
 
 
 @jitable
-def cylinder_cut(frame, r, half, origin, n):
+def cylinder_cut(frame: F1, r: float, half: float, origin: V3, n: V3) -> float:
     """Return the area of the cut of a cylinder with a plane: of an ellipse, between both ends.
 
     Along the axis it is the part of a disc between two chords.
@@ -196,7 +204,7 @@ def cylinder_cut(frame, r, half, origin, n):
 
 
 @jitable
-def disc_below(centre, o, r, origin, n):
+def disc_below(centre: V3, o: V3, r: float, origin: V3, n: V3) -> float:
     """Return the area of the part of a disc with normal o below a plane, seen along n."""
     s = norm(cross(o, n))
     height = dot(sub(centre, origin), n)
@@ -208,7 +216,7 @@ def disc_below(centre, o, r, origin, n):
 
 
 @jitable
-def frustum_ends(frame, size, origin, n):
+def frustum_ends(frame: F1, size: F1, origin: V3, n: V3) -> float:
     """Return the area of those parts of a frustum's ends that face a plane from below it."""
     a, total = axis(frame, 2), 0.0
     for end in range(2):
@@ -220,7 +228,7 @@ def frustum_ends(frame, size, origin, n):
 
 
 @jitable
-def polygon_area(polygon, count):
+def polygon_area(polygon: F2, count: int) -> float:
     """Return the area of a polygon, positive where it goes round to the left."""
     total = 0.0
     for k in range(count):
@@ -230,13 +238,13 @@ def polygon_area(polygon, count):
 
 
 @jitable
-def _sector(ax, ay, bx, by, r):
+def _sector(ax: float, ay: float, bx: float, by: float, r: float) -> float:
     """Return the area of the sector of a disc from a round to b."""
     return 0.5 * r * r * math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
 
 @jitable
-def _under_edge(ax, ay, bx, by, r):
+def _under_edge(ax: float, ay: float, bx: float, by: float, r: float) -> float:
     """Return the area of the part of the triangle 0, a, b that lies in the disc around 0."""
     dx, dy = bx - ax, by - ay
     aa, ab = dx * dx + dy * dy, ax * dx + ay * dy
@@ -254,7 +262,7 @@ def _under_edge(ax, ay, bx, by, r):
 
 
 @jitable
-def disc_in_polygon(polygon, count, r):
+def disc_in_polygon(polygon: F2, count: int, r: float) -> float:
     """Return the area that a convex polygon and the disc of radius r around 0 have in common."""
     total = 0.0
     for k in range(count):
@@ -264,7 +272,9 @@ def disc_in_polygon(polygon, count, r):
 
 
 @jitable
-def put_rectangle(polygon, face, origin, u, v, way):
+def put_rectangle(
+    polygon: F2, face: tuple[V3, V3, V3, V3], origin: V3, u: V3, v: V3, way: V3
+) -> None:
     """Write the corners of a rectangle in the axes u, v of a plane, seen along `way`.
 
     `face` is its centre, its half edges and its unit normal.
@@ -279,7 +289,7 @@ def put_rectangle(polygon, face, origin, u, v, way):
 
 
 @jitable
-def cylinder_on_rectangle(frame, r, half, face):
+def cylinder_on_rectangle(frame: F1, r: float, half: float, face: tuple[V3, V3, V3, V3]) -> float:
     """Return the area of the cut of a cylinder with a rectangle.
 
     `face` is the rectangle's centre, its half edges and its unit normal. Seen along the
@@ -318,7 +328,7 @@ def cylinder_on_rectangle(frame, r, half, face):
 
 
 @jitable
-def disc_on_rectangle(centre, o, r, face):
+def disc_on_rectangle(centre: V3, o: V3, r: float, face: tuple[V3, V3, V3, V3]) -> float:
     """Return the area of the part of a disc that is below a rectangle, seen along its normal."""
     origin, _, _, n = face
     c, tilt = dot(o, n), cross(cross(o, n), o)

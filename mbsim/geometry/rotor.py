@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, dot, norm, scale, sub
-from mbsim.geometry.convex import slant
+from mbsim.geometry.convex import Shape, slant
 
 
 @jitable
-def end_facing(shape, d):
+def end_facing(shape: Shape, d: V3) -> int:
     """Return -1, 0 or 1: the bottom end, the side or the top end is nearest to direction d.
 
     The border lies half-way between the normal of the end and that of the side.
@@ -24,14 +25,14 @@ def end_facing(shape, d):
 
 
 @jitable
-def end_disc(shape, end):
+def end_disc(shape: Shape, end: int) -> tuple[V3, V3, float]:
     """Return centre, outward normal and radius of the bottom (-1) or top (1) end."""
     o = scale(float(end), shape[4])
     return add(shape[1], scale(shape[5][2], o)), o, shape[5][1] if end > 0 else shape[5][0]
 
 
 @jitable
-def side_line(shape, d):
+def side_line(shape: Shape, d: V3) -> tuple[V3, V3, V3]:
     """Return bottom and top end of the straight line of the side that faces d, and its normal."""
     _, centre, _, _, a, size = shape
     w = sub(d, scale(dot(d, a), a))
@@ -44,7 +45,7 @@ def side_line(shape, d):
 
 
 @jitable
-def side_distance(shape, p):
+def side_distance(shape: Shape, p: V3) -> tuple[float, V3]:
     """Return the distance of p to the side taken as unlimited (< 0 inside), and its normal."""
     _, centre, _, _, a, size = shape
     d = sub(p, centre)
@@ -58,13 +59,13 @@ def side_distance(shape, p):
 
 
 @jitable
-def pointed(shape, d):
+def pointed(shape: Shape, d: V3) -> float:
     """Return how far d is from the normals of ends and side, where no single point is farthest."""
     c = dot(shape[4], d)
     return min(abs(c - slant(shape[5])), 1.0 - abs(c))
 
 
 @jitable
-def widest(size):
+def widest(size: V3) -> float:
     """Return the larger radius."""
     return max(size[0], size[1])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HIDES
+from mbsim.core.problem import ASK, BENDS, HIDES, Problem
 from mbsim.integrators.branches import (
     NEAR_CHANGE,
     ask_switching,
@@ -24,6 +25,8 @@ from mbsim.integrators.scheme import (
     SHOWN,
     STIFFNESS,
     SWITCH_CUT,
+    Method,
+    Steps,
     failure_or,
 )
 
@@ -41,13 +44,15 @@ MOST_SHORT = 20
 
 
 @jitable
-def output_within(m, times, t):
+def output_within(m: Method, times: F1, t: float) -> bool:
     """Return whether an output is due up to time t."""
     return m.counts[NEXT_OUTPUT] < len(times) and times[m.counts[NEXT_OUTPUT]] <= t
 
 
 @jitable
-def attempt(p, m, steps, t, h, times):
+def attempt(
+    p: Problem, m: Method, steps: Steps, t: float, h: float, times: F1
+) -> tuple[int, float, float, float, float]:
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
 
     And a part of it at which a force is on another branch, 0 for none, and what `horizon_of`
@@ -91,7 +96,9 @@ def attempt(p, m, steps, t, h, times):
 
 
 @jitable
-def attempt_to_event(p, m, steps, t, h, times, floor):
+def attempt_to_event(
+    p: Problem, m: Method, steps: Steps, t: float, h: float, times: F1, floor: float
+) -> tuple[int, float, float, float, float]:
     """Try a step as `attempt` does, again and shorter where an event lies in it; return h too.
 
     And the error of the step before it was made shorter.

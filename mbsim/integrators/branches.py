@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, HALF, HALVES, LOAD, SETTLE
-from mbsim.integrators.scheme import TOL, VAIN, answer_of, interpolate
+from mbsim.core.problem import ASK, HALF, HALVES, LOAD, SETTLE, Problem
+from mbsim.integrators.scheme import TOL, VAIN, Method, answer_of, interpolate
 
 #: At so many parts of a step for a side that is left and come back to: near the end of a touch what
 #: holds slips for a moment, a small part of a step of a high order.
@@ -30,19 +31,19 @@ BENT = 2.0
 
 
 @jitable
-def ask_switching(p, m, t, what, y, b):
+def ask_switching(p: Problem, m: Method, t: float, what: float, y: F1, b: F1) -> int:
     """Return what the hook `switching` answers; 0 where it failed, which is noted."""
     return answer_of(m, call_int(p.switching, (p.context, t, what, y, b)))
 
 
 @jitable
-def load_of(p, m, t, y):
+def load_of(p: Problem, m: Method, t: float, y: F1) -> float:
     """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
     return m.error[0] if ask_switching(p, m, t, LOAD, y, m.error) == 1 else -1.0
 
 
 @jitable
-def side_at(p, m, t, h, s, what):
+def side_at(p: Problem, m: Method, t: float, h: float, s: float, what: float) -> bool:
     """Return whether a force is on another branch at the part s of the fitted step.
 
     Sides are those just behind the step's begin: before that only what is found exactly counts.
@@ -53,7 +54,7 @@ def side_at(p, m, t, h, s, what):
 
 
 @jitable
-def first_switch(p, m, t, h, whole, behind):
+def first_switch(p: Problem, m: Method, t: float, h: float, whole: float, behind: float) -> float:
     """Return the length of the fitted step up to its first switch that matters, h for none.
 
     `whole` is its length before it was cut, or more where that is little; `behind` is a part of it
@@ -87,14 +88,14 @@ def first_switch(p, m, t, h, whole, behind):
 
 
 @jitable
-def load_at(p, m, t, h, s):
+def load_at(p: Problem, m: Method, t: float, h: float, s: float) -> float:
     """Return the load of what holds at the part s of the fitted step."""
     interpolate(m, s, m.error)
     return load_of(p, m, t + s * h, m.error)
 
 
 @jitable
-def horizon_of(p, m, t, h, begin):
+def horizon_of(p: Problem, m: Method, t: float, h: float, begin: float) -> float:
     """Return the part of the fitted step over which the load of what holds is known, 1 for all.
 
     What holds does not move, so that the method's error says nothing of its load: that is to go
@@ -118,7 +119,7 @@ def horizon_of(p, m, t, h, begin):
 
 
 @jitable
-def way_error(p, m, t, h):
+def way_error(p: Problem, m: Method, t: float, h: float) -> float:
     """Return the error, over tol, of friction that follows the way of the fitted step in one.
 
     Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
@@ -131,7 +132,7 @@ def way_error(p, m, t, h):
 
 
 @jitable
-def hidden_side(p, m, t, h):
+def hidden_side(p: Problem, m: Method, t: float, h: float) -> float:
     """Return a part of the fitted step at which a side differs that does not at its end, else 0.
 
     The problem is left evaluated at the trial point.

@@ -1,9 +1,9 @@
 """When AUTO changes over between its explicit and its implicit method.
 
-The explicit method estimates the largest rate of f from its last two stages, which are at the same
-time: |f(y7) - f(y6)| / |y7 - y6|. Where the step times that stays at the method's stability bound,
-some 3.3, stability and not the error bounds the steps: the model is stiff. Of a step that is cut at
-an event the whole one is meant, as it was tried before.
+The explicit method estimates the largest rate of f from its last stages (`dopri5.stiffness`). Where
+the step times that is at the bound of stability, stability and not the error bounds the steps: the
+model is stiff. Of a step that is cut at an event the whole one is meant, as it was tried before.
+From a loose tolerance steps go beyond that bound; where that costs something, they are kept within.
 
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
@@ -28,9 +28,11 @@ import math
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     BEGUN,
     BEGUN_WORK,
+    BOUNDED,
     CALM_STEPS,
     COSTLY,
     EVALUATIONS,
@@ -38,6 +40,7 @@ from mbsim.integrators.scheme import (
     IMPLICIT_STEPS,
     JACOBIANS,
     LAST_ERROR,
+    LAST_STEP,
     PACE,
     PATIENCE,
     RELUCTANCE,
@@ -48,11 +51,17 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     TIME,
     WAS_CUT,
+    Method,
+    Steps,
     failure_or,
 )
 
-#: From here on a step is at the stability bound, or in reach of it.
-BOUND, WITHIN = 3.0, 2.5
+#: From here on a step is at the stability bound; as long as this it stays within.
+BOUND, WITHIN = 1.6, 1.8
+#: A step below this error, over the allowed one, moves nothing that the rate could be of.
+NOTHING = 1e-10
+#: A step that is shorter than this part of one that was stiff is for what that has thrown.
+THROWS = 0.1
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
 #: Steps over which their number a time is taken: an impact is shorter.
@@ -77,7 +86,21 @@ WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
 @jitable
-def is_stiff(m, h, t_end):
+def stay_within(m: Method, h: float, error: float) -> None:
+    """Let the step after one of length h and this error end within the bound of stability.
+
+    The error lets steps beyond it pass as long as what they amplify is within the tolerance. Mostly
+    that does no harm. But a loose one lets them throw what rests into the air, or what friction
+    holds into slip, and all that follows costs steps: where far shorter ones came behind stiff ones
+    no step goes beyond any more. Nor where the implicit method may begin soon: from what flies
+    about it takes long. A step is no more than halved, for a kink looks like a high rate.
+    """
+    if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
+        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
+
+
+@jitable
+def is_stiff(m: Method, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
@@ -86,9 +109,11 @@ def is_stiff(m, h, t_end):
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
         # what trembles leaves and touches: the short steps behind that are not what bounds it
-        m.memory[CALM_STEPS] += min(1.0, h / m.memory[STIFF_STEP])
+        m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
+    if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
+        m.memory[BOUNDED] = 1.0
     m.memory[EXPLICIT_STEPS] += 1.0
     t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
     # the run so far: after a change back only whole windows count, for that may be in an impact
@@ -107,6 +132,8 @@ def is_stiff(m, h, t_end):
         enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
     else:
         enough = ahead > WORTH_AGAIN
+    if enough and m.memory[STIFF_STEPS] > 1.0:
+        m.memory[BOUNDED] = 1.0
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
@@ -115,7 +142,7 @@ def is_stiff(m, h, t_end):
 
 
 @jitable
-def is_calm(p, m, steps, t_end):
+def is_calm(p: Problem, m: Method, steps: Steps, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
     if m.memory[IMPLICIT_STEPS] % TRY_EVERY != 0.0:
@@ -151,7 +178,7 @@ def is_calm(p, m, steps, t_end):
 
 
 @jitable
-def changes_over(p, m, steps, h, t_end):
+def changes_over(p: Problem, m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return is_calm(p, m, steps, t_end)

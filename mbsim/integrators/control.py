@@ -13,7 +13,7 @@ HOLD = 1.2
 
 
 @jitable
-def next_factor(error, before, order, memory, rejected):
+def next_factor(error: float, before: float, order: float, memory: float, rejected: bool) -> float:
     """Return the factor from this step to the next, for error / tol now and in the step before.
 
     PI control with exponents (1 - 3 b/4)/k and b/k, k = order of the error's step power, b =
@@ -32,7 +32,7 @@ def next_factor(error, before, order, memory, rejected):
 
 
 @jitable
-def extrapolated_factor(error, before, order, ratio):
+def extrapolated_factor(error: float, before: float, order: float, ratio: float) -> float:
     """Return the factor from this step of an implicit method to the next.
 
     The error is extrapolated from this and the last one, `ratio` being this step over the last, 0
@@ -49,7 +49,7 @@ def extrapolated_factor(error, before, order, ratio):
 
 
 @jitable
-def quantised(h):
+def quantised(h: float) -> float:
     """Return h rounded down to six binary digits.
 
     Rounding errors in an error estimate then leave the next step as it is. Without this they
@@ -62,7 +62,7 @@ def quantised(h):
 
 
 @jitable
-def smallest_step(t, own, h_min):
+def smallest_step(t: float, own: float, h_min: float) -> float:
     """Return the step below which time itself does not advance cleanly, or the deck's h_min.
 
     `own` is the problem's own time: what the step is measured by at time 0.
@@ -71,7 +71,7 @@ def smallest_step(t, own, h_min):
 
 
 @jitable
-def starting_step(rate, curvature, tol, order, span):
+def starting_step(rate: float, curvature: float, tol: float, order: float, span: float) -> float:
     """Return a first step from |f| and |f'| in the scaled norm [1/T], [1/T^2].
 
     Hairer, Norsett and Wanner, Solving ODEs I, section II.4, with y of size one.

@@ -12,16 +12,20 @@ The dense output has an error of its own. At the bound of stability, h r near 6 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
     SHOWN,
     TOL,
+    Method,
     Scheme,
     combine,
     in_workspace,
@@ -30,7 +34,7 @@ from mbsim.integrators.scheme import (
 )
 
 
-def _table(width, *rows):
+def _table(width: int, *rows: Any) -> F2:
     """Return rows of weights, given where they are not 0."""
     table = np.zeros((len(rows), width))
     for row, entries in zip(table, rows, strict=True):
@@ -115,7 +119,7 @@ D = _table(
 E3 = A[12:13, :12] - _table(12, {0: 31 / 127, 8: 0.7338466882816118, 11: 3 / 136})
 
 
-def _polynomial(s):
+def _polynomial(s: float) -> tuple[F1, F1]:
     """Return weights of the stages in (p - y) / h and in p' / h, p being the polynomial at s."""
     unit = np.eye(16)
     rise = A[12]
@@ -141,7 +145,7 @@ PASSED, DEFECT = 10.0, 20.0
 
 
 @jitable
-def combined_error(fifth, third):
+def combined_error(fifth: float, third: float) -> float:
     """Return |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2), of order 8 in h, from errors h e5 and h e3.
 
     Hairer, Norsett and Wanner, section II.10. The estimate of order 5 alone overrates the error of
@@ -153,7 +157,7 @@ def combined_error(fifth, third):
 
 
 @jitable
-def stage(p, m, t, h, s, out):
+def stage(p: Problem, m: Method, t: float, h: float, s: int, out: F1) -> int:
     """Take stage s at its point, which is left in `out`; return a code."""
     combine(m.k, A[s], s, out)
     for i in range(len(out)):
@@ -162,7 +166,7 @@ def stage(p, m, t, h, s, out):
 
 
 @jitable
-def estimate(p, m, t, h, weights):
+def estimate(p: Problem, m: Method, t: float, h: float, weights: F1) -> float:
     """Return the norm of the error estimate with the given weights."""
     combine(m.k, weights, 12, m.error)
     for i in range(len(m.error)):
@@ -171,7 +175,7 @@ def estimate(p, m, t, h, weights):
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill stages 2..12, trial point and error, and stage 13 if the error is small enough."""
     for s in range(1, 12):
         m.counts[EVALUATIONS] += 1
@@ -192,7 +196,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def weigh_dense(p, m, t, h):
+def weigh_dense(p: Problem, m: Method, t: float, h: float) -> int:
     """Raise the step's error to that of its polynomial, where this is not far below; return a code.
 
     By how much it passes by its stages costs no evaluation. Where that is much the defect
@@ -226,7 +230,7 @@ def weigh_dense(p, m, t, h):
 
 
 @jitable
-def fit_dense(p, m, t, h):
+def fit_dense(p: Problem, m: Method, t: float, h: float) -> int:
     """Take three stages and fill the polynomial of the step from y to trial; return a code."""
     k, d = m.k, m.dense
     for s in range(13, 16):
@@ -252,13 +256,13 @@ def fit_dense(p, m, t, h):
     return call_int(p.rhs, (p.context, t + h, h, m.trial, k[12]))
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     problem, method = in_workspace(context)
     return attempt(problem, method, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Dense output of the step tried last."""
     problem, method = in_workspace(context)
     return fit_dense(problem, method, t, h)

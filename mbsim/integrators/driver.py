@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
@@ -29,11 +30,12 @@ from mbsim.core.problem import (
     TABLE_OVER,
     WATCH_DUE,
     WATCH_EVERY,
+    Problem,
     Taken,
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import ask_switching
-from mbsim.integrators.changing import changes_over
+from mbsim.integrators.changing import changes_over, stay_within
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -44,6 +46,7 @@ from mbsim.integrators.control import (
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
+    BOUNDED,
     CHANGE_DUE,
     CODE,
     CORRECTION,
@@ -85,6 +88,8 @@ from mbsim.integrators.scheme import (
     VAIN,
     WAS_CUT,
     WATCH,
+    Method,
+    Steps,
     failure_or,
     in_workspace,
     interpolate,
@@ -103,7 +108,7 @@ FORGIVEN = 0.1
 
 
 @jitable
-def first_step(p, m, t, span, order):
+def first_step(p: Problem, m: Method, t: float, span: float, order: float) -> float:
     """Return a first step from f and a small explicit Euler probe."""
     n = len(m.y)
     rate = call_float(p.norm, (p.context, t, 0.0, m.k[0], m.y))
@@ -122,7 +127,7 @@ def first_step(p, m, t, span, order):
 
 
 @jitable
-def stable(p, m, t, h_max):
+def stable(p: Problem, m: Method, t: float, h_max: float) -> float:
     """Return the step of a method without error estimate."""
     if p.stable == 0:
         return h_max
@@ -130,13 +135,13 @@ def stable(p, m, t, h_max):
 
 
 @jitable
-def bound_is_due(m):
+def bound_is_due(m: Method) -> bool:
     """Return whether the stability bound is to be found anew."""
     return m.counts[STEPS] % STABLE_EVERY == 0 or m.memory[STALE] == 1.0
 
 
 @jitable
-def begin(p, m, steps, t, t_end, h_max):
+def begin(p: Problem, m: Method, steps: Steps, t: float, t_end: float, h_max: float) -> int:
     """Evaluate f at the committed point and choose a first step where there is none."""
     if m.memory[HAVE_F] == 0.0:
         m.counts[EVALUATIONS] += 1
@@ -159,7 +164,9 @@ def begin(p, m, steps, t, t_end, h_max):
 
 
 @jitable
-def length(p, m, steps, t, t_end, h_max, floor):
+def length(
+    p: Problem, m: Method, steps: Steps, t: float, t_end: float, h_max: float, floor: float
+) -> float:
     """Return the length of the step to try from t."""
     h = min(m.memory[STEP], h_max)
     if steps.order > 0.0:
@@ -174,7 +181,7 @@ def length(p, m, steps, t, t_end, h_max, floor):
 
 
 @jitable
-def reject(p, m, t, h, reason, cut_from):
+def reject(p: Problem, m: Method, t: float, h: float, reason: int, cut_from: float) -> None:
     """Count a rejected step, tell the problem, and note the length h to try instead.
 
     `cut_from` is how long the step was meant to be, where nothing but its end is at fault, else 0.
@@ -189,7 +196,7 @@ def reject(p, m, t, h, reason, cut_from):
 
 
 @jitable
-def gives_up(m, code, t, h, floor):
+def gives_up(m: Method, code: int, t: float, h: float, floor: float) -> bool:
     """Return whether the failure of a hook in the step from t ends the run.
 
     Else it is tried again nearer: a trial far ahead may be where no law was meant for.
@@ -204,14 +211,14 @@ def gives_up(m, code, t, h, floor):
 
 
 @jitable
-def forgive(m):
+def forgive(m: Method) -> None:
     """Count fewer failures after a step that ends behind the last of them."""
     if m.memory[FAILURES] > 0.0 and m.memory[TIME] >= m.memory[FAILED_AT]:
         m.memory[FAILURES] = max(0.0, m.memory[FAILURES] - FORGIVEN)
 
 
 @jitable
-def look_up(m, t):
+def look_up(m: Method, t: float) -> bool:
     """Go to the row of the timetable in which t is; return whether there is one.
 
     A row from which no step may go is a switch: a force jumps within it.
@@ -227,7 +234,7 @@ def look_up(m, t):
 
 
 @jitable
-def arrive_at(m, t, h, bounded, t_end):
+def arrive_at(m: Method, t: float, h: float, bounded: bool, t_end: float) -> None:
     """Note the time at which a step from t ends; one that was bounded ends there exactly."""
     if bounded:
         m.memory[TIME] = m.memory[HORIZON]
@@ -237,7 +244,7 @@ def arrive_at(m, t, h, bounded, t_end):
 
 
 @jitable
-def outputs(p, m, steps, times):
+def outputs(p: Problem, m: Method, steps: Steps, times: F1) -> int:
     """Write a row for every output time within the last step; return 0, FULL, or less a code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
     t_new = m.memory[TIME]
@@ -260,7 +267,7 @@ def outputs(p, m, steps, times):
 
 
 @jitable
-def look_inside(p, m, asked):
+def look_inside(p: Problem, m: Method, asked: float) -> int:
     """Let the problem look at inner points of the last step; return 0 or its code."""
     t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
     # the force of a damped contact peaks before its depth does
@@ -275,7 +282,7 @@ def look_inside(p, m, asked):
 
 
 @jitable
-def accept(p, m, steps, t, h, asked):
+def accept(p: Problem, m: Method, steps: Steps, t: float, h: float, asked: float) -> int:
     """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
     word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
     if p.switching != 0:
@@ -312,7 +319,7 @@ def accept(p, m, steps, t, h, asked):
 
 
 @jitable
-def choose_next(m, steps, h, h_max):
+def choose_next(m: Method, steps: Steps, h: float, h_max: float) -> None:
     """Note the length of the step after one of length h that was good enough."""
     if steps.order == 0.0:
         m.memory[STEP] = h
@@ -332,7 +339,9 @@ def choose_next(m, steps, h, h_max):
     m.memory[AFTER_REJECTION] = 0.0
 
 
-def advance(steps, t_end, tol, h_max, h_min, times, budget):  # noqa: C901
+def advance(  # noqa: C901
+    steps: Steps, t_end: float, tol: float, h_max: float, h_min: float, times: F1, budget: int
+) -> int:
     """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
 
     `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
@@ -434,6 +443,8 @@ def advance(steps, t_end, tol, h_max, h_min, times, budget):  # noqa: C901
             m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
+        if m.memory[BOUNDED] == 1.0 and not steps.implicit:
+            stay_within(m, most, uncut)
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
         arrive_at(m, t, h, h < whole and h == m.memory[HORIZON] - t, t_end)

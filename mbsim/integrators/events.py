@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.integrators.scheme import NEXT_OUTPUT, answer_of, interpolate
+from mbsim.core.problem import Problem
+from mbsim.integrators.scheme import NEXT_OUTPUT, Method, answer_of, interpolate
 
 #: A step is looked into for events at so many points, and at one more for each row within it,
 #: up to so many.
@@ -12,7 +14,7 @@ LOOKS, MOST_LOOKS = 4, 64
 
 
 @jitable
-def looks_within(m, times, t):
+def looks_within(m: Method, times: F1, t: float) -> int:
     """Return at how many points a step to time t is looked into for events."""
     looks, row = LOOKS, m.counts[NEXT_OUTPUT]
     while looks < MOST_LOOKS and row < len(times) and times[row] < t:
@@ -22,7 +24,7 @@ def looks_within(m, times, t):
 
 
 @jitable
-def happens_at(p, m, t, h, s):
+def happens_at(p: Problem, m: Method, t: float, h: float, s: float) -> bool:
     """Return whether an event has happened by the part s of the step, its end being m.trial."""
     if s == 1.0:
         return answer_of(m, call_int(p.happens, (p.context, t + h, 0.0, m.trial, m.error))) == 1
@@ -31,7 +33,7 @@ def happens_at(p, m, t, h, s):
 
 
 @jitable
-def first_event(p, m, t, h, times):
+def first_event(p: Problem, m: Method, t: float, h: float, times: F1) -> float:
     """Return the length of the fitted step up to just behind its first event, 2 h for none.
 
     Bisection on whether it has happened, to the last digit of the time. The problem is left

@@ -31,9 +31,10 @@ import math
 import numpy as np
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE
+from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE, Problem
 from mbsim.core.rotation import norm
 from mbsim.integrators.galpha_iteration import (
     A0,
@@ -71,6 +72,7 @@ from mbsim.integrators.scheme import (
     LAST_ERROR,
     RETRY,
     TOL,
+    Method,
     Scheme,
     in_workspace,
     project,
@@ -95,7 +97,7 @@ PROBE = 0.05
 
 
 @jitable
-def carry_on(m, s):
+def carry_on(m: Method, s: float) -> None:
     """Move m.trial on for a time s with its velocities as they are; A_BEFORE keeps where it was."""
     w, before = m.trial, m.k[A_BEFORE]
     for i in range(len(w)):
@@ -107,7 +109,7 @@ def carry_on(m, s):
 
 
 @jitable
-def probe_on(p, m, t, h, s, ahead, gain):
+def probe_on(p: Problem, m: Method, t: float, h: float, s: float, ahead: float, gain: F1) -> int:
     """Take m.trial to t + ahead by a linearly implicit Euler step of length s; return a code.
 
     It is linearised about where velocities carry the bodies, put on their joints: so motions are
@@ -136,7 +138,7 @@ def probe_on(p, m, t, h, s, ahead, gain):
 
 
 @jitable
-def probe(p, m, t, h):
+def probe(p: Problem, m: Method, t: float, h: float) -> int:
     """Begin `kept` with v' and v'' at the committed point; return a code, < 0 for no solution.
 
     v'' is from two linearly implicit Euler steps: it is that of the motion, not of what is fast.
@@ -169,13 +171,13 @@ def probe(p, m, t, h):
 
 
 @jitable
-def position_error(m, h, i):
+def position_error(m: Method, h: float, i: int) -> float:
     """Return the error of a step in what y[i] is the velocity of."""
     return ERROR_X * h * h * (m.k[A1, i] - m.k[A0, i])
 
 
 @jitable
-def velocity_error(m, h, i, dot, bend):
+def velocity_error(m: Method, h: float, i: int, dot: float, bend: float) -> float:
     """Return the error of a step in the velocity y[i], with v' at its end and h^2 v'''.
 
     Both parts have one sign: of friction that turns from step to step they would cancel.
@@ -186,7 +188,7 @@ def velocity_error(m, h, i, dot, bend):
 
 
 @jitable
-def estimate_error(p, m, t, h):
+def estimate_error(p: Problem, m: Method, t: float, h: float) -> float:
     """Write the step's error, and what the next needs to know; return its norm over tol."""
     e, w = m.error, m.trial
     end, before = BODY_SIZE * m.bodies[0], step_before(m)
@@ -223,7 +225,7 @@ def estimate_error(p, m, t, h):
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for the new point, fill trial point and error; return a code."""
     if m.memory[FRESH] == 1.0:
         m.memory[RETRY] = QUARTER
@@ -238,7 +240,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def fit_dense(m, h):
+def fit_dense(m: Method, h: float) -> None:
     """Fill the cubic Hermite polynomial of the step from y to trial."""
     d, end = m.dense, BODY_SIZE * m.bodies[0]
     for i in range(len(m.y)):
@@ -252,13 +254,13 @@ def fit_dense(m, h):
         d[3, i] = 2.0 * rise - h * (first + last)
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Dense output of the step tried last."""
     _, m = in_workspace(context)
     fit_dense(m, h)

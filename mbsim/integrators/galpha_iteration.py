@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import Problem
 from mbsim.integrators.newton import (
     GO_ON,
-    LEFT,
     OFF,
     QUARTER,
     SOLVED,
@@ -31,9 +32,11 @@ from mbsim.integrators.scheme import (
     FRESH,
     HAVE_JACOBIAN,
     LAST_STEP,
+    LEFT,
     RATE,
     RETRY,
     TOL,
+    Method,
     project,
 )
 
@@ -66,7 +69,7 @@ ALGORITHMIC, DOT, SLOPE = range(3)
 
 
 @jitable
-def evaluate(p, m, t, h, anew):
+def evaluate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
     """Evaluate f at the point that a leads to, and linearise it there if asked; return a code."""
     settle(p, m, t, h)
     if anew:
@@ -76,7 +79,7 @@ def evaluate(p, m, t, h, anew):
 
 
 @jitable
-def correction(p, m, t, h, d):
+def correction(p: Problem, m: Method, t: float, h: float, d: F1) -> tuple[int, float]:
     """Write Newton's correction of y for the f evaluated last into d; return code and size."""
     if m.memory[FACTORED_STEP] != h:
         code = factor(p, m, t, h)
@@ -92,7 +95,7 @@ def correction(p, m, t, h, d):
 
 
 @jitable
-def take(m, h, part, d):
+def take(m: Method, h: float, part: float, d: F1) -> None:
     """Add a part of the correction d of y to a.
 
     The unknown is a, in turns as in shifts: with c1 dtheta - dtheta x w / 2 = dw of the linear
@@ -112,7 +115,7 @@ def take(m, h, part, d):
 
 
 @jitable
-def iterate(p, m, t, h, anew):
+def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
     """Solve for a by Newton's simplified iteration; return a code, < 0 for no solution."""
     begin(m)
     most = MOST_NEW if anew else MOST_OLD
@@ -133,7 +136,7 @@ def iterate(p, m, t, h, anew):
 
 
 @jitable
-def search(p, m, t, h, size):
+def search(p: Problem, m: Method, t: float, h: float, size: float) -> int:
     """Take the largest part of a correction after which the next is smaller; return a code.
 
     That is Deuflhard's natural test: it does not depend on the scales of the equations.
@@ -157,7 +160,7 @@ def search(p, m, t, h, size):
 
 
 @jitable
-def iterate_damped(p, m, t, h):
+def iterate_damped(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for a with a linearisation and a line search for each correction; return a code."""
     m.memory[RETRY] = QUARTER
     for _ in range(MOST_DAMPED):
@@ -168,7 +171,7 @@ def iterate_damped(p, m, t, h):
         if code != 0:
             return code
         note(m, size)
-        if size <= target(m.memory[TOL]):
+        if size <= target(m):
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0
@@ -185,7 +188,7 @@ def iterate_damped(p, m, t, h):
 
 
 @jitable
-def arrive(p, m, t, h):
+def arrive(p: Problem, m: Method, t: float, h: float) -> int:
     """Write the point that a leads to into m.trial, and f there; return a code."""
     if settle(p, m, t, h):
         show_drift(p, m, t, h)
@@ -194,7 +197,7 @@ def arrive(p, m, t, h):
 
 
 @jitable
-def is_off(p, m, t, h):
+def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
     """Return whether f where a leads to is so far from what a says that it matters in the step.
 
     Corrections of a linearisation in touch are small where nothing is touched any more, however
@@ -217,7 +220,7 @@ def is_off(p, m, t, h):
 
 
 @jitable
-def solve_step(p, m, t, h):
+def solve_step(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for a, with a linearisation kept if one is good, anew, then damped, and f there.
 
     Returns a code.
@@ -241,7 +244,7 @@ def solve_step(p, m, t, h):
 
 
 @jitable
-def factor(p, m, t, h):
+def factor(p: Problem, m: Method, t: float, h: float) -> int:
     """Factor the system of a step of length h; return a code."""
     m.counts[FACTORIZATIONS] += 1
     part = (1.0 - AM) / (1.0 - AF)
@@ -252,7 +255,7 @@ def factor(p, m, t, h):
 
 
 @jitable
-def extrapolate(m, h):
+def extrapolate(m: Method, h: float) -> None:
     """Write a at the begin for a step of length h, and as it is at the end if v'' stays."""
     before = step_before(m)
     for i in range(len(m.y)):
@@ -263,20 +266,20 @@ def extrapolate(m, h):
 
 
 @jitable
-def true_rate(m, i):
+def true_rate(m: Method, i: int) -> float:
     """Return v' at the end of the step, of a at its begin and end."""
     a0, a1 = m.k[A0, i], m.k[A1, i]
     return ((1.0 - AM) * a1 + AM * a0 - AF * m.kept[DOT, i]) / (1.0 - AF)
 
 
 @jitable
-def mean_velocity(m, h, i):
+def mean_velocity(m: Method, h: float, i: int) -> float:
     """Return the velocity y[i] in the mean of the step, which positions see."""
     return m.y[i] + h * ((0.5 - BETA) * m.k[A0, i] + BETA * m.k[A1, i])
 
 
 @jitable
-def place(m, h):
+def place(m: Method, h: float) -> None:
     """Write the point that a leads to into m.trial."""
     y, w, end = m.y, m.trial, BODY_SIZE * m.bodies[0]
     for i in range(len(y)):
@@ -290,7 +293,7 @@ def place(m, h):
 
 
 @jitable
-def swung(m):
+def swung(m: Method) -> bool:
     """Return whether a body was turned between m.error and m.trial across its angular velocity.
 
     The turn is twice the vector part of conj(q) q' in body axes.
@@ -308,7 +311,7 @@ def swung(m):
 
 
 @jitable
-def settle(p, m, t, h):
+def settle(p: Problem, m: Method, t: float, h: float) -> bool:
     """Write the point that a leads to into m.trial, where joints allow it, and let a follow.
 
     Returns whether it was projected twice: the norm has then not seen how far the first went.
@@ -334,7 +337,7 @@ def settle(p, m, t, h):
 
 
 @jitable
-def show_drift(p, m, t, h):
+def show_drift(p: Problem, m: Method, t: float, h: float) -> None:
     """Let the norm see by how much joints put the trial point right."""
     n = len(m.y)
     for i in range(n):
@@ -346,6 +349,6 @@ def show_drift(p, m, t, h):
 
 
 @jitable
-def step_before(m):
+def step_before(m: Method) -> float:
     """Return the length of the last step; at the start `kept` is as after one of no length."""
     return 0.0 if m.memory[FRESH] == 1.0 else m.memory[LAST_STEP]

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import ALONG
+from mbsim.core.problem import ALONG, Problem
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
@@ -21,16 +22,17 @@ from mbsim.integrators.scheme import (
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     JACOBIANS,
+    LEFT,
+    LEFT_PART,
     REST,
     RETRY,
     TOL,
+    Method,
     project,
 )
 
 # what `judge` says
 GO_ON, SOLVED, HOPELESS = range(3)
-#: What is left unsolved of a step's equations may be this part of its error, or less.
-LEFT = 0.03
 #: A step's velocities may be off by this part of its error for what f at its end is not.
 OFF = 0.2
 #: No correction need be smaller than this.
@@ -42,13 +44,14 @@ HALF, QUARTER = 0.5, 0.25
 
 
 @jitable
-def target(tol):
+def target(m: Method) -> float:
     """Return how large what is left may be, in the norm of the error."""
-    return max(ROUNDING, tol * min(LEFT, math.sqrt(tol)))
+    tol = m.memory[TOL]
+    return max(ROUNDING, tol * min(m.memory[LEFT_PART], math.sqrt(tol)))
 
 
 @jitable
-def linearise(p, m, t, h, y, f):
+def linearise(p: Problem, m: Method, t: float, h: float, y: F1, f: F1) -> int:
     """Linearise f at (t, y), h after the committed point, and write f; return a code."""
     m.counts[EVALUATIONS] += 1
     m.counts[JACOBIANS] += 1
@@ -62,7 +65,7 @@ def linearise(p, m, t, h, y, f):
 
 
 @jitable
-def put_along(p, m, t, y, r, w):
+def put_along(p: Problem, m: Method, t: float, y: F1, r: F1, w: F1) -> None:
     """Leave of what r asks of the bodies' positions what their joints allow at (t, y).
 
     w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
@@ -96,20 +99,20 @@ def put_along(p, m, t, y, r, w):
 
 
 @jitable
-def is_rate(i, end):
+def is_rate(i: int, end: int) -> bool:
     """Return whether y[i] is a velocity of a body or a state of first order, bodies' end given."""
     return i >= end or i % BODY_SIZE >= 7
 
 
 @jitable
-def note(m, size):
+def note(m: Method, size: float) -> None:
     """Note the size of a correction, for what is said of an iteration that does not end."""
     m.memory[CORRECTION_BEFORE] = m.memory[CORRECTION]
     m.memory[CORRECTION] = size
 
 
 @jitable
-def begin(m):
+def begin(m: Method) -> None:
     """Be as hopeful about the first correction as the step before allows."""
     m.memory[RETRY] = HALF
     m.memory[CORRECTION] = 0.0
@@ -119,7 +122,15 @@ def begin(m):
 
 
 @jitable
-def judge(m, iteration, most, size, before, rate_before, late):
+def judge(
+    m: Method,
+    iteration: int,
+    most: int,
+    size: float,
+    before: float,
+    rate_before: float,
+    late: float,
+) -> tuple[int, float]:
     """Return the word on correction number `iteration` (from 1) of `size`, and its rate.
 
     Of a rate r = size / before what is left after this correction is r / (1 - r) of it. A method
@@ -128,7 +139,7 @@ def judge(m, iteration, most, size, before, rate_before, late):
     step's error, is rounding. Only the second correction may be larger than the first, by less than
     `late`.
     """
-    goal = target(m.memory[TOL])
+    goal = target(m)
     note(m, size)
     if not size < math.inf:
         m.memory[RETRY] = QUARTER
@@ -158,28 +169,32 @@ def judge(m, iteration, most, size, before, rate_before, late):
 
 
 @jitable
-def is_good_enough(m, size, rate):
+def is_good_enough(m: Method, size: float, rate: float) -> bool:
     """Return whether what a correction of `size` leaves is a small part of the step's error.
 
     Where corrections end in rounding, above what is asked for, no better linearisation or shorter
-    step makes them smaller.
+    step makes them smaller: one that is no smaller than half the one before is that.
     """
-    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * m.memory[TOL]
+    most = LEFT * m.memory[TOL]
+    if not size < HALF * m.memory[CORRECTION_BEFORE]:
+        # what is left is looked at besides (`OFF`)
+        return size <= most
+    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= most
 
 
 @jitable
-def may_help(code):
+def may_help(code: int) -> bool:
     """Return whether a better linearisation or a smaller correction may help against a code."""
     return code < AT_ONCE
 
 
 @jitable
-def unless_singular(code):
+def unless_singular(code: int) -> int:
     """Return the code of `factor`, -1 for a singular system: another step has another."""
     return -1 if code == Code.SINGULAR else code
 
 
 @jitable
-def as_failure(code):
+def as_failure(code: int) -> int:
     """Return the code of a step whose equations were not solved for the reason `code`."""
     return code if code > 0 else Code.NOT_CONVERGED

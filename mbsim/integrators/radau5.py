@@ -23,8 +23,10 @@ import math
 import numpy as np
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import Problem
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -56,6 +58,7 @@ from mbsim.integrators.scheme import (
     RETRY,
     TOL,
     WHERE,
+    Method,
     Scheme,
     in_workspace,
     note_failure,
@@ -73,12 +76,10 @@ A = np.array(
     )
 )
 #: Eigenvalues of its inverse: one real, one complex pair.
-_THIRD = 81.0 ** (1.0 / 3.0)
-_SIXTH = 9.0 ** (1.0 / 3.0)
+_THIRD, _SIXTH = 81.0 ** (1.0 / 3.0), 9.0 ** (1.0 / 3.0)
 _REAL = (6.0 + _THIRD - _SIXTH) / 30.0
 _A, _B = (12.0 - _THIRD + _SIXTH) / 60.0, (_THIRD + _SIXTH) * math.sqrt(3.0) / 60.0
-G0 = 1.0 / _REAL
-G_RE, G_IM = _A / (_A * _A + _B * _B), _B / (_A * _A + _B * _B)
+G0, G_RE, G_IM = 1.0 / _REAL, _A / (_A * _A + _B * _B), _B / (_A * _A + _B * _B)
 # fmt: off
 T = np.array((
     (0.09123239487089295, -0.14125529502095421, -0.030029194105147425),
@@ -122,7 +123,7 @@ F, Z, W, REAL, REAL_D, PAIR, PAIR_D, LAST, UNSOLVED = 1, 4, 7, 10, 11, 12, 14, 1
 
 
 @jitable
-def factor(p, m, t, h):
+def factor(p: Problem, m: Method, t: float, h: float) -> int:
     """Factor both systems for a step of length h; return a code."""
     m.counts[FACTORIZATIONS] += 1
     m.memory[FACTORED_STEP] = 0.0
@@ -139,20 +140,20 @@ def factor(p, m, t, h):
 
 
 @jitable
-def carried_on(m, s, i):
+def carried_on(m: Method, s: float, i: int) -> float:
     """Return how much y[i] rises from the last step's end to s >= 1 of it, by its polynomial."""
     inner = m.kept[1, i] + s * m.kept[2, i]
     return s * (m.kept[0, i] + (1.0 - s) * inner) - m.kept[0, i]
 
 
 @jitable
-def is_short(m, h):
+def is_short(m: Method, h: float) -> bool:
     """Return whether the last step was too short for its polynomial to tell a step of length h."""
     return h > FARTHEST * m.memory[LAST_STEP]
 
 
 @jitable
-def extrapolate(m, h):
+def extrapolate(m: Method, h: float) -> None:
     """Write the stages as the last step's polynomial, carried on, has them."""
     fresh = m.memory[FRESH] == 1.0 or is_short(m, h)
     for j in range(3):
@@ -162,7 +163,7 @@ def extrapolate(m, h):
 
 
 @jitable
-def project_stage(p, m, t, h, j):
+def project_stage(p: Problem, m: Method, t: float, h: float, j: int) -> None:
     """Put stage j onto the problem's manifold, and leave by how much it moved in m.error.
 
     On entry m.error is by how much it is to move.
@@ -177,7 +178,7 @@ def project_stage(p, m, t, h, j):
 
 
 @jitable
-def transform(m):
+def transform(m: Method) -> None:
     """Write the transformed stages."""
     k = m.k
     for j in range(3):
@@ -186,7 +187,7 @@ def transform(m):
 
 
 @jitable
-def evaluate_stages(p, m, t, h):
+def evaluate_stages(p: Problem, m: Method, t: float, h: float) -> int:
     """Evaluate f at the stages; return a code."""
     for j in range(3):
         for i in range(len(m.y)):
@@ -199,7 +200,7 @@ def evaluate_stages(p, m, t, h):
 
 
 @jitable
-def unsolved(m, h, f, i):
+def unsolved(m: Method, h: float, f: int, i: int) -> float:
     """Return what the last stage's equation leaves of y[i], with f there in row `f`."""
     k = m.k
     slope = SLOPE[0] * k[Z, i] + SLOPE[1] * k[Z + 1, i] + SLOPE[2] * k[Z + 2, i]
@@ -207,7 +208,7 @@ def unsolved(m, h, f, i):
 
 
 @jitable
-def correct(p, m, t, h):
+def correct(p: Problem, m: Method, t: float, h: float) -> tuple[int, float]:
     """Correct the stages once; return a code, and the largest correction in the error's norm."""
     k = m.k
     n = len(m.y)
@@ -242,13 +243,13 @@ def correct(p, m, t, h):
 
 
 @jitable
-def place(m, t, h):
+def place(m: Method, t: float, h: float) -> float:
     """Return the time at which a step of length h is linearised."""
     return t if m.memory[FRESH] == 1.0 or is_short(m, h) else t + m.memory[WHERE] * h
 
 
 @jitable
-def iterate(p, m, t, h, anew):
+def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
     """Solve for the stages by Newton's simplified iteration; return a code, < 0 for no solution.
 
     It begins where the last step's polynomial has them, `anew` where they are. The second
@@ -290,7 +291,7 @@ def iterate(p, m, t, h, anew):
 
 
 @jitable
-def linearise_within(p, m, t, h):
+def linearise_within(p: Problem, m: Method, t: float, h: float) -> int:
     """Linearise at the step's begin or, as the last step's polynomial has it, further on.
 
     What turns or bends in a step is by half as much off in its middle as at its begin.
@@ -306,7 +307,7 @@ def linearise_within(p, m, t, h):
 
 
 @jitable
-def is_stale(m, t, h):
+def is_stale(m: Method, t: float, h: float) -> bool:
     """Return whether there is no linearisation that is good enough to begin a step with.
 
     One of this step, tried longer, is; one of a step before is where the iteration converged so
@@ -320,7 +321,7 @@ def is_stale(m, t, h):
 
 
 @jitable
-def solve_stages(p, m, t, h):
+def solve_stages(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for the stages, with an old linearisation if there is one; return a code."""
     stale = is_stale(m, t, h)
     # at most twice: with the old one, then with one of this step
@@ -345,13 +346,13 @@ def solve_stages(p, m, t, h):
 
 
 @jitable
-def led(m, i, last):
+def led(m: Method, i: int, last: int) -> float:
     """Return the mean of f of y[i] over the step, with f at its end in row `last`."""
     return A[2, 0] * m.k[F, i] + A[2, 1] * m.k[F + 1, i] + A[2, 2] * m.k[last, i]
 
 
 @jitable
-def estimate_error(p, m, t, h):
+def estimate_error(p: Problem, m: Method, t: float, h: float) -> None:
     """Write the filtered error into m.error and, over tol, into memory.
 
     Stages are where joints and motions have them, so these take out what accelerations do not
@@ -379,7 +380,7 @@ def estimate_error(p, m, t, h):
 
 
 @jitable
-def keep_polynomial(m):
+def keep_polynomial(m: Method) -> None:
     """Leave the polynomial through begin, stages and trial point for the next step."""
     k = m.k
     c0, c1 = C[0], C[1]
@@ -394,7 +395,7 @@ def keep_polynomial(m):
 
 
 @jitable
-def is_off(p, m, t, h):
+def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
     """Return whether f at the trial point says that the stages are not solved for after all.
 
     Corrections of a linearisation in touch are small where nothing is touched any more, however
@@ -414,7 +415,7 @@ def is_off(p, m, t, h):
 
 
 @jitable
-def arrive(p, m, t, h):
+def arrive(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill trial point, error and, where that is good enough, f at the trial point.
 
     Returns a code.
@@ -429,7 +430,7 @@ def arrive(p, m, t, h):
 
 
 @jitable
-def solve_anew(p, m, t, h):
+def solve_anew(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for the stages, from where they are, with a linearisation at the trial point.
 
     Returns a code.
@@ -446,7 +447,7 @@ def solve_anew(p, m, t, h):
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for the stages, fill trial point and error; return a code.
 
     What f at the trial point does not agree with is solved again with linearisations there.
@@ -465,7 +466,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def fit_dense(m):
+def fit_dense(m: Method) -> None:
     """Fill the polynomial of the step from y to trial."""
     for i in range(len(m.y)):
         m.dense[0, i] = m.y[i]
@@ -473,13 +474,13 @@ def fit_dense(m):
             m.dense[1 + j, i] = m.ahead[j, i]
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Dense output of the step tried last."""
     _, m = in_workspace(context)
     fit_dense(m)

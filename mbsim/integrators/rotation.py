@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def turn(y, at, h, wx, wy, wz, new):
+def turn(y: F1, at: int, h: float, wx: float, wy: float, wz: float, new: F1) -> None:
     """Write the quaternion of the body at y[at] into `new`, turned for h by w in body axes."""
     # cosine of half the angle, and sine over half the angle
     square = 0.25 * h * h * (wx * wx + wy * wy + wz * wz)

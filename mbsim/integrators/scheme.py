@@ -84,12 +84,18 @@ VAIN = 48
 BEGUN_WORK, RELUCTANCE = range(49, 51)
 # 1 where the step that was tried last was cut at a switch
 SWITCH_CUT = 51
-MEMORY = 52
+# what Newton's iteration may leave unsolved, as a part of a step's error
+LEFT_PART = 52
+# of AUTO: 1 once explicit steps are to stay within the bound of stability
+BOUNDED = 53
+MEMORY = 54
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
 COUNTS = 11
+#: What is left unsolved of a step's equations may be this part of its error, or less.
+LEFT = 0.03
 
 
 class Scheme(NamedTuple):
@@ -158,6 +164,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
+    memory[LEFT_PART] = LEFT
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
     counts = np.zeros(COUNTS, dtype=np.int64)
     counts[NEXT_WATCH] = np.iinfo(np.int64).max  # nobody watches
@@ -204,7 +211,7 @@ def bind(
 
 
 @jitable
-def in_workspace(context):
+def in_workspace(context: int) -> tuple[Problem, Method]:
     """Return the problem and the method that stand behind `context`."""
     workspace = view(context, Workspace)
     w = workspace.problem
@@ -215,14 +222,14 @@ def in_workspace(context):
 
 
 @jitable
-def note_failure(m, code):
+def note_failure(m: Method, code: int) -> None:
     """Keep the first code of a hook where it cannot be returned: `failure_or` hands it on."""
     if m.counts[CODE] == 0:
         m.counts[CODE] = code
 
 
 @jitable
-def failure_or(m, code):
+def failure_or(m: Method, code: int) -> int:
     """Return the code that `note_failure` kept, which is forgotten, or `code` if there is none."""
     noted = m.counts[CODE]
     m.counts[CODE] = 0
@@ -230,7 +237,7 @@ def failure_or(m, code):
 
 
 @jitable
-def answer_of(m, answer):
+def answer_of(m: Method, answer: int) -> int:
     """Return what a hook answers; 0 where it failed, which is noted."""
     if answer < 0:
         note_failure(m, -answer)
@@ -239,7 +246,7 @@ def answer_of(m, answer):
 
 
 @jitable
-def project(p, m, t, h, y):
+def project(p: Problem, m: Method, t: float, h: float, y: F1) -> None:
     """Bring y back onto the problem's manifold; a failure is noted."""
     code = call_int(p.project, (p.context, t, h, y, y))
     if code != 0:
@@ -247,7 +254,7 @@ def project(p, m, t, h, y):
 
 
 @jitable
-def combine(k, weights, count, out):
+def combine(k: F2, weights: F1, count: int, out: F1) -> None:
     """Write the sum of weights[j] k[j], j < count, into `out`."""
     for i in range(len(out)):
         out[i] = 0.0
@@ -259,7 +266,7 @@ def combine(k, weights, count, out):
 
 
 @jitable
-def interpolate(m, s, out):
+def interpolate(m: Method, s: float, out: F1) -> None:
     """Write the state at the part s (0..1) of the last fitted step into `out`."""
     d, r = m.dense, 1.0 - s
     last = len(d) - 1

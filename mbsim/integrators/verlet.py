@@ -13,14 +13,16 @@ Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 
 from __future__ import annotations
 
 from mbsim.core.address import call_int
+from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import Problem
 from mbsim.integrators.rotation import turn
-from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Scheme, in_workspace, project
+from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Method, Scheme, in_workspace, project
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill f at the new positions and the trial point; return a code."""
     y, f, w, new = m.y, m.k[0], m.trial, m.k[1]
     n, end = len(y), BODY_SIZE * m.bodies[0]
@@ -49,7 +51,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def fit_dense(p, m, t, h):
+def fit_dense(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill the cubic Hermite polynomial of the step from y to trial."""
     d, y, w = m.dense, m.y, m.trial
     for i in range(len(y)):
@@ -62,13 +64,13 @@ def fit_dense(p, m, t, h):
     return 0
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step."""
     p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The step as a polynomial."""
     p, m = in_workspace(context)
     return fit_dense(p, m, t, h)

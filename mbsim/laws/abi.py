@@ -1,7 +1,7 @@
 """The one internal signature of laws, and the adapters that put a law behind an address.
 
 Normal law      int64 f(double depth, double rate, const double *par, double out[3])
-                out: force [F], force at rate 0 [F], stored energy [F L]
+                out: force [F], force at rate 0 [F], stored energy [F L] (LOAD, ELASTIC, ENERGY)
 Friction law    int64 f(int64 id, const double *in, const double *par, double *out)
                 in: the FRICTION_INPUTS fields of `FrictionInput` in order, then the law's memory;
                 out: Fx, Fy, Mx, My, Tz on I; of a law with memory then the energy stored, mode,
@@ -24,11 +24,22 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
 from mbsim.core.address import vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
+from mbsim.core.rotation import vector
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
+#: An intrinsic is called without the typing context that it is declared with.
+_as_tuple: Callable[..., tuple[float, ...]] = to_fixed_tuple
+
+#: Results of a normal law.
+LOAD, ELASTIC, ENERGY = range(3)
+
 FRICTION_INPUTS = 27
-#: Places of the last of them, which only derivatives and laws with memory look at.
+#: Where the fields of `FrictionInput` begin in the numbers that a friction law is given.
+TIME_IN, STEP_IN, X_IN, XDOT_IN, ROLLING_IN, NFORCE_IN = 0, 1, 2, 5, 8, 10
+AREA_IN, RADIUS_IN, LOCI_IN, LOCJ_IN = 11, 12, 13, 16
+#: Those that only derivatives and laws with memory look at.
 DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19, 25)
 NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
 #: Fields of a law's output before its memory: force, torques, and those named here.
@@ -40,35 +51,35 @@ FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
 
 
 @jitable
-def friction_input(a):
+def friction_input(a: F1) -> FrictionInput:
     """Return the `FrictionInput` that lies in the numbers of array `a`."""
     return FrictionInput(
-        a[0],
-        a[1],
-        (a[2], a[3], a[4]),
-        (a[5], a[6], a[7]),
-        (a[8], a[9]),
-        a[10],
-        a[11],
-        a[12],
-        (a[13], a[14], a[15]),
-        (a[16], a[17], a[18]),
-        a[19],
-        a[20],
-        a[21],
-        a[22],
-        a[23],
-        a[24],
-        a[25],
-        a[26],
+        a[TIME_IN],
+        a[STEP_IN],
+        vector(a[X_IN:]),
+        vector(a[XDOT_IN:]),
+        (a[ROLLING_IN], a[ROLLING_IN + 1]),
+        a[NFORCE_IN],
+        a[AREA_IN],
+        a[RADIUS_IN],
+        vector(a[LOCI_IN:]),
+        vector(a[LOCJ_IN:]),
+        a[DFLAG],
+        a[FROZEN],
+        a[NORMAL_STIFFNESS],
+        a[SLIPPING_MASS],
+        a[SLIDING_LIMIT],
+        a[GROWTH],
+        a[NORMAL_RATE],
+        a[LIMIT_RATE],
     )
 
 
 def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
     """Return a normal law of `count` constants as a C function."""
 
-    def entry(depth, rate, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         result = vector_at(out, 3)
         force, elastic, stored = law(depth, rate, *values)
         result[0] = force
@@ -82,8 +93,8 @@ def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
 def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     """Return `force` of `count` parameters as a C function."""
 
-    def entry(element, inputs, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         result = vector_at(out, 5)
         given = friction_input(vector_at(inputs, FRICTION_INPUTS))
         fx, fy, mx, my, tz = force(given, *values)
@@ -101,10 +112,10 @@ def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int, carri
     """Return `force` of `count` parameters and so many numbers of memory as a C function."""
     given = memory + carried
 
-    def entry(element, inputs, par, out):
-        values = to_fixed_tuple(vector_at(par, count), count)
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        values = _as_tuple(vector_at(par, count), count)
         a = vector_at(inputs, FRICTION_INPUTS + memory)
-        kept = to_fixed_tuple(a[FRICTION_INPUTS:], memory)
+        kept = _as_tuple(a[FRICTION_INPUTS:], memory)
         result = vector_at(out, MEMORY_OUT + given)
         found, new = force(friction_input(a), kept, *values)
         for k in range(MEMORY_OUT):

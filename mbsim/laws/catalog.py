@@ -29,7 +29,7 @@ that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
@@ -44,6 +44,7 @@ class NormalLaw(NamedTuple):
     law: Callable[..., tuple[float, float, float]]
     parameters: tuple[str, ...]
     constants: Callable[..., tuple[float, ...]]
+    of_shapes: bool = False  # it needs the radii of what touches
 
     @property
     def takes(self) -> tuple[str, ...]:
@@ -120,6 +121,8 @@ class FrictionInput(NamedTuple):
     limit_rate: float  # of `limit`, likewise
 
 
+Law = TypeVar("Law", bound=Callable[..., Any])
+
 NORMAL_LAWS: Registry[NormalLaw] = Registry("mbsim.laws.normal")
 FRICTION_LAWS: Registry[FrictionLaw] = Registry("mbsim.laws.friction")
 
@@ -129,12 +132,15 @@ def _as_given(*parameters: float) -> tuple[float, ...]:
 
 
 def normal_law(
-    name: str, *parameters: str, constants: Callable[..., tuple[float, ...]] = _as_given
-) -> Any:
+    name: str,
+    *parameters: str,
+    constants: Callable[..., tuple[float, ...]] = _as_given,
+    of_shapes: bool = False,
+) -> Callable[[Law], Law]:
     """Register the decorated function as the normal law `name` of these attributes."""
 
-    def register(law: Callable[..., Any]) -> Callable[..., Any]:
-        NORMAL_LAWS.put(name, NormalLaw(name, jitable(law), parameters, constants))
+    def register(law: Law) -> Law:
+        NORMAL_LAWS.put(name, NormalLaw(name, jitable(law), parameters, constants, of_shapes))
         return law
 
     return register
@@ -149,12 +155,12 @@ def friction_law(
     takes_function: bool = False,
     modes: bool = False,
     rigid: FrictionLaw | None = None,
-) -> Any:
+) -> Callable[[Law], Law]:
     """Register the decorated function as the friction law `name` of these attributes."""
 
-    def register(force: Callable[..., Any]) -> Callable[..., Any]:
+    def register(force: Law) -> Law:
         own = tuple(each for each in parameters if isinstance(each, Parameter))
-        names = tuple(getattr(each, "name", each) for each in parameters)
+        names = tuple(each.name if isinstance(each, Parameter) else each for each in parameters)
         made = jitable(force)
         law = FrictionLaw(
             name, made, names, own, memory, carried, uses_x, takes_function, modes, rigid

@@ -18,11 +18,14 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V2, V3
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def dry_force(x, slider, slides, k, limit, static, frozen):
+def dry_force(
+    x: float, slider: float, slides: float, k: float, limit: float, static: float, frozen: int
+) -> V2:
     """Return the force f against x, and 1 where it gives way to x, 0 where it is the spring's.
 
     Parameters
@@ -54,7 +57,16 @@ def dry_force(x, slider, slides, k, limit, static, frozen):
 
 
 @jitable
-def dry_mode(x, rate, slider, slides, k, limit, static, frozen):
+def dry_mode(
+    x: float,
+    rate: float,
+    slider: float,
+    slides: float,
+    k: float,
+    limit: float,
+    static: float,
+    frozen: int,
+) -> float:
     """Return the mode that the point asks for: 0 to stick, or the sign of f in slip.
 
     The arguments are those of `dry_force`, and the rate of x.
@@ -69,7 +81,7 @@ def dry_mode(x, rate, slider, slides, k, limit, static, frozen):
 
 
 @jitable
-def rigid_mode(force, rate, slides, static, rest):
+def rigid_mode(force: float, rate: float, slides: float, static: float, rest: float) -> float:
     """Return the mode that a point asks for where k is infinite.
 
     Parameters
@@ -91,7 +103,16 @@ def rigid_mode(force, rate, slides, static, rest):
 
 
 @jitable
-def dry_commit(x, rate, slider, slides, k, limit, static, frozen):
+def dry_commit(
+    x: float,
+    rate: float,
+    slider: float,
+    slides: float,
+    k: float,
+    limit: float,
+    static: float,
+    frozen: int,
+) -> V3:
     """Return slider, mode and the force that hold from here on; arguments as of `dry_mode`."""
     if math.isnan(slider):
         return x, 0.0, 0.0

@@ -18,7 +18,7 @@ from mbsim.core.jitable import jitable
 
 
 @jitable
-def hunt_crossley(spring, depth_rate, dissipation):
+def hunt_crossley(spring: float, depth_rate: float, dissipation: float) -> float:
     """Return `spring` [F] with the factor max(0, 1 + a d'); `dissipation` is a [T/L]."""
     # fast separation would make the factor negative; contact cannot pull
     return spring * max(0.0, 1.0 + dissipation * depth_rate)

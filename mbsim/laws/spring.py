@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V2
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def power_spring(depth, stiffness, exponent):
+def power_spring(depth: float, stiffness: float, exponent: float) -> V2:
     """Return the force k d^e [F] and the energy k d^(e+1) / (e+1) [F L] at `depth` > 0 [L].
 
     The exponents 1, 1.5 and 2 go without pow, which costs more than all the rest of a law;

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V2
 from mbsim.core.jitable import jitable
 
 #: The shortest piece, how many are of one length, and how many there are at most.
@@ -33,7 +34,9 @@ STRAIGHT = 1e-15
 
 
 @jitable
-def dragged(ex, ey, ax, ay, mx, my, bx, by):
+def dragged(
+    ex: float, ey: float, ax: float, ay: float, mx: float, my: float, bx: float, by: float
+) -> V2:
     """Return the direction of the spring behind a way.
 
     Parameters

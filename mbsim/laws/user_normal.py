@@ -11,7 +11,9 @@ anything, nobody can tell.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 
 # places in the array: LOCI, NI, LOCJ, NJ take three numbers each
@@ -42,7 +44,7 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @jitable
-def questions(place, depth):
+def questions(place: Sequence[float] | F1, depth: float) -> int:
     """Return at how many depths and rates the law is asked."""
     if not depth > 0.0:
         return 0
@@ -50,7 +52,7 @@ def questions(place, depth):
 
 
 @jitable
-def question(k, depth, rate):
+def question(k: int, depth: float, rate: float) -> V2:
     """Return the depth and rate of question k: as given, at rate 0, then on the way there."""
     if k == 0:
         return depth, rate
@@ -60,14 +62,14 @@ def question(k, depth, rate):
 
 
 @jitable
-def begin(out, depth):
+def begin(out: F1, depth: float) -> None:
     """Set the law's three results to 0, or to nan where the depth is."""
     for k in range(3):
         out[k] = 0.0 * depth
 
 
 @jitable
-def keep(out, k, depth, force):
+def keep(out: F1, k: int, depth: float, force: float) -> None:
     """Add the answer to question k to the law's results."""
     if k < 2:
         out[k] = force

@@ -1,4 +1,4 @@
-"""Convex meshes as polyhedra: faces with their corners in order, edges, and a share a corner.
+"""Convex meshes as polyhedra: faces with their corners in order, edges, and a weight a corner.
 
 Triangles in one plane become one face, and vertices inside faces and edges fall away, so that
 contact does not depend on how a flat side is cut into triangles. The polyhedron is packed into
@@ -26,7 +26,7 @@ MOST_ROWS = 64
 #: Numbers of the header: corners, faces, edges, colours, rows, most corners of a face, then
 #: where these begin: corners (3), planes (4: outward normal, offset), first of each face in the
 #: loops (faces + 1), loops (2: corner, face beyond the edge that starts there), edges (4:
-#: corners, faces), corner data (3: share, colour, row), share of each row, how far each face is a
+#: corners, faces), corner data (3: weight, colour, row), weight of each row, how far each face is a
 #: side that the body can lie on (0 to 1).
 HEADER = 14
 (
@@ -42,7 +42,7 @@ HEADER = 14
     AT_LOOPS,
     AT_EDGES,
     AT_DATA,
-    AT_SHARES,
+    AT_WEIGHTS,
     AT_SIDES,
 ) = range(HEADER)
 
@@ -170,7 +170,7 @@ def polyhedron_of(vertices: Array, faces: Faces) -> Array | None:
     Notes
     -----
     A closed surface is convex if no vertex is above the plane of a triangle; `FLATNESS` of the
-    size is allowed. The share of a corner is the mean of its exterior angle in its
+    size is allowed. The weight of a corner is the mean of its exterior angle in its
     faces over a right angle: 1 for a box, 4/3 for a regular tetrahedron.
     """
     if len(faces) > MOST_FACES or solid_fault(vertices, faces):
@@ -215,7 +215,7 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         for corner, angle in zip(loop, _exterior(ring), strict=True):
             angles[corner][0] += float(angle)
             angles[corner][1] += 1
-    share = np.array([total / count / (0.5 * math.pi) for total, count in angles])
+    weight = np.array([total / count / (0.5 * math.pi) for total, count in angles])
     colour = _colours(len(corners), loops, corners)
     row = _patches(corners)
     rows = int(row.max()) + 1
@@ -237,8 +237,8 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         np.cumsum([0, *map(len, loops)]),
         np.array(table),
         np.array(edges),
-        np.column_stack([share, colour, row]),
-        np.array([share[row == k].mean() for k in range(rows)]),
+        np.column_stack([weight, colour, row]),
+        np.array([weight[row == k].mean() for k in range(rows)]),
         np.array(sides),
     ]
     head = [len(corners), len(loops), len(edges), max(colour) + 1, rows, max(map(len, loops))]

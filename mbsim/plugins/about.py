@@ -8,6 +8,7 @@ from typing import Any
 
 from mbsim.model.elements import Subroutine
 from mbsim.plugins.dependence import dependence
+from mbsim.plugins.permission import named, not_run
 from mbsim.plugins.source.find import find_script, find_source
 from mbsim.plugins.source.octave import OctaveFile
 from mbsim.plugins.source.script import Scripts, user_function
@@ -23,7 +24,10 @@ def about(
     plugin_files: Sequence[Path],
     scripts: Scripts,
 ) -> dict[str, Any]:
-    """Return facts of one subroutine; a script is run, and its function called with iflag 1.
+    """Return facts of one subroutine.
+
+    A script that `plugin_files` name is run, and its function called with iflag 1; one that only
+    the deck names is not.
 
     Parameters
     ----------
@@ -47,6 +51,8 @@ def about(
     facts: dict[str, Any] = {"function": user.fnc_name}
     if not (user.script_name or user.dll_name or plugin_files):
         return facts | {"file": "none; name one with --plugin FILE"}
+    if not named(user, plugin_files):
+        return facts | not_run(user)
     if prefix in ("usrsub", "ROUTINE"):
         source: Any = find_script(user, user.fnc_name, element, prefix, plugin_files, scripts)
     else:

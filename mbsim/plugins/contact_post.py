@@ -10,6 +10,7 @@ from typing import Any
 from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import Pair, host
+from mbsim.plugins.permission import watched
 from mbsim.plugins.source.find import find_script
 from mbsim.plugins.source.script import Scripts, user_function
 
@@ -46,8 +47,9 @@ class ContactPost:
         """
         user, outer = self.user, host.time
         par, host.time = [float(value) for value in user.par], time
+        function = watched(self.function, f"Force_Contact[{self.contact.id}]: {user.fnc_name}")
         try:
-            self.function(self.contact.id, *pair, time, par, len(par), iflag, endflg)
+            function(self.contact.id, *pair, time, par, len(par), iflag, endflg)
         except BaseException as error:
             guard.failure.clear()
             title = f"Force_Contact[{self.contact.id}]"

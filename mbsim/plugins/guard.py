@@ -18,6 +18,7 @@ from mbsim.plugins.source.octave import OctaveError
 
 if TYPE_CHECKING:
     from mbsim.plugins.types import UserFriction
+from mbsim.plugins.permission import watched
 from mbsim.plugins.returned import NotAForce, force_and_state, numbers, one_number, three_numbers
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
@@ -157,6 +158,7 @@ def callback(
     from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, MEMORY_OUT
 
     # plain locals and memoryviews are the cheapest way in: see tests/bench/test_speed.py
+    function = watched(function, f"{name} ({source})")
     inputs_at, par_at = Views(FRICTION_INPUTS + states), Views(par_count)
     out_at = Views(MEMORY_OUT + states if states else 5)
 
@@ -233,6 +235,7 @@ def state_callback(
     results_at = Views(count)
     title, id = element
     name, source = place
+    function = watched(function, f"{title}: {name} ({source})")
     values, npar = [float(value) for value in par], len(par)
     started = False
 

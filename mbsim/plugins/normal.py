@@ -16,6 +16,7 @@ from mbsim.model.elements import Contact
 from mbsim.plugins import guard
 from mbsim.plugins.dependence import dependence
 from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.permission import watched
 from mbsim.plugins.source.diagnose import reads_parameter
 from mbsim.plugins.source.find import find_source
 from mbsim.plugins.source.octave import OctaveFile, running
@@ -140,6 +141,7 @@ def _callback(made: UserNormal) -> tuple[int, object]:
     from mbsim.core.codes import Code
 
     out_at, place = guard.Views(3), made.place.data
+    call = watched(made.call, f"Force_Contact[{made.element}]: {made.name} ({made.source})")
 
     def guarded(depth: float, rate: float, par: int, out: int) -> int:
         outer = host.state
@@ -149,7 +151,7 @@ def _callback(made: UserNormal) -> tuple[int, object]:
             if host.seen is not None:
                 host.state = (host.seen[0], place[at.TIME], host.seen[1])
             for k in range(at.questions(place, depth)):
-                at.keep(results, k, depth, made.call(*at.question(k, depth, rate)))
+                at.keep(results, k, depth, call(*at.question(k, depth, rate)))
             return 0
         except guard.PassedOn:
             return Code.RAISED_INTERPRETED

@@ -26,6 +26,7 @@ from mbsim.model.elements import ForceElement
 from mbsim.plugins import guard
 from mbsim.plugins.compile.residual_trials import points, refuse_jumps, sort_unknowns
 from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.permission import named, not_run, watched
 from mbsim.plugins.returned import numbers
 from mbsim.plugins.source.find import find_script
 from mbsim.plugins.source.script import Script, Scripts, user_function
@@ -193,6 +194,7 @@ def _callback(
     given_at, out_at = guard.Views(inputs(axes, count)), guard.Views(count)
     first, values = 1 + 2 * axes, par.tolist()
     name, source = place
+    function = watched(function, f"Force_Element[{element}]: {name} ({source})")
 
     def guarded(id: int, inputs: int, par: int, out: int) -> int:
         time, outer = 0.0, host.state
@@ -223,7 +225,7 @@ def _callback(
 def about_residual(
     element: ForceElement, plugin_files: Sequence[Path], scripts: Scripts
 ) -> dict[str, Any]:
-    """Return what `mbsim info` says of an element's residual; its script is run.
+    """Return what `mbsim info` says of an element's residual; a script of `plugin_files` is run.
 
     Raises
     ------
@@ -233,5 +235,7 @@ def about_residual(
     facts: dict[str, Any] = {"function": element.user.fnc_name}
     if not (element.user.script_name or plugin_files):
         return facts | {"file": "none; name one with --plugin FILE"}
+    if not named(element.user, plugin_files):
+        return facts | not_run(element.user)
     user = load_residual(element, plugin_files, True, scripts, lambda line: None)
     return facts | {"file": str(user.source), "unknowns": user.about()}

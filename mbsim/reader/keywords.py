@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable
 
 from mbsim.forces.catalog import FORCES
-from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.request_types import TYPES
 
 
@@ -38,9 +38,9 @@ def spellings(**canonical: str) -> dict[str, str]:
 
 
 # one keyword, many documented forms; the canonical one is the key
-CNF_TYPES = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="", HERTZ="", USERCNF="USER")
+CNF_TYPES = spellings(**dict.fromkeys(NORMAL_LAWS, ""), USERCNF="USER")
 #: Laws that need no shapes: those of limits.
-CNF_OF_LIMITS = spellings(IMPACT="", POISSON="", HUNT_CROSSLEY="")
+CNF_OF_LIMITS = spellings(**{law: "" for law in NORMAL_LAWS if not NORMAL_LAWS[law].of_shapes})
 CNF_NOT_BUILT = spellings(VOLUME="")
 _OTHER_WORDS = {
     "COULOMB_ON": "ON",

@@ -21,7 +21,8 @@ def check_normal(entry: Entry, cnf_type: str) -> None:
     note_unused(entry, f"cnf_type {cnf_type}", (every | _USER_LAW | _LAYERS) - read)
     if cnf_type == "USERCNF":
         return
-    _CHECKS[cnf_type](entry)
+    if cnf_type in _CHECKS:
+        _CHECKS[cnf_type](entry)
 
 
 def note_unused(entry: Entry, law: str, names: set[str]) -> None:

@@ -1,6 +1,6 @@
 """`Audit`: what a run found out about itself; its table of entries is in one place, `ENTRIES`.
 
-Compiled code (`pipeline.audit`) keeps, for every row of `arrays.scene.Audit.found`, the value
+Compiled code (`pipeline.audit`) keeps, for every row of `arrays.state.Audit.found`, the value
 that was largest over what the local errors of the steps explain. Here it is said what that is,
 how many times as large it may be, and at which element it was.
 """
@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
 from mbsim.model.names import element_name
-from mbsim.results.quantities import ENERGY as ENERGY_UNIT
-from mbsim.results.quantities import UnitSystem
+from mbsim.results.units import ENERGY as ENERGY_UNIT
+from mbsim.results.units import UnitSystem
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -35,40 +35,52 @@ class Judged(NamedTuple):
 #: What a run is judged by. How the limits were found is in the manual, computation/audit.
 ENTRIES = (
     Judged(
-        a.ENERGY, "energy", "the energy balance is off by {value:.3g} {energy}", 30.0, "contact"
+        codes.ENERGY, "energy", "the energy balance is off by {value:.3g} {energy}", 30.0, "contact"
     ),
     Judged(
-        a.ENERGY_STEP,
+        codes.ENERGY_STEP,
         "energy_step",
         "the energy balance changes by {value:.3g} {energy} within a few steps",
         30.0,
         "contact",
     ),
     Judged(
-        a.MOMENTUM,
+        codes.MOMENTUM,
         "momentum",
         "bodies on which nothing but weight acts change their momentum by {value:.3g}",
         5.0,
         "body",
     ),
     Judged(
-        a.SPIN,
+        codes.SPIN,
         "angular_momentum",
         "bodies on which nothing but weight acts change their angular momentum by {value:.3g}",
         5.0,
         "body",
     ),
-    Judged(a.POSITION, "position", "a constraint is left open by {value:.3g}", 10.0, "equation"),
     Judged(
-        a.VELOCITY, "velocity", "the rate of a constraint is off by {value:.3g}", 10.0, "equation"
-    ),
-    Judged(a.HELD_SLIP, "held_slip", "what friction holds slips, by {value:.3g}", 10.0, "equation"),
-    Judged(a.CONE, "cone", "friction is {value:.3g} above mu N", 10.0, "contact"),
-    Judged(
-        a.NEWTON, "newton", "Newton's iteration left {value:.3g} of a step's equations", 10.0, ""
+        codes.POSITION, "position", "a constraint is left open by {value:.3g}", 10.0, "equation"
     ),
     Judged(
-        a.FOLD,
+        codes.VELOCITY,
+        "velocity",
+        "the rate of a constraint is off by {value:.3g}",
+        10.0,
+        "equation",
+    ),
+    Judged(
+        codes.HELD_SLIP, "held_slip", "what friction holds slips, by {value:.3g}", 10.0, "equation"
+    ),
+    Judged(codes.CONE, "cone", "friction is {value:.3g} above mu N", 10.0, "contact"),
+    Judged(
+        codes.NEWTON,
+        "newton",
+        "Newton's iteration left {value:.3g} of a step's equations",
+        10.0,
+        "",
+    ),
+    Judged(
+        codes.FOLD,
         "fold",
         "velocities are off by {value:.3g} of the usual behind a position in which a loop can fold",
         10.0,
@@ -140,10 +152,10 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
     """
     kept = system.scene.audit
     tally, found = kept.tally, kept.found.copy()
-    if tally[a.STEPS_ALL] == 0.0:
+    if tally[codes.STEPS_ALL] == 0.0:
         return None
     if left > 0.0:
-        found[a.NEWTON] = left, kept.plan[a.AUDIT_TOL], left_time, -1
+        found[codes.NEWTON] = left, kept.plan[codes.AUDIT_TOL], left_time, -1
     unit = UnitSystem(system.model.units.force, system.model.units.length).text(ENERGY_UNIT)
     entries, warnings = {}, []
     for judged in ENTRIES:
@@ -163,18 +175,18 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
         id: Share(*(float(number) for number in row[:3]))
         for id, row in zip(ids, kept.contact, strict=True)
     }
-    balance, time = abs(float(tally[a.WORST_OPEN])), float(tally[a.WORST_TIME])
-    size = float(tally[a.LARGEST_ENERGY])
+    balance, time = abs(float(tally[codes.WORST_OPEN])), float(tally[codes.WORST_TIME])
+    size = float(tally[codes.LARGEST_ENERGY])
     # of a model that stands still no energy is large: what its scales say is
-    usual = max(size, float(tally[a.USUAL_ENERGY]))
+    usual = max(size, float(tally[codes.USUAL_ENERGY]))
     part = balance / usual
     if part > COARSE and not any(
         entries[name].excess > 1.0 for name in ENERGIES if name in entries
     ):
         warnings.append(
             f"the energy balance is off by {balance:.2g} {unit}, {100.0 * part:.2g} % of the usual "
-            f"energy of {usual:.3g} {unit}, at time {time:.9g}, as tol {kept.plan[a.AUDIT_TOL]:g} "
-            "explains: choose a smaller one"
+            f"energy of {usual:.3g} {unit}, at time {time:.9g}, as tol "
+            f"{kept.plan[codes.AUDIT_TOL]:g} explains: choose a smaller one"
         )
     return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.scene import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
+from mbsim.arrays.codes import CONTACT_COLUMNS, INC_MEMORY, INC_REGION
 from mbsim.plugins.contact_post import ContactPost
 from mbsim.plugins.helpers import Pair, Shown, host
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from mbsim.results.files import problem, sync
+from mbsim.results.files import create, problem, sync
 from mbsim.results.reading import Results
 
 #: Rows formatted at a time, so that a long run does not sit in memory as text.
@@ -39,7 +40,7 @@ def write_csv(path: Path, results: Results, request_ids: Sequence[int]) -> None:
             return
         names = ["Time", *(f"{id}.F{k}" for id in request_ids for k in range(1, 9))]
         time = results["time"]
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+        with os.fdopen(create(temporary), "w", encoding="utf-8", newline="\n") as file:
             file.write(",".join(names) + "\n")
             tables = [results[f"requests/{id}"] for id in request_ids]
             for first in range(0, len(time), _ROWS):

@@ -15,8 +15,9 @@ import numpy as np
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results.elements import GROUPS
 from mbsim.results.names import PARTS
-from mbsim.results.quantities import TIME, Quantity, UnitSystem, quantity_of
+from mbsim.results.quantities import quantity_of
 from mbsim.results.reading import Results
+from mbsim.results.units import TIME, Quantity, UnitSystem
 
 Array = np.ndarray[Any, Any]
 
@@ -151,7 +152,7 @@ def collect(files: Sequence[Results], choice: Choice, minus: Results | None = No
         If a file has no rows, or cannot be read.
     """
     # one row of `tracks` a file; all are in the units of the first
-    units = UnitSystem.of(files[0])
+    units = UnitSystem.of(files[0].attributes)
     tracks = [_Track(results, units, choice, minus) for results in files]
     # the run that is taken off is not drawn, but whoever judges must know of it too
     others = [] if minus is None else [_Track(minus, units, Choice(choice.names), None)]
@@ -193,7 +194,7 @@ class _Track:
     ) -> None:
         self.results = results
         self.path = results.path or Path("in memory")
-        self.from_units, self.units = UnitSystem.of(results), units
+        self.from_units, self.units = UnitSystem.of(results.attributes), units
         time = self._rows_of(results, "time", TIME)
         if not len(time):
             raise ResultsError(f"{self.path}: has no output rows ({results.status})")
@@ -212,7 +213,7 @@ class _Track:
     def _rows_of(self, results: Results, name: str, quantity: Quantity) -> Array:
         """Return a signal in the units of the picture."""
         values = np.asarray(results[name], dtype=float)
-        own = UnitSystem.of(results)
+        own = UnitSystem.of(results.attributes)
         return values if own == self.units else values * own.factor_to(self.units, quantity)
 
     def _over(self, name: str) -> Component:

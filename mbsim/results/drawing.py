@@ -19,7 +19,7 @@ import numpy as np
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.curves import Curve, Panel, Picture
 from mbsim.results.files import sync
-from mbsim.results.quantities import INCIDENTS
+from mbsim.results.units import INCIDENTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

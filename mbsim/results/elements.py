@@ -72,7 +72,7 @@ def acting(system: System) -> list[tuple[str, int]]:
 
 
 def facts(model: Model) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the place of each such element in a result file, with its type and label."""
+    """Yield the name of each such element in a result file, with its type and label."""
     for statement in (*CONSTRAINTS, *APPLIED):
         for id, element in elements_of(model, statement).items():
             about = {"type": getattr(element, "type", ""), "label": element.label}

@@ -9,12 +9,95 @@ from pathlib import Path
 from mbsim.errors import ResultsError
 
 SUFFIXES = (".h5", ".csv", ".log")
+_LOCK_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 def problem(path: Path, error: BaseException) -> ResultsError:
     """Return what went wrong with a result file, in one line."""
     reason = getattr(error, "strerror", None) or " ".join(str(error).split())
     return ResultsError(f"{path}: results cannot be written: {reason or type(error).__name__}")
+
+
+def create(path: Path) -> int:
+    """Open a new empty file, in the place of what has its name; nothing is written through links.
+
+    Raises
+    ------
+    OSError
+        Where a folder has the name, or the disk does not let it.
+    """
+    with contextlib.suppress(FileNotFoundError):
+        path.unlink()
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
+    return os.open(path, flags | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0), 0o666)
+
+
+def locked(handle: int) -> bool:
+    """Lock an open file for one writer; False where others have it, or the disk has no locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def unlocked(handle: int) -> None:
+    """Take back what `locked` did."""
+    with contextlib.suppress(ImportError, OSError):
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_UN)
+
+
+class RunLock:
+    """Keeps a second run out of the same result files, where the system has locks.
+
+    Raises
+    ------
+    ResultsError
+        If another run is writing there.
+    OSError
+        If the lock file cannot be made.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.path = target.with_name(f".{target.name}.lock")
+        while True:
+            self._handle = os.open(self.path, _LOCK_FLAGS, 0o666)
+            if not self._take():
+                os.close(self._handle)
+                self._handle = -1
+                raise ResultsError(
+                    f"{target}: another run is writing there; choose another folder with -o"
+                )
+            # one that has just ended took its file away
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self._handle), os.lstat(self.path)):
+                    return
+            os.close(self._handle)
+
+    def _take(self) -> bool:
+        """Return whether nobody else has the lock."""
+        try:
+            import fcntl
+
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except (ImportError, OSError):
+            return True  # a disk without locks
+        return True
+
+    def release(self) -> None:
+        """Let others write; a second call does nothing."""
+        if self._handle >= 0:
+            # removed while it is held: whoever waits for it finds that out
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            os.close(self._handle)
+            self._handle = -1
 
 
 def prepare_directory(directory: Path, model_name: str) -> None:
@@ -28,7 +111,7 @@ def prepare_directory(directory: Path, model_name: str) -> None:
     probe = directory / f".{model_name}.probe"
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        probe.write_bytes(b"\0")
+        os.close(create(probe))
     except FileExistsError:
         raise ResultsError(f"{directory}: is a file; results need a folder (-o DIR)") from None
     except (OSError, ValueError) as error:
@@ -61,7 +144,10 @@ def replace_text(path: Path, text: str) -> None:
     """
     temporary = path.with_name(f".{path.name}.tmp")
     try:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        with os.fdopen(
+            create(temporary), "w", encoding="utf-8", errors="backslashreplace", newline="\n"
+        ) as file:
+            file.write(text)
         sync(temporary)
         os.replace(temporary, path)
     except OSError as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.arrays.scene import CONTACT_COLUMNS
+from mbsim.arrays.codes import CONTACT_COLUMNS
 from mbsim.errors import DeckError, Fault
 from mbsim.model.elements import Array, Contact, Model, Request
 from mbsim.model.names import element_name

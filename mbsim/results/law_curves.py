@@ -8,7 +8,7 @@ import numpy as np
 
 from mbsim.laws.slip_test import Conditions, Sample, cycle, samples, steady
 from mbsim.results.curves import Curve, Panel, Picture
-from mbsim.results.quantities import Quantity
+from mbsim.results.units import Quantity
 
 _SLIDING = Quantity("Friction over normal force")
 _TO_AND_FRO = Quantity("Friction on I over normal force")

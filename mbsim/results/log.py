@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
 from mbsim.compile_model.pairing import Plans
 from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS
@@ -47,8 +47,8 @@ def number(value: float, unit: str = "") -> str:
 class RunLog:
     """The log of a run; `directory` None keeps it in `lines`.
 
-    The file is written whole now and then and at `close`, each time atomically. A failure
-    to write it while the run goes on does not stop the run; `close` raises it.
+    The file is written whole at `close`, and now and then from `show` on, each time atomically. A
+    failure to write it while the run goes on does not stop the run; `close` raises it.
     """
 
     def __init__(
@@ -61,6 +61,8 @@ class RunLog:
         self.system = system
         self.path = None if directory is None else directory / f"{system.model.name}.log"
         self.lines: list[str] = []
+        self.closed = False
+        self._shown = resume
         self._dropped = 0
         self._written_at = time.monotonic()
         if resume and self.path is not None and self.path.is_file():
@@ -75,11 +77,16 @@ class RunLog:
             self._dropped += 1
             return
         self.lines += text.splitlines() or [""]
-        if self.path is not None and time.monotonic() - self._written_at > _WRITE_SECONDS:
-            try:
-                self.flush()
-            except ResultsError:
-                self._written_at = time.monotonic()
+        if self._shown and time.monotonic() - self._written_at > _WRITE_SECONDS:
+            self.show()
+
+    def show(self) -> None:
+        """Write the file as it is now, and now and then from here on: results are beside it."""
+        self._shown = True
+        try:
+            self.flush()
+        except ResultsError:
+            self._written_at = time.monotonic()
 
     def flush(self) -> None:
         """Write the file as it is now.
@@ -120,6 +127,7 @@ class RunLog:
         if self._dropped:
             self.lines.append(f"... and {self._dropped} lines more that are not kept")
         self.lines += ["", *summary(self.system, status, stats, watch, audit)]
+        self.closed = True
         self.flush()
 
 
@@ -277,28 +285,28 @@ def summary(
         row = log.contacts[c]
         yield ""
         yield title(system.model.contacts[contact_id])
-        if not row[a.TOUCHES]:
+        if not row[codes.TOUCHES]:
             yield fact("first touch", "never")
             continue
-        yield fact("first touch at time", number(row[a.FIRST_TOUCH]))
-        yield fact("touches", int(row[a.TOUCHES]))
-        yield fact("deepest penetration", number(row[a.PEAK_DEPTH]))
-        yield fact("largest slip speed", number(row[a.PEAK_SLIP]))
-        yield fact("largest force", number(row[a.PEAK_FORCE]))
-        yield fact("largest force at time", number(row[a.PEAK_FORCE_TIME]))
-        yield fact("closing speed of the last touch", number(row[a.APPROACH]))
-        yield fact("effective rebound, first impact", number(row[a.REBOUND]))
-        yield fact("energy lost, damper and friction", number(row[a.ENERGY_LOST]))
+        yield fact("first touch at time", number(row[codes.FIRST_TOUCH]))
+        yield fact("touches", int(row[codes.TOUCHES]))
+        yield fact("deepest penetration", number(row[codes.PEAK_DEPTH]))
+        yield fact("largest slip speed", number(row[codes.PEAK_SLIP]))
+        yield fact("largest force", number(row[codes.PEAK_FORCE]))
+        yield fact("largest force at time", number(row[codes.PEAK_FORCE_TIME]))
+        yield fact("closing speed of the last touch", number(row[codes.APPROACH]))
+        yield fact("effective rebound, first impact", number(row[codes.REBOUND]))
+        yield fact("energy lost, damper and friction", number(row[codes.ENERGY_LOST]))
     if watch is not None:
         yield from _force_lines(system, watch)
     yield ""
     yield "rejected steps, by the contact that asked for it"
     names = [f"Force_Contact[{id}]" for id in system.contact_ids] + ["no contact"]
     reasons = (
-        (a.REJECT_ERROR, "local error above tol"),
-        (a.REJECT_DEPTH, "impact would begin too deep"),
-        (a.REJECT_NOT_FINITE, "force not finite"),
-        (a.REJECT_NEWTON, "Newton's iteration did not converge"),
+        (codes.REJECT_ERROR, "local error above tol"),
+        (codes.REJECT_DEPTH, "impact would begin too deep"),
+        (codes.REJECT_NOT_FINITE, "force not finite"),
+        (codes.REJECT_NEWTON, "Newton's iteration did not converge"),
     )
     found = False
     for name, row in zip(names, log.rejections, strict=True):

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.scene import BODY_SIZE
-from mbsim.core.layout import AT_Q, AT_V, AT_W
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.model.elements import Array
 
 

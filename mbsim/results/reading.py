@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import functools
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from mbsim.errors import ResultsError, UnknownSignal
+from mbsim.results.audit import Audit, from_attributes
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 
 if TYPE_CHECKING:
     import h5py
 
-    from mbsim.results.audit import Audit
 
+#: How often a file that is just being published is asked for, and how long between [s].
+_TRIES, _PAUSE = 50, 0.002
 #: What h5py raises where a file is damaged.
 _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
 _Read = TypeVar("_Read", bound=Callable[..., Any])
@@ -43,6 +46,19 @@ def _damage(error: BaseException) -> str:
     return f"cannot be read, the file is damaged: {text or type(error).__name__}"
 
 
+class Side(NamedTuple):
+    """Where a signal is stored: its dataset, and its column among elements side by side."""
+
+    stored: str
+    column: int | None
+
+
+#: What a group says of its elements, beside their signals.
+_FACTS = ("id", "label", "type")
+#: Groups of other things than elements.
+_NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests")
+
+
 class Results:
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
@@ -54,7 +70,10 @@ class Results:
     def __init__(self, file: h5py.File, path: Path | None) -> None:
         self._file = file
         self.path = path
-        self._signals: dict[str, int] | None = None  # once they were looked up
+        # once they were looked up
+        self._signals: dict[str, int] | None = None
+        self._ids: dict[str, list[int]] | None = None
+        self._table: dict[str, Side] | None = None
 
     def __enter__(self) -> Results:
         return self
@@ -105,8 +124,6 @@ class Results:
     @_reads
     def audit(self) -> Audit | None:
         """What the run found out about itself; None if it was killed, or never took a step."""
-        from mbsim.results.audit import from_attributes
-
         file = self._open()
         if "audit" not in file:
             return None
@@ -122,16 +139,47 @@ class Results:
     @_reads
     def keys(self) -> list[str]:
         """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
+        return sorted((*self._stored(), *self._sides()), key=order)
+
+    def _stored(self) -> dict[str, h5py.Dataset]:
+        """Return the datasets that hold one signal or table, by name."""
         import h5py
 
-        names: list[str] = []
+        found: dict[str, h5py.Dataset] = {}
+        file = self._open()
 
         def note(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and not name.startswith("checkpoint/"):
-                names.append(name)
+            group, _, last = name.rpartition("/")
+            if not isinstance(item, h5py.Dataset) or name.startswith("checkpoint/"):
+                return
+            # of a group whose elements stand side by side `_sides` gives the names
+            if "/" in group or not last or f"{group}/id" not in file:
+                found[name] = item
 
-        self._open().visititems(note)
-        return sorted(names, key=order)
+        file.visititems(note)
+        return found
+
+    def _sides(self) -> dict[str, Side]:
+        """Return the signals whose elements stand side by side, by names with ids."""
+        if self._table is None:
+            self._table = {}
+            for group, ids in self._columns().items():
+                for last, item in self._open()[group].items():
+                    if last in _FACTS or not hasattr(item, "shape"):
+                        continue
+                    for k, id in enumerate(ids):
+                        self._table[f"{group}/{id}/{last}"] = Side(f"{group}/{last}", k)
+        return self._table
+
+    def _columns(self) -> dict[str, list[int]]:
+        """Return the ids in order of their columns, by group."""
+        if self._ids is None:
+            self._ids = {
+                group: item["id"][()].tolist()
+                for group, item in self._open().items()
+                if group not in _NO_ELEMENTS and hasattr(item, "keys") and "id" in item
+            }
+        return self._ids
 
     @_reads
     def signals(self) -> dict[str, int]:
@@ -140,16 +188,17 @@ class Results:
             return self._signals
         file, found = self._open(), {}
         rows = len(file["time"]) if "time" in file else 0
-        for name in self.keys():
-            item = file[name]
+        for name, item in self._stored().items():
             # /state is the solver's own, in its own layout
-            if item.shape[:1] != (rows,) or item.dtype.kind not in "iuf":
-                continue
-            columns = 1 if item.ndim == 1 else item.shape[1]
-            if not name.startswith("state/") and item.ndim <= 2 and columns in (1, *PARTS):
-                found[name] = columns
-        self._signals = found
-        return found
+            if not name.startswith("state/") and _is_signal(item, item.shape, rows):
+                found[name] = 1 if item.ndim == 1 else item.shape[1]
+        shapes = {stored: file[stored] for stored in {s.stored for s in self._sides().values()}}
+        for name, side in self._sides().items():
+            item = shapes[side.stored]
+            if item.ndim > 1 and _is_signal(item, (item.shape[0], *item.shape[2:]), rows):
+                found[name] = 1 if item.ndim == 2 else item.shape[2]
+        self._signals = {name: found[name] for name in sorted(found, key=order)}
+        return self._signals
 
     def find(self, name: str) -> list[str]:
         """Return the names of signals that a name stands for; a plain one stands for itself.
@@ -177,17 +226,32 @@ class Results:
             raise UnknownSignal(f"{self._where}: {name} is no signal over time{self._there()}")
         return found
 
-    @_reads
     def label(self, name: str) -> str:
         """Return what the deck calls a body, contact or request: ``bodies/2``; else nothing."""
-        item = self._open().get(name)
-        return str(_plain(item.attrs.get("label", ""))) if item is not None else ""
+        return str(self.attribute(name, "label") or "")
 
     @_reads
     def attribute(self, name: str, attribute: str) -> Any:
-        """Return an attribute of a dataset or group, None if it has none."""
-        item = self._open().get(name)
+        """Return an attribute of a dataset or group, or a fact of an element; None if it has none.
+
+        Parameters
+        ----------
+        name : str
+            ``requests/7``, ``joints/3``.
+        attribute : str
+            ``columns``; of an element ``label`` or ``type``.
+        """
+        file = self._open()
+        group, _, id = name.strip("/").partition("/")
+        ids = self._columns().get(group)
+        if ids is not None and id.isdecimal() and int(id) in ids:
+            if attribute not in _FACTS or attribute not in file[group]:
+                return None
+            return _plain(file[group][attribute][ids.index(int(id))])
+        item = file.get(name)
         value: Any = item.attrs.get(attribute) if item is not None else None
+        if isinstance(value, bytes):
+            return _plain(value)
         return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
     @property
@@ -213,7 +277,9 @@ class Results:
     @_reads
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
-        return sorted(int(id) for id in self._open().get(group, ()))
+        there = self._columns().get(group, ())
+        stored = (int(id) for id in self._open().get(group, ()) if id.isdecimal())
+        return sorted({*there, *stored})
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and self._find(name) is not None
@@ -232,30 +298,62 @@ class Results:
         return self._values(*found)
 
     @_reads
-    def _values(self, dataset: h5py.Dataset, part: str | None) -> Any:
+    def _values(self, side: Side, part: str | None) -> Any:
         """Return a signal or a part of it."""
-        if part is None:
-            return _plain(dataset[()])
-        if part == "mag":
-            return np.linalg.norm(dataset[()], axis=1)
-        return dataset[:, PARTS[dataset.shape[1]][part]]
+        dataset = self._open()[side.stored]
+        index: list[Any] = [slice(None)] * dataset.ndim
+        if side.column is not None:
+            index[0 if dataset.ndim == 1 else 1] = side.column
+        if part not in (None, "mag"):
+            index[-1] = PARTS[dataset.shape[-1]][part]
+        values = _plain(dataset[tuple(index)])
+        return np.linalg.norm(values, axis=1) if part == "mag" else values
 
     @_reads
-    def _find(self, name: str) -> tuple[h5py.Dataset, str | None] | None:
-        """Return the dataset of a name and the part of it asked for."""
-        import h5py
-
-        file, whole = self._open(), name.strip("/")
+    def _find(self, name: str) -> tuple[Side, str | None] | None:
+        """Return where a name is stored and the part of it asked for."""
+        whole = name.strip("/")
         if not whole:
             return None
-        item = file.get(whole)
-        if isinstance(item, h5py.Dataset):
-            return item, None
+        side = self._side(whole)
+        if side is not None:
+            return side, None
         whole, _, part = whole.rpartition("/")
-        item = file.get(whole) if whole else None
-        if not isinstance(item, h5py.Dataset) or item.ndim != 2:
+        side = self._side(whole) if whole else None
+        if side is None:
             return None
-        return (item, part) if part in parts_of(item.shape[1]) else None
+        dataset = self._open()[side.stored]
+        columns = dataset.ndim - (side.column is not None)
+        if columns != 2:
+            return None
+        return (side, part) if part in parts_of(dataset.shape[-1]) else None
+
+    def _side(self, name: str) -> Side | None:
+        """Return where a signal or table is stored."""
+        import h5py
+
+        file = self._open()
+        if isinstance(file.get(name), h5py.Dataset):
+            return Side(name, None)
+        group, _, rest = name.partition("/")
+        id, _, last = rest.partition("/")
+        ids = self._columns().get(group)
+        if ids is None or last in _FACTS or not id.isdecimal() or int(id) not in ids:
+            return None
+        if not isinstance(file.get(f"{group}/{last}"), h5py.Dataset):
+            return None
+        return Side(f"{group}/{last}", ids.index(int(id)))
+
+    @_reads
+    def last(self, group: str, signal: str) -> dict[int, Any]:
+        """Return the last row of a signal of all elements of a group, by id."""
+        ids = self._columns().get(group)
+        if ids is None:
+            names = {id: f"{group}/{id}/{signal}" for id in self.ids(group)}
+            return {id: self[name][-1] for id, name in names.items() if name in self}
+        if f"{group}/{signal}" not in self._open():
+            return {}
+        return dict(zip(ids, self._open()[f"{group}/{signal}"][-1], strict=True))
 
     @property
     def _where(self) -> str:
@@ -266,10 +364,13 @@ class Results:
         import h5py
 
         asked = name.strip("/")
-        item = self._open().get(asked) if asked else None
-        if isinstance(item, h5py.Group):
-            inside = ", ".join(sorted(item, key=order)[:12])
-            return f"{self._where}: {name} is a group, not a signal; it has {inside or 'nothing'}"
+        depth = len(asked) + 1 if asked else 0
+        inside = {
+            key[depth:].partition("/")[0] for key in self.keys() if key[:depth] == f"{asked}/"
+        }
+        if depth and (inside or isinstance(self._open().get(asked), h5py.Group)):
+            there = ", ".join(sorted(inside, key=order)[:12]) or "nothing"
+            return f"{self._where}: {name} is a group, not a signal; it has {there}"
         signals = self.signals()
         whole, _, part = asked.rpartition("/")
         if whole in signals and not is_pattern(part):
@@ -282,6 +383,13 @@ class Results:
     def _there(self) -> str:
         """Return all signals, with ids taken together, as the end of a message."""
         return f"; there is {', '.join(compact(self.signals())) or 'nothing'}"
+
+
+def _is_signal(item: Any, shape: tuple[int, ...], rows: int) -> bool:
+    """Return whether a dataset whose element has that shape is numbers over output times."""
+    if shape[:1] != (rows,) or item.dtype.kind not in "iuf" or len(shape) > 2:
+        return False
+    return (1 if len(shape) == 1 else shape[1]) in (1, *PARTS)
 
 
 def _facts(item: Any) -> dict[str, Any]:
@@ -327,14 +435,12 @@ def open_results(path: str | Path) -> Results:
     ResultsError
         If the file is not there or is no result file of mbsim.
     """
-    import h5py
-
     file = Path(path)
     if not file.is_file():
         what = "is a folder" if file.is_dir() else "no such file"
         raise ResultsError(f"{file}: {what}; a result file is named <model>.h5")
     try:
-        opened = h5py.File(file, "r", locking=False)
+        opened = _opened(file)
     except OSError as error:
         reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
         raise ResultsError(f"{file}: cannot be read: {reason}") from None
@@ -349,12 +455,27 @@ def open_results(path: str | Path) -> Results:
     return Results(opened, file)
 
 
+def _opened(path: Path) -> h5py.File:
+    """Open a file for reading, locked against being written on.
+
+    The writer holds its lock on a published file for microseconds, see `part_file`.
+    """
+    import h5py
+
+    for _ in range(_TRIES):
+        try:
+            return h5py.File(path, "r", locking="best-effort")
+        except BlockingIOError:
+            time.sleep(_PAUSE)
+    return h5py.File(path, "r", locking=False)
+
+
 def end_state(results: Results) -> dict[str, dict[str, list[float]]]:
     """Return every body's pose and velocity in the last row, by id; empty without rows."""
     if not len(results["time"]):
         return {}
-    names = ("position", "quaternion", "velocity", "angular_velocity")
-    return {
-        str(id): {name: results[f"bodies/{id}/{name}"][-1].tolist() for name in names}
-        for id in results.ids("bodies")
-    }
+    found: dict[str, dict[str, list[float]]] = {str(id): {} for id in results.ids("bodies")}
+    for name in ("position", "quaternion", "velocity", "angular_velocity"):
+        for id, values in results.last("bodies", name).items():
+            found[str(id)][name] = values.tolist()
+    return found

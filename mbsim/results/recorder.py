@@ -2,103 +2,52 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from mbsim.arrays.scene import CONTACT_COLUMNS, PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
+from mbsim.results.asked import Asked
 from mbsim.results.audit import Audit, to_attributes
+from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
-from mbsim.results.elements import GROUPS, acting, facts
+from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
-from mbsim.results.forces import Forces, check_requests
-from mbsim.results.identity import KINDS, Identity
-from mbsim.results.motion import motion
+from mbsim.results.forces import check_requests
+from mbsim.results.going_on import MADE_OF, check_same, digest
+from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
-from mbsim.results.requests import columns_of, measures_of, request_table
+from mbsim.results.signals import (
+    facts_of,
+    names_of,
+    request_columns,
+    signals,
+    without_rows,
+)
 from mbsim.results.store import Store, Value
-from mbsim.results.watch import Watch, energies
+from mbsim.results.watch import Watch
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
-Table = np.ndarray[Any, Any]
-
-#: Names of the kinds of `Rows.events`, by number.
-EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
-EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
 
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
-#: Attributes of which digests say whether they matter.
-_SAID_ELSEWHERE = ("tol_from", "model_file", "overrides", "plugins", "interpret_plugins")
-#: What a digest that differs says, and of which facts of `Identity` it is.
-_DIGESTS = {
-    "model_sha256": ("the model file has changed", "model"),
-    **{kind.attribute: (kind.differs, name) for name, kind in KINDS.items()},
-}
-#: Where a checkpoint says what the run is made of.
-MADE_OF = "made_of"
 #: Rows are kept in memory up to this size [bytes], then written to the part file.
 BUFFER_BYTES = 16 << 20
-#: That size is for each so many bodies (and joints, ...): a write opens every signal, 0.3 ms each,
-#: however few rows it adds (8000 bodies: 14 s), so that it should add many.
-BUFFER_BODIES = 400
+#: Memory that an output time takes while its rows are not there yet [bytes].
+TIME_BYTES = 32
 #: Time between two publications: at least this [s], and so many times what one costs.
 FLUSH_SECONDS = 5.0
 FLUSH_SHARE = 20.0
 #: The first comes sooner, so that a folder soon shows this run and not an earlier one.
 FIRST_FLUSH_SECONDS = 1.0
-
-
-@dataclass(frozen=True)
-class Block:
-    """Output rows as the pipeline leaves them; see `arrays.scene.Rows`."""
-
-    time: Table
-    y: Table
-    accel: Table
-    contact: Table
-    energy: Table
-    joint: Table
-    applied: Table
-    value: Table
-    incident_count: Table
-    incidents: Table
-    events: Table
-
-    @property
-    def bytes(self) -> int:
-        """Memory that the block takes."""
-        return sum(int(array.nbytes) for array in vars(self).values())
-
-    @property
-    def wrenches(self) -> Table:
-        """Force and torque of all elements between markers, in the order of `acting`."""
-        return np.hstack([self.joint, self.applied])
-
-
-def _cut(system: System, rows: int, incidents: int, events: int) -> Block:
-    """Return a copy of the first rows that the pipeline has left."""
-    counts = {"incidents": incidents, "events": events}
-    found = system.scene.rows
-    return Block(
-        *(getattr(found, f.name)[: counts.get(f.name, rows)].copy() for f in fields(Block))
-    )
-
-
-def _joined(blocks: list[Block]) -> Block:
-    """Return several blocks as one."""
-    if len(blocks) == 1:
-        return blocks[0]
-    columns = zip(*(vars(block).values() for block in blocks), strict=True)
-    return Block(*(np.concatenate(column) for column in columns))
 
 
 class Recorder:
@@ -116,6 +65,8 @@ class Recorder:
         Go on from the checkpoint in that folder, then in `checkpoint`.
     how : dataclass, optional
         `Settings` of the run, which those of a resumed one must equal.
+    asked : sequence of str
+        What to record, see `Asked`; nothing stands for everything.
 
     Raises
     ------
@@ -132,8 +83,10 @@ class Recorder:
         directory: Path | None,
         resume: bool = False,
         how: Any = None,
+        asked: Sequence[str] = (),
     ) -> None:
         self.system = system
+        self._asked = Asked(asked)
         self._identity = Identity(system, how)
         self.directory = directory
         self.checkpoint: dict[str, Table] = {}
@@ -141,25 +94,33 @@ class Recorder:
         self.watch = Watch(acting(system))
         self._blocks: list[Block] = []
         self._bytes = 0
-        described = len(system.body_ids) + len(self.watch.elements)
-        self._buffer = BUFFER_BYTES * max(1, described // BUFFER_BODIES)
         self._rows_since_flush = 0
         self._incidents = 0  # rows of state/incidents so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._target: Path | None = None
+        self._shown = False  # whether the folder shows this run, not an earlier one
+        self._saved: set[str] = set()  # tables of the last checkpoint
         self._posts = ContactPosts(system, system.posts) if system.posts else None
         check_requests(system.model)
+        if asked:
+            self._asked.check(names_of(system))
         settings: dict[str, Value] = {**attributes, **self._identity.digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
+        #: Whether another run's results are there.
+        self.earlier = self._target is not None and not resume and self._target.exists()
         if resume:
             self.checkpoint = self._resumed(settings)
         self._store = Store(self._target, resume)
-        labels = {} if resume else self._labels()
         self._store.update(
-            attributes={"/": {**settings, "status": "running"}, **labels}, remove=["stats", "audit"]
+            values={} if resume else facts_of(system, self._asked),
+            attributes={
+                "/": {**settings, "status": "running"},
+                **({} if resume else without_rows(system)),
+            },
+            remove=["stats", "audit"],
         )
 
     def _resumed(self, settings: Mapping[str, Value]) -> dict[str, Table]:
@@ -170,37 +131,44 @@ class Recorder:
             raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
         try:
             with open_results(self._target) as results:
-                _check_same(self._target, results, settings, self._identity)
-                offsets = results["state/incident_offsets"]
-                self._incidents, self._started = int(offsets[-1]), True
-                self.watch.recall(results)
+                check_same(self._target, results, settings, self._identity)
+                if "state/incident_offsets" in results:
+                    self._incidents = int(results["state/incident_offsets"][-1])
                 tables = results.tables("checkpoint")
+                if results.attribute("checkpoint", "sha256") != digest(tables):
+                    raise ModelError(
+                        f"--resume: {self._target}: the checkpoint is damaged: its numbers are not "
+                        "those that were written; start without --resume"
+                    )
+                self._started = self._shown = True
+                self._saved = set(tables)
                 tables.pop(MADE_OF, None)
+                self.watch.restore(tables)
                 return tables
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
 
-    def _labels(self) -> dict[str, dict[str, Any]]:
-        """Return what elements are called and what requests hold, by group or dataset."""
-        model = self.system.model
-        named = {f"bodies/{id}": model.bodies[id].label for id in self.system.body_ids}
-        named |= {f"diffs/{id}": state.label for id, state in model.differentials.items()}
-        named |= {f"contacts/{id}": model.contacts[id].label for id in self.system.contact_ids}
-        labels = {name: {"label": label} for name, label in named.items() if label}
-        return labels | {name: about for name, about in facts(model) if about}
+    def check_room(self, rows: float) -> None:
+        """Raise `ModelError` where so many output rows cannot be kept.
 
-    def _columns(self) -> dict[str, dict[str, Any]]:
-        """Return what the columns of the requests are, by dataset."""
-        about: dict[str, dict[str, Any]] = {}
-        for request in self.system.model.requests.values():
-            about[f"requests/{request.id}"] = {
-                "columns": columns_of(request),
-                "type": request.type,
-                "label": request.label or request.comment,
-            }
-            if request.type == "EXPRESSION":
-                about[f"requests/{request.id}"]["measures"] = measures_of(request)
-        return about
+        `rows` is a float: of a mistyped end time there may be more than integers count.
+        """
+        empty = self._signals(nothing(self.system))
+        size = sum(table.itemsize * math.prod(table.shape[1:]) for _, table in empty)
+        if self._target is None:
+            place, free = "in memory", free_memory()
+        else:
+            place, free = f"in {self.directory}", self._store.room()
+        memory = free_memory()
+        if memory is not None and rows * TIME_BYTES > memory:
+            # the times themselves are kept in memory
+            size, place, free = TIME_BYTES, "in memory", memory
+        if free is not None and rows * size > free:
+            raise ModelError(
+                f"{rows:.9g} output rows of {size} bytes would take {rows * size / 1e9:.3g} GB "
+                f"{place}, where {free / 1e9:.3g} GB are free; give a longer --print-interval, an "
+                "earlier --end-time, or --signals"
+            )
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
@@ -208,7 +176,7 @@ class Recorder:
         n, incidents, events = (int(count) for count in rows.used)
         if n == incidents == events == 0:
             return
-        block = _cut(self.system, n, incidents, events)
+        block = cut(self.system, n, incidents, events)
         rows.used[:] = 0
         self.watch.add(block.time, block.energy, block.wrenches)
         self._blocks.append(block)
@@ -216,7 +184,7 @@ class Recorder:
         self._rows_since_flush += n + events
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
-        if self._bytes > self._buffer:
+        if self._bytes > BUFFER_BYTES:
             self._write()
 
     def end(self) -> None:
@@ -245,11 +213,30 @@ class Recorder:
         if self._target is None:
             return
         self._write()
-        values = {f"checkpoint/{name}": array for name, array in checkpoint.items()}
-        self._store.update(values=values | {f"checkpoint/{MADE_OF}": self._identity.packed()})
+        self._save(checkpoint)
+        self._show()
         self._store.publish()
         self._rows_since_flush = 0
         self._published_at = time.monotonic()
+
+    def _save(self, checkpoint: Mapping[str, Table]) -> None:
+        """Write a checkpoint in the place of the last one."""
+        tables = {**checkpoint, **self.watch.saved(), MADE_OF: self._identity.packed()}
+        self._store.update(
+            values={f"checkpoint/{name}": table for name, table in tables.items()},
+            attributes={"checkpoint": {"sha256": digest(tables)}},
+            remove=[f"checkpoint/{name}" for name in self._saved - tables.keys()],
+        )
+        self._saved = set(tables)
+
+    def _show(self) -> None:
+        """Take away what an earlier run has left beside the file that is about to be replaced."""
+        if self._shown or self._target is None:
+            return
+        self._shown = True
+        for suffix in (".csv", ".log"):
+            with contextlib.suppress(OSError):
+                self._target.with_suffix(suffix).unlink()
 
     @property
     def empty(self) -> bool:
@@ -266,18 +253,25 @@ class Recorder:
         stats: Mapping[str, Value],
         contact_log: Table,
         audit: Audit | None = None,
+        checkpoint: Callable[[], Mapping[str, Table]] | None = None,
+        write_log: Callable[[], None] | None = None,
     ) -> Results:
         """Complete the files and return them as results.
 
         Parameters
         ----------
         status : {"finished", "interrupted", "failed"}
+            Written last: a file that says "finished" has all others beside it.
         stats : mapping
             Attributes of ``/stats``.
         contact_log : ndarray, shape (nc, LOG_COLUMNS)
             `Log.contacts`: largest force, depth and slip over all steps.
         audit : Audit, optional
             What the run found out about itself.
+        checkpoint : callable, optional
+            Returns the state at the end, with which a run can go on whose files were not completed.
+        write_log : callable, optional
+            Writes the log, after the ``.csv``.
 
         Raises
         ------
@@ -285,125 +279,75 @@ class Recorder:
             If the files cannot be written, or could not be before.
         """
         self._write(last=True)
+        contacts = self._asked.elements("contacts", self.system.contact_ids)
         peaks = {
-            f"contacts/{contact_id}/peak_{name}": float(row[column])
-            for row, contact_id in zip(contact_log, self.system.contact_ids, strict=True)
+            f"contacts/peak_{name}": contact_log[contacts, column]
             for name, column in _PEAKS.items()
+            if contacts
         }
         judged = to_attributes(audit) if audit is not None else {}
+        self._store.update(values=peaks, attributes={"stats": stats, **judged})
         # of rows after the checkpoint, a resumed run would record a second copy
         stale = status == "finished" or self._rows_since_flush > 0
+        failure = self._beside(write_log)
+        if failure is not None and checkpoint is not None:
+            self._save(checkpoint())
+            status, stale = "interrupted", False
         self._store.update(
-            values=peaks,
-            attributes={"stats": stats, "/": {"status": status}, **judged},
-            remove=["checkpoint"] if stale else [],
+            attributes={"/": {"status": status}}, remove=["checkpoint"] if stale else []
         )
         in_memory = self._store.finish()
-        if self._store.failure is not None:
+        if (failure := self._store.failure or failure) is not None:
             # raised once already, maybe; a caller that cleans up shall not hear another story
-            raise self._store.failure
-        if self._target is None:
-            if in_memory is None:
-                raise ResultsError("results in memory could not be written")
-            return Results(in_memory, None)
-        results = open_results(self._target)
-        if self.directory is not None:
-            write_csv(self._target.with_suffix(".csv"), results, list(self.system.model.requests))
-        return results
+            raise failure
+        if self._target is not None:
+            return open_results(self._target)
+        if in_memory is None:
+            raise ResultsError("results in memory could not be written")
+        return Results(in_memory, None)
+
+    def _beside(self, write_log: Callable[[], None] | None) -> ResultsError | None:
+        """Write the ``.csv`` and the log; return why that failed."""
+        self._show()
+        try:
+            if self._target is not None and self._store.file:
+                path = self._target.with_suffix(".csv")
+                write_csv(path, Results(self._store.file, None), list(self.system.model.requests))
+            if write_log is not None:
+                write_log()
+        except ResultsError as error:
+            return error
+        return None
 
     def _write(self, last: bool = False) -> None:
         """Hand the buffered rows to the store."""
         if not self._blocks:
             if self._started:
                 return
-            self._blocks = [_nothing(self.system)]
-        block = _joined(self._blocks)
+            self._blocks = [nothing(self.system)]
+        block = joined(self._blocks)
         self._blocks, self._bytes = [], 0
+        rows = dict(self._signals(block))
+        room, size = self._store.room(), sum(table.nbytes for table in rows.values())
+        short = room is not None and size > room
+        if room is not None and short:
+            block = first_rows(block, max(0, len(block.time) * room // size))
+            rows = dict(self._signals(block))
         # with the first rows, so that a run that dies has them too
-        columns = {} if self._started else self._columns()
-        self._store.update(rows=dict(self._signals(block)), attributes=columns, last=last)
+        columns = {} if self._started else request_columns(self.system)
+        if not short:
+            self._store.update(rows=rows, attributes=columns, last=last)
+        elif len(block.time):
+            self._store.update(
+                rows, attributes={**columns, "/": {"status": "failed"}}, remove=["checkpoint"]
+            )
+            self._show()
+            self._store.stop(f"no space left on device; rows up to time {block.time[-1]:.9g}")
+        else:
+            self._store.stop("no space left on device")
         self._started = True
         self._incidents += len(block.incidents)
 
     def _signals(self, block: Block) -> Iterator[tuple[str, Table]]:
         """Yield the rows of every dataset."""
-        system = self.system
-        n = len(block.time)
-        yield "time", block.time
-        bodies = motion(system.body_ids, block.y, block.accel)
-        for b, body_id in enumerate(system.body_ids):
-            yield f"bodies/{body_id}/position", bodies.p[:, b]
-            yield f"bodies/{body_id}/quaternion", bodies.q[:, b]
-            yield f"bodies/{body_id}/velocity", bodies.v[:, b]
-            yield f"bodies/{body_id}/angular_velocity", bodies.w[:, b]
-            yield f"bodies/{body_id}/acceleration", bodies.a[:, b]
-        contacts = block.contact.reshape(n, len(system.contact_ids), CONTACT_COLUMNS)
-        for c, contact_id in enumerate(system.contact_ids):
-            yield f"contacts/{contact_id}/force", contacts[:, c, 0:3]
-            yield f"contacts/{contact_id}/torque", contacts[:, c, 3:6]
-            yield f"contacts/{contact_id}/penetration", contacts[:, c, 6]
-            yield f"contacts/{contact_id}/slip_speed", contacts[:, c, 7]
-            yield f"contacts/{contact_id}/incidents", contacts[:, c, 8].astype(np.int64)
-            yield f"contacts/{contact_id}/area", contacts[:, c, 9]
-        elements = acting(system)
-        wrenches = block.wrenches.reshape(n, len(elements), 6)
-        for k, (statement, id) in enumerate(elements):
-            path = f"{GROUPS[statement].path}/{id}"
-            yield f"{path}/force", wrenches[:, k, 0:3]
-            yield f"{path}/torque", wrenches[:, k, 3:6]
-        for place, id in zip(system.scene.states.place, system.model.differentials, strict=False):
-            yield f"diffs/{id}/value", block.y[:, place]
-        for name, column in system.unknowns():
-            yield name, block.value[:, column]
-        forces = Forces(system, bodies, block.joint, block.applied, block.contact)
-        for request in system.model.requests.values():
-            markers = system.placement.markers
-            yield f"requests/{request.id}", request_table(request, markers, forces, block.value)
-        for k, name in enumerate(energies(system)):
-            yield f"energy/{name}", block.energy[:, k]
-        yield "state/y", block.y
-        ends = self._incidents + np.cumsum(block.incident_count, dtype=np.int64)
-        # row k has incidents[offsets[k] : offsets[k + 1]]
-        yield "state/incident_offsets", ends if self._started else np.append(0, ends)
-        yield "state/incidents", block.incidents
-        yield "events", _events(block.events)
-
-
-def _events(rows: Table) -> Table:
-    """Return the table of events in order of time; within a step they come slot by slot."""
-    table = np.zeros(len(rows), dtype=EVENT)
-    ordered = rows[np.argsort(rows[:, 0], kind="stable")]
-    table["time"] = ordered[:, 0]
-    table["kind"] = EVENT_KINDS[ordered[:, 1].astype(np.int64)]
-    table["element"] = ordered[:, 2].astype(np.int64)
-    return table
-
-
-def _nothing(system: System) -> Block:
-    """Return a block without rows: a run that failed at once has a complete file too."""
-    return _cut(system, 0, 0, 0)
-
-
-def _check_same(
-    path: Path, results: Results, settings: Mapping[str, Value], identity: Identity
-) -> None:
-    """Raise `ModelError` unless a run with these settings can go on from a result file."""
-    there = results.attributes
-    if results.status == "finished":
-        raise ModelError(f"--resume: {path}: this run has finished; there is nothing to go on with")
-    if not results.has_checkpoint:
-        raise ModelError(f"--resume: {path}: no checkpoint in it; start without --resume")
-    made_of = results.tables("checkpoint").get(MADE_OF)
-    # what explains a difference comes before the digests that only show it
-    for name, value in settings.items():
-        if name in _SAID_ELSEWHERE or (name == "subroutines_sha256" and results.status == "failed"):
-            continue  # a failed user subroutine may be mended
-        if name in there and there[name] == value:
-            continue
-        if name in _DIGESTS:
-            what, kind = _DIGESTS[name]
-            found = "" if made_of is None else identity.changes(made_of, kind)
-            what += f": {found}" if found else ""
-        else:
-            what = f"{name} was {there.get(name, 'not given')} and is {value} now"
-        raise ModelError(f"--resume: {path}: {what}; a run goes on as it began")
+        return signals(self.system, block, self._asked, self._incidents, not self._started)

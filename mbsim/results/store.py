@@ -1,18 +1,15 @@
 """An HDF5 file that grows in place and is published whole: readable after any crash.
 
-The file grows as ``.<name>.h5.part``. `publish` puts a complete copy in the place of
-``<name>.h5``, atomically, so that a reader, or whoever looks after a kill, finds the last
-one published. HDF5 itself promises nothing of a file whose writer was killed.
+The file grows hidden, see `part_file`; `publish` puts it in the place of ``<name>.h5``,
+atomically, so that a reader, or whoever looks after a kill, finds the last one published.
 """
 
 from __future__ import annotations
 
 import contextlib
-import errno
-import os
-import shutil
 import time
 import uuid
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,15 +17,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.errors import ResultsError
-from mbsim.results.files import problem, sync
+from mbsim.results.files import RunLock, problem
+from mbsim.results.part_file import PartFile
 
 if TYPE_CHECKING:
     import h5py
 
 Table = np.ndarray[Any, Any]
 Value = str | float | int
-#: Bytes of a chunk: small enough for many signals, large enough for long runs.
-_CHUNK = 4096
+#: Bytes of a chunk, of a signal that begins with few rows and of one that comes with many.
+_CHUNK, _LONG_CHUNK = 1 << 13, 1 << 16
+#: Most elements in a chunk, so that one of thousands is read without all the others.
+_ELEMENTS = 64
+#: A signal is compressed where its first rows, up to so many bytes of them, shrink to this share:
+#: zlib is fast on constants and zeros, and slow on noise, of which it makes little.
+_SAMPLE, _SHARE = 1 << 16, 0.25
+#: Room that stays free beside rows for tables, the log and HDF5's own.
+_SPARE = 1 << 18
 
 
 class Store:
@@ -46,49 +51,39 @@ class Store:
         self.broken = False
         self.failure: ResultsError | None = None
         self.publish_seconds = 0.0
-        self._lock = -1
-        self._growing = False
+        self._growing = resume
+        self._part: PartFile | None = None
+        self._lock: RunLock | None = None
+        self.file: h5py.File | None = None
         if target is None:
             name = f"mbsim-{uuid.uuid4().hex}"
-            self.file: h5py.File = h5py.File(
-                name, "w", driver="core", backing_store=False, block_size=1 << 20
-            )
+            self.file = h5py.File(name, "w", driver="core", backing_store=False, block_size=1 << 20)
             return
-        self.part = target.with_name(f".{target.name}.part")
-        self.file = None
+        try:
+            self._lock = RunLock(target)
+        except ResultsError:
+            self.broken = True  # what is there is another's
+            raise
+        except OSError as error:
+            self.broken = True
+            raise problem(target, error) from None
         with self._writing():
-            self._take_lock()
-            if resume:
-                shutil.copyfile(target, self.part)
-                self._growing = True
-            # our own lock instead of HDF5's, which comes only after it has emptied the file
-            self.file = h5py.File(self.part, "r+" if resume else "w", locking=False)
-
-    def _take_lock(self) -> None:
-        """Keep a second run out of the same files (where the system has flock)."""
-        self._lock = os.open(self.part, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            import fcntl
-        except ImportError:
-            return
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(self._lock)
-            self._lock = -1
-            self.broken = True  # and the part file, being another's, is left alone
-            raise ResultsError(
-                f"{self.target}: another run is writing there; choose another folder with -o"
-            ) from None
+            self._part = PartFile(target, resume)
+            self.file = h5py.File(self._part, "r+" if resume else "w")
 
     @contextlib.contextmanager
-    def _writing(self) -> Iterator[None]:
+    def _writing(self) -> Iterator[h5py.File]:
         """Turn failures to write into one `ResultsError` that names the file."""
         try:
-            yield
-        except (OSError, RuntimeError) as error:
+            yield self.file
+            if self._part is not None:
+                self._part.check()
+        except (OSError, RuntimeError, ValueError, KeyError) as error:
+            first = self._part.failure if self._part is not None else None
+            if first is None and isinstance(error, (ValueError, KeyError)):
+                raise
             self.abandon()
-            self.failure = problem(self.target or Path("memory"), error)
+            self.failure = problem(self.target or Path("memory"), first or error)
             raise self.failure from None
 
     def abandon(self) -> None:
@@ -96,25 +91,32 @@ class Store:
         if self.broken:
             return
         self.broken = True
+        if self._part is not None:
+            self._part.close()
         if self.file is not None:
-            # a file that cannot be written cannot be closed cleanly either
-            with contextlib.suppress(OSError, RuntimeError):
+            # what HDF5 still has to write goes nowhere
+            with contextlib.suppress(OSError, RuntimeError, ValueError):
                 self.file.close()
-        if self.target is not None:
-            for path in (self.part, self._copy):
-                with contextlib.suppress(OSError):
-                    path.unlink()
         self._unlock()
 
-    def _unlock(self) -> None:
-        if self._lock >= 0:
-            os.close(self._lock)
-            self._lock = -1
-
-    @property
-    def _copy(self) -> Path:
+    def stop(self, reason: str) -> None:
+        """Publish what is there as the last, and raise why nothing more can be written."""
         assert self.target is not None
-        return self.target.with_name(f".{self.target.name}.tmp")
+        self.finish()
+        if self.failure is None:
+            self.failure = ResultsError(f"{self.target}: results cannot be written: {reason}")
+        raise self.failure
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            self._lock.release()
+
+    def room(self) -> int | None:
+        """Return how many bytes of rows the disk takes yet; None in memory."""
+        if self._part is None or self.broken:
+            return None
+        # chunks are allocated whole, and each dataset has an index and a header
+        return int((self._part.room() - _SPARE) / 1.125)
 
     def update(
         self,
@@ -137,105 +139,102 @@ class Store:
         remove : iterable of str
             Datasets and groups to take out, if they are there.
         last : bool
-            No more rows will follow: a file written at once needs no chunks.
+            No more rows will follow: chunks are as long as the rows.
         """
         if self.broken:
             return
         rows, attributes = rows or {}, attributes or {}
-        arrays = {name: np.asarray(value) for name, value in (values or {}).items()}
-        items = [*rows.values(), *arrays.values()]
-        with self._writing():
-            self._reserve(sum(int(array.nbytes) for array in items), len(items) + len(attributes))
+        with self._writing() as file:
             for name in remove:
-                if name in self.file:
-                    del self.file[name]
+                if name in file:
+                    del file[name]
             growing = self._growing or not last
             for name, array in rows.items():
-                self._append(name, array, growing)
+                self._append(file, name, array, growing)
             self._growing = self._growing or bool(rows)
-            for name, array in arrays.items():
-                self._put(name, array)
+            for name, value in (values or {}).items():
+                self._put(file, name, np.asarray(value))
             for name, facts in attributes.items():
-                if name != "/" and name not in self.file:
-                    self.file.create_group(name)
-                self.file[name].attrs.update(facts)
-            self._settle()
+                if name != "/" and name not in file:
+                    file.create_group(name)
+                file[name].attrs.update({key: _text(value) for key, value in facts.items()})
+            file.flush()
 
-    def _reserve(self, size: int, items: int) -> None:
-        """Raise OSError unless the disk has room for `size` bytes in `items` places.
-
-        HDF5 cannot be left when it meets a full disk: it prints, and may crash at the
-        close. So the room is taken before it writes.
-        """
-        if self.target is None:
-            return
-        # chunks are allocated whole, and each dataset has an index and a header
-        room = size + size // 8 + items * 4 * _CHUNK + (1 << 18)
-        end = os.fstat(self._lock).st_size
-        if hasattr(os, "posix_fallocate"):
-            try:
-                os.posix_fallocate(self._lock, end, room)
-                return
-            except OSError as error:
-                if error.errno not in (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS):
-                    raise
-        if shutil.disk_usage(self.part.parent).free < room:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    def _settle(self) -> None:
-        """Bring everything to the file, and give back the room that was not used."""
-        self.file.flush()
-        if self.target is not None:
-            os.ftruncate(self._lock, self.file.id.get_filesize())
-
-    def _append(self, name: str, rows: Table, growing: bool) -> None:
+    def _append(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
         """Add rows to one dataset."""
-        if self._growing and name in self.file:
+        if self._growing and name in file:
             if len(rows):
-                dataset = self.file[name]
+                dataset = file[name]
                 count = dataset.shape[0]
                 dataset.resize(count + len(rows), axis=0)
                 dataset[count:] = rows
-        elif growing:
-            width = max(1, rows.itemsize * int(np.prod(rows.shape[1:])))
-            columns = (max(1, size) for size in rows.shape[1:])
-            chunk = (max(1, min(1024, _CHUNK // width)), *columns)
-            limits = (None, *rows.shape[1:])
-            self.file.create_dataset(name, data=rows, maxshape=limits, chunks=chunk)
-        else:
-            self.file.create_dataset(name, data=rows)
+            return
+        if not growing and (self.target is None or not rows.size):
+            file.create_dataset(name, data=rows)
+            return
+        elements = tuple(max(1, size) for size in rows.shape[1:])
+        if len(elements) > 1:
+            elements = (min(elements[0], _ELEMENTS), *elements[1:])
+        width = rows.itemsize * int(np.prod(elements))
+        chunk = _CHUNK if len(rows) * width < _LONG_CHUNK else _LONG_CHUNK
+        count = max(1, chunk // max(1, width))
+        file.create_dataset(
+            name,
+            data=rows,
+            maxshape=(None, *rows.shape[1:]) if growing else None,
+            chunks=(count if growing else max(1, min(count, len(rows))), *elements),
+            fletcher32=True,
+            **_compression(rows),
+        )
 
-    def _put(self, name: str, array: Table) -> None:
+    def _put(self, file: h5py.File, name: str, array: Table) -> None:
         """Write one dataset whole."""
-        before = self.file.get(name)
+        before = file.get(name)
         if before is not None and (before.shape, before.dtype) == (array.shape, array.dtype):
             before[...] = array
             return
         if before is not None:
-            del self.file[name]
-        self.file.create_dataset(name, data=array)
+            del file[name]
+        file.create_dataset(name, data=array)
 
     def publish(self) -> None:
-        """Put a complete copy in the target's place; does nothing in memory."""
-        if self.broken or self.target is None:
+        """Put what is written in the target's place; does nothing in memory."""
+        if self.broken or self._part is None:
             return
         began = time.perf_counter()
         with self._writing():
-            shutil.copyfile(self.part, self._copy)
-            sync(self._copy)
-            os.replace(self._copy, self.target)
+            self._part.publish()
         self.publish_seconds = time.perf_counter() - began
 
     def finish(self) -> h5py.File | None:
         """Make the part file the target; return the file where it is kept in memory."""
         if self.broken:
             return None
-        if self.target is None:
+        if self._part is None:
             return self.file
-        with self._writing():
-            self.file.close()
-            sync(self.part)
-            os.replace(self.part, self.target)
+        with self._writing() as file:
+            file.close()
+            self._part.publish(last=True)
         self.broken = True  # there is nothing left to write to
         self._unlock()
         return None
+
+
+def _text(value: Any) -> Any:
+    """Return a text as HDF5 takes it: bytes of file names that are no text as escapes."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode("utf-8")
+    return value
+
+
+def _compression(rows: Table) -> dict[str, Any]:
+    """Return how a signal that begins with these rows is compressed, if at all."""
+    wanted = max(1, _SAMPLE // max(1, rows[:1].nbytes))
+    sample = np.ascontiguousarray(rows[:: max(1, len(rows) // wanted)][:wanted])
+    if sample.nbytes < 4096:
+        return {}
+    # as HDF5's filter does: first bytes of all numbers, then second ones
+    shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T.tobytes()
+    if len(zlib.compress(shuffled, 1)) > _SHARE * len(shuffled):
+        return {}
+    return {"compression": "gzip", "compression_opts": 1, "shuffle": True}

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.model.elements import Array
-from mbsim.results.elements import GROUPS
-from mbsim.results.reading import Results
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -68,15 +66,14 @@ class Watch:
             self.peaks[above, 2 * kind] = size[above]
             self.peaks[above, 2 * kind + 1] = time[rows[above, kind]]
 
-    def recall(self, results: Results) -> None:
-        """Look at the rows that a run which goes on has recorded before."""
-        time = results["time"]
-        n = len(time)
-        columns = [f"energy/{name}" for name in ENERGIES]
-        energy = [results[name] if name in results else np.zeros(n) for name in columns]
-        wrenches = [
-            results[f"{GROUPS[statement].path}/{id}/{kind}"]
-            for statement, id in self.elements
-            for kind in ("force", "torque")
-        ]
-        self.add(time, np.column_stack(energy), np.hstack([np.zeros((n, 0)), *wrenches]))
+    def saved(self) -> dict[str, Array]:
+        """Return tables for a checkpoint."""
+        none = np.zeros(0)
+        first, last = (none if value is None else value for value in (self.first, self.last))
+        return {"watch/first": first, "watch/last": last, "watch/peaks": self.peaks.copy()}
+
+    def restore(self, tables: dict[str, Array]) -> None:
+        """Go on from those tables, which are taken out."""
+        first, last = tables.pop("watch/first"), tables.pop("watch/last")
+        self.first, self.last = (value if value.size else None for value in (first, last))
+        self.peaks[:] = tables.pop("watch/peaks")

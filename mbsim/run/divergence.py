@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.scene import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.errors import SolverError
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ import numpy as np
 
 from mbsim.core.layout import AT_V, AT_W
 from mbsim.errors import ModelError, ResultsError
+from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -118,7 +119,7 @@ class ContactProblems:
         """Return H (6 nb, 3 nc), force then torque about the cg in global axes, and forces."""
         from scipy import sparse
 
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
         from mbsim.dynamics.contact import forces as at
 
         scene = self.system.scene
@@ -126,7 +127,7 @@ class ContactProblems:
         rows, columns, values, force = [], [], [], np.zeros(3 * len(hit))
         for k, s in enumerate(hit):
             point = scene.work.points[s]
-            p, n, tx = point[1:4], point[4:7], scene.work.t[s]
+            p, n, tx = point[AT_POINT:], point[AT_NORMAL:], scene.work.t[s]
             axes = np.array([n, tx, np.cross(n, tx)])
             force[3 * k : 3 * k + 3] = axes @ scene.work.slot[s, at.FORCE : at.FORCE + 3]
             for g, sign in zip(at.sides(scene, s), (1.0, -1.0), strict=True):
@@ -148,7 +149,7 @@ class ContactProblems:
         """Return W, and the velocities q of the contacts after h without them."""
         from scipy import sparse
 
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
         from mbsim.dynamics.contact import forces as at
 
         scene = self.system.scene
@@ -198,7 +199,7 @@ class ContactProblems:
 
     def _accelerations(self, t: float, y: Array, forces: Array) -> Array:
         """Return accelerations, linear then angular in global axes, under all forces (6 nb,)."""
-        from mbsim.arrays.scene import BODY_SIZE
+        from mbsim.core.layout import BODY_SIZE
 
         scene = self.system.scene
         nb, work = len(scene.bodies.mass), scene.work

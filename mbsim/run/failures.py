@@ -74,7 +74,7 @@ def _held_by(system: System, body: int) -> list[str]:
 
 def _out_of_reach(system: System, settings: Settings) -> list[str]:
     """Return the equation that the step tried last left by more than its error may be."""
-    from mbsim.arrays.scene import DRIFT, DRIFTER
+    from mbsim.arrays.codes import DRIFT, DRIFTER
 
     quality = system.scene.sweep.quality
     if not quality[DRIFT] > settings.tol:

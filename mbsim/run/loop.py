@@ -58,7 +58,7 @@ class Runner:
         tell: Notify,
         changes: list[Parameters] | None = None,
     ) -> None:
-        from mbsim.arrays.scene import AUDIT_TOL
+        from mbsim.arrays.codes import AUDIT_TOL
         from mbsim.compile_model.timetable import follows_time
         from mbsim.core import jit
         from mbsim.integrators import driver, scheme
@@ -86,7 +86,7 @@ class Runner:
         self.pace = Pace(start, start)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
-        self.interrupted = False
+        self.interrupted = 0  # number of the signal that asks for an end
         self.dump: ContactProblems | None = None
 
     def _make_detector(self) -> Any:
@@ -291,7 +291,7 @@ class Runner:
 
     def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
         """Run one Simulate statement."""
-        from mbsim.arrays.scene import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
+        from mbsim.arrays.codes import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
         from mbsim.core import problem
         from mbsim.integrators import scheme
 
@@ -344,9 +344,11 @@ class Runner:
                 return
             self._answer(outcome, simulation.end_time)
             if self.interrupted:
-                raise Interrupted(f"interrupted at time {method.memory[scheme.TIME]:.6g}")
+                now = float(method.memory[scheme.TIME])
+                raise Interrupted(f"interrupted at time {now:.6g}", self.interrupted)
             if self.recorder.due():
                 self.recorder.flush(self.checkpoint())
+                self.log.show()
             if progress is not None:
                 h = float(method.memory[scheme.STEP])
                 progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
@@ -390,7 +392,7 @@ class Runner:
 
     def stats(self, wall: float, compiled: float) -> dict[str, float]:
         """Return the counters of the run; seconds in all, and of these for compiling."""
-        found = statistics.counters(self.system.scene, self.method, self.methods.changes)
+        found = statistics.counters(self.system.scene, self.methods)
         halted = self.sensing.halted_by
         seconds = {"loop_s": self.loop_seconds, "wall_s": wall, "compile_s": compiled}
         return {**found, **seconds, **({"halted_by_sensor": halted} if halted else {})}

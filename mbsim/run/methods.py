@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.scene import AUDIT_EVERY
+from mbsim.arrays.codes import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
 from mbsim.core import jit
@@ -32,6 +32,10 @@ MOST_BODIES = 300
 #: FEW bodies, and implicit ones: what samples cost is then about 1 % of the steps, or less.
 EVERY, EVERY_OF_MANY, EVERY_IMPLICIT = 8.0, 16.0, 1.0
 FEW = 16
+#: The part of a step's error that Newton's iteration may leave where friction holds without give.
+#: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
+#: than the error of a step, made it slip.
+LEFT_OF_HELD = 3e-4
 
 
 class Methods:
@@ -42,7 +46,7 @@ class Methods:
 
     def __init__(self, system: System, name: str, start: float, timed: bool = False) -> None:
         from mbsim.compile_model.timetable import ROWS
-        from mbsim.dynamics.pipeline.hooks import mechanism
+        from mbsim.dynamics.pipeline.problem import mechanism
 
         self.system = system
         changing = name == catalog.AUTO
@@ -57,6 +61,8 @@ class Methods:
         self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
         length, speed = system.scene.world.scale[:2]
         self.arrays.memory[scheme.OWN_TIME] = length / speed
+        if system.scene.contacts.rigid.any() or (system.scene.applied.equation >= 0).any():
+            self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_HELD
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem
@@ -76,12 +82,21 @@ class Methods:
         self.changes = 0
         #: When AUTO changed over last, and the work by then.
         self._since = (start, 0.0)
+        #: Evaluations by AUTO's implicit method before that, and all of them by then.
+        self._spent = (0, 0)
         self.bind()
 
     @property
     def is_stiff(self) -> bool:
         """Whether AUTO's implicit method runs."""
         return bool(self.arrays.memory[scheme.STIFF] == 1.0)
+
+    @property
+    def implicit_evaluations(self) -> int:
+        """How many of the evaluations so far an implicit method took."""
+        before, since = self._spent
+        now = int(self.arrays.counts[scheme.EVALUATIONS])
+        return before + (now - since if self.steps.implicit else 0)
 
     def bind(self) -> None:
         """Bind the method that memory names."""
@@ -93,7 +108,7 @@ class Methods:
         if self.other is not None and self.is_stiff:
             running = self.other
         if running.implicit and linearised is None:
-            from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+            from mbsim.dynamics.pipeline.problem import implicit_hooks
 
             problem, linearised = implicit_hooks(self.system.scene, problem, running.pair)
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
@@ -103,7 +118,11 @@ class Methods:
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""
-        kept: dict[str, Any] = {"changes": np.array(self.changes), "since": np.array(self._since)}
+        kept: dict[str, Any] = {
+            "changes": np.array(self.changes),
+            "since": np.array(self._since),
+            "spent": np.array(self._spent),
+        }
         if self.steps.implicit:
             kept |= tangent.saved(self._tangent[0])
         return kept
@@ -112,6 +131,7 @@ class Methods:
         """Bind the method that ran, whose arrays are as they were, to what it kept."""
         self.changes = int(kept["changes"])
         self._since = (float(kept["since"][0]), float(kept["since"][1]))
+        self._spent = (int(kept["spent"][0]), int(kept["spent"][1]))
         self.bind()
         if self.steps.implicit:
             tangent.restore(self._tangent[0], kept)
@@ -148,6 +168,7 @@ class Methods:
         """Let AUTO's other method go on from the committed point; return what is to be said."""
         memory, counts = self.arrays.memory, self.arrays.counts
         stiff = not self.is_stiff
+        self._spent = (self.implicit_evaluations, int(counts[scheme.EVALUATIONS]))
         bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0

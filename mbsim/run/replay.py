@@ -99,7 +99,7 @@ class Replay:
     """
 
     def __init__(self, results: Results) -> None:
-        from mbsim.arrays import scene as a
+        from mbsim.arrays import codes
         from mbsim.compile_model.build import build
         from mbsim.reader.xml import read_model
         from mbsim.results.identity import Identity
@@ -125,7 +125,7 @@ class Replay:
         scene = self.system.scene
         scene.world.fixed_step[0] = int(named["integrator"] == "VERLET")
         self.wide = scene.rows.incidents.shape[1]
-        self.region = self.wide > a.INC_MEMORY + scene.state.before.shape[1]
+        self.region = self.wide > codes.INC_MEMORY + scene.state.before.shape[1]
         self._open()
 
     def _changes(self) -> None:
@@ -183,7 +183,7 @@ class Replay:
 
     def _row(self, time: float, y: Array, incidents: Array) -> Row:
         """Evaluate one row."""
-        from mbsim.arrays import scene as a
+        from mbsim.arrays import codes
         from mbsim.run.failures import fail
 
         self._settle(time)
@@ -191,24 +191,24 @@ class Replay:
         count, n = len(incidents), len(y)
         scene.rows.incidents[:count] = incidents
         scene.rows.used[1] = count
-        groups = (len(scene.work.law_in), len(scene.work.law_out), a.SLOT_COLUMNS)
-        size, wide = a.CONTACT_COLUMNS * len(ids), sum(groups)
+        groups = (len(scene.work.law_in), len(scene.work.law_out), codes.SLOT_COLUMNS)
+        size, wide = codes.CONTACT_COLUMNS * len(ids), sum(groups)
         room = np.zeros(n + size + count * wide)
         code = self._hook(self._table.ctypes.data, time, 0.0, y.ctypes.data, room.ctypes.data)
         if code != 0:
             fail(self.system, None, code, time)
-        nets = room[n : n + size].reshape(len(ids), a.CONTACT_COLUMNS)
+        nets = room[n : n + size].reshape(len(ids), codes.CONTACT_COLUMNS)
         found = Row(time, {id: _net(net) for id, net in zip(ids, nets, strict=True)})
         found.incidents = {id: [] for id in ids}
         for row, numbers in zip(incidents, room[n + size :].reshape(count, wide), strict=True):
-            c = int(scene.kinds.contact[int(row[a.INC_KIND])])
+            c = int(scene.kinds.contact[int(row[codes.INC_KIND])])
             given, out, slot = np.split(numbers, np.cumsum(groups)[:-1])
             found.incidents[ids[c]].append(self._incident(c, row, given, out, slot))
         return found
 
     def _incident(self, c: int, row: Array, given: Array, out: Array, slot: Array) -> Any:
         """Return the signals of an incident of contact row c."""
-        from mbsim.arrays import scene as a
+        from mbsim.arrays import codes
         from mbsim.dynamics.contact import forces as at
         from mbsim.laws.abi import FRICTION_INPUTS
         from mbsim.laws.catalog import FRICTION_LAWS
@@ -226,15 +226,15 @@ class Replay:
             "mode": _MODES.get(float(slot[at.MODE]), "") if sticks else "",
             "slip": float(slot[at.SLIP]),
             "xdot": given[5:8] if rubs else np.full(3, math.nan),
-            "x": row[a.INC_X : a.INC_X + 3],
+            "x": row[codes.INC_X : codes.INC_X + 3],
             "depth": float(slot[at.DEPTH]),
             "rate": float(slot[at.RATE]),
             "nforce": nforce,
             "friction": friction,
             "stored": float(slot[at.STORED] + slot[at.HELD]),
-            "point": row[a.INC_POINT : a.INC_POINT + 3],
-            "normal": row[a.INC_NORMAL : a.INC_NORMAL + 3],
-            "area": float(row[-a.INC_REGION]) if self.region else 0.0,
+            "point": row[codes.INC_POINT : codes.INC_POINT + 3],
+            "normal": row[codes.INC_NORMAL : codes.INC_NORMAL + 3],
+            "area": float(row[-codes.INC_REGION]) if self.region else 0.0,
         }
         kept = int(contacts.memory[c])
         for k in range(kept if contacts.carried[c] < kept else 0):

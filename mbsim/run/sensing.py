@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.scene import FIRED, NEXT, SHOWN
+from mbsim.arrays.codes import FIRED, NEXT, SHOWN
 from mbsim.compile_model.build import System
 from mbsim.integrators import scheme
 from mbsim.model.elements import Sensor

@@ -303,6 +303,12 @@ def settle(
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 
 
+def output_rows(settings: Settings) -> float:
+    """Return about how many output times all Simulates of a run have."""
+    stages = [stage.simulation for stage in settings.stages]
+    return sum((one.end_time - one.start_time) / one.print_interval + 1.0 for one in stages)
+
+
 def output_times(simulation: Simulation, last: bool) -> np.ndarray[Any, Any]:
     """Return the output times of one Simulate; a restart's row belongs to the one that follows."""
     t0, t1, dt = simulation.start_time, simulation.end_time, simulation.print_interval

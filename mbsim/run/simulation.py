@@ -5,16 +5,16 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbsim import __version__
-from mbsim.errors import Interrupted, ModelError
+from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
 from mbsim.run.loop import Notify, Progress, Runner
-from mbsim.run.settings import Settings, settle
+from mbsim.run.settings import Settings, output_rows, settle
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -23,21 +23,42 @@ if TYPE_CHECKING:
     from mbsim.results.reading import Results
 
 
+#: Signals that end a run at the next return from compiled code, what there is being kept.
+_STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
 @contextmanager
 def _stoppable(runner: Runner) -> Iterator[None]:
-    """Let Ctrl-C ask the runner to stop at the next return from compiled code."""
+    """Let Ctrl-C and a scheduler's signals ask the runner to stop; a second one stops at once."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    before: dict[int, Any] = {}
 
     def ask(number: int, frame: Any) -> None:
-        runner.interrupted = True
+        if runner.interrupted:
+            raise KeyboardInterrupt
+        runner.interrupted = number
 
-    before = signal.signal(signal.SIGINT, ask)
+    for name in _STOPPING:
+        number = getattr(signal, name, None)
+        # what `nohup` has switched off stays so
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, ask)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractContextManager[None]:
+    """Return what watches over users' functions while the run goes on, where there are some."""
+    if not (system.user_laws or system.subroutines or system.posts or system.residuals):
+        return nullcontext()
+    from mbsim.plugins.permission import limited
+
+    return limited(timeout, tell)
 
 
 def _parameters(system: System, settings: Settings) -> list[Parameters]:
@@ -66,6 +87,9 @@ def simulate(
     interpret_plugins: bool = False,
     allow_overlap: bool = False,
     dump_fclib: int | None = None,
+    signals: Sequence[str] = (),
+    scripts: bool = True,
+    plugin_timeout: float | None = None,
     progress: Progress | None = None,
     notify: Notify | None = None,
 ) -> Results:
@@ -97,6 +121,13 @@ def simulate(
         Do not compile user subroutines; start although shapes overlap deeply.
     dump_fclib : int, optional
         Write the frictional contact problem of every so many steps into `output`/fclib.
+    signals : sequence of str
+        Names or patterns of what to record, ``bodies/2/position``, ``contacts/*/force``,
+        ``joints``, beside time, events and requests; default: everything.
+    scripts : bool
+        False refuses a model that needs users' code, that of `plugins` included.
+    plugin_timeout : float, optional
+        Longest time of one call of an interpreted user function [s]; default: no bound.
     progress : callable, optional
         Called with time, step and end time [T] now and then.
     notify : callable, optional
@@ -109,6 +140,8 @@ def simulate(
     """
     from mbsim.compile_model.build import build
     from mbsim.core import jit
+    from mbsim.plugins.permission import no_scripts
+    from mbsim.results.going_on import completed
     from mbsim.results.log import RunLog
     from mbsim.results.recorder import Recorder
 
@@ -125,13 +158,22 @@ def simulate(
     for file in files:
         if not file.is_file():
             raise ModelError(f"--plugin {file}: no such file")
+    folder = None if output is None else Path(output)
+    if resume and folder is not None and (whole := completed(model, folder, tell)) is not None:
+        return whole
     said: list[str] = []
-    system = build(model, files, interpret_plugins, detector, said.append)
+    with no_scripts(not scripts):
+        system = build(model, files, interpret_plugins, detector, said.append)
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
     attributes = _attributes(system, settings, detector, files, interpret_plugins)
-    folder = None if output is None else Path(output)
-    recorder = Recorder(system, attributes, folder, resume, settings)
+    attributes["signals"] = "\n".join(signals)
+    recorder = Recorder(system, attributes, folder, resume, settings, signals)
+    try:
+        recorder.check_room(output_rows(settings))
+    except ModelError:
+        recorder.abandon()
+        raise
     log = RunLog(system, attributes, recorder.directory, resume)
     for note in (*said, *settings.notes):
         log.line(note)
@@ -142,7 +184,7 @@ def simulate(
     status = "failed"
     runner = Runner(system, settings, recorder, log, tell, changes)
     try:
-        with _stoppable(runner):
+        with _stoppable(runner), _limited(system, plugin_timeout, tell):
             if resume:
                 runner.restore(recorder.checkpoint)
             else:
@@ -179,10 +221,19 @@ def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Result
     audit = runner.audit()
     for warning in audit.warnings if audit is not None else ():
         runner.tell(f"warning: {warning}")
+    log = runner.log
+
+    def close_log() -> None:
+        log.close(status, stats, runner.recorder.watch, audit)
+
     try:
-        return _keep(runner, status, stats, audit)
+        return _keep(runner, status, stats, audit, close_log)
+    except ResultsError:
+        if not log.closed:
+            with suppress(ResultsError):
+                close_log()
+        raise
     finally:
-        runner.log.close(status, stats, runner.recorder.watch, audit)
         if any(user.language == "Octave" for _, user in system.user_laws):
             from mbsim.plugins.subroutine import end_run
 
@@ -239,15 +290,21 @@ def _attributes(
 
 
 def _keep(
-    runner: Runner, status: str, stats: dict[str, float], audit: Audit | None
+    runner: Runner,
+    status: str,
+    stats: dict[str, float],
+    audit: Audit | None,
+    close_log: Callable[[], None],
 ) -> Results | None:
-    """Close the result file; None where it holds no row, and an earlier one stays."""
+    """Close the files; None where there is no row: an earlier run's files stay as they are."""
     recorder = runner.recorder
     if recorder.empty and recorder.directory is not None:
         recorder.abandon()
+        if not recorder.earlier:
+            close_log()
         return None
     if status != "finished":
         recorder.flush(runner.checkpoint())
     contacts = runner.system.scene.log.contacts
-    results: Results = recorder.close(status, stats, contacts, audit)
+    results: Results = recorder.close(status, stats, contacts, audit, runner.checkpoint, close_log)
     return results

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from mbsim.errors import ModelError
+from mbsim.geometry.catalog import AT_DEPTH
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -77,7 +78,7 @@ def settle_contacts(
     tell: Tell,
 ) -> None:
     """Begin with the incidents that exist at the start; refuse those that are too deep."""
-    from mbsim.arrays.scene import TOLERANCE
+    from mbsim.arrays.codes import TOLERANCE
 
     scene, problem = system.scene, hooks.problem
     t = settings.stages[0].simulation.start_time
@@ -96,7 +97,7 @@ def settle_contacts(
 
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     """Report shapes that overlap at the start; return a line for each that is too deep."""
-    from mbsim.arrays.scene import ACTIVE
+    from mbsim.arrays.codes import ACTIVE
 
     scene, model = system.scene, system.model
     faults = []
@@ -105,7 +106,7 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     slots = [s for pair in active for s in range(pairs.slot[pair], pairs.last[pair])]
     for s in slots:
         # those that are ignored for their depth overlap too
-        depth = float(scene.work.points[s, 0])
+        depth = float(scene.work.points[s, AT_DEPTH])
         if not depth > 0.0:
             continue
         pair = int(scene.slots.pair[s])

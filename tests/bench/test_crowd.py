@@ -15,7 +15,8 @@ from numba import njit
 import mbsim
 from helpers.crowd_decks import LAW, block, pile, random_axes, sets, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, write_deck
-from mbsim.arrays.scene import ACTIVE, Scene
+from mbsim.arrays.codes import ACTIVE
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model import pairing
 from mbsim.compile_model.build import build
 from mbsim.core import jit

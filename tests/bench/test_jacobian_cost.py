@@ -15,7 +15,7 @@ import mbsim
 from helpers import joint_chain
 from helpers.free_bodies import Silent
 from mbsim.compile_model.build import build
-from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.dynamics.pipeline.problem import implicit_hooks
 from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
 from mbsim.run.start import assemble_model

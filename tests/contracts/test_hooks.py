@@ -14,9 +14,9 @@ from helpers import crowd_decks, mechanism_decks
 from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, Memory
-from mbsim.arrays.scene import NEAR_FOLD
-from mbsim.dynamics.pipeline import hook_table, hooks, implicit_hooks
+from mbsim.arrays.codes import NEAR_FOLD
+from mbsim.arrays.hooks import Dry, Hook, Joints, Memory, Sticking
+from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
 
 FAILS = 77
@@ -33,8 +33,8 @@ CASES = [
     (Hook.WRENCH, None, "stiff/bushing_chain", "DOPRI5"),
     (Hook.ELEMENT, None, "dry_friction_element", "DOPRI5"),
     *((Hook.JOINTS, what, "cam", "DOPRI5") for what in Joints),
-    *((Hook.HELD, what, "stiction_rigid", "RADAU5") for what in Held),
-    (Hook.LATE, None, "pin", "DOPRI5"),
+    *((Hook.STICKING, what, "stiction_rigid", "RADAU5") for what in Sticking),
+    (Hook.REACTION_FORCES, None, "pin", "DOPRI5"),
     (Hook.EVALUATE, None, "dry_friction_element", "DOPRI5"),
     (Hook.BEND, None, "four_bar", "RADAU5"),
     *((Hook.MEMORY, what, "lugre_stick_slip", "RADAU5") for what in Memory),
@@ -119,13 +119,12 @@ class Failure:
 )
 def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, monkeypatch):
     failure = Failure(hook, request_)
-    for module in (hooks, implicit_hooks):
 
-        def fill(scene, *given, plain=module.fill):
-            plain(scene, *given)
-            failure.put(scene)
+    def fill(scene, *given, plain=problem.fill):
+        plain(scene, *given)
+        failure.put(scene)
 
-        monkeypatch.setattr(module, "fill", fill)
+    monkeypatch.setattr(problem, "fill", fill)
     detector = "fcl" if hook is Hook.FCL else "auto"
     with pytest.raises(SolverError, match=f"code {FAILS} at time"):
         mbsim.simulate(model_of(deck, tmp_path), integrator=method, detector=detector)
@@ -134,7 +133,7 @@ def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, 
 
 def test_every_hook_and_request_is_tried():
     tried = {(hook, what) for hook, what, *_ in CASES}
-    requests = {Hook.JOINTS: Joints, Hook.HELD: Held, Hook.DRY: Dry, Hook.MEMORY: Memory}
+    requests = {Hook.JOINTS: Joints, Hook.STICKING: Sticking, Hook.DRY: Dry, Hook.MEMORY: Memory}
     for hook in set(Hook) - {Hook.TANGENT}:
         for what in requests.get(hook, (None,)):
             assert (hook, what) in tried, (hook, what)

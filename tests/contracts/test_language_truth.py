@@ -16,8 +16,9 @@ from helpers import free_bodies as free
 from helpers.language_truth import CASES, MOST_ARGS
 from helpers.measure_truth import Motion, component, fixed, measure, opposite
 from helpers.minimal_deck import deck, read
+from mbsim.arrays.codes import SHOWN
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import SHOWN, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.core import jit
 from mbsim.core.address import pack, view

@@ -21,7 +21,7 @@ from helpers.mechanics import Body
 from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
 from mbsim.arrays.hooks import Joints
 from mbsim.compile_model.build import build
-from mbsim.dynamics.pipeline.implicit_hooks import implicit_hooks
+from mbsim.dynamics.pipeline.problem import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
 from mbsim.run.loop import Runner
 from mbsim.run.settings import settle
@@ -532,7 +532,7 @@ LATE = {
 def test_forces_by_reactions(name, tmp_path):
     # reactions are taken as they are, and have next to no part in these
     it = check(of(two("SPHERICAL", extra=MARKERS + LATE[name]), tmp_path), 1e-6, t=0.3)
-    assert len(it.scene.applied.late) > 0
+    assert len(it.scene.applied.by_reactions) > 0
 
 
 # --- contacts: points and normals stay where they are on the bodies ---

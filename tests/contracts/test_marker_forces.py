@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mbsim
-from mbsim.arrays import scene
+from mbsim.arrays import codes
 from mbsim.forces.catalog import FORCES, Motion
 
 #: Half of the difference of displacements and velocities, and rounding over it.
@@ -149,7 +149,7 @@ def test_the_numbers_of_kinds_have_no_order():
             *("SLIDE_FRICTION", "TURN_FRICTION", "SCREW_FRICTION", "BALL_FRICTION"),
         )
     )
-    assert all(hasattr(scene, name) for name in names.split("|"))
-    ordered = re.compile(rf"[<>]=?\s*(a\.)?({names})\b|\b({names})\s*([<>+\-%]|\.\.)")
+    assert all(hasattr(codes, name) for name in names.split("|"))
+    ordered = re.compile(rf"[<>]=?\s*(codes\.)?({names})\b|\b({names})\s*([<>+\-%]|\.\.)")
     for file in Path(mbsim.__file__).parent.rglob("*.py"):
         assert not ordered.search(file.read_text(encoding="utf-8")), file

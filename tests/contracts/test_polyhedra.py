@@ -264,7 +264,7 @@ def test_what_is_convex():
     assert hull is not None
     head = hull[[packed.CORNERS, packed.FACES, packed.EDGES, packed.COLOURS]]
     assert head.tolist() == [8, 6, 12, 4]
-    np.testing.assert_allclose(hull[int(hull[packed.AT_SHARES]) :][:8], 1.0, atol=1e-12)
+    np.testing.assert_allclose(hull[int(hull[packed.AT_WEIGHTS]) :][:8], 1.0, atol=1e-12)
     # single precision, turned: flat sides stay one face
     turned = (vertices @ rotation([0.3, 0.2, 0.5]).T).astype(np.float32).astype(float)
     hull = polyhedron_of(turned, faces)
@@ -279,7 +279,7 @@ def test_what_is_convex():
     assert polyhedron_of(vertices, faces[:, ::-1]) is None
     hull = polyhedron_of(*TETRAHEDRON)
     assert hull is not None
-    np.testing.assert_allclose(hull[int(hull[packed.AT_SHARES]) :][:4], 4 / 3, atol=1e-12)
+    np.testing.assert_allclose(hull[int(hull[packed.AT_WEIGHTS]) :][:4], 4 / 3, atol=1e-12)
 
 
 def test_a_fine_mesh_has_a_row_for_each_patch_and_its_deepest_corner():

@@ -15,9 +15,13 @@ from typing import Any
 import numpy as np
 
 from helpers.minimal_deck import added, read
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
+from mbsim.arrays.model import Graphics
+from mbsim.arrays.scratch import Rows
+from mbsim.arrays.state import Log
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.pairing import plan_pairs
+from mbsim.core.layout import BODY_SIZE
 from mbsim.model.elements import Model
 from mbsim.model.placement import place
 from mbsim.results.elements import APPLIED, CONSTRAINTS, elements_of
@@ -47,10 +51,10 @@ def fake_system_of(model: Model) -> Any:
     placement = place(model)
     bodies = list(placement.bodies.values())
     nb, nc = len(bodies), len(model.contacts)
-    n = a.BODY_SIZE * nb + 1
+    n = BODY_SIZE * nb + 1
     y0 = np.zeros(n)
     for k, body in enumerate(bodies):
-        row = y0[a.BODY_SIZE * k :]
+        row = y0[BODY_SIZE * k :]
         row[0:3], row[3:7], row[7:10] = body.p, body.q, body.v
     row_of = {body.id: nb for body in model.bodies.values()}
     row_of |= {body.id: k for k, body in enumerate(bodies)}
@@ -63,12 +67,12 @@ def fake_system_of(model: Model) -> Any:
         for number, expr in enumerate(request.exprs, 1)
         if expr is not None
     ]
-    log = np.zeros((nc, a.LOG_COLUMNS))
-    rows = a.Rows(
+    log = np.zeros((nc, codes.LOG_COLUMNS))
+    rows = Rows(
         time=np.zeros(CAPACITY),
         y=np.zeros((CAPACITY, n)),
         accel=np.zeros((CAPACITY, 6 * nb)),
-        contact=np.zeros((CAPACITY, a.CONTACT_COLUMNS * nc)),
+        contact=np.zeros((CAPACITY, codes.CONTACT_COLUMNS * nc)),
         energy=np.zeros((CAPACITY, 4)),
         joint=np.zeros((CAPACITY, 6 * len(connections))),
         applied=np.zeros((CAPACITY, 6 * len(applied))),
@@ -86,7 +90,7 @@ def fake_system_of(model: Model) -> Any:
     )
     scene = SimpleNamespace(
         bodies=(np.array([body.mass for body in bodies]),),
-        graphics=a.Graphics(*[np.zeros(0)] * len(a.Graphics._fields)),
+        graphics=Graphics(*[np.zeros(0)] * len(Graphics._fields)),
         contacts=contacts,
         world=SimpleNamespace(
             gravity=np.array(model.gravity.g), scale=np.ones(2), accumulators=np.full(2, -1)
@@ -98,7 +102,7 @@ def fake_system_of(model: Model) -> Any:
         tree=SimpleNamespace(of_body=np.arange(nb + 1), free=np.array([4])),
         equations=SimpleNamespace(active=np.array([0, 1, 2, 3])),
         states=SimpleNamespace(place=np.zeros(0, dtype=np.int64)),
-        log=a.Log(log, np.zeros(a.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 4), np.int64)),
+        log=Log(log, np.zeros(codes.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 4), np.int64)),
         rows=rows,
     )
     return SimpleNamespace(
@@ -146,7 +150,9 @@ def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
         rows.y[at, 0] = k
         rows.y[at, 10:13] = (0.0, 0.0, 0.5)
         rows.accel[at] = k
-        rows.contact[at].reshape(-1, a.CONTACT_COLUMNS)[:] = np.arange(a.CONTACT_COLUMNS) + 100 * k
+        rows.contact[at].reshape(-1, codes.CONTACT_COLUMNS)[:] = (
+            np.arange(codes.CONTACT_COLUMNS) + 100 * k
+        )
         rows.energy[at] = (k, 2 * k, 3 * k, 4 * k)
         for table in (rows.joint, rows.applied):
             table[at] = np.arange(table.shape[1]) + 100 * k
@@ -158,7 +164,7 @@ def add_rows(system: Any, first: int, count: int, events: bool = True) -> None:
         rows.used[0] = at + 1
     if events:
         # within a step the slots come in any order
-        for time, kind in ((0.1 * first + 0.05, a.LEAVE), (0.1 * first + 0.01, a.TOUCH)):
+        for time, kind in ((0.1 * first + 0.05, codes.LEAVE), (0.1 * first + 0.01, codes.TOUCH)):
             rows.events[rows.used[2]] = (time, kind, system.contact_ids[0], 0)
             rows.used[2] += 1
 

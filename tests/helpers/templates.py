@@ -15,22 +15,7 @@ class Template(NamedTuple):
 
 TEMPLATES = {
     "friction_law": Template("laws/friction/viscous.py", 1),
-    "normal_law": Template(
-        "laws/normal/foundation.py",
-        3,
-        (
-            (
-                "reader/keywords.py",
-                'HERTZ="", USERCNF="USER")',
-                'HERTZ="", FOUNDATION="", USERCNF="USER")',
-            ),
-            (
-                "reader/normal_force.py",
-                '    "IMPACT": _check_impact,\n',
-                '    "IMPACT": _check_impact,\n    "FOUNDATION": _check_spring,\n',
-            ),
-        ),
-    ),
+    "normal_law": Template("laws/normal/kelvin_voigt.py", 1),
     "joint": Template("joints/kinds/pin_in_slot.py", 1),
     "force": Template("forces/kinds/tether.py", 1),
     "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),

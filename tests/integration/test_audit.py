@@ -17,7 +17,7 @@ import mbsim
 from helpers.audit_runs import FREE_FLIGHT, INCLINE, LOOPS
 from helpers.decks import GROUND, contact, run_in_pieces, run_model, sphere, write_deck
 from helpers.folders import MODELS
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
 from mbsim.cli.main import main
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.audit import examine
@@ -232,15 +232,15 @@ def test_what_earlier_versions_did_unsaid_is_told(run, finds, tmp_path):
     system = stand_in(tmp_path, run.scale)
     scene, y = system.scene, system.y0.copy()
     plan, tally, work = scene.audit.plan, scene.audit.tally, scene.work
-    plan[a.AUDIT_TOL] = run.tol
+    plan[codes.AUDIT_TOL] = run.tol
     for k, (steps, errors, t, speed, potential, dissipated, touches) in enumerate(run.samples):
         # the ball has 1 kg
         y[9], y[2] = speed, potential / 9.81
         y[-1] = dissipated
         work.hit[-1], work.hit[0] = int(touches > 0), 0
         work.slot[0] = 0.0
-        tally[a.STEPS_SINCE], tally[a.ERRORS_SINCE] = steps - 1.0, errors
-        tally[a.ERROR_NOW] = 0.0
+        tally[codes.STEPS_SINCE], tally[codes.ERRORS_SINCE] = steps - 1.0, errors
+        tally[codes.ERROR_NOW] = 0.0
         examine(scene, t, 0.0 if k == 0 else 1e-9, y)
     audit = audit_of(system, 0.0, 0.0)
     assert audit is not None

@@ -46,9 +46,11 @@ def slow_deck(folder):
     return write_deck(folder, model, end_time=40.0, print_interval=0.01)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
-@pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
-def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path, method):
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+@pytest.mark.parametrize(
+    ("method", "sent"), [("DOPRI5", "SIGINT"), ("DOP853", "SIGTERM"), ("DOP853", "SIGHUP")]
+)
+def test_a_signal_keeps_everything_and_resume_gives_the_same_run(tmp_path, method, sent):
     deck = slow_deck(tmp_path)
     by = ["--integrator", method]
     arguments = ["run", deck, "-o", tmp_path / "a", "--progress", "off", *by]
@@ -57,10 +59,10 @@ def test_ctrl_c_keeps_everything_and_resume_gives_the_same_run(tmp_path, method)
     )
     for line in process.stderr:
         if "reached 0.5" in line:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(getattr(signal, sent))
             break
     _, rest = process.communicate(timeout=120)
-    assert process.returncode == 130, rest
+    assert process.returncode == 128 + getattr(signal, sent), rest
     assert "Traceback" not in rest
     with mbsim.open_results(tmp_path / "a/deck.h5") as results:
         assert results.status == "interrupted"

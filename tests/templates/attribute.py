@@ -33,7 +33,7 @@ LINES = {
     "mbsim/dynamics/forces/joint_friction.py": (
         "RADIUS, PRELOAD, ARM = range(3)",
         "RADIUS, PRELOAD, ARM, PRELOAD_RATE = range(4)",
-        "    given[10] = press(scene, f)\n",
-        "    given[10] = press(scene, f) + applied.par[f, PRELOAD_RATE] * t\n",
+        "    given[NFORCE_IN] = press(scene, f)\n",
+        "    given[NFORCE_IN] = press(scene, f) + applied.par[f, PRELOAD_RATE] * t\n",
     ),
 }

@@ -6,12 +6,13 @@ and cite the formula's source here. `laws.catalog` says what a law may look at a
 
 from __future__ import annotations
 
-from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.core.arrays import V5
+from mbsim.laws.catalog import FrictionInput, Parameter, friction_law
 
 
 # a name of Force_Contact's own (`"mu_dynamic"`) stands for its attribute, a Parameter is a new one
 @friction_law("VISCOUS", Parameter("slip_coef", None, about="force over slip and N", unit="T/L"))
-def viscous(inputs, slip_coef):
+def viscous(inputs: FrictionInput, slip_coef: float) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I; `slip_coef` [T/L]."""
     pull = -slip_coef * inputs.nforce
     return pull * inputs.xdot[0], pull * inputs.xdot[1], 0.0, 0.0, 0.0

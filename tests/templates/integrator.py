@@ -10,12 +10,22 @@ functions have to fill. Source: K. Heun, Z. Math. Phys. 45 (1900) 23-38.
 from __future__ import annotations
 
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, TOL, Scheme, in_workspace, project
+from mbsim.core.problem import Problem
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    LAST_ERROR,
+    TOL,
+    Method,
+    Scheme,
+    in_workspace,
+    project,
+)
 
 
 @jitable
-def attempt(p, m, t, h):
+def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill stages, trial point and error; return a code."""
     y, k, w = m.y, m.k, m.trial
     m.counts[EVALUATIONS] += 2
@@ -34,7 +44,7 @@ def attempt(p, m, t, h):
 
 
 @jitable
-def fit_dense(m, h):
+def fit_dense(m: Method, h: float) -> None:
     """Fill the cubic Hermite polynomial of the step from y to trial."""
     for i in range(len(m.y)):
         rise = m.trial[i] - m.y[i]
@@ -45,13 +55,13 @@ def fit_dense(m, h):
         m.dense[3, i] = rise - h * m.k[2, i] - bend
 
 
-def _attempt(context, t, h, a, b):
+def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     p, m = in_workspace(context)
     return attempt(p, m, t, h)
 
 
-def _fit_dense(context, t, h, a, b):
+def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The step as a polynomial."""
     _, m = in_workspace(context)
     fit_dense(m, h)

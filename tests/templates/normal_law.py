@@ -1,17 +1,17 @@
-"""FOUNDATION: a bed of springs of `stiffness` k that stiffens, F = k d + k d^2/dmax.
+"""A linear spring and damper side by side: F = k d + c d', of which nothing is left behind d = 0.
 
-Template of a normal law: copy it into mbsim/laws/normal/ and give its name a line in
-`reader/keywords.py` and its checks one in `reader/normal_force.py`. `laws.catalog` says what a law
-returns: force, its elastic part and the energy stored, k d^2/2 + k d^3/(3 dmax).
+Template of a normal law: copy it into mbsim/laws/normal/ and change it. It takes attributes that
+Force_Contact has; decks may say cnf_type="KELVIN_VOIGT" as soon as the file is there.
 """
 
 from __future__ import annotations
 
+from mbsim.core.arrays import V3
 from mbsim.laws.catalog import normal_law
 
 
-@normal_law("FOUNDATION", "stiffness", "dmax")
-def foundation(depth, rate, stiffness, dmax):
-    """Return force [F], elastic force [F], stored energy [F L]."""
-    force = stiffness * depth * (1.0 + depth / dmax)
-    return force, force, stiffness * depth * depth * (0.5 + depth / (3.0 * dmax))
+@normal_law("KELVIN_VOIGT", "stiffness", "damping")
+def kelvin_voigt(depth: float, depth_rate: float, stiffness: float, damping: float) -> V3:
+    """Return force [F], force at rate 0 [F] and stored energy [F L]."""
+    spring = stiffness * depth
+    return spring + damping * depth_rate, spring, 0.5 * spring * depth

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, scale, sub, vector
@@ -22,7 +23,7 @@ from mbsim.model.hull import AT_PLANES, FACES
 
 
 @jitable
-def _lowest(frame, size, n):
+def _lowest(frame: F1, size: F1, n: V3) -> V3:
     """Return the ellipsoid's lowest point along n from its centre: -A^2 n / h(n)."""
     low, reach = (0.0, 0.0, 0.0), 0.0
     for k in range(3):
@@ -33,7 +34,7 @@ def _lowest(frame, size, n):
 
 
 @pair("ELLIPSOID", "MESH", slots=1)
-def ellipsoid_mesh(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The face that it has to leave by the shortest way."""
     hull = floats_at(size_j[0], size_j[1])
     apart, depth = sub(vector(frame_i), vector(frame_j)), math.inf

@@ -13,9 +13,9 @@ from click.testing import CliRunner
 
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system_of
 from helpers.minimal_deck import added, read
-from mbsim.arrays import scene as a
 from mbsim.cli import info
 from mbsim.cli.main import main
+from mbsim.core.layout import BODY_SIZE
 from mbsim.errors import DeckError, ModelError
 from mbsim.expressions import Expression
 from mbsim.expressions.tree import Call, Node, Number, Time
@@ -89,7 +89,7 @@ def moved_rows(system: Any, count: int = 5) -> np.ndarray[Any, Any]:
     rows = system.scene.rows
     for k in range(count):
         for b in range(2):
-            at = a.BODY_SIZE * b
+            at = BODY_SIZE * b
             rows.y[k, at : at + 3] = random.normal(size=3)
             q = random.normal(size=4)
             rows.y[k, at + 3 : at + 7] = q / np.linalg.norm(q)

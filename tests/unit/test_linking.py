@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -314,3 +315,114 @@ def test_what_is_compiled_for_a_scene_is_found_again_by_the_next_process(tmp_pat
         for _ in range(2)
     ]
     assert said == [["True"], ["False"]]
+
+
+def sums_and_branches(a, n):
+    best, at = -1.0, -1
+    if n > 3:
+        scale = 2.0
+    else:
+        scale = -1.0
+    row, last = a[1], a[-1, -1]
+    for k in range(n):
+        pair = (a[k, 0], a[k, 1] * scale)
+        if pair[1] > best:
+            best, at = pair[1], k
+            continue
+        for value in pair:
+            best += 0.125 * value
+            row[0] = best
+    return best, at, row[0], last, a[at, 0] if at >= 0 else scale
+
+
+def caught(a, n):
+    try:
+        total = checked_sum(a, n)
+    except Exception:
+        return -1.0
+    return total
+
+
+@jitable
+def checked_sum(a, n):
+    if n > len(a):
+        raise ValueError("too many")
+    return a[:n].sum()
+
+
+def kept_of_each(n):
+    last = np.zeros(2)
+    for k in range(n):
+        made = np.full(2, float(k))
+        if k % 2 == 0:
+            last = made
+    return last[0] + made[1]
+
+
+@pytest.mark.parametrize(
+    ("function", "make"),
+    [
+        (sums_and_branches, lambda: (np.arange(12.0).reshape(6, 2) - 3.5, 6)),
+        (sums_and_branches, lambda: (np.arange(4.0).reshape(2, 2), 2)),
+        (caught, lambda: (np.arange(3.0), 3)),
+        (caught, lambda: (np.arange(3.0), 4)),
+        (kept_of_each, lambda: (5,)),
+    ],
+)
+def test_plain_code_gives_what_python_gives(function, make):
+    jit._register()
+    assert njit(error_model="numpy")(function)(*make()) == function(*make())
+
+
+def test_variables_assigned_once_take_no_memory():
+    jit._register()
+
+    @njit
+    def placed(a, x):
+        shift = 2.0 * x
+        if x > 0.0:
+            return shift + a[1, 2]
+        return shift - a[0, 1]
+
+    assert placed(np.ones((2, 3)), 1.0) == 3.0
+    kinds = placed.nopython_signatures[0].args
+    library = placed.overloads[kinds].library
+    own = library._as_lowered or library._final_module
+    text = next(str(f) for f in own.functions if "placed" in f.name and not f.is_declaration)
+    assert "alloca" not in text
+
+
+def test_uses_and_definitions_are_numbas():
+    def numbas(blocks):
+        """Find them as Numba's own function does it, written down anew."""
+        used, defined = {}, {}
+        for at, block in blocks.items():
+            used[at], defined[at] = set(), set()
+            for statement in block.body:
+                names = {v.name for v in by_numbas_rule(statement.__dict__)}
+                if isinstance(statement, ir.Assign):
+                    read = {v.name for v in by_numbas_rule(statement.__dict__["value"])}
+                    if statement.target.name not in read:
+                        defined[at].add(statement.target.name)
+                used[at] |= names - defined[at]
+        return used, defined
+
+    for function in (sums_and_branches, kept_of_each, checked_sum):
+        blocks = run_frontend(function).blocks
+        found = numba_costs._uses_and_definitions(blocks)
+        assert (found.usemap, found.defmap) == numbas(blocks)
+
+
+def test_a_location_is_taken_by_who_names_it():
+    def without(a, b):
+        return a
+
+    def with_it(a, *, loc=None):
+        return loc
+
+    @functools.wraps(with_it)
+    def wraps_it(*args, **kwargs):
+        return with_it(*args, **kwargs)
+
+    for function in (without, with_it, wraps_it, functools.partial(with_it, 1)):
+        assert numba_costs._takes_location(function) == numba_costs._has_location(function)

@@ -309,7 +309,7 @@ BAD = {
     ),
     "limit by Hertz": (
         f'{REVOLUTE}{STOPS} motion_type="R" upper="1"/>'.replace("IMPACT", "HERTZ"),
-        ('cnf_type="HERTZ"', "IMPACT, POISSON, HUNT_CROSSLEY"),
+        ('cnf_type="HERTZ"', "HUNT_CROSSLEY, IMPACT, POISSON"),
     ),
     "limit without speed": (
         f'{REVOLUTE}{STOPS} motion_type="R" upper="1" penalty="9"/>'.replace("IMPACT", "POISSON"),

@@ -12,7 +12,7 @@ import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS
 from mbsim.compile_model.build import build
-from mbsim.dynamics.pipeline.hooks import mechanism
+from mbsim.dynamics.pipeline.problem import mechanism
 
 POINTER = ctypes.c_void_p
 HOOK = ctypes.CFUNCTYPE(
@@ -32,6 +32,13 @@ def evaluator(path):
 
     rhs.table = table
     return system, rhs
+
+
+@pytest.mark.parametrize(("name", "rigid"), [("drop_m.xml", False), ("stiction_rigid.xml", True)])
+def test_only_rigid_friction_has_its_arrays(name, rigid):
+    work = build(mbsim.read_model(MODELS / name)).scene.work
+    arrays = (work.sticking_point, work.sticking_force, work.look)
+    assert {array.size > 0 for array in arrays} == {rigid}
 
 
 @pytest.mark.parametrize("name", ["drop_m.xml", "incline_slip.xml", "sphere_pair.xml"])
@@ -100,7 +107,7 @@ def quaternion_about_z(angle):
 
 def test_incident_marker_turns_with_a_turntable(tmp_path):
     from mbsim.dynamics.bodies.kinematics import place_bodies
-    from mbsim.dynamics.contact.forces import tangent
+    from mbsim.dynamics.contact.frames import tangent
 
     # a ball on a disc, both moving bodies; the frame must turn with both
     disc = """<Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="2"/>

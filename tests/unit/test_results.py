@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,7 +16,7 @@ import pytest
 from helpers.fake_run import REQUEST, SETTINGS, add_rows, checkpoint, fake_system, fake_system_of
 from helpers.folders import PACKAGES, TESTS
 from helpers.minimal_deck import added
-from mbsim.arrays import scene as a
+from mbsim.arrays import codes
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
 from mbsim.results.log import MOST_LINES, RunLog
@@ -33,7 +34,7 @@ def recorded(folder: Path, rows: int = 10, status: str = "finished") -> Results:
     recorder = Recorder(system, SETTINGS, folder)
     add_rows(system, 0, rows)
     recorder.take()
-    system.scene.log.contacts[0, a.PEAK_FORCE] = 77.0
+    system.scene.log.contacts[0, codes.PEAK_FORCE] = 77.0
     return recorder.close(status, STATS, system.scene.log.contacts)
 
 
@@ -277,8 +278,7 @@ def test_folder_disappears(tmp_path: Path) -> None:
     recorder = Recorder(system, SETTINGS, out)
     add_rows(system, 0, 3)
     recorder.take()
-    (out / ".deck.h5.part").unlink()
-    out.rmdir()
+    shutil.rmtree(out)
     with pytest.raises(ResultsError, match="cannot be written"):
         recorder.flush(checkpoint(3))
     recorder.take()
@@ -437,8 +437,8 @@ def test_log(tmp_path: Path) -> None:
     log.line("USRMES:USER [1] INFO: hello")
     row = system.scene.log.contacts[0]
     row[:] = np.nan
-    row[[a.TOUCHES, a.PEAK_FORCE, a.FIRST_TOUCH]] = 2, 1234.5, 0.25
-    system.scene.log.rejections[0, a.REJECT_DEPTH] = 4
+    row[[codes.TOUCHES, codes.PEAK_FORCE, codes.FIRST_TOUCH]] = 2, 1234.5, 0.25
+    system.scene.log.rejections[0, codes.REJECT_DEPTH] = 4
     watch = Watch([])
     watch.add(np.array([0.0, 1.0]), np.array([[4.0, 1, 0, 0], [1, 2, 3, 0]]), np.zeros((2, 0)))
     log.close("finished", {"steps": 12, "wall_s": 0.5}, watch)

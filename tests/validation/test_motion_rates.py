@@ -122,7 +122,7 @@ def order_of(folder, name, method, tol, counts):
     """Return the order between two runs with steps of one length, against DOP853."""
     with pytest.MonkeyPatch.context() as patch:
         exact, _ = run(folder, name, "DOP853", 1e-13, rows=1)
-        patch.setitem(hooks._HOOKS, "norm", _norm_of_differences)
+        patch.setitem(hooks.HOOKS, "norm", _norm_of_differences)
         errors = []
         for n in counts:
             found, results = run(folder, name, method, tol, rows=1, h_max=END / n)

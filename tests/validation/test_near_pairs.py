@@ -19,7 +19,7 @@ from helpers.crowd_decks import (
     surface,
 )
 from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
-from mbsim.arrays.scene import ACTIVE, FREE, LISTINGS, WANTED
+from mbsim.arrays.codes import ACTIVE, FREE, LISTINGS, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact import broadphase as contact_set

@@ -11,7 +11,7 @@ import pytest
 
 import mbsim
 from helpers.folders import USERFUNCS
-from mbsim.dynamics.pipeline import hooks
+from mbsim.dynamics.pipeline import problem
 from mbsim.errors import Interrupted, ModelError, PluginError
 from mbsim.plugins import failure
 from mbsim.run import loop
@@ -75,7 +75,7 @@ def chance():
 def rejections(monkeypatch, chance):
     """Let the check of steps reject some at random; return how many it did."""
     made, kept = [], []
-    plain = hooks.mechanism
+    plain = problem.mechanism
     signature = ctypes.CFUNCTYPE(
         ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double,
         ctypes.c_void_p, ctypes.c_void_p,
@@ -95,7 +95,7 @@ def rejections(monkeypatch, chance):
         address = ctypes.cast(kept[-1], ctypes.c_void_p).value
         return problem._replace(check=address), table
 
-    monkeypatch.setattr(hooks, "mechanism", mechanism)
+    monkeypatch.setattr(problem, "mechanism", mechanism)
     return made
 
 

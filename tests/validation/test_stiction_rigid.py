@@ -163,11 +163,23 @@ def test_a_sphere_rolls_down_an_incline_without_slip(method, tmp_path):
     assert drift(results) < 1e-9
 
 
-@pytest.mark.parametrize(("margin", "slip"), [(0.003, 9.7e-7), (0.01, 2.1e-7)])
-def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(margin, slip, tmp_path):
+@pytest.mark.parametrize(
+    ("angle", "margin", "tol", "slip"),
+    [
+        (20.0, 0.003, 1e-5, 9.7e-7),
+        (20.0, 0.01, 1e-5, 2.1e-7),
+        # loose: what Newton's iteration left, some 1e-9 m, let what was held slip again after 2 s,
+        # and what slid slide ten times as far
+        (5.0, 1e-3, 1e-3, 6.88e-7),
+        (10.0, 1e-4, 1e-3, 1.473e-5),
+    ],
+)
+def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(
+    angle, margin, tol, slip, tmp_path
+):
     # as deep on all points as it would rest on a plane: it tilts onto its front points at first.
     # The slip is that of a planar integration; a point let go alone slid 0.7 m in 3 s
-    tilt = math.radians(20.0)
+    tilt = math.radians(angle)
     depth = 2.0 * G * math.cos(tilt) / 4e6
     body = f"""
 <Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.02" inertia_yy="0.02" inertia_zz="0.03"/>
@@ -175,12 +187,12 @@ def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(margin, slip, 
 <Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
   length_x="0.3" length_y="0.3" length_z="0.1"/>"""
     mu = math.tan(tilt) * (1.0 + margin)
-    model = plane(20.0) + body + rub(mu, mu, damping=2e3, dmax=1e-5)
-    results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5")
+    model = plane(angle) + body + rub(mu, mu, damping=2e3, dmax=1e-5)
+    results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5", tol=tol)
     place, turn = results["bodies/2/position"], results["bodies/2/quaternion"]
     rubs = place[:, 0] - 0.05 * 2.0 * turn[:, 2]  # the middle of its lower face
     assert -rubs[-1] == pytest.approx(slip, rel=0.05)
-    assert np.ptp(rubs[3:]) < 1e-12
+    assert np.ptp(rubs[6:]) < 1e-12
     assert len(events(results, "slip")) == len(events(results, "stick")) == 1
 
 

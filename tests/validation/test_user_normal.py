@@ -136,7 +136,8 @@ def test_check_info_and_log_name_it(tmp_path):
         mbsim.simulate(mbsim.read_model(path))
     assert CliRunner().invoke(main, ["check", str(path)]).exit_code == 2
     path = write_deck(tmp_path, dropped(**SCRIPT), 0.1)
-    said = CliRunner().invoke(main, ["info", str(path), "--json"]).stdout
+    law = mbsim.read_model(path).contacts[301].cnf.script_name
+    said = CliRunner().invoke(main, ["info", str(path), "--json", "--plugin", law]).stdout
     assert json.loads(said)["subroutines"]["Force_Contact[301] cnf"]["asks_for"] == "nothing"
     mbsim.simulate(mbsim.read_model(path), output=tmp_path / "out").close()
     log = (tmp_path / "out/deck.log").read_text()

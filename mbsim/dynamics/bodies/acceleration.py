@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_Q, AT_V, AT_W
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
 
 
 @jitable
-def accelerate(scene, y, dy):
+def accelerate(scene: Scene, y: F1, dy: F1) -> float:
     """Fill y' of every body: x' = v, q' = q (0, w)/2, m v' = F, I w' = T - w x I w in cg axes."""
     bodies, work = scene.bodies, scene.work
     total = 0.0

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_Q, AT_V, AT_W
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import matrix_from_quaternion, rotate
 
 
 @jitable
-def place_body(scene, y, b):
+def place_body(scene: Scene, y: F1, b: int) -> None:
     """Fill R, v and w (global) of moving body b from y."""
     work, at = scene.work, BODY_SIZE * b
     matrix_from_quaternion(y[at + AT_Q : at + AT_V], work.R[b])
@@ -22,14 +23,14 @@ def place_body(scene, y, b):
 
 
 @jitable
-def place_bodies(scene, y):
+def place_bodies(scene: Scene, y: F1) -> None:
     """Fill R, v and w (global) of every moving body from y; the ground's rows stay as made."""
     for b in range(len(scene.bodies.mass)):
         place_body(scene, y, b)
 
 
 @jitable
-def position(scene, y, b):
+def position(scene: Scene, y: F1, b: int) -> V3:
     """Return the cg position of body b; ground's is the global origin."""
     if b == len(scene.bodies.mass):
         return (0.0, 0.0, 0.0)
@@ -38,7 +39,7 @@ def position(scene, y, b):
 
 
 @jitable
-def place_graphic(scene, y, g):
+def place_graphic(scene: Scene, y: F1, g: int) -> None:
     """Fill the frame (centre, rotation by rows) of graphic g."""
     graphics, frame = scene.graphics, scene.work.frames[g]
     b = graphics.body[g]
@@ -56,7 +57,7 @@ def place_graphic(scene, y, g):
 
 
 @jitable
-def place_graphics(scene, y):
+def place_graphics(scene: Scene, y: F1) -> bool:
     """Place every shape that moves, and bound how far any of its points has come.
 
     Since the committed state the centre moved by |dx|, and a turn by angle a moves points at

@@ -7,33 +7,35 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3, V4
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, rotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 
 
 @jitable
-def marker_arm(scene, m):
+def marker_arm(scene: Scene, m: int) -> V3:
     """Return the vector from the cg of its body to the origin of marker m [L]."""
     return rotate(scene.work.R[scene.markers.body[m]], vector(scene.markers.p[m]))
 
 
 @jitable
-def marker_point(scene, y, m):
+def marker_point(scene: Scene, y: F1, m: int) -> V3:
     """Return the origin of marker m [L]."""
     return add(position(scene, y, scene.markers.body[m]), marker_arm(scene, m))
 
 
 @jitable
-def marker_axis(scene, m, k):
+def marker_axis(scene: Scene, m: int, k: int) -> V3:
     """Return the unit vector of axis k (0, 1, 2 for x, y, z) of marker m."""
     R = scene.markers.R[m]
     return rotate(scene.work.R[scene.markers.body[m]], (R[0, k], R[1, k], R[2, k]))
 
 
 @jitable
-def marker_velocity(scene, m):
+def marker_velocity(scene: Scene, m: int) -> V3:
     """Return the velocity of the origin of marker m, v + w x arm [L/T]."""
     b = scene.markers.body[m]
     w = vector(scene.work.w[b])
@@ -41,7 +43,7 @@ def marker_velocity(scene, m):
 
 
 @jitable
-def marker_quaternion(scene, y, m):
+def marker_quaternion(scene: Scene, y: F1, m: int) -> V4:
     """Return the unit quaternion of marker m, global, which moves on as its body's in y does.
 
     Of the products of a quaternion's components, which the rotation matrix has, the row with the

@@ -16,8 +16,7 @@ import math
 
 import numpy as np
 
-from mbsim.arrays.hooks import Held, Hook, answer_of
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ANGLE,
     ASKED,
     FOLD_POWER,
@@ -30,9 +29,11 @@ from mbsim.arrays.scene import (
     TOUCHING,
     TWIST,
     USUAL,
-    Scene,
 )
+from mbsim.arrays.hooks import Hook, Sticking, answer_of
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector
 from mbsim.dynamics.constraints.folding import SAMPLED, is_sticking, near_fold, passes_fold
@@ -57,7 +58,7 @@ NAUGHT = 1e-8
 
 
 @jitable
-def fill_equation(scene, t, y, e):
+def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
     """Fill gradient, residual and rates of equation e."""
     eq, sweep = scene.equations, scene.sweep
     value, flow, second = -eq.constant[e], 0.0, 0.0
@@ -110,22 +111,22 @@ def lasting(scene: Scene) -> np.ndarray:
 
 
 @jitable
-def fill_equations(scene, t, y):
+def fill_equations(scene: Scene, t: float, y: F1) -> None:
     """Fill gradient, residual and rates of the equations in use."""
-    if scene.world.hooks[Hook.HELD] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.PLACE, t, y)))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.PLACE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 
 
 @jitable
-def side_place(scene, m):
+def side_place(scene: Scene, m: int) -> int:
     """Return the place in the tree of the body of marker m, -1 for none."""
     return scene.tree.of_body[scene.markers.body[m]]
 
 
 @jitable
-def add_wrench(scene, e, factor):
+def add_wrench(scene: Scene, e: int, factor: float) -> None:
     """Take `factor` times the gradient of equation e from the forces p: it acts on the bodies."""
     eq, sweep = scene.equations, scene.sweep
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -137,7 +138,7 @@ def add_wrench(scene, e, factor):
 
 
 @jitable
-def along(scene, e, motion, stamp):
+def along(scene: Scene, e: int, motion: F2, stamp: int) -> float:
     """Return G_e times the spatial motions of all places.
 
     With stamp >= 0 only trees whose root carries that mark count.
@@ -154,7 +155,7 @@ def along(scene, e, motion, stamp):
 
 
 @jitable
-def answer(scene, e, stamp):
+def answer(scene: Scene, e: int, stamp: int) -> None:
     """Fill `answer` of the trees that equation e acts on with what a unit multiplier causes."""
     eq, sweep, tree = scene.equations, scene.sweep, scene.tree
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -185,7 +186,7 @@ def answer(scene, e, stamp):
 
 
 @jitable
-def fill_matrix(scene):
+def fill_matrix(scene: Scene) -> None:
     """Fill the lower part of A for the equations in use, within the skyline."""
     sweep, active = scene.sweep, scene.equations.active
     n = active_count(scene)
@@ -199,7 +200,7 @@ def fill_matrix(scene):
 
 
 @jitable
-def factor_matrix(scene, t):
+def factor_matrix(scene: Scene, t: float) -> None:
     """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier.
 
     A pivot d stands as d (1 + 1/x^8), x being d over a part of the usual ones: itself where d
@@ -230,7 +231,7 @@ def factor_matrix(scene, t):
 
 
 @jitable
-def solve_matrix(scene):
+def solve_matrix(scene: Scene) -> None:
     """Return the multipliers of `rhs`, by the equations in use."""
     sweep = scene.sweep
     A, first, x, n = sweep.A, sweep.skyline, sweep.multiplier, active_count(scene)
@@ -246,7 +247,7 @@ def solve_matrix(scene):
 
 
 @jitable
-def hold(scene, t, y):
+def hold(scene: Scene, t: float, y: F1) -> None:
     """Fill the accelerations of all places under joints and equations."""
     load(scene)
     respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
@@ -259,7 +260,7 @@ def hold(scene, t, y):
 
 
 @jitable
-def hold_again(scene, t):
+def hold_again(scene: Scene, t: float) -> None:
     """Fill the accelerations anew after forces changed; all else is as `hold` left it."""
     load(scene)
     respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
@@ -268,7 +269,7 @@ def hold_again(scene, t):
 
 
 @jitable
-def impose(scene, t):
+def impose(scene: Scene, t: float) -> None:
     """Bend accelerations of the tree alone to those that the equations allow."""
     sweep, active = scene.sweep, scene.equations.active
     nt, n = len(scene.tree.body), active_count(scene)
@@ -299,7 +300,7 @@ def impose(scene, t):
 
 
 @jitable
-def power_of_equations(scene):
+def power_of_equations(scene: Scene) -> float:
     """Return the power of what moves with time: multiplier times the rate of its equation's sum."""
     sweep, power = scene.sweep, 0.0
     for r in range(active_count(scene)):
@@ -310,7 +311,7 @@ def power_of_equations(scene):
 
 
 @jitable
-def foresee(scene, t):
+def foresee(scene: Scene, t: float) -> None:
     """Fill `answer` with what multipliers do to accelerations, if that goes on as it did.
 
     It goes on as the polynomial through what was kept does (Lagrange's form).
@@ -333,7 +334,7 @@ def foresee(scene, t):
 
 
 @jitable
-def keep_accelerations(scene, t):
+def keep_accelerations(scene: Scene, t: float) -> None:
     """Keep what multipliers do to accelerations at the committed state.
 
     Their square, in the norm of the inertia, is w = m' A m. Where a loop passes through a fold it
@@ -375,7 +376,7 @@ def keep_accelerations(scene, t):
 
 
 @jitable
-def along_motion(scene, e):
+def along_motion(scene: Scene, e: int) -> float:
     """Return G_e times the accelerations, less what G_e takes of velocities.
 
     The gradient acts on (alpha, a_cg) as a wrench about the cg does; about O the linear part of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AUDIT_TOL,
     FOLD_BEGINS,
     FOLD_ENDS,
@@ -16,6 +16,7 @@ from mbsim.arrays.scene import (
     PIVOT_TIME,
     USUAL,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, vector
 from mbsim.dynamics.constraints.in_use import active_count
@@ -45,14 +46,14 @@ REACH = 1.0
 
 
 @jitable
-def near_fold(scene):
+def near_fold(scene: Scene) -> bool:
     """Return whether the factor at hand is of a state near a position in which a loop can fold."""
     quality = scene.sweep.quality
     return quality[PIVOT] < NEAR * quality[USUAL]
 
 
 @jitable
-def passes_fold(scene, t):
+def passes_fold(scene: Scene, t: float) -> bool:
     """Return whether at t a loop passes a fold.
 
     Steps begin and end where that does; times before are those of output rows.
@@ -62,13 +63,13 @@ def passes_fold(scene, t):
 
 
 @jitable
-def is_sticking(scene, e, t):
+def is_sticking(scene: Scene, e: int, t: float) -> bool:
     """Return whether equation e holds at t: what is released does not while a fold is passed."""
     return scene.sweep.released[e] == 0 or not passes_fold(scene, t)
 
 
 @jitable
-def watch_fold(scene, t):
+def watch_fold(scene: Scene, t: float) -> None:
     """Look at the committed state how far ahead a fold is, and begin to pass one that is near.
 
     The time until there follows from how the square root of the least pivot falls. Through the
@@ -99,7 +100,7 @@ def watch_fold(scene, t):
 
 
 @jitable
-def doubted(scene, t):
+def doubted(scene: Scene, t: float) -> float:
     """Return by how much accelerations foreseen at t differ with one sample less, over V [1/T]."""
     sweep, scales, when, off = scene.sweep, scene.scales, scene.sweep.kept_at, 0.0
     count = int(sweep.quality[KEPT])
@@ -125,7 +126,7 @@ def doubted(scene, t):
 
 
 @jitable
-def leave_fold(scene, t):
+def leave_fold(scene: Scene, t: float) -> bool:
     """Return whether a fold that was being passed is left behind at the committed time t."""
     quality = scene.sweep.quality
     begins, ends = quality[FOLD_BEGINS], quality[FOLD_ENDS]

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.scene import Scene
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def active_count(scene):
+def active_count(scene: Scene) -> int:
     """Return the number of equations in use."""
     active = scene.equations.active
     return active[len(active) - 1]
 
 
 @jitable
-def is_active(scene, e):
+def is_active(scene: Scene, e: int) -> bool:
     """Return whether equation e is in use."""
     active = scene.equations.active
     for r in range(active_count(scene)):
@@ -23,6 +24,6 @@ def is_active(scene, e):
 
 
 @jitable
-def is_friction(scene, e):
+def is_friction(scene: Scene, e: int) -> bool:
     """Return whether equation e is of friction: it holds only while that sticks."""
     return scene.equations.dry[e] >= 0 or scene.equations.slot[e] >= 0

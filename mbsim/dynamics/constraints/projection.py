@@ -6,8 +6,11 @@ that the tree allows, weighted by inertia; last, velocities are treated likewise
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE, DRIFT, DRIFTER
+from mbsim.arrays.codes import DRIFT, DRIFTER, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.equations import (
@@ -43,7 +46,7 @@ FORGIVEN = 0.1
 
 
 @jitable
-def correct(scene, level, column):
+def correct(scene: Scene, level: int, column: int) -> None:
     """Fill `answer` with the motion that takes the residuals of that level and column away."""
     sweep, active = scene.sweep, scene.equations.active
     n = active_count(scene)
@@ -55,7 +58,7 @@ def correct(scene, level, column):
 
 
 @jitable
-def push(scene):
+def push(scene: Scene) -> None:
     """Fill `answer` with the motion that the multipliers cause."""
     sweep, active = scene.sweep, scene.equations.active
     for k in range(len(scene.tree.body)):
@@ -67,7 +70,7 @@ def push(scene):
 
 
 @jitable
-def displace(scene, y):
+def displace(scene: Scene, y: F1) -> None:
     """Move all bodies by the spatial displacement in `answer`.
 
     All moves are found before the first is made: they are about points that move too.
@@ -89,7 +92,7 @@ def displace(scene, y):
 
 
 @jitable
-def speed_up(scene, y):
+def speed_up(scene: Scene, y: F1) -> None:
     """Add the spatial velocities in `answer` to those of all bodies."""
     for k in range(len(scene.tree.body)):
         b = scene.tree.body[k]
@@ -102,7 +105,7 @@ def speed_up(scene, y):
 
 
 @jitable
-def largest_residual(scene, level, column, t):
+def largest_residual(scene: Scene, level: int, column: int, t: float) -> float:
     """Return the largest residual over its unit of the equations in use that hold at t."""
     largest = 0.0
     for r in range(active_count(scene)):
@@ -113,7 +116,7 @@ def largest_residual(scene, level, column, t):
 
 
 @jitable
-def note_drift(scene, level, column, part):
+def note_drift(scene: Scene, level: int, column: int, part: float) -> None:
     """Note the largest residual of motions, over its unit and times `part`, if none was larger."""
     quality = scene.sweep.quality
     for r in range(active_count(scene)):
@@ -125,7 +128,7 @@ def note_drift(scene, level, column, part):
 
 
 @jitable
-def note_gap(scene, t):
+def note_gap(scene: Scene, t: float) -> None:
     """Note as drift, over `SMALL`, a residual that Newton has left: the step is to be refused.
 
     A motion that asked for more than that of the step keeps its name: it is the cause.
@@ -145,7 +148,7 @@ def note_gap(scene, t):
 
 
 @jitable
-def prepare_equations(scene, t, y):
+def prepare_equations(scene: Scene, t: float, y: F1) -> None:
     """Fill all that follows from y: bodies, tree, equations."""
     place_bodies(scene, y)
     prepare(scene, y)
@@ -153,7 +156,7 @@ def prepare_equations(scene, t, y):
 
 
 @jitable
-def close_loops(scene, t, y):
+def close_loops(scene: Scene, t: float, y: F1) -> None:
     """Move the bodies until no equation has a residual; leave the factor of there.
 
     Newton leaves the square of a residual: after a small one neither bodies nor factor are so
@@ -179,7 +182,7 @@ def close_loops(scene, t, y):
 
 
 @jitable
-def project(scene, t, y, level):
+def project(scene: Scene, t: float, y: F1, level: int) -> None:
     """Bring y back onto all constraints, positions first.
 
     Of velocities, what equations of that level and above hold: with 2, velocities are
@@ -193,7 +196,7 @@ def project(scene, t, y, level):
     carry_all(scene, y)
     if active_count(scene) > 0:
         fill_equations(scene, t, y)
-        part = FORGIVEN * scene.world.scale[0] / scene.world.scale[1]
+        part = FORGIVEN * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
         note_drift(scene, level, MISMATCH, part)
         correct(scene, level, MISMATCH)
         speed_up(scene, y)

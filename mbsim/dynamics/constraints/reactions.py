@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.constraints.equations import (
     add_wrench,
@@ -26,7 +29,7 @@ _NEW = 1e-9
 
 
 @jitable
-def add_equation_reaction(scene, y, e, multiplier, out):
+def add_equation_reaction(scene: Scene, y: F1, e: int, multiplier: float, out: F1) -> None:
     """Add what a multiplier of equation e does to the body of I."""
     eq, sweep = scene.equations, scene.sweep
     c = eq.connection[e]
@@ -48,7 +51,7 @@ def add_equation_reaction(scene, y, e, multiplier, out):
 
 
 @jitable
-def add_reactions(scene, y, motion, out):
+def add_reactions(scene: Scene, y: F1, motion: F2, out: F1) -> None:
     """Add the reactions of all connections for forces p, accelerations and multipliers."""
     add_tree_reactions(scene, y, motion, out)
     for r in range(active_count(scene)):
@@ -56,7 +59,7 @@ def add_reactions(scene, y, motion, out):
 
 
 @jitable
-def self_stress(scene, t, y, e, out):
+def self_stress(scene: Scene, t: float, y: F1, e: int, out: F1) -> None:
     """Fill the reactions by which equation e, implied by others, and those hold each other."""
     sweep, active, n = scene.sweep, scene.equations.active, active_count(scene)
     nt = len(scene.tree.body)
@@ -81,9 +84,9 @@ def self_stress(scene, t, y, e, out):
 
 
 @jitable
-def product(scene, a, b):
+def product(scene: Scene, a: F1, b: F1) -> float:
     """Return the sum of F.F' + T.T'/L^2 over all connections."""
-    L2, total = scene.world.scale[0] ** 2, 0.0
+    L2, total = scene.world.scale[SCALE_LENGTH] ** 2, 0.0
     for c in range(len(scene.connections.i)):
         for i in range(3):
             at = 6 * c + i
@@ -92,7 +95,7 @@ def product(scene, a, b):
 
 
 @jitable
-def fill_stresses(scene, t, y):
+def fill_stresses(scene: Scene, t: float, y: F1) -> int:
     """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
     stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
@@ -115,7 +118,7 @@ def fill_stresses(scene, t, y):
 
 
 @jitable
-def sum_reactions(scene, y):
+def sum_reactions(scene: Scene, y: F1) -> None:
     """Fill reactions that hold, not yet the least of all; the state has just been evaluated."""
     out = scene.work.reaction
     for i in range(len(out)):
@@ -124,7 +127,7 @@ def sum_reactions(scene, y):
 
 
 @jitable
-def take_stresses(scene, count):
+def take_stresses(scene: Scene, count: int) -> None:
     """Take the self-stresses out of the reactions, so that these are the least."""
     out = scene.work.reaction
     for k in range(count):
@@ -135,7 +138,7 @@ def take_stresses(scene, count):
 
 
 @jitable
-def fill_reactions(scene, t, y):
+def fill_reactions(scene: Scene, t: float, y: F1) -> None:
     """Fill the reactions of all connections; the state has just been evaluated."""
     sum_reactions(scene, y)
     take_stresses(scene, fill_stresses(scene, t, y))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     CHOSEN,
     FOLDS,
     KEPT,
@@ -25,6 +25,8 @@ from mbsim.arrays.scene import (
     USUAL,
     WITHIN,
 )
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
@@ -58,7 +60,7 @@ _DOUBT, _APART = 1e-11, 1e-6
 
 
 @jitable
-def fill_size(scene, e):
+def fill_size(scene: Scene, e: int) -> None:
     """Fill the square root of what A would have for equation e if the bodies were free."""
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -77,7 +79,7 @@ def fill_size(scene, e):
 
 
 @jitable
-def share_tree(scene, e, f):
+def share_tree(scene: Scene, e: int, f: int) -> bool:
     """Return whether two equations act on bodies of one tree."""
     eq, root = scene.equations, scene.tree.root
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -94,7 +96,7 @@ def share_tree(scene, e, f):
 
 
 @jitable
-def fill_skyline(scene):
+def fill_skyline(scene: Scene) -> None:
     """Set where the rows of the matrix of the equations in use begin."""
     active = scene.equations.active
     for r in range(active_count(scene)):
@@ -105,7 +107,7 @@ def fill_skyline(scene):
 
 
 @jitable
-def sticks(scene, e):
+def sticks(scene: Scene, e: int) -> bool:
     """Return whether equation e is of friction that sticks at the point being evaluated."""
     s = scene.equations.slot[e]
     if s >= 0:
@@ -122,7 +124,7 @@ def sticks(scene, e):
 
 
 @jitable
-def use_all(scene, sticking):
+def use_all(scene: Scene, sticking: int) -> None:
     """Take all equations into use, of friction those that stick if that is wanted, or none."""
     active, count = scene.equations.active, 0
     n = len(active) - 1
@@ -135,7 +137,7 @@ def use_all(scene, sticking):
 
 
 @jitable
-def may_be_chosen(scene, e, pivot, friction):
+def may_be_chosen(scene: Scene, e: int, pivot: float, friction: int) -> bool:
     """Return whether equation e with what is left of it may be chosen; 1: friction may, too."""
     if not is_friction(scene, e):
         return True
@@ -143,7 +145,7 @@ def may_be_chosen(scene, e, pivot, friction):
 
 
 @jitable
-def choose(scene, t, y):
+def choose(scene: Scene, t: float, y: F1) -> None:
     """Choose equations that are independent at y, where the tree has been prepared.
 
     Friction holds what nothing else does: it is asked last.
@@ -195,7 +197,7 @@ def choose(scene, t, y):
 
 
 @jitable
-def implied_residual(scene, t, y):
+def implied_residual(scene: Scene, t: float, y: F1) -> tuple[float, int]:
     """Return the largest residual of the equations not in use, over its unit, and whose it is."""
     largest, worst = 0.0, -1
     for e in range(len(scene.equations.active) - 1):
@@ -208,7 +210,7 @@ def implied_residual(scene, t, y):
 
 
 @jitable
-def choose_better(scene, t, y, least):
+def choose_better(scene: Scene, t: float, y: F1, least: float) -> None:
     """Choose anew, and keep to what was chosen if no other equations are better than those.
 
     `least` is their least pivot. Where a loop can fold it vanishes whatever is chosen.
@@ -233,7 +235,7 @@ def choose_better(scene, t, y, least):
 
 
 @jitable
-def keep_selection(scene, t, y):
+def keep_selection(scene: Scene, t: float, y: F1) -> int:
     """Choose anew where the choice has worn; return 0, or a code if implied equations fail.
 
     Or LEFT where a fold was left behind: what was released does not hold exactly then.

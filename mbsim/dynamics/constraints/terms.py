@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
@@ -20,7 +22,7 @@ from mbsim.dynamics.expressions.jets import gradient
 
 
 @jitable
-def add_side(scene, y, G, m, at, force, torque):
+def add_side(scene: Scene, y: F1, G: F1, m: int, at: V3, force: V3, torque: V3) -> None:
     """Write force at a point and torque, on the body of marker m, as a wrench about its O."""
     b = scene.markers.body[m]
     k = scene.tree.of_body[b]
@@ -32,14 +34,14 @@ def add_side(scene, y, G, m, at, force, torque):
 
 
 @jitable
-def centripetal(scene, m):
+def centripetal(scene: Scene, m: int) -> V3:
     """Return the acceleration of marker m that the turning of its body alone causes."""
     w = vector(scene.work.w[scene.markers.body[m]])
     return cross(w, cross(w, marker_arm(scene, m)))
 
 
 @jitable
-def offset_term(scene, y, i, j, axis, G):
+def offset_term(scene: Scene, y: F1, i: int, j: int, axis: int, G: F1) -> V3:
     """Return value, rate and second rate of e_J . (P_I - P_J), and fill its gradient."""
     e = marker_axis(scene, j, axis)
     at = marker_point(scene, y, i)
@@ -56,7 +58,7 @@ def offset_term(scene, y, i, j, axis, G):
 
 
 @jitable
-def fill_turn(scene, y, i, j, torque, G):
+def fill_turn(scene: Scene, y: F1, i: int, j: int, torque: V3, G: F1) -> None:
     """Fill the gradient of a term that only turns: opposite torques on the two bodies."""
     zero = (0.0, 0.0, 0.0)
     add_side(scene, y, G[0:6], i, zero, zero, torque)
@@ -64,7 +66,9 @@ def fill_turn(scene, y, i, j, torque, G):
 
 
 @jitable
-def cosine(scene, i, axis_i, j, axis_j):
+def cosine(
+    scene: Scene, i: int, axis_i: int, j: int, axis_j: int
+) -> tuple[float, float, float, V3]:
     """Return value, rate, second rate and torque of a_I . b_J."""
     a, b = marker_axis(scene, i, axis_i), marker_axis(scene, j, axis_j)
     w_i, w_j = (
@@ -77,7 +81,7 @@ def cosine(scene, i, axis_i, j, axis_j):
 
 
 @jitable
-def perp_term(scene, y, i, j, axis_i, axis_j, G):
+def perp_term(scene: Scene, y: F1, i: int, j: int, axis_i: int, axis_j: int, G: F1) -> V3:
     """Return value, rate and second rate of a_I . b_J, and fill its gradient."""
     value, rate, second, torque = cosine(scene, i, axis_i, j, axis_j)
     fill_turn(scene, y, i, j, torque, G)
@@ -85,7 +89,7 @@ def perp_term(scene, y, i, j, axis_i, axis_j, G):
 
 
 @jitable
-def angle_term(scene, y, i, j, slot, G):
+def angle_term(scene: Scene, y: F1, i: int, j: int, slot: int, G: F1) -> V3:
     """Return value, rate and second rate of the angle about z, and fill its gradient.
 
     With c, s the cosines of x_I against x_J and y_J, n = c^2 + s^2: the rate is
@@ -101,7 +105,7 @@ def angle_term(scene, y, i, j, slot, G):
 
 
 @jitable
-def twist_term(scene, y, i, j, G):
+def twist_term(scene: Scene, y: F1, i: int, j: int, G: F1) -> V3:
     """Return value, rate and second rate of 2 z of the quaternion from J to I; fill its gradient.
 
     With q = (w, x, y, z), W = w_I - w_J and J's axes e: q' = (0, W) q/2 in these axes, so that
@@ -125,7 +129,7 @@ def twist_term(scene, y, i, j, G):
 
 
 @jitable
-def distance_term(scene, y, i, j, G):
+def distance_term(scene: Scene, y: F1, i: int, j: int, G: F1) -> V3:
     """Return value, rate and second rate of the distance of I and J, and fill its gradient."""
     at_i, at_j = marker_point(scene, y, i), marker_point(scene, y, j)
     d = sub(at_i, at_j)
@@ -143,7 +147,7 @@ def distance_term(scene, y, i, j, G):
 
 
 @jitable
-def touching_term(scene, y, i, j, way, s, G):
+def touching_term(scene: Scene, y: F1, i: int, j: int, way: int, s: int, G: F1) -> V2:
     """Return rate and second rate of slip along x or y of slot s, and fill its gradient.
 
     With p where the surfaces touch, t the axis and n the normal, which all go with the contact:
@@ -153,7 +157,7 @@ def touching_term(scene, y, i, j, way, s, G):
 
     and where nothing slips t' . v = -(t . n') (n . v). `stiction.rigid_contact` places the slot.
     """
-    row = scene.work.hold[s]
+    row = scene.work.sticking_point[s]
     p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
     if way == 1:
         t = cross(n, t)
@@ -171,7 +175,7 @@ def touching_term(scene, y, i, j, way, s, G):
 
 
 @jitable
-def general_term(scene, t, y, i, program, G):
+def general_term(scene: Scene, t: float, y: F1, i: int, program: int, G: F1) -> None:
     """Fill the gradient of a program with respect to the body of marker i."""
     b = scene.markers.body[i]
     out = scene.sweep.jet

@@ -15,53 +15,56 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import BODY_SIZE, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, F2, V3, V6
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 
 
 @jitable
-def origin(scene, y, k):
+def origin(scene: Scene, y: F1, k: int) -> V3:
     """Return O of the tree that place k belongs to."""
     return position(scene, y, scene.tree.body[scene.tree.root[k]])
 
 
 @jitable
-def parent_body(scene, k):
+def parent_body(scene: Scene, k: int) -> int:
     """Return the body row of the parent of place k."""
     parent = scene.tree.parent[k]
     return scene.tree.body[parent] if parent >= 0 else len(scene.bodies.mass)
 
 
 @jitable
-def parent_axis(scene, k, axis):
+def parent_axis(scene: Scene, k: int, axis: int) -> V3:
     """Return an axis of the joint's marker on the parent, global."""
     M = scene.tree.parent_R[k]
     return rotate(scene.work.R[parent_body(scene, k)], (M[0, axis], M[1, axis], M[2, axis]))
 
 
 @jitable
-def child_axis(scene, k, axis):
+def child_axis(scene: Scene, k: int, axis: int) -> V3:
     """Return an axis of the joint's marker on the child, global."""
     M = scene.tree.child_R[k]
     return rotate(scene.work.R[scene.tree.body[k]], (M[0, axis], M[1, axis], M[2, axis]))
 
 
 @jitable
-def six(row):
+def six(row: F1) -> V6:
     """Return a spatial vector as a tuple, which stores to arrays do not make be read again."""
     return (row[0], row[1], row[2], row[3], row[4], row[5])
 
 
 @jitable
-def inner(a, b):
+def inner(a: V6, b: V6) -> float:
     """Return the product of a force and a motion."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
 @jitable
-def plus(a, factor, b):
+def plus(a: V6, factor: float, b: V6) -> V6:
     """Return a + factor b."""
     return (
         a[0] + factor * b[0],
@@ -74,7 +77,7 @@ def plus(a, factor, b):
 
 
 @jitable
-def times(H, a):
+def times(H: F2, a: V6) -> V6:
     """Return H a, rows of H times a."""
     return (
         inner(six(H[0]), a),
@@ -87,7 +90,7 @@ def times(H, a):
 
 
 @jitable
-def put(row, a, b):
+def put(row: F1, a: V3, b: V3) -> None:
     """Write a spatial vector into a row."""
     for i in range(3):
         row[i] = a[i]
@@ -95,7 +98,7 @@ def put(row, a, b):
 
 
 @jitable
-def fill_directions(scene, y, k):
+def fill_directions(scene: Scene, y: F1, k: int) -> None:
     """Fill the free directions of place k, and the acceleration that velocities cause in them.
 
     A turn about e through P, e fixed to a body with angular velocity w_e and P to the child, has
@@ -154,7 +157,7 @@ def fill_directions(scene, y, k):
 
 
 @jitable
-def fill_body(scene, y, k):
+def fill_body(scene: Scene, y: F1, k: int) -> None:
     """Fill inertia about O and the force that velocities call for."""
     b = scene.tree.body[k]
     bodies, work, H = scene.bodies, scene.work, scene.sweep.H[k]
@@ -191,7 +194,7 @@ def fill_body(scene, y, k):
 
 
 @jitable
-def factor_free(scene, k):
+def factor_free(scene: Scene, k: int) -> None:
     """Fill L and W of place k: D = S'HS = L L', W = L^-1 S'H."""
     sweep, free = scene.sweep, scene.tree.free[k]
     H, S, W, L = sweep.H[k], sweep.S[k], sweep.W[k], sweep.L[k]
@@ -211,7 +214,7 @@ def factor_free(scene, k):
 
 
 @jitable
-def hang(scene, k):
+def hang(scene: Scene, k: int) -> None:
     """Factor what place k resists in its free directions and hang the rest, H - W'W, above."""
     factor_free(scene, k)
     sweep, parent = scene.sweep, scene.tree.parent[k]
@@ -228,7 +231,7 @@ def hang(scene, k):
 
 
 @jitable
-def prepare(scene, y):
+def prepare(scene: Scene, y: F1) -> None:
     """Fill all that follows from positions and velocities: inertias, directions, biases."""
     n = len(scene.tree.body)
     for k in range(n):
@@ -239,7 +242,7 @@ def prepare(scene, y):
 
 
 @jitable
-def load(scene):
+def load(scene: Scene) -> None:
     """Start the forces p of all places: what velocities call for less what acts."""
     sweep, work, tree = scene.sweep, scene.work, scene.tree
     for k in range(len(tree.body)):
@@ -252,7 +255,7 @@ def load(scene):
 
 
 @jitable
-def pass_up(scene, k, moving):
+def pass_up(scene: Scene, k: int, moving: int) -> None:
     """Find what the forces p of place k ask of its free directions; pass the rest to its parent."""
     sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
     S, W, L, z, p = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k], six(sweep.p[k])
@@ -277,7 +280,7 @@ def pass_up(scene, k, moving):
 
 
 @jitable
-def pass_down(scene, k, moving, out):
+def pass_down(scene: Scene, k: int, moving: int, out: F2) -> None:
     """Find the acceleration of place k from that of its parent: L' q'' = z - W a."""
     sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
     S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
@@ -301,7 +304,7 @@ def pass_down(scene, k, moving, out):
 
 
 @jitable
-def respond(scene, first, end, moving, out):
+def respond(scene: Scene, first: int, end: int, moving: int, out: F2) -> None:
     """Fill the accelerations `out` of places first..end that the forces p cause.
 
     `moving` 0 leaves out what velocities cause. On return p is the articulated force.
@@ -313,7 +316,7 @@ def respond(scene, first, end, moving, out):
 
 
 @jitable
-def write_accelerations(scene, dy):
+def write_accelerations(scene: Scene, dy: F1) -> float:
     """Write the accelerations of all places into y'; return their sum, finite if all are."""
     total = 0.0
     for k in range(len(scene.tree.body)):

@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    BODY_SIZE,
-    TURN_AXIS,
-    TURN_CROSS,
-    TURN_FREE,
-    TURN_LOCKED,
-    TURN_ROOT,
-)
+from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_LOCKED, TURN_ROOT
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
 from mbsim.dynamics.constraints.tree import child_axis, parent_axis, parent_body
 
 
 @jitable
-def turn_body(scene, y, b, rotation):
+def turn_body(scene: Scene, y: F1, b: int, rotation: V3) -> None:
     """Turn body b by a rotation vector, global, and place it anew."""
     angle = norm(rotation)
     if angle == 0.0:
@@ -43,7 +39,7 @@ def turn_body(scene, y, b, rotation):
 
 
 @jitable
-def set_spin(scene, y, b, w):
+def set_spin(scene: Scene, y: F1, b: int, w: V3) -> None:
     """Give body b an angular velocity, global."""
     turn = unrotate(scene.work.R[b], w)
     for i in range(3):
@@ -52,7 +48,7 @@ def set_spin(scene, y, b, w):
 
 
 @jitable
-def set_velocity(scene, y, b, v):
+def set_velocity(scene: Scene, y: F1, b: int, v: V3) -> None:
     """Give the cg of body b a velocity."""
     for i in range(3):
         scene.work.v[b, i] = v[i]
@@ -60,7 +56,7 @@ def set_velocity(scene, y, b, v):
 
 
 @jitable
-def wanted_turn(scene, k):
+def wanted_turn(scene: Scene, k: int) -> V3:
     """Return the shortest rotation vector that brings the child's axes where the joint has them."""
     turn = scene.tree.turn[k]
     if turn == TURN_LOCKED:
@@ -87,7 +83,7 @@ def wanted_turn(scene, k):
 
 
 @jitable
-def joint_arms(scene, y, k):
+def joint_arms(scene: Scene, y: F1, k: int) -> tuple[V3, V3]:
     """Return the joint's point on the child, from the child's cg and from that on the parent."""
     tree, R = scene.tree, scene.work.R
     body, parent = tree.body[k], parent_body(scene, k)
@@ -97,7 +93,7 @@ def joint_arms(scene, y, k):
 
 
 @jitable
-def project_child(scene, y, k):
+def project_child(scene: Scene, y: F1, k: int) -> None:
     """Put the child of place k where its joint has it."""
     tree = scene.tree
     body = tree.body[k]
@@ -113,7 +109,7 @@ def project_child(scene, y, k):
 
 
 @jitable
-def project_tree(scene, y):
+def project_tree(scene: Scene, y: F1) -> None:
     """Put all bodies of the trees where their joints have them, parents first."""
     for k in range(len(scene.tree.body)):
         if scene.tree.turn[k] != TURN_ROOT:
@@ -121,7 +117,7 @@ def project_tree(scene, y):
 
 
 @jitable
-def carry(scene, y, k):
+def carry(scene: Scene, y: F1, k: int) -> None:
     """Give the child of place k a velocity that its joint allows."""
     tree, work = scene.tree, scene.work
     turn, body, parent = tree.turn[k], tree.body[k], parent_body(scene, k)
@@ -151,7 +147,7 @@ def carry(scene, y, k):
 
 
 @jitable
-def carry_all(scene, y):
+def carry_all(scene: Scene, y: F1) -> None:
     """Give all bodies of the trees velocities that their joints allow, parents first."""
     for k in range(len(scene.tree.body)):
         if scene.tree.turn[k] != TURN_ROOT:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, scale, sub
 from mbsim.dynamics.bodies.markers import marker_point
@@ -9,7 +11,9 @@ from mbsim.dynamics.constraints.tree import origin
 
 
 @jitable
-def add_reaction(scene, y, c, place, wrench, factor, out):
+def add_reaction(
+    scene: Scene, y: F1, c: int, place: int, wrench: F1, factor: float, out: F1
+) -> None:
     """Add `factor` times a wrench about O of that place to the reaction of connection c."""
     at = sub(marker_point(scene, y, scene.connections.i[c]), origin(scene, y, place))
     force = scale(factor, (wrench[3], wrench[4], wrench[5]))
@@ -20,7 +24,7 @@ def add_reaction(scene, y, c, place, wrench, factor, out):
 
 
 @jitable
-def add_tree_reaction(scene, y, c, motion, out):
+def add_tree_reaction(scene: Scene, y: F1, c: int, motion: F2, out: F1) -> None:
     """Add what the joint of the tree carries: H A + p of all that hangs on it."""
     sweep, k = scene.sweep, scene.connections.tree[c]
     for i in range(6):
@@ -34,7 +38,7 @@ def add_tree_reaction(scene, y, c, motion, out):
 
 
 @jitable
-def add_tree_reactions(scene, y, motion, out):
+def add_tree_reactions(scene: Scene, y: F1, motion: F2, out: F1) -> None:
     """Add the reactions of all joints of the tree, for forces p and accelerations."""
     for c in range(len(scene.connections.i)):
         if scene.connections.tree[c] >= 0:

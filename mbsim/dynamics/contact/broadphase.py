@@ -12,8 +12,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import ACTIVE, BODY_SIZE, FIXED, FREE, LISTINGS, WANTED
+from mbsim.arrays.codes import ACTIVE, FIXED, FREE, LISTINGS, WANTED
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.dynamics.contact.detection import measure_pair
 
@@ -24,7 +27,7 @@ MOST_HALVINGS = 20
 
 
 @jitable
-def fill_box(scene, g, skin):
+def fill_box(scene: Scene, g: int, skin: float) -> None:
     """Write the box of graphic g, grown by half the skin."""
     graphics, frame, box = scene.graphics, scene.work.frames[g], scene.broadphase.box[g]
     for r in range(3):
@@ -39,7 +42,7 @@ def fill_box(scene, g, skin):
 
 
 @jitable
-def boxes_meet(scene, i, j):
+def boxes_meet(scene: Scene, i: int, j: int) -> bool:
     """Return whether the boxes of two graphics overlap."""
     a, b = scene.broadphase.box[i], scene.broadphase.box[j]
     for k in range(3):
@@ -49,7 +52,7 @@ def boxes_meet(scene, i, j):
 
 
 @jitable
-def balls_meet(scene, i, j, skin):
+def balls_meet(scene: Scene, i: int, j: int, skin: float) -> bool:
     """Return whether the balls around two graphics are nearer than the skin."""
     a, b = scene.work.frames[i], scene.work.frames[j]
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
@@ -58,7 +61,7 @@ def balls_meet(scene, i, j, skin):
 
 
 @jitable
-def above_plane(scene, plane, g, skin):
+def above_plane(scene: Scene, plane: int, g: int, skin: float) -> bool:
     """Return whether a shape is farther than the skin above a plane."""
     frame = scene.work.frames[plane]
     d = sub(vector(scene.work.frames[g]), vector(frame))
@@ -67,7 +70,7 @@ def above_plane(scene, plane, g, skin):
 
 
 @jitable
-def near(scene, i, j, skin):
+def near(scene: Scene, i: int, j: int, skin: float) -> bool:
     """Return whether two graphics are to be listed."""
     radius, ground = scene.graphics.radius, len(scene.bodies.mass)
     for plane, other in ((i, j), (j, i)):
@@ -79,7 +82,7 @@ def near(scene, i, j, skin):
 
 
 @jitable
-def place_of(scene, kind, i, j):
+def place_of(scene: Scene, kind: int, i: int, j: int) -> int:
     """Return the place of a listed pair, -1 if there is none."""
     pairs, at = scene.pairs, scene.broadphase.head[i]
     while at >= 0:
@@ -90,7 +93,7 @@ def place_of(scene, kind, i, j):
 
 
 @jitable
-def hold(scene, pair):
+def hold(scene: Scene, pair: int) -> None:
     """Keep a place in the list."""
     pairs, broadphase = scene.pairs, scene.broadphase
     pairs.active[pairs.count[ACTIVE]] = pair
@@ -101,7 +104,7 @@ def hold(scene, pair):
 
 
 @jitable
-def add_pair(scene, contact_set, i, j):
+def add_pair(scene: Scene, contact_set: int, i: int, j: int) -> None:
     """List the I graphic i with the J graphic j of a large contact unless they are listed."""
     graphics, pairs, broadphase = scene.graphics, scene.pairs, scene.broadphase
     if graphics.body[i] == graphics.body[j]:
@@ -128,7 +131,7 @@ def add_pair(scene, contact_set, i, j):
 
 
 @jitable
-def against_all(scene, contact_set, i, others, skin):
+def against_all(scene: Scene, contact_set: int, i: int, others: int, skin: float) -> None:
     """List graphic i with those of the contact's other side that are near; 0: it is their J."""
     broadphase = scene.broadphase
     first, last = (
@@ -148,13 +151,13 @@ def against_all(scene, contact_set, i, others, skin):
 
 
 @jitable
-def usual_size(scene, g):
+def usual_size(scene: Scene, g: int) -> bool:
     """Return whether a graphic belongs into the grid."""
     return scene.graphics.radius[g] <= GIANT * scene.broadphase.size[1]
 
 
 @jitable
-def cell_range(scene, contact_set):
+def cell_range(scene: Scene, contact_set: int) -> tuple[V3, float, int, int, int]:
     """Return lowest corner, width and numbers of the cells that hold the J members' centres."""
     broadphase, frames = scene.broadphase, scene.work.frames
     low = (math.inf, math.inf, math.inf)
@@ -186,22 +189,24 @@ def cell_range(scene, contact_set):
 
 
 @jitable
-def cell_at(scene, g, low, width, r, n):
+def cell_at(scene: Scene, g: int, low: V3, width: float, r: int, n: int) -> int:
     """Return the number, -2 to n + 1, of the cell along axis r where graphic g's centre is."""
     number = math.floor((scene.work.frames[g, r] - low[r]) / width)
     return int(max(-2.0, min(number, n + 1.0)))
 
 
 @jitable
-def search(scene, contact_set, skin):
-    """List all near pairs of a large contact."""
-    broadphase = scene.broadphase
-    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
-    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
-    low, width, nx, ny, nz = cell_range(scene, contact_set)
-    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
+def fill_cells(
+    scene: Scene, contact_set: int, grid: tuple[V3, float, int, int, int], skin: float
+) -> int:
+    """List members of J cell by cell; return how many. Planes and giants are taken against every I.
 
-    # J members cell by cell; planes and giants at once against every I
+    start[c + 1] is then where cell c begins; the next cell's begin is its end.
+    """
+    broadphase = scene.broadphase
+    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
+    low, width, nx, ny, nz = grid
+    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
     for cell in range(cells + 1):
         start[cell] = 0
     for k in range(first_j, last_j):
@@ -222,11 +227,21 @@ def search(scene, contact_set, skin):
             # the end of a cell's range moves down to its begin
             start[broadphase.cell[j] + 1] -= 1
             order[start[broadphase.cell[j] + 1]] = j
-
-    # start[c + 1] is now where cell c begins; the next cell's begin is its end
     usual = 0
     for k in range(first_j, last_j):
         usual += 1 if usual_size(scene, broadphase.member[k]) else 0
+    return usual
+
+
+@jitable
+def search(scene: Scene, contact_set: int, skin: float) -> None:
+    """List all near pairs of a large contact."""
+    broadphase = scene.broadphase
+    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
+    grid = cell_range(scene, contact_set)
+    usual = fill_cells(scene, contact_set, grid, skin)
+    low, width, nx, ny, nz = grid
+    start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
     for k in range(first_i, last_i):
         i = broadphase.member[k]
         if not usual_size(scene, i):
@@ -253,7 +268,7 @@ def search(scene, contact_set, skin):
 
 
 @jitable
-def keep_near(scene, skin):
+def keep_near(scene: Scene, skin: float) -> None:
     """Begin the list with the pairs that still are near or touch; free the others."""
     pairs, broadphase = scene.pairs, scene.broadphase
     for g in range(len(broadphase.head)):
@@ -271,7 +286,7 @@ def keep_near(scene, skin):
 
 
 @jitable
-def order_by_graphic(scene):
+def order_by_graphic(scene: Scene) -> None:
     """Put pairs into the order of their I graphics, near each other in memory."""
     pairs, broadphase = scene.pairs, scene.broadphase
     at = pairs.count[FIXED]
@@ -284,7 +299,7 @@ def order_by_graphic(scene):
 
 
 @jitable
-def put_aside(scene, k, s, row):
+def put_aside(scene: Scene, k: int, s: int, row: F1) -> None:
     """Copy all that belongs to the touching slot s into `row`, or with k = 1 back from it."""
     state, work = scene.state, scene.work
     at = 0
@@ -323,7 +338,7 @@ def put_aside(scene, k, s, row):
 
 
 @jitable
-def close_ranks(scene):
+def close_ranks(scene: Scene) -> None:
     """Move pairs to places in the order of the list, with their slots that touch.
 
     An evaluation then walks through memory from front to back; pairs that come and go would
@@ -371,7 +386,7 @@ def close_ranks(scene):
 
 
 @jitable
-def list_pairs(scene, y):
+def list_pairs(scene: Scene, y: F1) -> None:
     """List the near pairs of all large contacts at the committed state, and how long that holds."""
     broadphase, pairs = scene.broadphase, scene.pairs
     ground = len(scene.bodies.mass)
@@ -403,7 +418,7 @@ def list_pairs(scene, y):
 
 
 @jitable
-def follow(scene, y):
+def follow(scene: Scene, y: F1) -> None:
     """Find out how far each member may still move; list the pairs anew where half of it is gone."""
     broadphase, graphics = scene.broadphase, scene.graphics
     half = 0.5 * broadphase.size[0]

@@ -7,17 +7,19 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
-from mbsim.geometry.catalog import COUPLE
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, COUPLE
 
 
 @jitable
-def measure_pair(scene, pair):
+def measure_pair(scene: Scene, pair: int) -> bool:
     """Run a pair's closed form into its rows of `points`; False where FCL has to do it."""
     pairs, kinds, work = scene.pairs, scene.kinds, scene.work
     kind = pairs.kind[pair]
@@ -37,13 +39,13 @@ def measure_pair(scene, pair):
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):
-                work.points[s, 4 + k] = -work.points[s, 4 + k]
+                work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
     return True
 
 
 @jitable
-def gather(scene, pair):
+def gather(scene: Scene, pair: int) -> None:
     """Append the slots of a pair that touch to the list of hits."""
     work, hit = scene.work, scene.work.hit
     kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
@@ -51,7 +53,7 @@ def gather(scene, pair):
     # of one region the points behind the first row are in that
     count = scene.kinds.slots[kind] if scene.kinds.whole[kind] == 0.0 else 1
     for s in range(first, first + count):
-        depth = work.points[s, 0]
+        depth = work.points[s, AT_DEPTH]
         if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
             work.touching[s] = 1
             hit[hit[last]] = s
@@ -59,7 +61,7 @@ def gather(scene, pair):
 
 
 @jitable
-def find_contacts(scene, y):
+def find_contacts(scene: Scene, y: F1) -> int:
     """Fill the list of slots that touch, with their points; return 0, or a code."""
     pairs, work, log = scene.pairs, scene.work, scene.log
     hit, last = work.hit, len(work.hit) - 1

@@ -11,49 +11,64 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
-    AGAIN,
-    BODY_SIZE,
-    FRICTION_CALLS,
-    NORMAL_CALLS,
-    NOW,
-    PYTHON_CALLS,
-)
+from mbsim.arrays.codes import FRICTION_CALLS, NORMAL_CALLS, NOW, PYTHON_CALLS
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import (
     add,
-    any_tangent,
     cross,
     dot,
     norm,
-    rotate,
     scale,
-    spin,
     sub,
-    turn_about,
-    turn_with_normal,
     unrotate,
     vector,
 )
 from mbsim.dynamics.bodies.kinematics import position
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY, plane_axes
+from mbsim.dynamics.contact.frames import tangent
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    plane_axes,
+)
 from mbsim.laws.abi import (
+    AREA_IN,
     BRANCH_OUT,
+    ELASTIC,
+    ENERGY,
     FRICTION_INPUTS,
     FROZEN,
     GROWTH,
     LIMIT_RATE,
+    LOAD,
+    LOCI_IN,
+    LOCJ_IN,
     MEMORY_OUT,
     MODE_OUT,
+    NFORCE_IN,
     NORMAL_RATE,
     NORMAL_STIFFNESS,
+    RADIUS_IN,
+    ROLLING_IN,
     SLIDING_LIMIT,
     SLIPPING_MASS,
+    STEP_IN,
     STORED_OUT,
+    TIME_IN,
     UNIT_OUT,
+    X_IN,
+    XDOT_IN,
 )
 from mbsim.laws.user_normal import AREA as PLACE_AREA
 from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
@@ -83,60 +98,14 @@ HELD_BACK = 0.25
 
 
 @jitable
-def velocity_at(scene, y, b, p):
+def velocity_at(scene: Scene, y: F1, b: int, p: V3) -> V3:
     """Return the velocity of body b's material point at p."""
     arm = sub(p, position(scene, y, b))
     return add(vector(scene.work.v[b]), cross(vector(scene.work.w[b]), arm))
 
 
 @jitable
-def turned(scene, t, y, b, n, n0):
-    """Return the angle by which body b turned about n since the committed state, where it was n0.
-
-    What follows a frame through many steps must not depend on how long they are.
-    """
-    if b == len(scene.bodies.mass):
-        return 0.0
-    state, at = scene.state, BODY_SIZE * b + 3
-    q, w, w0 = (y[at], y[at + 1], y[at + 2], y[at + 3]), scene.work.w[b], state.w[b]
-    return turn_about(q, state.q[b], vector(w), vector(w0), n, n0, t - state.since[0])
-
-
-@jitable
-def birth_tangent(scene, graphic_i, n):
-    """Return the x-axis of a new incident marker: I's marker x-axis (or y), projected."""
-    R = scene.work.R[scene.graphics.body[graphic_i]]
-    S = scene.graphics.marker_R[graphic_i]
-    x = rotate(R, (S[0, 0], S[1, 0], S[2, 0]))
-    if abs(dot(x, n)) > 0.9:
-        x = rotate(R, (S[0, 1], S[1, 1], S[2, 1]))
-    x = sub(x, scale(dot(x, n), n))
-    return scale(1.0 / math.sqrt(dot(x, x)), x)
-
-
-@jitable
-def tangent(scene, time, y, s, c, graphic_i, bi, bj, n):
-    """Return the x-axis of the incident marker of slot s of contact c at the trial point.
-
-    Since the committed state it has turned with the normal by the shortest rotation and about
-    the normal by the mean of both bodies' turns; a new incident gets its axes by birth.
-    """
-    state = scene.state
-    if scene.contacts.framed[c] == 0:
-        # the law is the same in every tangent frame
-        return any_tangent(n)
-    if scene.world.past[0] == AGAIN:
-        return vector(state.t[s])
-    if state.touching[s] == 0:
-        return birth_tangent(scene, graphic_i, n)
-    n0 = vector(state.n[s])
-    t = turn_with_normal(vector(state.t[s]), n0, n)
-    both = turned(scene, time, y, bi, n, n0) + turned(scene, time, y, bj, n, n0)
-    return spin(t, n, 0.5 * both)
-
-
-@jitable
-def in_marker(scene, y, g, p):
+def in_marker(scene: Scene, y: F1, g: int, p: V3) -> V3:
     """Return point p from the origin of graphic g's reference marker, in that marker's axes."""
     b = scene.graphics.body[g]
     in_body = unrotate(scene.work.R[b], sub(p, position(scene, y, b)))
@@ -144,14 +113,14 @@ def in_marker(scene, y, g, p):
 
 
 @jitable
-def along_marker(scene, g, v):
+def along_marker(scene: Scene, g: int, v: V3) -> V3:
     """Return a vector along the axes of graphic g's reference marker."""
     in_body = unrotate(scene.work.R[scene.graphics.body[g]], v)
     return unrotate(scene.graphics.marker_R[g], in_body)
 
 
 @jitable
-def sides(scene, s):
+def sides(scene: Scene, s: int) -> tuple[int, int]:
     """Return the graphics of a slot in the contact's order: I, J."""
     pair = scene.slots.pair[s]
     i, j = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
@@ -161,25 +130,25 @@ def sides(scene, s):
 
 
 @jitable
-def contact_of(scene, s):
+def contact_of(scene: Scene, s: int) -> int:
     """Return the contact of slot s."""
     return scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
 
 
 @jitable
-def face_weight_of(scene, s):
-    """Return the shares of a flat face where slot s is the one incident of its pair, else 0."""
+def face_weight_of(scene: Scene, s: int) -> float:
+    """Return the weights of a flat face where slot s is the one incident of its pair, else 0."""
     return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
 
 
 @jitable
-def patch(scene, s):
+def patch(scene: Scene, s: int) -> float:
     """Return the area of contact of slot s, 0 for a point."""
     return scene.work.slot[s, PATCH] if face_weight_of(scene, s) > 0.0 else 0.0
 
 
 @jitable
-def add_wrench(scene, y, b, p, force, torque):
+def add_wrench(scene: Scene, y: F1, b: int, p: V3, force: V3, torque: V3) -> None:
     """Add a force at p and a torque to body b."""
     arm = sub(p, position(scene, y, b))
     moment = add(cross(arm, force), torque)
@@ -189,7 +158,7 @@ def add_wrench(scene, y, b, p, force, torque):
 
 
 @jitable
-def slipping_mass(scene, s):
+def slipping_mass(scene: Scene, s: int) -> float:
     """Return the mass of both bodies of slot s as one slips on the other, a part for each point."""
     inverse = 0.0
     for g in sides(scene, s):
@@ -201,7 +170,7 @@ def slipping_mass(scene, s):
 
 
 @jitable
-def remember(scene, y, s, c, given):
+def remember(scene: Scene, y: F1, s: int, c: int, given: F1) -> None:
     """Give a friction law what it kept, and what only laws with memory look at."""
     state, at, z, row = scene.state, FRICTION_INPUTS, scene.slots.z[s], scene.work.slot[s]
     carried = scene.contacts.carried[c]
@@ -209,7 +178,7 @@ def remember(scene, y, s, c, given):
     given[NORMAL_STIFFNESS], given[GROWTH] = row[STIFFNESS], row[STIFFENS]
     given[SLIPPING_MASS] = slipping_mass(scene, s)
     given[SLIDING_LIMIT] = math.nan
-    known = row[FOUND_AT] == given[0]
+    known = row[FOUND_AT] == given[TIME_IN]
     given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
     given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
     for k in range(scene.contacts.memory[c]):
@@ -222,7 +191,7 @@ def remember(scene, y, s, c, given):
 
 
 @jitable
-def keep(scene, dy, s, c, out):
+def keep(scene: Scene, dy: F1, s: int, c: int, out: F1) -> None:
     """Keep what a friction law with memory made of it."""
     row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
     row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
@@ -234,14 +203,26 @@ def keep(scene, dy, s, c, out):
 
 
 @jitable
-def show_state(scene, y):
+def show_state(scene: Scene, y: F1) -> None:
     """Let interpreted laws that ask for it see the trial point."""
     for k in range(len(scene.users.seen)):
         scene.users.seen[k] = y[k]
 
 
 @jitable
-def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
+def friction(
+    scene: Scene,
+    t: float,
+    h: float,
+    y: F1,
+    s: int,
+    c: int,
+    loci: V3,
+    locj: V3,
+    spin_rates: V3,
+    slip: V2,
+    normal: float,
+) -> int:
     """Call the friction law of contact c for slot s into `law_out`; return its code.
 
     Many arguments because compiled code is given numbers, not records.
@@ -249,18 +230,18 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
     contacts, work = scene.contacts, scene.work
     given = work.law_in
     at = scene.slots.x[s]
-    given[0] = t
-    given[1] = h
+    given[TIME_IN] = t
+    given[STEP_IN] = h
     for k in range(3):
-        given[2 + k] = y[at + k] if at >= 0 else 0.0
-        given[13 + k] = loci[k]
-        given[16 + k] = locj[k]
-    given[5], given[6], given[7] = slip[0], slip[1], spin_rates[2]
-    given[8], given[9] = spin_rates[0], spin_rates[1]
-    given[10] = normal
+        given[X_IN + k] = y[at + k] if at >= 0 else 0.0
+        given[LOCI_IN + k] = loci[k]
+        given[LOCJ_IN + k] = locj[k]
+    given[XDOT_IN], given[XDOT_IN + 1], given[XDOT_IN + 2] = slip[0], slip[1], spin_rates[2]
+    given[ROLLING_IN], given[ROLLING_IN + 1] = spin_rates[0], spin_rates[1]
+    given[NFORCE_IN] = normal
     area = patch(scene, s)
-    given[11] = area
-    given[12] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
+    given[AREA_IN] = area
+    given[RADIUS_IN] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
     if contacts.memory[c] > 0:
         remember(scene, y, s, c, given)
     scene.log.counters[FRICTION_CALLS] += 1
@@ -279,7 +260,16 @@ def friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, normal):
 
 
 @jitable
-def ask_normal(scene, t, y, c, at, depth, rate, out):
+def ask_normal(
+    scene: Scene,
+    t: float,
+    y: F1,
+    c: int,
+    at: tuple[int, int, V3, V3, float],
+    depth: float,
+    rate: float,
+    out: F1,
+) -> int:
     """Call the normal law of contact c into `out`; `at`: graphics I and J, point, normal, area."""
     contacts = scene.contacts
     if contacts.user_normal[c] == 0:
@@ -301,13 +291,13 @@ def ask_normal(scene, t, y, c, at, depth, rate, out):
     place[PLACE_MODE] = EVALUATE
     code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     place[PLACE_MODE] = EXPLORE
-    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[0]):
+    if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[LOAD]):
         return Code.USER_NORMAL_FAILED
     return code
 
 
 @jitable
-def yielding(scene, y, b, p, n):
+def yielding(scene: Scene, y: F1, b: int, p: V3, n: V3) -> float:
     """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
     bodies = scene.bodies
     if b == len(bodies.mass):
@@ -318,7 +308,9 @@ def yielding(scene, y, b, p, n):
 
 
 @jitable
-def hold_back(scene, y, bi, bj, p, n, h, slip, out):
+def hold_back(
+    scene: Scene, y: F1, bi: int, bj: int, p: V3, n: V3, h: float, slip: V2, out: F1
+) -> None:
     """Reduce a friction force to a quarter of what would stop the slip within the step.
 
     Friction that turns sign from step to step would shake what rests; a quarter, since some
@@ -334,7 +326,17 @@ def hold_back(scene, y, bi, bj, p, n, h, slip, out):
 
 
 @jitable
-def tilting(scene, t, y, c, s, at, depth, normal, w):
+def tilting(
+    scene: Scene,
+    t: float,
+    y: F1,
+    c: int,
+    s: int,
+    at: tuple[int, int, V3, V3, float],
+    depth: float,
+    normal: float,
+    w: V3,
+) -> tuple[int, V3, float]:
     """Return code, couple on I and power lost of the points of slot s that are damped one by one.
 
     With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
@@ -356,12 +358,12 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
         return 0, none, 0.0
     rate = math.sqrt(square)
     code = ask_normal(scene, t, y, c, at, depth, rate, out)
-    closing = out[0]
+    closing = out[LOAD]
     if code == 0:
         code = ask_normal(scene, t, y, c, at, depth, -rate, out)
     if code != 0:
         return code, none, 0.0
-    damping = (closing - out[0]) / (2.0 * rate)
+    damping = (closing - out[LOAD]) / (2.0 * rate)
     about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
     size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
     part = most / size if size > most else 1.0
@@ -371,17 +373,18 @@ def tilting(scene, t, y, c, s, at, depth, normal, w):
 
 
 @jitable
-def add_contact(scene, t, h, y, dy, s):
+def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:  # noqa: C901
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
 
-    Long because normal force, friction and torques share the contact's frame and velocities.
+    Long, with many branches, because normal force, friction and torques share the contact's frame
+    and velocities.
     """
     contacts, work = scene.contacts, scene.work
     c = contact_of(scene, s)
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
-    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
 
     # how the surfaces move at p
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
@@ -405,11 +408,11 @@ def add_contact(scene, t, h, y, dy, s):
     code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
     if code != 0:
         return code
-    share = point[7]
-    normal, elastic, stored = share * out[0], share * out[1], share * out[2]
+    weight = point[AT_WEIGHT]
+    normal, elastic, stored = weight * out[LOAD], weight * out[ELASTIC], weight * out[ENERGY]
     lost = (normal - elastic) * rate
-    # of shares that turn with the shapes
-    couple = scale(out[1] if whole > 0.0 else out[2], vector(point[COUPLE:]))
+    # of weights that turn with the shapes
+    couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
     row[HELD] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
@@ -418,7 +421,7 @@ def add_contact(scene, t, h, y, dy, s):
         row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
     if whole > 0.0:
         # see geometry.region
-        stored = whole * out[2]
+        stored = whole * out[ENERGY]
         code, torque, damped = tilting(scene, t, y, c, s, at_place, depth, normal, w)
         if code != 0:
             return code

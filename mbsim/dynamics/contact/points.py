@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
-    BODY_SIZE,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -32,9 +30,13 @@ from mbsim.arrays.scene import (
     TOUCHES,
     USED_EVENTS,
 )
-from mbsim.arrays.scene import SLIP as SLIP_EVENT
+from mbsim.arrays.codes import SLIP as SLIP_EVENT
+from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
@@ -50,15 +52,16 @@ from mbsim.dynamics.contact.forces import (
     sides,
     velocity_at,
 )
-from mbsim.geometry.catalog import axis
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
 from mbsim.laws import catalog
+from mbsim.laws.abi import ELASTIC, ENERGY
 
 
 @jitable
-def effective_mass(scene, y, s):
+def effective_mass(scene: Scene, y: F1, s: int) -> float:
     """Return the mass that meets in slot s along its normal: 1 / (n J M^-1 J' n)."""
     point = scene.work.points[s]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     inverse = 0.0
     gi, gj = sides(scene, s)
     for g in (gi, gj):
@@ -71,7 +74,7 @@ def effective_mass(scene, y, s):
 
 
 @jitable
-def deepest_of_impact(scene, c, energy):
+def deepest_of_impact(scene: Scene, c: int, energy: float) -> float:
     """Return the depth at which contact c has stored `energy`: how deep an impact goes, to 1 %.
 
     Newton for log E over log d, whose slope is F d / E: exact at once for a power law.
@@ -82,19 +85,19 @@ def deepest_of_impact(scene, c, energy):
     depth = 1e-4 * scene.world.scale[SCALE_LENGTH]
     for _ in range(50):
         call_int(contacts.normal_law[c], (depth, 0.0, contacts.normal_par[c], out))
-        if out[2] <= 0.0 or not out[1] > 0.0:
+        if out[ENERGY] <= 0.0 or not out[ELASTIC] > 0.0:
             depth *= 16.0
             continue
-        ratio = energy / out[2]
+        ratio = energy / out[ENERGY]
         if 0.99 < ratio < 1.01:
             break
-        change = ratio ** (out[2] / (out[1] * depth))
+        change = ratio ** (out[ENERGY] / (out[ELASTIC] * depth))
         depth *= min(1e4, max(1e-4, change))
     return depth
 
 
 @jitable
-def first_depth(scene, t, h, y):
+def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
     """Return 1, or the part of the step to take so that a new incident begins shallow.
 
     The first depth of an impact is at most max(v Tc/70, 1e-3 dmax), with v the closing speed
@@ -115,7 +118,7 @@ def first_depth(scene, t, h, y):
             continue
         c = scene.kinds.contact[kind]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
-        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, 7]
+        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, AT_WEIGHT]
         deepest = deepest_of_impact(scene, c, energy)
         allowed = max(3.0 * deepest / 70.0, 1e-3 * contacts.dmax[c])
         if depth > allowed:
@@ -129,7 +132,7 @@ def first_depth(scene, t, h, y):
 
 
 @jitable
-def record_event(scene, t, kind, s):
+def record_event(scene: Scene, t: float, kind: int, s: int) -> None:
     """Append an event; the driver empties the table before it can overflow."""
     rows = scene.rows
     k = rows.used[USED_EVENTS]
@@ -142,7 +145,7 @@ def record_event(scene, t, kind, s):
 
 
 @jitable
-def crossing(depth0, rate0, depth1, rate1, h):
+def crossing(depth0: float, rate0: float, depth1: float, rate1: float, h: float) -> float:
     """Return the part of the step at which the depth crosses zero, by its Hermite cubic."""
     low, high = 0.0, 1.0
     rising = depth1 > depth0
@@ -161,7 +164,7 @@ def crossing(depth0, rate0, depth1, rate1, h):
 
 
 @jitable
-def log_touch(scene, t, h, y, s):
+def log_touch(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
     """Note that slot s began to touch within the step that ends at t."""
     row, log = scene.work.slot[s], scene.log.contacts[contact_of(scene, s)]
     speed = max(row[RATE], 0.0)
@@ -179,11 +182,11 @@ def log_touch(scene, t, h, y, s):
 
 
 @jitable
-def log_leave(scene, t, h, y, s):
+def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
     """Note that slot s ceased to touch within the step that ends at t."""
     state, log = scene.state, scene.log.contacts[contact_of(scene, s)]
     depth, rate = state.depth[s], state.rate[s]
-    after = scene.work.points[s, 0]
+    after = scene.work.points[s, AT_DEPTH]
     if after < 0.0 and after > -1e3 * depth:
         part = crossing(depth, rate, after, min(rate, (after - depth) / h), h)
     else:
@@ -200,7 +203,7 @@ def log_leave(scene, t, h, y, s):
 
 
 @jitable
-def watch_peaks(scene, t):
+def watch_peaks(scene: Scene, t: float) -> None:
     """Keep the largest force, depth and slip of every contact at the point just evaluated."""
     work, net, hit = scene.work, scene.work.net, scene.work.hit
     if hit[len(hit) - 1] == 0:
@@ -223,7 +226,7 @@ def watch_peaks(scene, t):
 
 
 @jitable
-def reversal(scene, h):
+def reversal(scene: Scene, h: float) -> float:
     """Return where in the step (0..1) a contact was deepest, or -1: closing before, opening after.
 
     Called before `commit`: the committed table holds the begin of the step, `work` its end.
@@ -239,7 +242,7 @@ def reversal(scene, h):
 
 
 @jitable
-def bounding_gap(scene, pair):
+def bounding_gap(scene: Scene, pair: int) -> float:
     """Return a lower bound of two shapes' distance: ball of one to box or plane of the other."""
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     best = -math.inf
@@ -260,14 +263,14 @@ def bounding_gap(scene, pair):
 
 
 @jitable
-def measure_gap(scene, pair, measured):
+def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
     """Store how far apart the pair is at the accepted point, where it may be `measured` already."""
     pairs, work = scene.pairs, scene.work
     closed_form = scene.kinds.kernel[pairs.kind[pair]] != 0
     if (measured and closed_form) or measure_pair(scene, pair):
         first, deepest = pairs.slot[pair], -math.inf
         for s in range(first, first + scene.kinds.slots[pairs.kind[pair]]):
-            deepest = max(deepest, work.points[s, 0])
+            deepest = max(deepest, work.points[s, AT_DEPTH])
         gap = -deepest
     else:
         gap = bounding_gap(scene, pair)
@@ -275,10 +278,10 @@ def measure_gap(scene, pair, measured):
 
 
 @jitable
-def another_point(scene, y, h, s):
+def another_point(scene: Scene, y: F1, h: float, s: int) -> bool:
     """Return whether the point that FCL gives for slot s is too far to be the one before."""
     point, before = scene.work.points[s], scene.state.p[s]
-    p = (point[1], point[2], point[3])
+    p = vector(point[AT_POINT:])
     gi, gj = sides(scene, s)
     graphics = scene.graphics
     speed = norm(velocity_at(scene, y, graphics.body[gi], p))
@@ -289,7 +292,7 @@ def another_point(scene, y, h, s):
 
 
 @jitable
-def commit_memory(scene, t, y, s, fresh):
+def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
     """Keep what friction in slot s makes of the step, anew if `fresh`.
 
     Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
@@ -313,7 +316,7 @@ def commit_memory(scene, t, y, s, fresh):
 
 
 @jitable
-def commit_slot(scene, t, h, y, s):
+def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
     """Write the incident of slot s for the accepted point; return what `commit` does."""
     state, work = scene.state, scene.work
     now, before = work.touching[s], state.touching[s]
@@ -350,14 +353,14 @@ def commit_slot(scene, t, h, y, s):
         state.normal[s] = work.slot[s, NORMAL]
         if scene.world.fixed_step[0] == 0 or scene.contacts.framed[contact_of(scene, s)] == 1:
             for k in range(3):
-                state.p[s, k] = work.points[s, 1 + k]
-                state.n[s, k] = work.points[s, 4 + k]
+                state.p[s, k] = work.points[s, AT_POINT + k]
+                state.n[s, k] = work.points[s, AT_NORMAL + k]
                 state.t[s, k] = work.t[s, k]
     return changed
 
 
 @jitable
-def commit_incidents(scene, t, h, y):
+def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     """Write the incident table for the accepted point; return what `commit` does."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     old, new, last = state.hit, work.hit, len(work.hit) - 1
@@ -376,7 +379,7 @@ def commit_incidents(scene, t, h, y):
 
 
 @jitable
-def commit_gaps(scene):
+def commit_gaps(scene: Scene) -> None:
     """Take what the shapes moved from the distance of every pair; measure where half is gone."""
     pairs, work = scene.pairs, scene.work
     for k in range(pairs.count[ACTIVE]):
@@ -394,7 +397,7 @@ def commit_gaps(scene):
 
 
 @jitable
-def commit(scene, t, h, y):
+def commit(scene: Scene, t: float, h: float, y: F1) -> int:
     """Take the point evaluated last as accepted.
 
     Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.

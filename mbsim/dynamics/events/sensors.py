@@ -15,8 +15,7 @@ and it acts where it is on and was not. A located EQUAL acts wherever e comes to
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     EQUAL,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -32,9 +31,11 @@ from mbsim.arrays.scene import (
     ON,
     SENSOR,
     USED_EVENTS,
-    Scene,
 )
+from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.expressions.jets import value
@@ -44,13 +45,13 @@ LEAST = 1e-300
 
 
 @jitable
-def opposite(a, b):
+def opposite(a: float, b: float) -> bool:
     """Return whether one is above 0 and the other below."""
     return (a < 0.0 < b) or (b < 0.0 < a)
 
 
 @jitable
-def is_on(scene, k, excess):
+def is_on(scene: Scene, k: int, excess: float) -> bool:
     """Return whether the condition of sensor k holds."""
     compare, width = scene.sensors.compare[k], scene.sensors.width[k]
     if compare == NOT_LESS:
@@ -65,7 +66,7 @@ def is_on(scene, k, excess):
 
 
 @jitable
-def becomes_true(scene, k, excess):
+def becomes_true(scene: Scene, k: int, excess: float) -> bool:
     """Return whether sensor k acts where the expression exceeds the value by `excess`."""
     before = scene.state.sensed[k, EXCESS]
     if scene.sensors.compare[k] == EQUAL and scene.sensors.located[k] == 1:
@@ -74,7 +75,7 @@ def becomes_true(scene, k, excess):
 
 
 @jitable
-def happens(scene, t, y):
+def happens(scene: Scene, t: float, y: F1) -> int:
     """Return 1 if a located sensor has become true by (t, y), else 0."""
     place_bodies(scene, y)
     sensors = scene.sensors
@@ -90,7 +91,7 @@ def happens(scene, t, y):
 
 
 @jitable
-def arrive(scene, t, y):
+def arrive(scene: Scene, t: float, y: F1) -> int:
     """Note what every sensor sees at the committed state; return 1 if one has become true."""
     place_bodies(scene, y)
     sensors, sensed, rows, any_fired = scene.sensors, scene.state.sensed, scene.rows, 0
@@ -112,7 +113,7 @@ def arrive(scene, t, y):
     return any_fired
 
 
-def happens_hook(context, t, h, a, b):
+def happens_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Whether a located sensor has become true."""
     scene = view(context, Scene)
     answer = happens(scene, t, vector_at(a, scene.rows.y.shape[1]))
@@ -120,7 +121,7 @@ def happens_hook(context, t, h, a, b):
     return answer if code == 0 else -code
 
 
-def arrive_hook(context, t, h, a, b):
+def arrive_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """What sensors see at a committed state."""
     scene = view(context, Scene)
     answer = arrive(scene, t, vector_at(a, scene.rows.y.shape[1]))

@@ -18,9 +18,13 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
     AXIS_TORQUE,
+    BEST_CONTACT,
+    BEST_ENERGY,
+    BEST_FORCE,
+    BEST_INVERSE,
     BOUND_DAMPING,
     BOUND_FORCE,
     BOUND_STIFFNESS,
@@ -31,7 +35,9 @@ from mbsim.arrays.scene import (
     SCALE_LENGTH,
     SCALE_SPEED,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies, position
@@ -40,7 +46,8 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides
 from mbsim.dynamics.contact.points import deepest_of_impact
 from mbsim.dynamics.events.step_limits import longest_travel
-from mbsim.geometry.catalog import REGION_ROWS
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, REGION_ROWS
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
@@ -53,30 +60,30 @@ SUBSTITUTIONS = 6
 
 
 @jitable
-def slopes(scene, c, depth, out):
+def slopes(scene: Scene, c: int, depth: float, out: F1) -> V2:
     """Return stiffness dF/dd and damping dF/dd' of contact c's law at a depth."""
     contacts, speed = scene.contacts, scene.world.scale[SCALE_SPEED]
     call_int(contacts.normal_law[c], (depth, speed, contacts.normal_par[c], out))
-    here, damping = out[1], (out[0] - out[1]) / speed
+    here, damping = out[ELASTIC], (out[LOAD] - out[ELASTIC]) / speed
     call_int(contacts.normal_law[c], (1.001 * depth, 0.0, contacts.normal_par[c], out))
-    return max(0.0, (out[1] - here) / (0.001 * depth)), max(0.0, damping)
+    return max(0.0, (out[ELASTIC] - here) / (0.001 * depth)), max(0.0, damping)
 
 
 @jitable
-def yielding(scene, b, arm, n):
+def yielding(scene: Scene, b: int, arm: V3, n: V3) -> float:
     """Return n' J I^-1 J' n: how a unit force along n at `arm` from body b's cg turns the point."""
     turning = unrotate(scene.work.R[b], cross(arm, n))
     return dot(turning, rotate(scene.bodies.inverse[b], turning))
 
 
 @jitable
-def translation(scene, b):
+def translation(scene: Scene, b: int) -> float:
     """Return 1/m of body b, 0 for ground."""
     return 1.0 / scene.bodies.mass[b] if b < len(scene.bodies.mass) else 0.0
 
 
 @jitable
-def turning(scene, g):
+def turning(scene: Scene, g: int) -> float:
     """Return a bound of n' J I^-1 J' n for a touch anywhere on graphic g: ground and planes 0.
 
     With the box half edges a (from the cg) and D = I^-1 in its axes (r x n)' D (r x n) is at most
@@ -108,7 +115,7 @@ def turning(scene, g):
 
 
 @jitable
-def depth_to_come(scene, c, energy, force):
+def depth_to_come(scene: Scene, c: int, energy: float, force: float) -> float:
     """Return the depth at which contact c has stored an impact's energy and what `force` adds.
 
     E(d) = energy + force d, by repeated substitution: of a power law of exponent e an error
@@ -122,7 +129,7 @@ def depth_to_come(scene, c, energy, force):
 
 
 @jitable
-def add_to_block(block, n, stiffness, damping, turn):
+def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float) -> None:
     """Add stiffness and damping along n to the block of a body; `turn`: see `yielding`."""
     for r in range(3):
         for q in range(3):
@@ -133,51 +140,55 @@ def add_to_block(block, n, stiffness, damping, turn):
 
 
 @jitable
-def add_points(scene, y, s, b, k, damping):
-    """Add the points that slot s stands for to the block of body b, each with its share."""
+def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) -> None:
+    """Add the points that slot s stands for to the block of body b, each with its weight."""
     rows = scene.work.points
     first = s + REGION_ROWS
     for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
-        if rows[row, 0] > 0.0:
-            p, n, share = vector(rows[row, 1:4]), vector(rows[row, 4:7]), rows[row, 7]
+        if rows[row, AT_DEPTH] > 0.0:
+            p, n, weight = (
+                vector(rows[row, AT_POINT:]),
+                vector(rows[row, AT_NORMAL:]),
+                rows[row, AT_WEIGHT],
+            )
             turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
-            add_to_block(scene.work.block[b], n, share * k, share * damping, turn)
+            add_to_block(scene.work.block[b], n, weight * k, weight * damping, turn)
 
 
 @jitable
-def add_touching(scene, y, s, out):
+def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
     point = work.points[s]
-    c, depth, share = contact_of(scene, s), point[0], point[7]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    c, depth, weight = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     ground = len(bodies.mass)
     rate = state.rate[s] if state.touching[s] == 1 else 0.0
     inverse = translation(scene, bi) + translation(scene, bj)
-    kinetic = 0.5 * rate * rate / (share * inverse)
-    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (share * inverse)
+    kinetic = 0.5 * rate * rate / (weight * inverse)
+    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (weight * inverse)
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    if kinetic + force * depth > AT_REST * out[2]:
-        energy = max(0.0, out[2] + kinetic - force * depth)
+    if kinetic + force * depth > AT_REST * out[ENERGY]:
+        energy = max(0.0, out[ENERGY] + kinetic - force * depth)
         depth = max(depth, depth_to_come(scene, c, energy, force))
     k, damping = slopes(scene, c, depth, out)
-    k *= share
-    damping *= share
+    k *= weight
+    damping *= weight
     both = 2.0 if bi < ground and bj < ground else 1.0
     for b in (bi, bj):
         if b == ground:
             continue
         if face_weight_of(scene, s) > 0.0:
-            add_points(scene, y, s, b, both * k / share, both * damping / share)
+            add_points(scene, y, s, b, both * k / weight, both * damping / weight)
             continue
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
         add_to_block(work.block[b], n, both * k, both * damping, turn)
 
 
 @jitable
-def add_marker_force(scene, y, f):
+def add_marker_force(scene: Scene, y: F1, f: int) -> None:
     """Add the largest stiffness and damping of marker force f, along every axis and about it.
 
     Both bodies are pushed at I's origin P, so arms go there. A turn of body b moves P by its
@@ -211,7 +222,7 @@ def add_marker_force(scene, y, f):
 
 
 @jitable
-def add_spring(scene, y, f):
+def add_spring(scene: Scene, y: F1, f: int) -> None:
     """Add stiffness and damping of spring f to the blocks of its bodies.
 
     Along the line of a spring at distance d acts k, across it F/d, and an arm r turns with the
@@ -251,7 +262,7 @@ def add_spring(scene, y, f):
 
 
 @jitable
-def fast_pair(scene, pair, best):
+def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
     """Return whether a pair that may come to touch can be stiffer than the one in `best`.
 
     If so `best` becomes it: contact, its energy at touch, the force behind it, inverse mass.
@@ -267,24 +278,30 @@ def fast_pair(scene, pair, best):
     force = push / inverse
     energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
     inverse += turning(scene, i) + turning(scene, j)
-    if c == best[0] and energy <= best[1] and force <= best[2] and inverse <= best[3]:
+    if (
+        c == best[BEST_CONTACT]
+        and energy <= best[BEST_ENERGY]
+        and force <= best[BEST_FORCE]
+        and inverse <= best[BEST_INVERSE]
+    ):
         return False
-    best[0], best[1], best[2], best[3] = c, energy, force, inverse
+    best[BEST_CONTACT], best[BEST_ENERGY] = c, energy
+    best[BEST_FORCE], best[BEST_INVERSE] = force, inverse
     return True
 
 
 @jitable
-def add_meeting(scene, best, out, bound):
+def add_meeting(scene: Scene, best: F1, out: F1, bound: F1) -> None:
     """Raise the squared frequency and the rate in `bound` to those of the pair in `best`."""
-    c, inverse = int(best[0]), best[3]
-    depth = depth_to_come(scene, c, best[1], best[2])
+    c, inverse = int(best[BEST_CONTACT]), best[BEST_INVERSE]
+    depth = depth_to_come(scene, c, best[BEST_ENERGY], best[BEST_FORCE])
     k, damping = slopes(scene, c, depth, out)
     bound[0] = max(bound[0], k * inverse)
     bound[1] = max(bound[1], damping * inverse)
 
 
 @jitable
-def anisotropy(inertia):
+def anisotropy(inertia: F2) -> float:
     """Return |I - E tr I / 3| over tr I / 3 (Frobenius): 0 of a ball, 1.22 of a thin rod."""
     mean = (inertia[0, 0] + inertia[1, 1] + inertia[2, 2]) / 3.0
     square = 0.0
@@ -296,7 +313,7 @@ def anisotropy(inertia):
 
 
 @jitable
-def turning_step(scene, tol):
+def turning_step(scene: Scene, tol: float) -> float:
     """Return the step over which the rotation of every body, as placed, is good to `tol`."""
     bodies, longest = scene.bodies, math.inf
     # (angle / 2)^4 / 384 = tol
@@ -314,7 +331,7 @@ def turning_step(scene, tol):
 
 
 @jitable
-def stable_step(scene, tol, y, f):
+def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     """Return the step that a method without error estimate is to take from the committed point."""
     work, bodies, pairs = scene.work, scene.bodies, scene.pairs
     # what was evaluated last may be another point: an output within the step, or nothing yet
@@ -339,7 +356,7 @@ def stable_step(scene, tol, y, f):
             damped += block[10 + k] * block[10 + k]
         bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
         bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
-    best[0] = -1.0
+    best[BEST_CONTACT] = -1.0
     for k in range(pairs.count[ACTIVE]):
         if pairs.touches[pairs.active[k]] == 0 and fast_pair(scene, pairs.active[k], best):
             add_meeting(scene, best, work.law_out, bound)

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import ACTIVE, AUDIT_TOL, BODY_SIZE, SCALE_LENGTH
+from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, SCALE_LENGTH
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_V, AT_W
+from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
 from mbsim.dynamics.contact.points import deepest_of_impact, effective_mass
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Halvings of the way out in which a force is looked for, and of where it ends.
 SHALLOWEST = 12
@@ -41,7 +45,7 @@ ROUNDING = 1e-13
 
 
 @jitable
-def seen_part(scene, c, depth, per_mass):
+def seen_part(scene: Scene, c: int, depth: float, per_mass: float) -> float:
     """Return the part of the way out from a depth, or in to it, that may be one step; 1 for all.
 
     The spring of contact c is F ~ d^e there, e + 1 = F d/E, so that a step over the part x of this
@@ -49,16 +53,21 @@ def seen_part(scene, c, depth, per_mass):
     """
     out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    if not out[2] > 0.0:
+    if not out[ENERGY] > 0.0:
         return 1.0
-    e = out[1] * depth / out[2] - 1.0
-    wrong = min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0))) * BLIND * out[1] * per_mass
+    e = out[ELASTIC] * depth / out[ENERGY] - 1.0
+    wrong = (
+        min(1.0, abs((e - 1.0) * (e - 2.0) * (e - 3.0) * (e - 4.0)))
+        * BLIND
+        * out[ELASTIC]
+        * per_mass
+    )
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
     return (allowed / wrong) ** (1.0 / (e + 1.0)) if wrong > allowed > 0.0 else 1.0
 
 
 @jitable
-def is_over(scene, c, depth, normal, per_mass):
+def is_over(scene: Scene, c: int, depth: float, normal: float, per_mass: float) -> bool:
     """Return whether all that contact c may still do before it leaves is too little to matter.
 
     `per_mass` is h/m of a step over it, whose first stage takes it to last. Where points of a patch
@@ -68,11 +77,11 @@ def is_over(scene, c, depth, normal, per_mass):
     out, tol = scene.work.law_out, scene.audit.plan[AUDIT_TOL]
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
-    return BLIND_JUMP * max(normal, out[1]) * per_mass <= allowed
+    return BLIND_JUMP * max(normal, out[ELASTIC]) * per_mass <= allowed
 
 
 @jitable
-def longest_at_jump(scene, c, depth, speed, mass):
+def longest_at_jump(scene: Scene, c: int, depth: float, speed: float, mass: float) -> float:
     """Return the longest step that may begin just before a touch at which the force jumps.
 
     It does where a damper comes in over nothing; inf where what is there at AT_ONCE of `depth`,
@@ -83,21 +92,21 @@ def longest_at_jump(scene, c, depth, speed, mass):
         scene.contacts.normal_law[c], (AT_ONCE * depth, speed, scene.contacts.normal_par[c], out)
     )
     allowed = BLIND_SHARE * tol * math.sqrt(scene.work.squares[scene.scales.of_contact[c]])
-    return allowed * mass / (BLIND_JUMP * out[0]) if out[0] > 0.0 else math.inf
+    return allowed * mass / (BLIND_JUMP * out[LOAD]) if out[LOAD] > 0.0 else math.inf
 
 
 @jitable
-def pushes_at(scene, c, t, depth, rate, bend):
+def pushes_at(scene: Scene, c: int, t: float, depth: float, rate: float, bend: float) -> bool:
     """Return whether contact c would push after a time t in which depth goes on as it does."""
     out = scene.work.law_out
     d = depth + t * (rate + 0.5 * t * bend)
     par = scene.contacts.normal_par[c]
     call_int(scene.contacts.normal_law[c], (d, rate + t * bend, par, out))
-    return out[0] > 0.0
+    return out[LOAD] > 0.0
 
 
 @jitable
-def thrust(scene, f, b):
+def thrust(scene: Scene, f: F1, b: int) -> V3:
     """Return the acceleration of body b's cg."""
     if b == len(scene.bodies.mass):
         return (0.0, 0.0, 0.0)
@@ -106,7 +115,7 @@ def thrust(scene, f, b):
 
 
 @jitable
-def depth_bend(scene, f, s):
+def depth_bend(scene: Scene, f: F1, s: int) -> float:
     """Return the second rate of the depth of slot s that accelerations make, d'' of d."""
     gi, gj = sides(scene, s)
     i, j = thrust(scene, f, scene.graphics.body[gi]), thrust(scene, f, scene.graphics.body[gj])
@@ -114,7 +123,7 @@ def depth_bend(scene, f, s):
 
 
 @jitable
-def step_to_leave(scene, f, s, h):
+def step_to_leave(scene: Scene, f: F1, s: int, h: float) -> float:
     """Return the step that ends where the force of the parting slot s ends or comes back.
 
     A step across such a place is one whose error estimate may vanish by chance, and those
@@ -164,7 +173,7 @@ def step_to_leave(scene, f, s, h):
 
 
 @jitable
-def step_to_ramp(scene, f, s, h):
+def step_to_ramp(scene: Scene, f: F1, s: int, h: float) -> float:
     """Return the step that ends where the depth of slot s passes dmax; h where it does not in h.
 
     There the damper's curvature jumps, so that a step across it is taken where its error estimate
@@ -182,7 +191,7 @@ def step_to_ramp(scene, f, s, h):
 
 
 @jitable
-def longest_touching(scene, f, h):
+def longest_touching(scene: Scene, f: F1, h: float) -> float:
     """Return how much of a step h may be tried so that no force bends sharply or ends within it."""
     state, longest = scene.state, h
     for k in range(state.hit[len(state.hit) - 1]):
@@ -194,7 +203,7 @@ def longest_touching(scene, f, h):
 
 
 @jitable
-def time_for(travel, speed, push):
+def time_for(travel: float, speed: float, push: float) -> float:
     """Return the time in which a shape can come `travel` far: way = speed h + push h^2 / 2."""
     if speed == 0.0 and push == 0.0:
         return math.inf
@@ -202,7 +211,7 @@ def time_for(travel, speed, push):
 
 
 @jitable
-def place_side(scene, y, g):
+def place_side(scene: Scene, y: F1, g: int) -> None:
     """Place graphic g and its body at y."""
     if scene.graphics.body[g] < len(scene.bodies.mass):
         place_body(scene, y, scene.graphics.body[g])
@@ -210,7 +219,7 @@ def place_side(scene, y, g):
 
 
 @jitable
-def step_to_touch(scene, y, f, pair, h):
+def step_to_touch(scene: Scene, y: F1, f: F1, pair: int, h: float) -> float:
     """Return the step that ends where a pair is about to touch, or begins its contact; else inf.
 
     A step much longer than the contact would meet it with a force out of all proportion, and
@@ -226,12 +235,12 @@ def step_to_touch(scene, y, f, pair, h):
         return math.inf
     s = pairs.slot[pair]
     for k in range(s + 1, s + scene.kinds.slots[pairs.kind[pair]]):
-        if work.points[k, 0] > work.points[s, 0]:
+        if work.points[k, AT_DEPTH] > work.points[s, AT_DEPTH]:
             s = k
-    gap, bi, bj = -work.points[s, 0], graphics.body[gi], graphics.body[gj]
+    gap, bi, bj = -work.points[s, AT_DEPTH], graphics.body[gi], graphics.body[gj]
     if gap < 0.0:
         return math.inf
-    p, n = vector(work.points[s, 1:4]), vector(work.points[s, 4:7])
+    p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
     if scene.kinds.swapped[pairs.kind[pair]] == 1:
         bi, bj = bj, bi
     v = dot(sub(velocity_at(scene, y, bj, p), velocity_at(scene, y, bi, p)), n)
@@ -263,7 +272,7 @@ def step_to_touch(scene, y, f, pair, h):
 
 
 @jitable
-def longest_stay(scene, y, f):
+def longest_stay(scene: Scene, y: F1, f: F1) -> float:
     """Return a step in which no shape of a large contact leaves where the list of near pairs holds.
 
     Speed and acceleration of all shapes are left in `work.speed`.
@@ -288,7 +297,7 @@ def longest_stay(scene, y, f):
 
 
 @jitable
-def longest_travel(scene, y, f, h):
+def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
 
     A step of length h, the one intended, ends where a pair begins to touch.
@@ -315,6 +324,6 @@ def longest_travel(scene, y, f, h):
 
 
 @jitable
-def longest_step(scene, y, f, h):
+def longest_step(scene: Scene, y: F1, f: F1, h: float) -> float:
     """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
     return min(longest_touching(scene, f, h), longest_travel(scene, y, f, h))

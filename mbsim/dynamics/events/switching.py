@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
-from mbsim.arrays.scene import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES, Scene
+from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES
+from mbsim.arrays.hooks import Hook, Sticking, answer_of, failure_or, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -55,7 +57,7 @@ EVEN = 1e-3
 
 
 @jitable
-def side_of_limit(scene, y, f):
+def side_of_limit(scene: Scene, y: F1, f: int) -> float:
     """Return 0 between the bounds, 1 below, 2 above, and 2 more where the limit pushes."""
     if scene.applied.kind[f] == SLIDE_LIMIT:
         _, x, rate = along_slide(scene, y, f)
@@ -69,7 +71,7 @@ def side_of_limit(scene, y, f):
 
 
 @jitable
-def modes(scene):
+def modes(scene: Scene) -> float:
     """Return a number that tells what the incidents that go on do: stick or slip."""
     total, hit = 0.0, scene.work.hit
     for k in range(hit[len(hit) - 1]):
@@ -81,7 +83,7 @@ def modes(scene):
 
 
 @jitable
-def leaves_branch(scene):
+def leaves_branch(scene: Scene) -> bool:
     """Return whether an incident that goes on asks for another branch than it is committed to."""
     hit, state = scene.work.hit, scene.state
     for k in range(hit[len(hit) - 1]):
@@ -93,13 +95,13 @@ def leaves_branch(scene):
 
 
 @jitable
-def look_at(scene, context, t, y, dy):
+def look_at(scene: Scene, context: int, t: float, y: F1, dy: F1) -> None:
     """Evaluate a point that is no step's; a failure is noted."""
     note_failure(scene, call_int(scene.world.hooks[Hook.EVALUATE], (context, t, 0.0, y, dy)))
 
 
 @jitable
-def decide(scene, context, t, y):
+def decide(scene: Scene, context: int, t: float, y: F1) -> None:
     """Evaluate again with the rates of normal forces, where a branch depends on them."""
     hit, work, h = scene.work.hit, scene.work, math.inf
     for k in range(hit[len(hit) - 1]):
@@ -127,7 +129,7 @@ def decide(scene, context, t, y):
 
 
 @jitable
-def side(scene, t, y, k):
+def side(scene: Scene, t: float, y: F1, k: int) -> float:
     """Return on which side row k of `Switching` is; the bodies have been placed."""
     program = scene.switching.program[k]
     if program >= 0:
@@ -139,7 +141,7 @@ def side(scene, t, y, k):
 
 
 @jitable
-def watch_held(scene, t, y, what):
+def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
     Of a step that was taken: 1 if it was cut for that. Such a step adds 1, whether a mode
@@ -152,13 +154,14 @@ def watch_held(scene, t, y, what):
         chattering[0] = chattering[0] + 1.0 if chattering[1] == 1.0 else 0.5 * chattering[0]
         chattering[1] = 0.0
     elif chattering[0] <= CHATTERS:
-        if answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.ASK, t, y))) == 1:
+        asked = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.ASK, t, y))
+        if answer_of(scene, asked) == 1:
             chattering[1], differs = 1.0, 2
     return differs
 
 
 @jitable
-def load(scene, context, t, y):
+def load(scene: Scene, context: int, t: float, y: F1) -> float:
     """Return the largest force by which friction without give holds, over its limit.
 
     -1 where nothing is held so, and -1 too where modes are left to each evaluation.
@@ -175,14 +178,14 @@ def load(scene, context, t, y):
             force = holding_force(scene, f)
             if not math.isnan(force):
                 most = max(most, abs(force) / scene.applied.par[f, STATIC])
-    if scene.world.hooks[Hook.HELD] != 0:
-        held = call_int(scene.world.hooks[Hook.HELD], (scene, Held.LOAD, t, y))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        held = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
         most = max(most, 1e-6 * answer_of(scene, held))
     return most
 
 
 @jitable
-def watch(scene, context, t, y, what):
+def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
 
     Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
@@ -215,8 +218,8 @@ def watch(scene, context, t, y, what):
             sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
-    if scene.world.hooks[Hook.HELD] != 0:
-        differs = max(differs, watch_held(scene, t, y, what))
+    if scene.world.hooks[Hook.STICKING] != 0:
+        differs = max(differs, watch_sticking(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
     chatters = sides[last, CHATTERING] > CHATTERS_MODES
     for k in range(last):
@@ -228,21 +231,21 @@ def watch(scene, context, t, y, what):
 
 
 @jitable
-def follows(scene, s):
+def follows(scene: Scene, s: int) -> bool:
     """Return whether friction in slot s follows the way of its slip in closed form."""
     slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIPS
     return slips and scene.contacts.carried[contact_of(scene, s)] > 0
 
 
 @jitable
-def counts_as(scene, s):
+def counts_as(scene: Scene, s: int) -> float:
     """Return the part of the norm of errors that a change of friction in slot s by all of it is."""
     squares, group = scene.work.squares, scene.scales.of_contact[contact_of(scene, s)]
     return scene.work.slot[s, UNIT] / math.sqrt(squares[group])
 
 
 @jitable
-def bends(scene, y, before):
+def bends(scene: Scene, y: F1, before: F1) -> bool:
     """Return whether the way of some slip since y `before` is another than friction's direction.
 
     By an angle that tol sees: less changes its direction by less.
@@ -261,7 +264,7 @@ def bends(scene, y, before):
 
 
 @jitable
-def hides(scene, t, y, before):
+def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
     """Return whether a spring that sticks may have slipped since y `before` and stick again.
 
     So it is where load and normal force change by more within the step than is left to the limit.
@@ -287,7 +290,7 @@ def hides(scene, t, y, before):
 
 
 @jitable
-def follow_half(scene, context, t, y):
+def follow_half(scene: Scene, context: int, t: float, y: F1) -> None:
     """Go on from a step's middle y as if that were committed, as far as friction is concerned."""
     state, work, hit = scene.state, scene.work, scene.state.hit
     for k in range(hit[len(hit) - 1]):
@@ -307,7 +310,7 @@ def follow_half(scene, context, t, y):
 
 
 @jitable
-def follow_halves(scene, context, t, y):
+def follow_halves(scene: Scene, context: int, t: float, y: F1) -> float:
     """Return how far friction at a step's end is from that of its second half, as an error."""
     state, work, hit, worst = scene.state, scene.work, scene.state.hit, 0.0
     look_at(scene, context, t, y, work.idle)
@@ -324,7 +327,9 @@ def follow_halves(scene, context, t, y):
 
 
 @jitable
-def serve_switching(scene, context, t, what, a, b):
+def serve_switching(
+    scene: Scene, context: int, t: float, what: float, a: Pointer, b: Pointer
+) -> int:
     """Do what the hook `switching` is asked for; return its answer."""
     n = scene.rows.y.shape[1]
     if what == LOAD:
@@ -345,7 +350,7 @@ def serve_switching(scene, context, t, what, a, b):
     return watch(scene, context, t, vector_at(a, n), what)
 
 
-def switching_hook(context, t, h, a, b):
+def switching_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Whether a force is on another branch; h says whether that is kept, or what else is asked."""
     scene = view(context, Scene)
     answer = serve_switching(scene, context, t, h, a, b)

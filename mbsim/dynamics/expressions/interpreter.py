@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import SHOWN
+from mbsim.arrays.codes import SHOWN
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,
@@ -21,6 +22,7 @@ from mbsim.compile_model.instructions import (
     TURNING,
     VELOCITY,
 )
+from mbsim.core.arrays import F1, I1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, norm
 from mbsim.dynamics.bodies.markers import marker_axis
@@ -46,7 +48,7 @@ from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, con
 
 
 @jitable
-def displacement(scene, y, code, body, direction):
+def displacement(scene: Scene, y: F1, code: I1, body: int, direction: int) -> V3:
     """Return the jet of a displacement measure."""
     op = code[0]
     if op == DISTANCE:
@@ -63,7 +65,7 @@ def displacement(scene, y, code, body, direction):
 
 
 @jitable
-def rate_or_force(scene, y, code):
+def rate_or_force(scene: Scene, y: F1, code: I1) -> float:
     """Return a velocity or force measure."""
     op = code[0]
     if op == SPEED:
@@ -93,7 +95,7 @@ def rate_or_force(scene, y, code):
 
 
 @jitable
-def interpret(scene, t, y, program, body, direction):
+def interpret(scene: Scene, t: float, y: F1, program: int, body: int, direction: int) -> int:
     """Leave the jet of a program in the first row of the stack; see measures for both."""
     programs = scene.programs
     stack, top = programs.stack, 0

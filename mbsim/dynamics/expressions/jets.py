@@ -11,14 +11,16 @@ from typing import Any
 from numba.extending import overload
 
 from mbsim.arrays.hooks import Hook, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.measures import AS_THEY_ARE
 from mbsim.dynamics.expressions.values import evaluate_program
 
 
-def run(scene, t, y, program, body, direction):
+def run(scene: Scene, t: float, y: F1, program: int, body: int, direction: int) -> int:
     """Leave the jet of a program in the first row of the stack."""
     return interpret(scene, t, y, program, body, direction)
 
@@ -35,7 +37,7 @@ def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, direction: Any) ->
     return compiled
 
 
-def value(scene, t, y, program):
+def value(scene: Scene, t: float, y: F1, program: int) -> float:
     """Return the value of a program at time t and state y."""
     return evaluate_program(scene, t, y, program)
 
@@ -51,7 +53,7 @@ def _value(scene: Any, t: Any, y: Any, program: Any) -> Any:
 
 
 @jitable
-def jet(scene, t, y, program):
+def jet(scene: Scene, t: float, y: F1, program: int) -> V3:
     """Return value, rate and second rate of a program of displacements and TIME.
 
     In the second rate the bodies' own accelerations (of cg and angular velocity) are zero: what
@@ -63,7 +65,7 @@ def jet(scene, t, y, program):
 
 
 @jitable
-def gradient(scene, t, y, program, body, out):
+def gradient(scene: Scene, t: float, y: F1, program: int, body: int, out: F1) -> None:
     """Write how the rate follows from the velocity of a body's cg and its angular velocity.
 
     `out` (6,): d rate / d (v, w), both in global axes.
@@ -74,7 +76,7 @@ def gradient(scene, t, y, program, body, out):
 
 
 @jitable
-def fill_values(scene, t, y):
+def fill_values(scene: Scene, t: float, y: F1) -> int:
     """Write the expressions of requests, which are the last programs, to the row; return 0."""
     row = scene.rows.value[scene.rows.used[0]]
     first = len(scene.programs.start) - 1 - len(row)

@@ -9,7 +9,9 @@ are what follows from velocities: bodies' own are taken as zero. A vector's jet 
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import VECTOR_FORCE
+from mbsim.arrays.codes import VECTOR_FORCE
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import nearest_turn
@@ -17,12 +19,13 @@ from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.contact.forces import FORCE, TORQUE, contact_of, sides
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
+from mbsim.geometry.catalog import AT_POINT
 
 AT_REST, AS_THEY_ARE = -2, -1
 
 
 @jitable
-def unit(direction):
+def unit(direction: int) -> V3:
     """Return the unit vector 0, 1 or 2; the zero vector for other numbers."""
     return (
         1.0 if direction == 0 else 0.0,
@@ -32,7 +35,7 @@ def unit(direction):
 
 
 @jitable
-def twist(scene, b, body, direction):
+def twist(scene: Scene, b: int, body: int, direction: int) -> tuple[V3, V3]:
     """Return velocity of the cg and angular velocity of body b."""
     if body == AS_THEY_ARE:
         return vector(scene.work.v[b]), vector(scene.work.w[b])
@@ -42,7 +45,7 @@ def twist(scene, b, body, direction):
 
 
 @jitable
-def point_jet(scene, y, m, body, direction):
+def point_jet(scene: Scene, y: F1, m: int, body: int, direction: int) -> tuple[V3, V3, V3]:
     """Return the origin of marker m, v + w x r, and w x (w x r)."""
     b = scene.markers.body[m]
     arm = marker_arm(scene, m)
@@ -52,7 +55,7 @@ def point_jet(scene, y, m, body, direction):
 
 
 @jitable
-def axis_jet(scene, m, k, body, direction):
+def axis_jet(scene: Scene, m: int, k: int, body: int, direction: int) -> tuple[V3, V3, V3]:
     """Return axis k of marker m, w x e, and w x (w x e)."""
     e = marker_axis(scene, m, k)
     w = twist(scene, scene.markers.body[m], body, direction)[1]
@@ -61,14 +64,14 @@ def axis_jet(scene, m, k, body, direction):
 
 
 @jitable
-def between(scene, y, i, j, body, direction):
+def between(scene: Scene, y: F1, i: int, j: int, body: int, direction: int) -> tuple[V3, V3, V3]:
     """Return the jet of P_i - P_j."""
     p, q = point_jet(scene, y, i, body, direction), point_jet(scene, y, j, body, direction)
     return sub(p[0], q[0]), sub(p[1], q[1]), sub(p[2], q[2])
 
 
 @jitable
-def dot_jet(a, b):
+def dot_jet(a: tuple[V3, V3, V3], b: tuple[V3, V3, V3]) -> V3:
     """Return the jet of a . b."""
     return (
         dot(a[0], b[0]),
@@ -78,14 +81,14 @@ def dot_jet(a, b):
 
 
 @jitable
-def distance(scene, y, i, j, body, direction):
+def distance(scene: Scene, y: F1, i: int, j: int, body: int, direction: int) -> V3:
     """Return DM: d = |r|, d' = r.r'/d, d'' = (r'.r' + r.r'' - d'^2)/d; 0 where d is 0."""
     r = between(scene, y, i, j, body, direction)
     return root(dot_jet(r, r))
 
 
 @jitable
-def offset(scene, y, i, j, k, axis, body, direction):
+def offset(scene: Scene, y: F1, i: int, j: int, k: int, axis: int, body: int, direction: int) -> V3:
     """Return (P_i - P_j) along an axis of k."""
     return dot_jet(
         between(scene, y, i, j, body, direction), axis_jet(scene, k, axis, body, direction)
@@ -93,7 +96,7 @@ def offset(scene, y, i, j, k, axis, body, direction):
 
 
 @jitable
-def included_angle(scene, y, i, j, k, body, direction):
+def included_angle(scene: Scene, y: F1, i: int, j: int, k: int, body: int, direction: int) -> V3:
     """Return INCANG: the angle between P_i - P_j and P_k - P_j, atan2(|a x b|, a . b)."""
     a = between(scene, y, i, j, body, direction)
     b = between(scene, y, k, j, body, direction)
@@ -107,7 +110,7 @@ def included_angle(scene, y, i, j, k, body, direction):
 
 
 @jitable
-def cosine(scene, i, axis_i, j, axis_j, body, direction):
+def cosine(scene: Scene, i: int, axis_i: int, j: int, axis_j: int, body: int, direction: int) -> V3:
     """Return the cosine between an axis of i and one of j."""
     return dot_jet(
         axis_jet(scene, i, axis_i, body, direction), axis_jet(scene, j, axis_j, body, direction)
@@ -115,7 +118,7 @@ def cosine(scene, i, axis_i, j, axis_j, body, direction):
 
 
 @jitable
-def angle(scene, row, body, direction):
+def angle(scene: Scene, row: int, body: int, direction: int) -> V3:
     """Return a followed angle: of I's x about J's z from J's x."""
     i, j = scene.angles.i[row], scene.angles.j[row]
     s = cosine(scene, i, 0, j, 1, body, direction)
@@ -124,7 +127,7 @@ def angle(scene, row, body, direction):
 
 
 @jitable
-def euler_angle(scene, i, j, which, body, direction):
+def euler_angle(scene: Scene, i: int, j: int, which: int, body: int, direction: int) -> V3:
     """Return PSI, THETA, PHI or YAW, PITCH, ROLL of i in j.
 
     The turns Rz(psi) Rx(theta) Rz(phi), and Rz(yaw) Ry(pitch) Rx(roll), are R_j' R_i. Where the
@@ -164,7 +167,9 @@ def euler_angle(scene, i, j, which, body, direction):
 
 
 @jitable
-def parameter_product(scene, i, j, a, b, body, direction):
+def parameter_product(
+    scene: Scene, i: int, j: int, a: int, b: int, body: int, direction: int
+) -> V3:
     """Return 4 e_a e_b of the Euler parameters of i in j, from the cosines m_rc of its axes.
 
     4 e0^2 = 1 + trace, 4 e1^2 = 1 + 2 m00 - trace, 4 e0 e1 = m21 - m12, 4 e1 e2 = m01 + m10, and
@@ -190,7 +195,7 @@ def parameter_product(scene, i, j, a, b, body, direction):
 
 
 @jitable
-def euler_parameter(scene, i, j, which, body, direction):
+def euler_parameter(scene: Scene, i: int, j: int, which: int, body: int, direction: int) -> V3:
     """Return Euler parameter e0, e1, e2 or e3 of i in j, e0 being at least 0."""
     largest, most = 0, -1.0
     for k in range(4):
@@ -207,7 +212,7 @@ def euler_parameter(scene, i, j, which, body, direction):
 
 
 @jitable
-def relative_velocity(scene, y, i, j, k):
+def relative_velocity(scene: Scene, y: F1, i: int, j: int, k: int) -> V3:
     """Return the velocity of i's origin against j's, as seen from marker k's body."""
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
     w = vector(scene.work.w[scene.markers.body[k]])
@@ -215,14 +220,14 @@ def relative_velocity(scene, y, i, j, k):
 
 
 @jitable
-def relative_spin(scene, i, j):
+def relative_spin(scene: Scene, i: int, j: int) -> V3:
     """Return the angular velocity of marker i against marker j."""
     w = scene.work.w
     return sub(vector(w[scene.markers.body[i]]), vector(w[scene.markers.body[j]]))
 
 
 @jitable
-def spin_up(scene, b):
+def spin_up(scene: Scene, b: int) -> V3:
     """Return the angular acceleration of body b at the output row that is being written."""
     if b >= len(scene.bodies.mass):
         return 0.0, 0.0, 0.0
@@ -230,7 +235,7 @@ def spin_up(scene, b):
 
 
 @jitable
-def marker_acceleration(scene, m):
+def marker_acceleration(scene: Scene, m: int) -> V3:
     """Return the acceleration of marker m's origin, a + alpha x r + w x (w x r), at that row."""
     b = scene.markers.body[m]
     if b >= len(scene.bodies.mass):
@@ -241,7 +246,7 @@ def marker_acceleration(scene, m):
 
 
 @jitable
-def relative_acceleration(scene, y, i, j, k):
+def relative_acceleration(scene: Scene, y: F1, i: int, j: int, k: int) -> V3:
     """Return how i's origin accelerates against j's, as seen from marker k's body.
 
     With r, v, a the differences in the global frame: a - alpha x r - 2 w x v + w x (w x r).
@@ -256,7 +261,7 @@ def relative_acceleration(scene, y, i, j, k):
 
 
 @jitable
-def relative_spin_up(scene, i, j, k):
+def relative_spin_up(scene: Scene, i: int, j: int, k: int) -> V3:
     """Return the derivative of i's angular velocity against j's, as seen from marker k's body."""
     body = scene.markers.body
     alpha = sub(spin_up(scene, body[i]), spin_up(scene, body[j]))
@@ -264,7 +269,7 @@ def relative_spin_up(scene, i, j, k):
 
 
 @jitable
-def closing(scene, y, i, j):
+def closing(scene: Scene, y: F1, i: int, j: int) -> float:
     """Return VR, the rate of DM; 0 where the points coincide."""
     r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     d = norm(r)
@@ -274,14 +279,14 @@ def closing(scene, y, i, j):
 
 
 @jitable
-def on_j(scene, y, i, j, force, torque):
+def on_j(scene: Scene, y: F1, i: int, j: int, force: V3, torque: V3) -> tuple[V3, V3]:
     """Return what acts on J's body, about J's origin, where force and torque act on I's."""
     arm = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     return scale(-1.0, force), scale(-1.0, add(torque, cross(arm, force)))
 
 
 @jitable
-def component(scene, force, torque, k, comp):
+def component(scene: Scene, force: V3, torque: V3, k: int, comp: int) -> float:
     """Return component 1 to 8: |F|, Fx, Fy, Fz, |T|, Tx, Ty, Tz along marker k's axes."""
     u = force if comp <= 4 else torque
     axis = (comp - 1) % 4
@@ -289,7 +294,7 @@ def component(scene, force, torque, k, comp):
 
 
 @jitable
-def on_i(scene, applied, row):
+def on_i(scene: Scene, applied: int, row: int) -> tuple[V3, V3]:
     """Return force and torque of an applied force or a connection on I, at marker I."""
     if applied == 1:
         table = scene.work.applied[row]
@@ -299,13 +304,13 @@ def on_i(scene, applied, row):
 
 
 @jitable
-def floats(scene, applied, row):
+def floats(scene: Scene, applied: int, row: int) -> bool:
     """Return whether a row's J marker is a floating one, which is wherever I is."""
     return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
 
 
 @jitable
-def contact_force(scene, y, contact, jflag, k, comp):
+def contact_force(scene: Scene, y: F1, contact: int, jflag: int, k: int, comp: int) -> float:
     """Return a component of all incidents of a contact: force, torque about the body's cg."""
     work = scene.work
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -315,9 +320,7 @@ def contact_force(scene, y, contact, jflag, k, comp):
             values, point = work.slot[s], work.points[s]
             graphic = sides(scene, s)[jflag]
             push = vector(values[FORCE : FORCE + 3])
-            arm = sub(
-                (point[1], point[2], point[3]), position(scene, y, scene.graphics.body[graphic])
-            )
+            arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[graphic]))
             force = add(force, push)
             torque = add(torque, add(cross(arm, push), vector(values[TORQUE : TORQUE + 3])))
     sign = 1.0 if jflag == 0 else -1.0
@@ -325,7 +328,9 @@ def contact_force(scene, y, contact, jflag, k, comp):
 
 
 @jitable
-def element_force(scene, y, applied, row, jflag, k, comp):
+def element_force(
+    scene: Scene, y: F1, applied: int, row: int, jflag: int, k: int, comp: int
+) -> float:
     """Return a component of the force of a connection, applied force or contact (0, 1, 2)."""
     if applied == 2:
         return contact_force(scene, y, row, jflag, k, comp)
@@ -342,7 +347,9 @@ def element_force(scene, y, applied, row, jflag, k, comp):
 
 
 @jitable
-def add_between(scene, y, i, j, applied, row, force, torque):
+def add_between(
+    scene: Scene, y: F1, i: int, j: int, applied: int, row: int, force: V3, torque: V3
+) -> tuple[V3, V3]:
     """Return force and torque on i with those of a row added, if it acts between i and j."""
     first = scene.applied.i[row] if applied == 1 else scene.connections.i[row]
     second = scene.applied.j[row] if applied == 1 else scene.connections.j[row]
@@ -356,7 +363,7 @@ def add_between(scene, y, i, j, applied, row, force, torque):
 
 
 @jitable
-def net_force(scene, y, i, j, k, comp):
+def net_force(scene: Scene, y: F1, i: int, j: int, k: int, comp: int) -> float:
     """Return a component of all forces on i between i and j; without j, of those on i alone."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for row in range(len(scene.connections.i)):

@@ -10,7 +10,9 @@ of the cg or a unit angular velocity, global. `A_STATE` for `body` is the number
 
 from __future__ import annotations
 
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import CLOSING, SPEED, SPIN, STATE, TURNING, VELOCITY
+from mbsim.core.arrays import F1, I1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, sub, vector
 from mbsim.dynamics.bodies.markers import marker_arm, marker_point, marker_velocity
@@ -29,7 +31,7 @@ POSES, DIRECTIONS = 6, 12
 
 
 @jitable
-def velocity_rise(scene, m, body, direction):
+def velocity_rise(scene: Scene, m: int, body: int, direction: int) -> V3:
     """Return the change of the velocity of marker m's origin."""
     b = scene.markers.body[m]
     if b != body:
@@ -41,7 +43,7 @@ def velocity_rise(scene, m, body, direction):
 
 
 @jitable
-def spin_rise(scene, m, body, direction):
+def spin_rise(scene: Scene, m: int, body: int, direction: int) -> V3:
     """Return the change of the angular velocity of marker m."""
     if scene.markers.body[m] != body or direction < POSES:
         return 0.0, 0.0, 0.0
@@ -49,7 +51,7 @@ def spin_rise(scene, m, body, direction):
 
 
 @jitable
-def between_rise(scene, y, i, j, body, direction):
+def between_rise(scene: Scene, y: F1, i: int, j: int, body: int, direction: int) -> V3:
     """Return the change of P_i - P_j."""
     if direction >= POSES:
         return 0.0, 0.0, 0.0
@@ -59,14 +61,14 @@ def between_rise(scene, y, i, j, body, direction):
 
 
 @jitable
-def along_unit(u, rise):
+def along_unit(u: V3, rise: V3) -> float:
     """Return the change of |u|; 0 where u is."""
     size = norm(u)
     return dot(u, rise) / size if size > 0.0 else 0.0
 
 
 @jitable
-def relative_rise(scene, y, i, j, k, body, direction):
+def relative_rise(scene: Scene, y: F1, i: int, j: int, k: int, body: int, direction: int) -> V3:
     """Return the change of the velocity of i against j as seen from k's body."""
     apart = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     rise = sub(velocity_rise(scene, i, body, direction), velocity_rise(scene, j, body, direction))
@@ -76,7 +78,7 @@ def relative_rise(scene, y, i, j, k, body, direction):
 
 
 @jitable
-def closing_rise(scene, y, i, j, body, direction):
+def closing_rise(scene: Scene, y: F1, i: int, j: int, body: int, direction: int) -> float:
     """Return the change of VR = r.v/d: (dr.v + r.dv - VR dd)/d, dd = r.dr/d."""
     r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     d = norm(r)
@@ -89,7 +91,7 @@ def closing_rise(scene, y, i, j, body, direction):
 
 
 @jitable
-def slope(scene, y, code, body, direction):
+def slope(scene: Scene, y: F1, code: I1, body: int, direction: int) -> float:
     """Return how a velocity measure or a state changes; 0 for what is not one of these.
 
     Accelerations and forces of other elements count as they are.

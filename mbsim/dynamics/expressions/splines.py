@@ -6,13 +6,15 @@ the last of them, its value is linear in z.
 
 from __future__ import annotations
 
+from mbsim.arrays.model import Programs
+from mbsim.core.arrays import V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub
 from mbsim.expressions.elementary import chain, constant, times
 
 
 @jitable
-def piece_at(programs, curve, x):
+def piece_at(programs: Programs, curve: int, x: float) -> int:
     """Return the piece of a curve that x is in; the last knot belongs to the piece before it."""
     piece, low, high = programs.piece, programs.curve[curve], programs.curve[curve + 1] - 1
     if x <= piece[high, 0]:
@@ -28,7 +30,7 @@ def piece_at(programs, curve, x):
 
 
 @jitable
-def derivatives(programs, curve, order, x):
+def derivatives(programs: Programs, curve: int, order: int, x: float) -> V3:
     """Return the derivative of an order of a curve at x, and the two above it."""
     p = programs.piece[piece_at(programs, curve, x)]
     s = x - p[0]
@@ -43,7 +45,7 @@ def derivatives(programs, curve, order, x):
 
 
 @jitable
-def level_below(programs, first, count, z):
+def level_below(programs: Programs, first: int, count: int, z: float) -> int:
     """Return the curve of the last level that is not above z, never the last of them all."""
     curve = first
     while curve < first + count - 2 and programs.level[curve + 1] <= z:
@@ -52,7 +54,7 @@ def level_below(programs, first, count, z):
 
 
 @jitable
-def spline(programs, first, count, order, x, z):
+def spline(programs: Programs, first: int, count: int, order: int, x: V3, z: V3) -> V3:
     """Return the jet of a spline of `count` curves from `first` on, at the jets x and z."""
     if count == 1:
         f, f1, f2 = derivatives(programs, first, order, x[0])
@@ -67,7 +69,9 @@ def spline(programs, first, count, order, x, z):
 
 
 @jitable
-def spline_value(programs, first, count, order, x, z):
+def spline_value(
+    programs: Programs, first: int, count: int, order: int, x: float, z: float
+) -> float:
     """Return the value of a spline at x and z."""
     if count == 1:
         return derivatives(programs, first, order, x)[0]

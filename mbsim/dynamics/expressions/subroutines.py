@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import PYTHON_CALLS
 from mbsim.arrays.hooks import Hook, note_failure
-from mbsim.arrays.scene import PYTHON_CALLS
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 
 
 @jitable
-def user_result(scene, t, y, row, component, calls):
+def user_result(scene: Scene, t: float, y: F1, row: int, component: int, calls: int) -> float:
     """Return result `component` of subroutine `row`: 0 calls it, and what `calls`, or reads."""
     users = scene.users
     if component == 0 or calls == 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import (
     ADD_N,
     ADD_TIME_N,
@@ -22,6 +23,7 @@ from mbsim.compile_model.instructions import (
     USER,
     VELOCITY,
 )
+from mbsim.core.arrays import F1, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, norm, sub
 from mbsim.dynamics.bodies.angles import followed_angle
@@ -46,7 +48,7 @@ from mbsim.expressions.values import apply_value, power_value
 
 
 @jitable
-def displacement_value(scene, y, code):
+def displacement_value(scene: Scene, y: F1, code: I1) -> float:
     """Return a displacement measure."""
     op = code[0]
     if op == OFFSET or op == DISTANCE:
@@ -58,7 +60,7 @@ def displacement_value(scene, y, code):
 
 
 @jitable
-def rate_value(scene, y, code):
+def rate_value(scene: Scene, y: F1, code: I1) -> float:
     """Return a velocity, acceleration or force measure; most are velocities."""
     if code[0] == VELOCITY:
         v = relative_velocity(scene, y, code[1], code[2], code[4])
@@ -67,7 +69,7 @@ def rate_value(scene, y, code):
 
 
 @jitable
-def evaluate_program(scene, t, y, program):  # noqa: C901
+def evaluate_program(scene: Scene, t: float, y: F1, program: int) -> float:  # noqa: C901
     """Return the value of a program.
 
     The topmost value is `x`; those below it stand in `values` from row 1 on. Many branches because

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     LINE_FORCE,
@@ -36,7 +36,9 @@ from mbsim.arrays.scene import (
     TURN_LIMIT,
     VECTOR_FORCE,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
@@ -45,10 +47,11 @@ from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point,
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.dry_friction import add_dry, is_dry
 from mbsim.dynamics.forces.wrenches import wrench
+from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 
 @jitable
-def push(scene, m, force, torque):
+def push(scene: Scene, m: int, force: V3, torque: V3) -> None:
     """Add a force at the origin of marker m, and a torque, to those of its body about the cg."""
     work, b = scene.work, scene.markers.body[m]
     moment = cross(marker_arm(scene, m), force)
@@ -58,7 +61,7 @@ def push(scene, m, force, torque):
 
 
 @jitable
-def along_line(scene, y, f):
+def along_line(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
     """Return direction on I, distance and its rate."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
@@ -70,7 +73,7 @@ def along_line(scene, y, f):
 
 
 @jitable
-def along_axis(scene, f):
+def along_axis(scene: Scene, f: int) -> tuple[V3, float, float]:
     """Return J's z-axis, the angle if a row of `Angles` follows it (else 0), and its rate."""
     i, j, row = scene.applied.i[f], scene.applied.j[f], scene.applied.angle[f]
     w, z = scene.work.w, marker_axis(scene, j, 2)
@@ -79,7 +82,7 @@ def along_axis(scene, f):
 
 
 @jitable
-def along_slide(scene, y, f):
+def along_slide(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
     """Return J's z-axis, how far I is along it, and its rate."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     z = marker_axis(scene, j, 2)
@@ -88,7 +91,7 @@ def along_slide(scene, y, f):
 
 
 @jitable
-def at_limit(scene, f, x, rate):
+def at_limit(scene: Scene, f: int, x: float, rate: float) -> V3:
     """Return F, stored energy and lost power of limit f at displacement x."""
     applied, out = scene.applied, scene.work.law_out
     lower, upper = applied.bounds[f, 0], applied.bounds[f, 1]
@@ -100,11 +103,11 @@ def at_limit(scene, f, x, rate):
         return 0.0, 0.0, 0.0
     if call_int(applied.law[f], (depth, closing, applied.law_par[f], out)) != 0:
         return math.nan, 0.0, 0.0
-    return side * out[0], out[2], (out[0] - out[1]) * closing
+    return side * out[LOAD], out[ENERGY], (out[LOAD] - out[ELASTIC]) * closing
 
 
 @jitable
-def strength(scene, t, y, f, x, rate):
+def strength(scene: Scene, t: float, y: F1, f: int, x: float, rate: float) -> V3:
     """Return F, stored energy and lost power of applied force f at displacement x."""
     par, program = scene.applied.par[f], scene.applied.program[f]
     kind = scene.applied.kind[f]
@@ -120,8 +123,11 @@ def strength(scene, t, y, f, x, rate):
 
 
 @jitable
-def add_applied(scene, t, y, dy):
-    """Add every applied force to its bodies and what it dissipates to y'; return 0."""
+def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:  # noqa: C901
+    """Add every applied force to its bodies and what it dissipates to y'; return 0.
+
+    Many branches because kinds differ in their line or axis; how they push is one for all.
+    """
     applied, work, lost = scene.applied, scene.work, 0.0
     none = (0.0, 0.0, 0.0)
     for f in range(len(applied.kind)):

@@ -17,11 +17,12 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     DRY_SLIDE,
     DRY_TURN,
     LOST_POWER,
+    SCALE_LENGTH,
+    SCALE_SPEED,
     SLIDER,
     SLIDER_BEFORE,
     SLIDES,
@@ -30,6 +31,9 @@ from mbsim.arrays.scene import (
     STICK,
     STORED_ENERGY,
 )
+from mbsim.arrays.hooks import Dry
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
@@ -47,13 +51,13 @@ AT_REST = 1e4
 
 
 @jitable
-def is_dry(kind):
+def is_dry(kind: int) -> bool:
     """Return whether a kind of applied force is dry friction."""
     return kind == DRY_SLIDE or kind == DRY_TURN
 
 
 @jitable
-def dry_motion(scene, y, f):
+def dry_motion(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
     """Return the axis of dry friction f, x and its rate; the bodies have been placed."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     n, w = marker_axis(scene, scene.applied.axes[f], 2), scene.work.w
@@ -67,7 +71,7 @@ def dry_motion(scene, y, f):
 
 
 @jitable
-def dry_memory(scene, f):
+def dry_memory(scene: Scene, f: int) -> V2:
     """Return slider and mode that hold for the point being evaluated."""
     kept = scene.state.dry[f]
     if scene.world.past[0] == 1:
@@ -76,7 +80,7 @@ def dry_memory(scene, f):
 
 
 @jitable
-def dry_now(scene, f, x):
+def dry_now(scene: Scene, f: int, x: float) -> V2:
     """Return the force of dry friction f at x, and whether it gives way to x."""
     par = scene.applied.par[f]
     slider, slides = dry_memory(scene, f)
@@ -88,7 +92,7 @@ def dry_now(scene, f, x):
 
 
 @jitable
-def add_dry(scene, y, f):
+def add_dry(scene: Scene, y: F1, f: int) -> float:
     """Add dry friction f to its bodies, fill its row of `Work.applied`; return what is lost."""
     applied, row = scene.applied, scene.work.applied[f]
     n, x, rate = dry_motion(scene, y, f)
@@ -110,14 +114,14 @@ def add_dry(scene, y, f):
 
 
 @jitable
-def rest_of(scene, f):
+def rest_of(scene: Scene, f: int) -> float:
     """Return what is no velocity of rigid dry friction f but rounding."""
-    scale = scene.world.scale
-    return ROUNDING * (scale[1] / scale[0] if scene.applied.kind[f] == DRY_TURN else scale[1])
+    speed, turns = scene.world.scale[SCALE_SPEED], scene.applied.kind[f] == DRY_TURN
+    return ROUNDING * (speed / scene.world.scale[SCALE_LENGTH] if turns else speed)
 
 
 @jitable
-def holding_force(scene, f):
+def holding_force(scene: Scene, f: int) -> float:
     """Return the force against x that holds rigid dry friction f, no number where it need not."""
     active = scene.equations.active
     for r in range(active[len(active) - 1]):
@@ -127,7 +131,7 @@ def holding_force(scene, f):
 
 
 @jitable
-def show_sticking(scene):
+def show_sticking(scene: Scene) -> None:
     """Fill `Work.applied` of rigid dry frictions that are held; multipliers have been found."""
     active = scene.equations.active
     for r in range(active[len(active) - 1]):
@@ -141,7 +145,7 @@ def show_sticking(scene):
 
 
 @jitable
-def side_of_dry(scene, y, f):
+def side_of_dry(scene: Scene, y: F1, f: int) -> float:
     """Return what dry friction f does from here on: 0 to stick, or the sign in which it slides."""
     par, kept = scene.applied.par[f], scene.state.dry[f]
     _, x, rate = dry_motion(scene, y, f)
@@ -157,7 +161,7 @@ def side_of_dry(scene, y, f):
 
 
 @jitable
-def record_dry(scene, t, kind, f):
+def record_dry(scene: Scene, t: float, kind: int, f: int) -> None:
     """Append an event of dry friction f; it has no slot."""
     rows = scene.rows
     k = rows.used[2]
@@ -168,7 +172,7 @@ def record_dry(scene, t, kind, f):
 
 
 @jitable
-def commit_dry(scene, t, y):
+def commit_dry(scene: Scene, t: float, y: F1) -> int:
     """Keep what all dry frictions with a spring make of the point evaluated last; return 0.
 
     What the spring loses as it snaps from the force that began to slide is lost by the model.
@@ -194,6 +198,6 @@ def commit_dry(scene, t, y):
 
 
 @jitable
-def serve_dry(scene, what, t, y):
+def serve_dry(scene: Scene, what: int, t: float, y: F1) -> int:
     """Do what dry friction is asked for (`Dry`) where none is rigid; return 0."""
     return commit_dry(scene, t, y) if what == Dry.KEEP else 0

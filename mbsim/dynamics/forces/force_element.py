@@ -23,6 +23,8 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.hooks import Dry
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
@@ -47,13 +49,13 @@ SHORT, SHORTEST = 1e-8, 1e-14
 
 
 @jitable
-def memory_of(scene, e):
+def memory_of(scene: Scene, e: int) -> F1:
     """Return what element e remembers for the point being evaluated: time, x, f, f'."""
     return scene.state.residual[e, BEFORE if scene.world.past[0] == 1 else NOW]
 
 
 @jitable
-def switches(scene, e):
+def switches(scene: Scene, e: int) -> bool:
     """Return whether an unknown of element e is SWITCHING."""
     R = scene.residuals
     for u in range(R.begin[e], R.begin[e + 1]):
@@ -63,7 +65,7 @@ def switches(scene, e):
 
 
 @jitable
-def fill_motion(scene, t, y, e):
+def fill_motion(scene: Scene, t: float, y: F1, e: int) -> None:
     """Write time, x and x' of element e into `given`; the bodies have been placed."""
     R, na = scene.residuals, axes_of(scene, e)
     R.given[0] = t
@@ -82,14 +84,14 @@ def fill_motion(scene, t, y, e):
 
 
 @jitable
-def step_of(scene, t, memory):
+def step_of(scene: Scene, t: float, memory: F1) -> float:
     """Return the time since the state that is remembered."""
     h = t - memory[0]
     return h if h > 0.0 else 0.0
 
 
 @jitable
-def mean_rates(scene, e, h, memory):
+def mean_rates(scene: Scene, e: int, h: float, memory: F1) -> None:
     """Write the mean rates of x since the state that is remembered into `given`."""
     na = axes_of(scene, e)
     if not h > SHORT * own_time(scene):
@@ -99,7 +101,7 @@ def mean_rates(scene, e, h, memory):
 
 
 @jitable
-def find_unknowns(scene, t, y, e):
+def find_unknowns(scene: Scene, t: float, y: F1, e: int) -> int:
     """Find the unknowns of element e at a point and leave them in `given`; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     memory = memory_of(scene, e)
@@ -121,7 +123,7 @@ def find_unknowns(scene, t, y, e):
 
 
 @jitable
-def mode_now(scene, t, y, e):
+def mode_now(scene: Scene, t: float, y: F1, e: int) -> float:
     """Return the mode at the point whose unknowns are in `given`: rows of r that look at f'.
 
     With f as it is, and x' as it is and no mean, r = 0 is solved for f'; -1 where it is not.
@@ -160,7 +162,7 @@ def mode_now(scene, t, y, e):
 
 
 @jitable
-def serve_residual(scene, t, y, e, component):
+def serve_residual(scene: Scene, t: float, y: F1, e: int, component: int) -> int:
     """Fill what element e gives into `Users.result`, the mode if asked for; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     result = scene.users.result[R.user[e]]
@@ -182,7 +184,7 @@ def serve_residual(scene, t, y, e, component):
 
 
 @jitable
-def keep_residuals(scene, what, t, y):
+def keep_residuals(scene: Scene, what: int, t: float, y: F1) -> int:
     """Keep what all elements make of the point evaluated last; return 0."""
     if what != Dry.KEEP:
         return 0

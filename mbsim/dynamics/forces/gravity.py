@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.expressions.jets import value
 
 
 @jitable
-def add_weight(scene, t, y, dy):
+def add_weight(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add m g(t) to every body, and its work, with the sign turned, to what is lost; return 0.
 
     Only of the components that are expressions: the constant ones have a potential.

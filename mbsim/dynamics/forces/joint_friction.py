@@ -23,14 +23,16 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     BALL_FRICTION,
     FRICTION_CALLS,
     LOST_POWER,
     SLIDE_FRICTION,
     TURN_FRICTION,
 )
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
@@ -39,6 +41,7 @@ from mbsim.dynamics.constraints.equations import hold_again
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.forces.applied import push
+from mbsim.laws.abi import NFORCE_IN, TIME_IN, XDOT_IN
 
 # columns of `Work.rub`: wrench on I of a unit force (force 3, torque 3), then
 SPEED, FORCE, MISS = 6, 7, 8
@@ -54,7 +57,7 @@ MOST_ROUNDS = 60
 
 
 @jitable
-def fill_slip(scene, f):
+def fill_slip(scene: Scene, f: int) -> None:
     """Fill the wrench of a unit force along the slip of friction f, and its speed."""
     applied, row = scene.applied, scene.work.rub[f]
     i, j, kind, radius = applied.i[f], applied.j[f], applied.kind[f], applied.par[f, RADIUS]
@@ -77,13 +80,13 @@ def fill_slip(scene, f):
 
 
 @jitable
-def across(a, z):
+def across(a: V3, z: V3) -> float:
     """Return how much of a is across the unit vector z."""
     return norm(cross(z, a))
 
 
 @jitable
-def press(scene, f):
+def press(scene: Scene, f: int) -> float:
     """Return the normal force [F] of friction f under the reactions as they are filled."""
     applied, reaction = scene.applied, scene.work.reaction
     at = 6 * applied.connection[f]
@@ -99,16 +102,16 @@ def press(scene, f):
 
 
 @jitable
-def ask_law(scene, t, f):
+def ask_law(scene: Scene, t: float, f: int) -> float:
     """Return the force along the slip that the law of friction f makes of the reactions."""
     applied, given, out = scene.applied, scene.work.law_in, scene.work.law_out
     if applied.law[f] == 0:
         return 0.0
     for k in range(len(given)):
         given[k] = 0.0
-    given[0] = t
-    given[5] = scene.work.rub[f, SPEED]
-    given[10] = press(scene, f)
+    given[TIME_IN] = t
+    given[XDOT_IN] = scene.work.rub[f, SPEED]
+    given[NFORCE_IN] = press(scene, f)
     scene.log.counters[FRICTION_CALLS] += 1
     if call_int(applied.law[f], (applied.id[f], given, applied.law_par[f], out)) != 0:
         return math.nan
@@ -116,7 +119,7 @@ def ask_law(scene, t, f):
 
 
 @jitable
-def add_force(scene, f, size):
+def add_force(scene: Scene, f: int, size: float) -> None:
     """Add a force along the slip to what friction f does to both bodies."""
     applied, row = scene.applied, scene.work.rub[f]
     row[FORCE] += size
@@ -127,7 +130,7 @@ def add_force(scene, f, size):
 
 
 @jitable
-def compare(scene, t):
+def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
     """Fill by how much each friction misses its law.
 
     Returns the largest miss (no number if a force is none), the largest force, the row that
@@ -152,7 +155,7 @@ def compare(scene, t):
 
 
 @jitable
-def settle_friction(scene, t, y, stresses):
+def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
     """Find the friction forces and the accelerations under them; return 0 or a code."""
     applied, rub, step = scene.applied, scene.work.rub, 1.0
     for k in range(MOST_ROUNDS):
@@ -178,7 +181,7 @@ def settle_friction(scene, t, y, stresses):
 
 
 @jitable
-def add_friction(scene, t, y, dy):
+def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add friction to the accelerations and what it dissipates to y'; return 0 or a code."""
     applied, work, lost = scene.applied, scene.work, 0.0
     for f in range(len(applied.kind)):

@@ -16,15 +16,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     JOINT_FRICTION,
     LINE_FORCE,
     LOST_POWER,
     SCALAR,
+    SCALE_LENGTH,
 )
+from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
@@ -45,7 +48,7 @@ from mbsim.dynamics.forces.joint_friction import (
 )
 from mbsim.dynamics.forces.wrenches import push_at, velocity_at
 
-# columns of `Work.late`
+# columns of `Work.by_reactions`
 SIZE, MISS, STEP, CHANGE, ROW = range(5)
 
 
@@ -57,7 +60,7 @@ TOO_LARGE = 1e9
 
 
 @jitable
-def fill_direction(scene, y, f):
+def fill_direction(scene: Scene, y: F1, f: int) -> None:
     """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
     applied, row = scene.applied, scene.work.rub[f]
     i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
@@ -78,7 +81,7 @@ def fill_direction(scene, y, f):
 
 
 @jitable
-def push_scalar(scene, f, size):
+def push_scalar(scene: Scene, f: int, size: float) -> None:
     """Add `size` of scalar force f to its bodies."""
     applied, row = scene.applied, scene.work.rub[f]
     force = scale(size, (row[0], row[1], row[2]))
@@ -89,7 +92,7 @@ def push_scalar(scene, f, size):
 
 
 @jitable
-def push_component(scene, y, f, c, size):
+def push_component(scene: Scene, y: F1, f: int, c: int, size: float) -> None:
     """Add `size` of component c of vector force f to its bodies."""
     applied, none = scene.applied, (0.0, 0.0, 0.0)
     e = scale(size, marker_axis(scene, applied.axes[f], c % 3))
@@ -102,11 +105,11 @@ def push_component(scene, y, f, c, size):
 
 
 @jitable
-def add_to_all(scene, y):
+def add_to_all(scene: Scene, y: F1) -> None:
     """Add the last step of every unknown to the bodies."""
-    late, work = scene.applied.late, scene.work.late
-    for u in range(len(late)):
-        f, c, size = late[u, 0], late[u, 1], work[u, STEP]
+    by_reactions, work = scene.applied.by_reactions, scene.work.by_reactions
+    for u in range(len(by_reactions)):
+        f, c, size = by_reactions[u, 0], by_reactions[u, 1], work[u, STEP]
         work[u, SIZE] += size
         if c == JOINT_FRICTION:
             add_force(scene, f, size)
@@ -117,7 +120,7 @@ def add_to_all(scene, y):
 
 
 @jitable
-def add_to_row(scene, f, c, size):
+def add_to_row(scene: Scene, f: int, c: int, size: float) -> None:
     """Add an unknown to the force and torque of its row of `Work.applied`."""
     row = scene.work.applied[f]
     if c >= SCALAR:
@@ -131,34 +134,34 @@ def add_to_row(scene, f, c, size):
 
 
 @jitable
-def fill_rows(scene):
+def fill_rows(scene: Scene) -> None:
     """Fill force and torque of all rows that are settled."""
-    late, work = scene.applied.late, scene.work
-    for u in range(len(late)):
-        for k in range(len(work.applied[late[u, 0]])):
-            work.applied[late[u, 0], k] = 0.0
-    for u in range(len(late)):
-        add_to_row(scene, late[u, 0], late[u, 1], work.late[u, SIZE])
+    by_reactions, work = scene.applied.by_reactions, scene.work
+    for u in range(len(by_reactions)):
+        for k in range(len(work.applied[by_reactions[u, 0]])):
+            work.applied[by_reactions[u, 0], k] = 0.0
+    for u in range(len(by_reactions)):
+        add_to_row(scene, by_reactions[u, 0], by_reactions[u, 1], work.by_reactions[u, SIZE])
 
 
 @jitable
-def measure_misses(scene, t, y):
+def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
     """Fill by how much each unknown misses its law or expression, and the change of that.
 
     Returns the first that is no number or -1, and the largest force, torque (over the length)
     and reaction.
     """
-    late, work = scene.applied.late, scene.work
-    length = scene.world.scale[0]
+    by_reactions, work = scene.applied.by_reactions, scene.work
+    length = scene.world.scale[SCALE_LENGTH]
     largest, reaction = 0.0, 0.0
     for k in range(len(work.reaction)):
         reaction = max(reaction, abs(work.reaction[k]) / (1.0 if k % 6 < 3 else length))
-    for u in range(len(late)):
-        f, row = late[u, 0], work.late[u]
-        if late[u, 1] == JOINT_FRICTION:
+    for u in range(len(by_reactions)):
+        f, row = by_reactions[u, 0], work.by_reactions[u]
+        if by_reactions[u, 1] == JOINT_FRICTION:
             asked = ask_law(scene, t, f)
         else:
-            asked = value(scene, t, y, late[u, 2])
+            asked = value(scene, t, y, by_reactions[u, 2])
         if not math.isfinite(asked):
             work.applied[f, 0] = asked
             return u, largest, reaction
@@ -170,28 +173,28 @@ def measure_misses(scene, t, y):
 
 
 @jitable
-def unit(scene, u):
+def unit(scene: Scene, u: int) -> float:
     """Return what makes a force of unknown u: the length for torques, else 1."""
-    f, c = scene.applied.late[u, 0], scene.applied.late[u, 1]
+    f, c = scene.applied.by_reactions[u, 0], scene.applied.by_reactions[u, 1]
     turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE
-    return scene.world.scale[0] if turns else 1.0
+    return scene.world.scale[SCALE_LENGTH] if turns else 1.0
 
 
 @jitable
-def worst_unknown(scene):
+def worst_unknown(scene: Scene) -> tuple[int, float]:
     """Return the unknown that misses most, and by how much."""
     worst, at = 0.0, 0
-    for u in range(len(scene.applied.late)):
-        miss = abs(scene.work.late[u, MISS]) / unit(scene, u)
+    for u in range(len(scene.applied.by_reactions)):
+        miss = abs(scene.work.by_reactions[u, MISS]) / unit(scene, u)
         if miss > worst:
             worst, at = miss, u
     return at, worst
 
 
 @jitable
-def update_secant(scene):
+def update_secant(scene: Scene) -> None:
     """Let H take the last change of the misses to the last step."""
-    H, work = scene.work.secant, scene.work.late
+    H, work = scene.work.secant, scene.work.by_reactions
     n, below = len(H), 0.0
     for i in range(n):
         row = 0.0
@@ -211,9 +214,9 @@ def update_secant(scene):
 
 
 @jitable
-def next_step(scene):
+def next_step(scene: Scene) -> None:
     """Fill the next step, -H r."""
-    H, work = scene.work.secant, scene.work.late
+    H, work = scene.work.secant, scene.work.by_reactions
     for i in range(len(H)):
         total = 0.0
         for j in range(len(H)):
@@ -222,26 +225,26 @@ def next_step(scene):
 
 
 @jitable
-def begin(scene, y):
+def begin(scene: Scene, y: F1) -> None:
     """Set all unknowns to 0, H to -1, and fill the directions in which they act."""
-    late, work = scene.applied.late, scene.work
-    for u in range(len(late)):
-        f = late[u, 0]
-        if late[u, 1] == JOINT_FRICTION:
+    by_reactions, work = scene.applied.by_reactions, scene.work
+    for u in range(len(by_reactions)):
+        f = by_reactions[u, 0]
+        if by_reactions[u, 1] == JOINT_FRICTION:
             fill_slip(scene, f)
-        elif late[u, 1] == SCALAR:
+        elif by_reactions[u, 1] == SCALAR:
             fill_direction(scene, y, f)
-        for k in range(work.late.shape[1]):
-            work.late[u, k] = 0.0
-        for k in range(len(late)):
+        for k in range(work.by_reactions.shape[1]):
+            work.by_reactions[u, k] = 0.0
+        for k in range(len(by_reactions)):
             work.secant[u, k] = -1.0 if k == u else 0.0
 
 
 @jitable
-def settle(scene, t, y, stresses):
+def settle(scene: Scene, t: float, y: F1, stresses: int) -> int:
     """Find the unknowns and the accelerations under them; return 0 or a code."""
-    late, work = scene.applied.late, scene.work
-    most, bound = MOST_ROUNDS + 2 * len(late), 0.0
+    by_reactions, work = scene.applied.by_reactions, scene.work
+    most, bound = MOST_ROUNDS + 2 * len(by_reactions), 0.0
     for k in range(most):
         sum_reactions(scene, y)
         take_stresses(scene, stresses)
@@ -258,20 +261,24 @@ def settle(scene, t, y, stresses):
         if largest <= bound and worst <= max(part * largest, ROUNDING * reaction):
             work.trouble[1] = -1
             return 0
-        work.trouble[1] = late[at, 0]
+        work.trouble[1] = by_reactions[at, 0]
         if k > 0:
             update_secant(scene)
         next_step(scene)
         add_to_all(scene, y)
         hold_again(scene, t)
-    return Code.JAMMED if scene.applied.late[at, 1] == JOINT_FRICTION else Code.UNSETTLED
+    return Code.JAMMED if scene.applied.by_reactions[at, 1] == JOINT_FRICTION else Code.UNSETTLED
 
 
 @jitable
-def lost_power(scene, y, u):
+def lost_power(scene: Scene, y: F1, u: int) -> float:
     """Return the power of unknown u with the sign turned."""
-    applied, f, c = scene.applied, scene.applied.late[u, 0], scene.applied.late[u, 1]
-    size = scene.work.late[u, SIZE]
+    applied, f, c = (
+        scene.applied,
+        scene.applied.by_reactions[u, 0],
+        scene.applied.by_reactions[u, 1],
+    )
+    size = scene.work.by_reactions[u, SIZE]
     if c >= SCALAR:
         return -size * scene.work.rub[f, SPEED]
     i, j = applied.i[f], applied.j[f]
@@ -286,9 +293,9 @@ def lost_power(scene, y, u):
 
 
 @jitable
-def add_late(scene, t, y, dy):
-    """Add late forces and friction to the accelerations, what they dissipate to y'; return 0."""
-    late, work, lost = scene.applied.late, scene.work, 0.0
+def add_reaction_forces(scene: Scene, t: float, y: F1, dy: F1) -> int:
+    """Add forces by reactions to the accelerations, what they dissipate to y'; return 0."""
+    by_reactions, work, lost = scene.applied.by_reactions, scene.work, 0.0
     begin(scene, y)
     stresses = 0
     if active_count(scene) < len(scene.equations.program):
@@ -297,9 +304,9 @@ def add_late(scene, t, y, dy):
     code = failure_or(scene, settle(scene, t, y, stresses))
     if code != 0:
         return code
-    for u in range(len(late)):
+    for u in range(len(by_reactions)):
         power = lost_power(scene, y, u)
-        work.applied[late[u, 0], LOST_POWER] += power
+        work.applied[by_reactions[u, 0], LOST_POWER] += power
         lost += power
     dy[scene.world.accumulators[1]] += lost
     # bodies that no joint holds may be pushed too

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import PYTHON_CALLS
+from mbsim.arrays.codes import PYTHON_CALLS, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.model import Residuals
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.laws.residual import ALGEBRAIC, DIFFERENTIAL, SWITCHING
@@ -27,25 +30,25 @@ SINGULAR_BELOW = 1e-13
 
 
 @jitable
-def axes_of(scene, e):
+def axes_of(scene: Scene, e: int) -> int:
     """Return how many directions element e has."""
     return scene.residuals.first[e + 1] - scene.residuals.first[e]
 
 
 @jitable
-def unknowns_of(scene, e):
+def unknowns_of(scene: Scene, e: int) -> int:
     """Return how many unknowns element e has."""
     return scene.residuals.begin[e + 1] - scene.residuals.begin[e]
 
 
 @jitable
-def own_time(scene):
+def own_time(scene: Scene) -> float:
     """Return L/V."""
-    return scene.world.scale[0] / scene.world.scale[1]
+    return scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
 
 
 @jitable
-def ask(scene, e):
+def ask(scene: Scene, e: int) -> int:
     """Fill `out` with the residual of what is given; return a code."""
     R = scene.residuals
     if R.interpreted[e] == 1:
@@ -61,7 +64,7 @@ def ask(scene, e):
 
 
 @jitable
-def put_unknowns(scene, e, h):
+def put_unknowns(scene: Scene, e: int, h: float) -> None:
     """Write f and f' that follow from z into `given`; `base` holds what f begins at."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     first = 1 + 2 * na
@@ -76,14 +79,14 @@ def put_unknowns(scene, e, h):
 
 
 @jitable
-def ask_at(scene, e, h):
+def ask_at(scene: Scene, e: int, h: float) -> int:
     """Fill `out` with the residual of z; return a code."""
     put_unknowns(scene, e, h)
     return ask(scene, e)
 
 
 @jitable
-def difference(scene, e, at, size, column):
+def difference(scene: Scene, e: int, at: int, size: float, column: F1) -> int:
     """Fill a column with the residual by one argument, where r is in `rows`; return a code."""
     R = scene.residuals
     kept = R.given[at]
@@ -97,7 +100,7 @@ def difference(scene, e, at, size, column):
 
 
 @jitable
-def find_slopes(scene, e, every):
+def find_slopes(scene: Scene, e: int, every: bool) -> int:
     """Fill `by` with the residual by f and f', where r is in `rows`; return a code.
 
     What r is not solved for is left out unless `every` one is wanted.
@@ -121,7 +124,7 @@ def find_slopes(scene, e, every):
 
 
 @jitable
-def fill_matrix(scene, e, h):
+def fill_matrix(scene: Scene, e: int, h: float) -> None:
     """Fill A with the residual by z."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
@@ -137,7 +140,7 @@ def fill_matrix(scene, e, h):
 
 
 @jitable
-def factor(R, nu):
+def factor(R: Residuals, nu: int) -> bool:
     """Factor A in place, rows and columns scaled to 1; return whether that can be done."""
     for k in range(nu):
         largest = 0.0
@@ -166,7 +169,7 @@ def factor(R, nu):
 
 
 @jitable
-def back(R, nu, b):
+def back(R: Residuals, nu: int, b: F1) -> None:
     """Solve A x = b in place, A as `factor` left it."""
     for k in range(nu):
         # rows were swapped as a whole, their factors too
@@ -183,7 +186,7 @@ def back(R, nu, b):
 
 
 @jitable
-def scale_of(scene, e, k, h):
+def scale_of(scene: Scene, e: int, k: int, h: float) -> float:
     """Return a usual size of what is sought of unknown k."""
     R = scene.residuals
     u = R.begin[e] + k
@@ -194,7 +197,7 @@ def scale_of(scene, e, k, h):
 
 
 @jitable
-def is_small(scene, e, h):
+def is_small(scene: Scene, e: int, h: float) -> bool:
     """Return whether the step is one that ends the iteration."""
     R, worst = scene.residuals, 0.0
     for k in range(unknowns_of(scene, e)):
@@ -203,7 +206,7 @@ def is_small(scene, e, h):
 
 
 @jitable
-def is_naught(scene, e):
+def is_naught(scene: Scene, e: int) -> bool:
     """Return whether the residual is 0 to the last digit."""
     for k in range(unknowns_of(scene, e)):
         if scene.residuals.out[k] != 0.0:
@@ -212,7 +215,7 @@ def is_naught(scene, e):
 
 
 @jitable
-def take_step(scene, e):
+def take_step(scene: Scene, e: int) -> None:
     """Let the step be -A^-1 r."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
@@ -221,7 +224,7 @@ def take_step(scene, e):
 
 
 @jitable
-def slopes_here(scene, e, h):
+def slopes_here(scene: Scene, e: int, h: float) -> int:
     """Factor the residual by z, where r is in `out`; return a code, -1 if singular."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
@@ -236,7 +239,7 @@ def slopes_here(scene, e, h):
 
 
 @jitable
-def largest(R, nu):
+def largest(R: Residuals, nu: int) -> float:
     """Return the largest number of the residual."""
     most = 0.0
     for k in range(nu):
@@ -245,7 +248,7 @@ def largest(R, nu):
 
 
 @jitable
-def newton(scene, e, h):
+def newton(scene: Scene, e: int, h: float) -> int:
     """Find z by Newton's method from where it is; return 0, -1 where it fails, or a code.
 
     -2: corrections are small, but the residual is not: differences reach over a switch.
@@ -287,7 +290,7 @@ def newton(scene, e, h):
 
 
 @jitable
-def bracket(scene, e, h):
+def bracket(scene: Scene, e: int, h: float) -> int:
     """Find an only unknown between values where r has two signs; return what `newton` does."""
     R = scene.residuals
     z0, size = R.start[0], scale_of(scene, e, 0, h)
@@ -336,7 +339,7 @@ def bracket(scene, e, h):
 
 
 @jitable
-def go_down(scene, e, h):
+def go_down(scene: Scene, e: int, h: float) -> int:
     """Find several unknowns by steps that make r smaller; return what `newton` does."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):
@@ -376,7 +379,7 @@ def go_down(scene, e, h):
 
 
 @jitable
-def solve(scene, e, h):
+def solve(scene: Scene, e: int, h: float) -> int:
     """Find z that makes the residual 0, from `start`; return 0 or a code."""
     R, nu = scene.residuals, unknowns_of(scene, e)
     for k in range(nu):

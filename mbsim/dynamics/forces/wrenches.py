@@ -11,9 +11,11 @@ from typing import Any
 
 from numba.extending import overload
 
+from mbsim.arrays.codes import LOST_POWER, MARKER_FORCE, STORED_ENERGY
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import LOST_POWER, MARKER_FORCE, STORED_ENERGY
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
@@ -22,7 +24,7 @@ from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.expressions.jets import value
 
 
-def wrench(scene, t, y, f):
+def wrench(scene: Scene, t: float, y: F1, f: int) -> int:
     """Add the wrench of row f to its bodies and fill its row of `Work.applied`; return 0."""
     return add_wrench(scene, t, y, f)
 
@@ -38,7 +40,7 @@ def _wrench(scene: Any, t: Any, y: Any, f: Any) -> Any:
 
 
 @jitable
-def along(scene, m, a):
+def along(scene: Scene, m: int, a: V3) -> V3:
     """Return a global vector's components along the axes of marker m."""
     return (
         dot(marker_axis(scene, m, 0), a),
@@ -48,14 +50,14 @@ def along(scene, m, a):
 
 
 @jitable
-def combined(scene, m, a):
+def combined(scene: Scene, m: int, a: V3) -> V3:
     """Return the global vector that has components a along the axes of marker m."""
     x, y = scale(a[0], marker_axis(scene, m, 0)), scale(a[1], marker_axis(scene, m, 1))
     return add(add(x, y), scale(a[2], marker_axis(scene, m, 2)))
 
 
 @jitable
-def rotation_vector(scene, i, j):
+def rotation_vector(scene: Scene, i: int, j: int) -> V3:
     """Return the vector along J's axes that turns them into I's; its length is at most pi.
 
     The quaternion of the rotation comes from the largest of its four products, as S. W. Shepperd,
@@ -79,14 +81,14 @@ def rotation_vector(scene, i, j):
 
 
 @jitable
-def velocity_at(scene, y, b, p):
+def velocity_at(scene: Scene, y: F1, b: int, p: V3) -> V3:
     """Return the velocity of the point of body b that is at p."""
     w = vector(scene.work.w[b])
     return add(vector(scene.work.v[b]), cross(w, sub(p, position(scene, y, b))))
 
 
 @jitable
-def push_at(scene, y, b, p, force, torque):
+def push_at(scene: Scene, y: F1, b: int, p: V3, force: V3, torque: V3) -> None:
     """Add a force at point p, and a torque, to those of body b about its cg."""
     work = scene.work
     moment = cross(sub(p, position(scene, y, b)), force)
@@ -96,14 +98,14 @@ def push_at(scene, y, b, p, force, torque):
 
 
 @jitable
-def component_value(scene, t, y, f, k):
+def component_value(scene: Scene, t: float, y: F1, f: int, k: int) -> float:
     """Return component k of a vector force, 0 where it has no expression."""
     program = scene.applied.components[f, k]
     return value(scene, t, y, program) if program >= 0 else 0.0
 
 
 @jitable
-def vector_wrench(scene, t, y, f):
+def vector_wrench(scene: Scene, t: float, y: F1, f: int) -> tuple[V3, V3]:
     """Return force and torque of a vector force on I."""
     force = (
         component_value(scene, t, y, f, 0),
@@ -120,7 +122,7 @@ def vector_wrench(scene, t, y, f):
 
 
 @jitable
-def add_vector_force(scene, t, y, f):
+def add_vector_force(scene: Scene, t: float, y: F1, f: int) -> int:
     """Add a vector force to its bodies and fill its row of `Work.applied`; return 0."""
     applied = scene.applied
     i, alone = applied.i[f], applied.alone[f] == 1
@@ -133,7 +135,7 @@ def add_vector_force(scene, t, y, f):
 
 
 @jitable
-def fill_motion(scene, y, f):
+def fill_motion(scene: Scene, y: F1, f: int) -> None:
     """Fill `Work.motion` with how I of marker force f stands and moves as seen from J."""
     i, j, motion = scene.applied.i[f], scene.applied.j[f], scene.work.motion
     p, b, other = marker_point(scene, y, i), scene.markers.body[i], scene.markers.body[j]
@@ -149,7 +151,7 @@ def fill_motion(scene, y, f):
 
 
 @jitable
-def add_marker_force(scene, y, f):
+def add_marker_force(scene: Scene, y: F1, f: int) -> int:
     """Add a force of a kind of `forces.catalog`, as `add_vector_force`; return 0 or a code."""
     applied, out = scene.applied, scene.work.wrench
     fill_motion(scene, y, f)
@@ -163,7 +165,7 @@ def add_marker_force(scene, y, f):
 
 
 @jitable
-def apply(scene, y, f, force, torque, stored, lost):
+def apply(scene: Scene, y: F1, f: int, force: V3, torque: V3, stored: float, lost: float) -> int:
     """Add force and torque on I at I's origin, the opposite on J's body; return 0 or a code."""
     applied, row = scene.applied, scene.work.applied[f]
     i = applied.i[f]
@@ -181,7 +183,7 @@ def apply(scene, y, f, force, torque, stored, lost):
 
 
 @jitable
-def add_wrench(scene, t, y, f):
+def add_wrench(scene: Scene, t: float, y: F1, f: int) -> int:
     """Add a vector force or a marker force; return 0 or a code."""
     if scene.applied.kind[f] == MARKER_FORCE:
         return add_marker_force(scene, y, f)

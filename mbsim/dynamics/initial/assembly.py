@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import ANGLE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Joints
-from mbsim.arrays.scene import ANGLE, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import System
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting
@@ -160,7 +161,7 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
 def _lost(scene: Scene, y: Array, given: dict[int, Array]) -> list[tuple[int, str, float, float]]:
     """Return the given velocities that do not hold."""
     found = []
-    speed, length = float(scene.world.scale[1]), float(scene.world.scale[0])
+    speed, length = float(scene.world.scale[SCALE_SPEED]), float(scene.world.scale[SCALE_LENGTH])
     for b, rows in given.items():
         if scene.tree.of_body[b] < 0:
             continue
@@ -182,7 +183,7 @@ def _changes(
 ) -> tuple[list[tuple[int, float, float]], list[tuple[int, Array, Array]]]:
     """Return which bodies moved and which changed velocity, beyond rounding."""
     moved, sped = [], []
-    length, speed = scene.world.scale[0], scene.world.scale[1]
+    length, speed = scene.world.scale[SCALE_LENGTH], scene.world.scale[SCALE_SPEED]
     for b in scene.tree.body:
         old, new = (v[BODY_SIZE * b : BODY_SIZE * (b + 1)] for v in (before, after))
         way = float(np.linalg.norm(new[0:3] - old[0:3]))

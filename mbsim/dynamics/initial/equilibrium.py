@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import SCALE_LENGTH
 from mbsim.arrays.hooks import Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.layout import BODY_SIZE
@@ -87,7 +88,7 @@ class Search:
         self.y = y.copy()
         self.first = y.copy()
         self.f = np.zeros_like(y)
-        self.length = float(scene.world.scale[0])
+        self.length = float(scene.world.scale[SCALE_LENGTH])
         inertia = np.trace(scene.bodies.inertia, axis1=1, axis2=2)
         self.gyration = np.sqrt(inertia / (2.0 * scene.bodies.mass))
         thin = scene.graphics.thin[np.isfinite(scene.graphics.thin)]
@@ -392,10 +393,10 @@ def balance(
         if search.gone():
             far = True
             break
-    found = Balance(
+    balance = Balance(
         k, search.evaluations, size, scale or 1.0, worst, far, loose, unstable and done, done
     )
-    return found, search.y
+    return balance, search.y
 
 
 def _try_newton(search: Search, local: _Local, size: float, done: bool) -> Array | None:

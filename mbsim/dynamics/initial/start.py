@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import SCALE_LENGTH
 from mbsim.arrays.scene import Scene
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting
@@ -94,7 +95,7 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
     `given` has, by body row, rows (v axis, w axis, value): six coefficients, global, and what they
     times (v, w) shall be. Bodies that no constraint holds keep theirs as they are.
     """
-    tree, length = scene.tree, float(scene.world.scale[0])
+    tree, length = scene.tree, float(scene.world.scale[SCALE_LENGTH])
     found = tree_map(scene)
     if found.shape[1] == 0:
         # all is fixed: nothing can move

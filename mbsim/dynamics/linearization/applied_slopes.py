@@ -6,17 +6,23 @@ reactions, and press friction in joints, these are taken as they are.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import (
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import (
     AXIS_FORCE,
     AXIS_TORQUE,
     DRY_TURN,
     LINE_FORCE,
     MARKER_FORCE,
     RESIDUAL,
+    SCALE_LENGTH,
+    SCALE_SPEED,
     SLIDE_LIMIT,
     TURN_LIMIT,
     VECTOR_FORCE,
 )
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
@@ -37,9 +43,12 @@ from mbsim.dynamics.linearization.stiffness import (
     sides_of,
 )
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Pattern, Tangent
+
 
 @jitable
-def couple_applied(scene, P, T):
+def couple_applied(scene: Scene, P: Pattern, T: Tangent) -> bool:
     """Couple the bodies between which forces act, and those that they look at."""
     nb = len(scene.bodies.mass)
     for f in range(len(scene.applied.kind)):
@@ -67,7 +76,9 @@ def couple_applied(scene, P, T):
 
 
 @jitable
-def add_turning_rate(scene, T, y, f, by_rate, n, d, u):
+def add_turning_rate(
+    scene: Scene, T: Tangent, y: F1, f: int, by_rate: float, n: V3, d: float, u: F2
+) -> None:
     """Add how the rate changes as the line turns: (v across)/d . (dP_I - dP_J)."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
@@ -82,7 +93,7 @@ def add_turning_rate(scene, T, y, f, by_rate, n, d, u):
 
 
 @jitable
-def add_vector_slopes(scene, T, t, y, f):
+def add_vector_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
     """Add a vector force by expressions."""
     none = (0.0, 0.0, 0.0)
     for k in range(6):
@@ -96,17 +107,17 @@ def add_vector_slopes(scene, T, t, y, f):
 
 
 @jitable
-def limit_slopes(scene, f, x, rate):
+def limit_slopes(scene: Scene, f: int, x: float, rate: float) -> V2:
     """Return dF/dx and dF/dx' of a limit."""
-    step = PUSH * max(abs(x), 1e-3 * scene.world.scale[0])
-    fast = PART_OF_SPEED * scene.world.scale[1] + PART * abs(rate)
+    step = PUSH * max(abs(x), 1e-3 * scene.world.scale[SCALE_LENGTH])
+    fast = PART_OF_SPEED * scene.world.scale[SCALE_SPEED] + PART * abs(rate)
     by_x = at_limit(scene, f, x + step, rate)[0] - at_limit(scene, f, x - step, rate)[0]
     by_rate = at_limit(scene, f, x, rate + fast)[0] - at_limit(scene, f, x, rate - fast)[0]
     return by_x / (2.0 * step), by_rate / (2.0 * fast)
 
 
 @jitable
-def add_scalar_slopes(scene, T, t, y, f):
+def add_scalar_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
     """Add a force along a line, along an axis or about one."""
     P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
     bi, bj = sides_of(scene, f)
@@ -151,7 +162,7 @@ def add_scalar_slopes(scene, T, t, y, f):
 
 
 @jitable
-def add_dry_slopes(scene, T, y, f):
+def add_dry_slopes(scene: Scene, T: Tangent, y: F1, f: int) -> None:
     """Add dry friction: a spring where it sticks, in slip nothing but that its axis turns."""
     n, x, _ = dry_motion(scene, y, f)
     none, turns = (0.0, 0.0, 0.0), scene.applied.kind[f] == DRY_TURN
@@ -167,7 +178,7 @@ def add_dry_slopes(scene, T, y, f):
 
 
 @jitable
-def add_applied_slopes(scene, T, t, y):
+def add_applied_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> int:
     """Add what forces between markers do, but for marker forces and friction in joints."""
     for f in range(len(scene.applied.kind)):
         kind = scene.applied.kind[f]

@@ -11,7 +11,14 @@ Loops over a block take its size from the array: unrolled, they would take long 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from mbsim.core.arrays import F2, I1, N1, N2
 from mbsim.core.jitable import jitable
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Pair, Pattern, Real
+
 
 # entries of `Pattern.count`
 COUPLINGS, BLOCKS, STALE = range(3)
@@ -21,7 +28,7 @@ _NO_PIVOT = 1e-14
 
 
 @jitable
-def forget_pattern(P):
+def forget_pattern(P: Pattern) -> None:
     """Start with the blocks of each body on itself."""
     nb = len(P.order)
     for a in range(nb):
@@ -34,7 +41,7 @@ def forget_pattern(P):
 
 
 @jitable
-def couple(P, a, b):
+def couple(P: Pattern, a: int, b: int) -> bool:
     """Make room for what body b does to a and a to b; return whether there is room."""
     if P.place[a, b] >= 0 and P.place[a, b] < P.count[COUPLINGS]:
         return True
@@ -53,7 +60,7 @@ def couple(P, a, b):
 
 
 @jitable
-def drop_fill(P):
+def drop_fill(P: Pattern) -> None:
     """Take away the blocks that only elimination fills."""
     nb = len(P.order)
     for a in range(nb):
@@ -63,7 +70,7 @@ def drop_fill(P):
 
 
 @jitable
-def place_block(P, a, b):
+def place_block(P: Pattern, a: int, b: int) -> bool:
     """Make room for a block; return whether there is room."""
     if P.place[a, b] < 0:
         if P.count[BLOCKS] >= len(P.neighbour):
@@ -74,7 +81,7 @@ def place_block(P, a, b):
 
 
 @jitable
-def count_neighbours(P, a):
+def count_neighbours(P: Pattern, a: int) -> int:
     """Return with how many bodies that are not yet eliminated body a is coupled."""
     count = 0
     for b in range(len(P.order)):
@@ -84,7 +91,7 @@ def count_neighbours(P, a):
 
 
 @jitable
-def next_body(P):
+def next_body(P: Pattern) -> int:
     """Return the body to be eliminated next."""
     best, least = -1, len(P.order) + 1
     for a in range(len(P.order)):
@@ -94,7 +101,7 @@ def next_body(P):
 
 
 @jitable
-def find_order(P):
+def find_order(P: Pattern) -> bool:
     """Find the order of elimination and the blocks that it fills; return whether there is room."""
     nb = len(P.order)
     P.count[BLOCKS] = P.count[COUPLINGS]
@@ -130,7 +137,7 @@ def find_order(P):
 
 
 @jitable
-def factor_small(a, swap, size):
+def factor_small(a: N2, swap: I1, size: int) -> bool:
     """Replace the leading part of a by its factors with row exchanges; return whether it could."""
     for k in range(size):
         best, largest = k, abs(a[k, k])
@@ -153,7 +160,7 @@ def factor_small(a, swap, size):
 
 
 @jitable
-def solve_small(a, swap, size, x):
+def solve_small(a: N2, swap: I1, size: int, x: N1) -> None:
     """Replace the vector x by a^-1 x; what has no pivot is 0."""
     for k in range(size):
         if swap[k] != k:
@@ -171,7 +178,7 @@ def solve_small(a, swap, size, x):
 
 
 @jitable
-def solve_rows(a, swap, size, X):
+def solve_rows(a: N2, swap: I1, size: int, X: N2) -> None:
     """Replace the first rows of X, six long, by a^-1 X."""
     for k in range(size):
         other = swap[k]
@@ -194,7 +201,7 @@ def solve_rows(a, swap, size, X):
 
 
 @jitable
-def add_block(A, B):
+def add_block(A: N2, B: N2) -> None:
     """Add B to A."""
     for i in range(A.shape[0]):
         for j in range(A.shape[1]):
@@ -202,7 +209,7 @@ def add_block(A, B):
 
 
 @jitable
-def take_product(A, Q, X, size):
+def take_product(A: N2, Q: N2, X: N2, size: int) -> None:
     """Take Q X from A; Q is 6 x size, X size x 6."""
     for i in range(A.shape[0]):
         for q in range(size):
@@ -212,7 +219,7 @@ def take_product(A, Q, X, size):
 
 
 @jitable
-def times_directions(A, S, size, out):
+def times_directions(A: N2, S: F2, size: int, out: N2) -> None:
     """Write A S' into the first columns of `out`, which may be A; S has directions by rows."""
     for i in range(A.shape[0]):
         a0, a1, a2, a3, a4, a5 = A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5]
@@ -228,7 +235,7 @@ def times_directions(A, S, size, out):
 
 
 @jitable
-def directions_times(S, A, size, out):
+def directions_times(S: F2, A: N2, size: int, out: N2) -> None:
     """Write S A into the first rows of `out`, which is not A."""
     for q in range(size):
         for j in range(A.shape[1]):
@@ -239,7 +246,7 @@ def directions_times(S, A, size, out):
 
 
 @jitable
-def copy_rows(A, B, size):
+def copy_rows(A: N2, B: N2, size: int) -> None:
     """Copy the first rows of B into A."""
     for i in range(size):
         for j in range(A.shape[1]):
@@ -247,7 +254,7 @@ def copy_rows(A, B, size):
 
 
 @jitable
-def hang(P, M, linear, free, c, first, end):
+def hang(P: Pattern, M: Real | Pair, linear: Linear, free: I1, c: int, first: int, end: int) -> int:
     """Bring rows and columns of body c, which hangs on a joint, to its parent and its dq."""
     k, p = P.joint[c], P.parent[c]
     S, U, own, spare = linear.S[k], linear.U[k], M.work[0], M.work[1]
@@ -289,7 +296,7 @@ def hang(P, M, linear, free, c, first, end):
 
 
 @jitable
-def eliminate(P, M, linear, free):
+def eliminate(P: Pattern, M: Real | Pair, linear: Linear, free: I1) -> bool:
     """Replace A by its factors; return whether that is possible."""
     for step in range(len(P.order)):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]
@@ -312,8 +319,11 @@ def eliminate(P, M, linear, free):
 
 
 @jitable
-def solve_bodies(P, M, linear, free, g):
-    """Replace the right side g, (nb, 6) at least, by the displacements of all bodies."""
+def solve_bodies(P: Pattern, M: Real | Pair, linear: Linear, free: I1, g: N2) -> None:  # noqa: C901
+    """Replace the right side g, (nb, 6) at least, by the displacements of all bodies.
+
+    Many branches because the sweeps forward and back both treat bodies on joints in their own way.
+    """
     nb = len(P.order)
     for step in range(nb):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]
@@ -358,7 +368,7 @@ def solve_bodies(P, M, linear, free, g):
 
 
 @jitable
-def factor_border(a, swap, size):
+def factor_border(a: N2, swap: I1, size: int) -> None:
     """Replace a by its factors; rows that follow from others get no pivot (0 on the diagonal)."""
     for k in range(size):
         best, largest, scale = k, 0.0, 0.0

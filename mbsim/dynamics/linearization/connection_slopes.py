@@ -6,7 +6,11 @@ press friction are taken as they are.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BALL_FRICTION, SCREW_FRICTION, SLIDE_FRICTION
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import BALL_FRICTION, SCALE_SPEED, SCREW_FRICTION, SLIDE_FRICTION
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
@@ -23,12 +27,15 @@ from mbsim.dynamics.linearization.stiffness import (
     sides_of,
 )
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Tangent
+
 
 @jitable
-def rub_slopes(scene, t, f):
+def rub_slopes(scene: Scene, t: float, f: int) -> V3:
     """Return slip speed s, dF/ds and F/s of friction f in a joint, its normal force as it is."""
     row = scene.work.rub[f]
-    s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[1]
+    s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     low, high = max(s - kept, 0.0), s + kept
     row[SPEED] = low
     before = ask_law(scene, t, f)
@@ -39,7 +46,7 @@ def rub_slopes(scene, t, f):
 
 
 @jitable
-def add_rub_slopes(scene, T, t, y, f):
+def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
     """Add friction in a joint: dF/ds along the slip s, F/s across it.
 
     Of slip and wrenches there are one (slide or turn), two (screw) or three (ball) components.
@@ -82,7 +89,7 @@ def add_rub_slopes(scene, T, t, y, f):
 
 
 @jitable
-def add_rubs_slopes(scene, T, t, y):
+def add_rubs_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add what friction in joints does."""
     for f in range(len(scene.applied.kind)):
         if scene.applied.connection[f] >= 0 and scene.applied.law[f] != 0:

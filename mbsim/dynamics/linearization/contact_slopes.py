@@ -7,9 +7,13 @@ and memory as they are. Laws are asked at neighbouring arguments.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
@@ -27,11 +31,25 @@ from mbsim.dynamics.contact.forces import (
 )
 from mbsim.dynamics.linearization.blocks import couple
 from mbsim.dynamics.linearization.stiffness import PART, PART_OF_SPEED, add_two_sided, lever
-from mbsim.geometry.catalog import MOMENT_XX, MOMENT_XY, MOMENT_YY, REGION_ROWS, plane_axes
-from mbsim.laws.abi import DFLAG
+from mbsim.geometry.catalog import (
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    REGION_ROWS,
+    plane_axes,
+)
+from mbsim.laws.abi import DFLAG, LOAD
 from mbsim.laws.catalog import SLIP
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
 from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Pattern, Tangent
+
 
 #: Row of `basis` with how the force of one incident for many points changes.
 PRESS = 6
@@ -45,14 +63,14 @@ _PART_OF_SLIP = 1e-3
 
 
 @jitable
-def contact_bodies(scene, s):
+def contact_bodies(scene: Scene, s: int) -> tuple[int, int]:
     """Return the bodies of a slot."""
     gi, gj = sides(scene, s)
     return scene.graphics.body[gi], scene.graphics.body[gj]
 
 
 @jitable
-def couple_contacts(scene, P):
+def couple_contacts(scene: Scene, P: Pattern) -> bool:
     """Couple the bodies that touch; return whether there is room."""
     nb, hit = len(scene.bodies.mass), scene.work.hit
     for k in range(hit[len(hit) - 1]):
@@ -63,7 +81,9 @@ def couple_contacts(scene, P):
 
 
 @jitable
-def ask_friction(scene, t, h, y, s, c, around, given):
+def ask_friction(
+    scene: Scene, t: float, h: float, y: F1, s: int, c: int, around: tuple[V3, V3], given: F1
+) -> int:
     """Return code of the friction law; `given`: slip (2), spin rates (3), normal force."""
     loci, locj = around
     slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
@@ -74,7 +94,7 @@ def ask_friction(scene, t, h, y, s, c, around, given):
 
 
 @jitable
-def rigid_slip(scene, s, c):
+def rigid_slip(scene: Scene, s: int, c: int) -> float:
     """Return over which slip the friction of slot s turns if it is rigid and slips, else 0."""
     kept = scene.state.memory[s]
     if scene.contacts.rigid[c] == 0 or kept[KEPT_MODE] != SLIP:
@@ -83,9 +103,19 @@ def rigid_slip(scene, s, c):
 
 
 @jitable
-def friction_slopes(scene, t, h, y, s, c, around, given, table):
+def friction_slopes(
+    scene: Scene,
+    t: float,
+    h: float,
+    y: F1,
+    s: int,
+    c: int,
+    around: tuple[V3, V3],
+    given: F1,
+    table: F2,
+) -> int:
     """Fill rows of d(Fx, Fy, Mx, My, Tz)/d(slip x, y, spin x, y, z, normal); return a code."""
-    out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[1]
+    out, least = scene.work.law_out, PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     base, code, speed = table[:, 6:11], 0, rigid_slip(scene, s, c)
     if speed > 0.0:
         # it turns over a way in velocities as short as itself
@@ -93,7 +123,7 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
     for column in range(6):
         size = PART * abs(given[column])
         if column < 5:
-            size += least if column < 2 else least / scene.world.scale[0]
+            size += least if column < 2 else least / scene.world.scale[SCALE_LENGTH]
         elif size == 0.0:
             size = PART
         kept = given[column]
@@ -112,13 +142,13 @@ def friction_slopes(scene, t, h, y, s, c, around, given, table):
 
 
 @jitable
-def damp_tilting(scene, T, y, s):
+def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     """Add the couple against tilting of `contact.tilting`."""
     P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
     i, j = contact_bodies(scene, s)
     point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
     numbers = scene.work.points[s + 1]
-    p, (ax, ay) = vector(point[1:4]), plane_axes(vector(point[4:7]))
+    p, (ax, ay) = vector(point[AT_POINT:]), plane_axes(vector(point[AT_NORMAL:]))
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
         lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
@@ -130,7 +160,9 @@ def damp_tilting(scene, T, y, s):
 
 
 @jitable
-def add_region_stiffness(scene, T, y, s, force, by_depth):
+def add_region_stiffness(
+    scene: Scene, T: Tangent, y: F1, s: int, force: float, by_depth: float
+) -> float:
     """Add how the force of one incident for many points changes with depth and tilt.
 
     With the energy S U(d), d^2 = sum w_i d_i^2 / S of `geometry.region` and g_i the displacement
@@ -141,22 +173,22 @@ def add_region_stiffness(scene, T, y, s, force, by_depth):
     """
     P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
-    depth, whole, none = rows[s, 0], face_weight_of(scene, s), (0.0, 0.0, 0.0)
+    depth, whole, none = rows[s, AT_DEPTH], face_weight_of(scene, s), (0.0, 0.0, 0.0)
     one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
     every[:] = press[:] = 0.0
     weight, moment = 0.0, 0.0
     first = s + REGION_ROWS
     for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
-        if rows[k, 0] > 0.0:
-            p, n, w = vector(rows[k, 1:4]), vector(rows[k, 4:7]), rows[k, 7]
+        if rows[k, AT_DEPTH] > 0.0:
+            p, n, w = vector(rows[k, AT_POINT:]), vector(rows[k, AT_NORMAL:]), rows[k, AT_WEIGHT]
             for side in range(2):
                 lever(scene, L, y, i if side == 0 else j, p, n, none, one[side])
             add_two_sided(P, L.K, nb, i, j, -w * force / depth, one, one)
             weight += w
-            moment += w * rows[k, 0]
+            moment += w * rows[k, AT_DEPTH]
             for side in range(2):
                 for c in range(6):
-                    every[side, c] += w * rows[k, 0] * one[side, c]
+                    every[side, c] += w * rows[k, AT_DEPTH] * one[side, c]
                     press[side, c] += w * force / depth * one[side, c]
     rest = (by_depth - force / depth) / (whole * depth * depth)
     add_two_sided(P, L.K, nb, i, j, -rest, every, every)
@@ -168,7 +200,7 @@ def add_region_stiffness(scene, T, y, s, force, by_depth):
 
 
 @jitable
-def add_moves_of_place(scene, T, y, s, by_rate):
+def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) -> None:
     """Add that friction acts elsewhere, and at another slip, where tilting moves the place.
 
     The place is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
@@ -177,36 +209,38 @@ def add_moves_of_place(scene, T, y, s, by_rate):
     P, L, work, nb = T.pattern, T.linear, scene.work, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
     point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
-    p, n, tx = vector(point[1:4]), vector(point[4:7]), vector(work.t[s])
+    p, n, tx = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), vector(work.t[s])
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
     rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
     one, moved, first = L.basis[:, 7], L.basis[:, 8], s + REGION_ROWS
     last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
-        weight += max(0.0, work.points[k, 0]) * work.points[k, 7]
+        weight += max(0.0, work.points[k, AT_DEPTH]) * work.points[k, AT_WEIGHT]
     for k in range(first, last):
         row = work.points[k]
-        if row[0] <= 0.0:
+        if row[AT_DEPTH] <= 0.0:
             continue
-        q = sub(vector(row[1:4]), p)
+        q = sub(vector(row[AT_POINT:]), p)
         faster = cross(w_rel, q)
         slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
         torque = cross(q, rub)
         for side in range(2):
             b = i if side == 0 else j
-            lever(scene, L, y, b, vector(row[1:4]), vector(row[4:7]), none, one[side])
+            lever(scene, L, y, b, vector(row[AT_POINT:]), vector(row[AT_NORMAL:]), none, one[side])
             lever(scene, L, y, b, p, scale(by_rate * rate, n), torque, moved[side])
             for r in range(5):
                 rise = L.law[r, 0] * slip_x + L.law[r, 1] * slip_y + L.law[r, 5] * by_rate * rate
                 for c in range(6):
                     moved[side, c] += rise * L.basis[side, 1 + r, c]
-        add_two_sided(P, L.K, nb, i, j, -row[7] / weight, moved, one)
+        add_two_sided(P, L.K, nb, i, j, -row[AT_WEIGHT] / weight, moved, one)
 
 
 @jitable
-def normal_slopes(scene, s, c, depth, rate):
+def normal_slopes(
+    scene: Scene, s: int, c: int, depth: float, rate: float
+) -> tuple[int, float, float]:
     """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
-    contacts, out, share = scene.contacts, scene.work.law_out, scene.work.points[s, 7]
+    contacts, out, weight = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
     user = contacts.user_normal[c]
     if user != 0:
         place = floats_at(user, PLACE)
@@ -214,29 +248,34 @@ def normal_slopes(scene, s, c, depth, rate):
     step = PART * depth
     call = (depth + step, rate, contacts.normal_par[c], out)
     code = call_int(contacts.normal_law[c], call)
-    upper = out[0]
+    upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth - step, rate, contacts.normal_par[c], out))
-    by_depth = share * (upper - out[0]) / (2.0 * step)
-    step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[1]
+    by_depth = weight * (upper - out[LOAD]) / (2.0 * step)
+    step = PART * abs(rate) + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     code += call_int(contacts.normal_law[c], (depth, rate + step, contacts.normal_par[c], out))
-    upper = out[0]
+    upper = out[LOAD]
     code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
-    by_rate = share * (upper - out[0]) / (2.0 * step)
+    by_rate = weight * (upper - out[LOAD]) / (2.0 * step)
     if user != 0:
         floats_at(user, PLACE)[MODE] = EXPLORE
     return code, by_depth, by_rate
 
 
 @jitable
-def add_contact_slopes(scene, T, t, h, y, s):
-    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code."""
+def add_contact_slopes(  # noqa: C901
+    scene: Scene, T: Tangent, t: float, h: float, y: F1, s: int
+) -> int:
+    """Add what the incident in slot s does, as `contact.add_contact` left it; return a code.
+
+    Many branches because normal force, friction and its memory share levers and the law's slopes.
+    """
     P, L, contacts, work = T.pattern, T.linear, scene.contacts, scene.work
     nb, c = len(scene.bodies.mass), contact_of(scene, s)
     gi, gj = sides(scene, s)
     i, j = scene.graphics.body[gi], scene.graphics.body[gj]
     point = work.points[s]
-    depth, p, n = point[0], (point[1], point[2], point[3]), (point[4], point[5], point[6])
-    share, none = point[7], (0.0, 0.0, 0.0)
+    depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
+    weight, none = point[AT_WEIGHT], (0.0, 0.0, 0.0)
     rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
 
     code, by_depth, by_rate = normal_slopes(scene, s, c, depth, rate)
@@ -246,8 +285,8 @@ def add_contact_slopes(scene, T, t, h, y, s):
     # depth and its rate are -n . of displacement and velocity
     normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
-        slope = by_depth / share
-        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / share, slope)
+        slope = by_depth / weight
+        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
     u, v = normal[:, 0], normal[:, 0]
@@ -277,9 +316,13 @@ def add_contact_slopes(scene, T, t, h, y, s):
     counts = 1.0
     if contacts.rigid[c] == 1:
         slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
-        counts = min(1.0, slow / (SLOW * scene.world.scale[1]))
+        counts = min(1.0, slow / (SLOW * scene.world.scale[SCALE_SPEED]))
+    # bristles that are damped rub by more than what presses as that falls to 0: velocities that
+    # differ by rounding then change friction by much of it
+    force = vector(work.slot[s, FORCE : FORCE + 3])
+    pressed = max(given[5], math.hypot(dot(force, tx), dot(force, ty)))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2] / given[5] if given[5] > 0.0 else 0.0
+        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[5] > 0.0 else 0.0
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]
@@ -311,7 +354,7 @@ def add_contact_slopes(scene, T, t, h, y, s):
 
 
 @jitable
-def add_contacts_slopes(scene, T, t, h, y):
+def add_contacts_slopes(scene: Scene, T: Tangent, t: float, h: float, y: F1) -> int:
     """Add what all incidents do; return a code."""
     hit = scene.work.hit
     T.keeps.held[len(T.keeps.held) - 1] = 0

@@ -10,7 +10,12 @@ turn the force is counted, that they turn the rates is not: Newton's method is a
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import RESIDUAL
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import RESIDUAL, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.model import Residuals
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.forces.force_element import BEFORE, NOW, SHORT, find_unknowns, step_of, switches
@@ -29,12 +34,15 @@ from mbsim.dynamics.forces.residual_solver import (
 from mbsim.dynamics.linearization.stiffness import add_geometry, add_two_sided, lever, sides_of
 from mbsim.laws.residual import DIFFERENTIAL, SWITCHING
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Tangent
+
 
 @jitable
-def fill_moves(scene, e):
+def fill_moves(scene: Scene, e: int) -> int:
     """Fill `moves` with the residual by x and x', where r is in `rows`; return a code."""
     R, na = scene.residuals, axes_of(scene, e)
-    length, speed = scene.world.scale[0], scene.world.scale[1]
+    length, speed = scene.world.scale[SCALE_LENGTH], scene.world.scale[SCALE_SPEED]
     for k in range(na):
         turns = R.angle[R.first[e] + k] >= 0
         for part in range(2):
@@ -50,7 +58,7 @@ def fill_moves(scene, e):
 
 
 @jitable
-def step_for_slopes(scene, t, e):
+def step_for_slopes(scene: Scene, t: float, e: int) -> float:
     """Return the step over which means are taken: at its begin, that of the last one."""
     kept = scene.state.residual[e]
     h = step_of(scene, t, kept[NOW])
@@ -60,7 +68,7 @@ def step_for_slopes(scene, t, e):
 
 
 @jitable
-def solve_slopes(scene, t, y, e):
+def solve_slopes(scene: Scene, t: float, y: F1, e: int) -> float:
     """Fill `slopes` with what is sought by x, x' and states; return the step, or -1 - a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     code = find_unknowns(scene, t, y, e)
@@ -97,7 +105,7 @@ def solve_slopes(scene, t, y, e):
 
 
 @jitable
-def residual_here(scene, e):
+def residual_here(scene: Scene, e: int) -> int:
     """Keep r of what is given in `rows`; return a code."""
     R = scene.residuals
     code = ask(scene, e)
@@ -107,7 +115,7 @@ def residual_here(scene, e):
 
 
 @jitable
-def by_force(R, u, i, part, k, h):
+def by_force(R: Residuals, u: int, i: int, part: int, k: int, h: float) -> float:
     """Return the derivative of f of unknown u, the i-th of its element, as `slopes` has it."""
     if R.kind[u] == DIFFERENTIAL:
         return 1.0 if part == 2 and i == k else 0.0
@@ -115,8 +123,11 @@ def by_force(R, u, i, part, k, h):
 
 
 @jitable
-def add_residual_slopes(scene, T, t, y, f):
-    """Add what the element of row f does; nothing where it cannot be solved there."""
+def add_residual_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:  # noqa: C901
+    """Add what the element of row f does; nothing where it cannot be solved there.
+
+    Many branches because axes and states of one element share its levers.
+    """
     R, P, L = scene.residuals, T.pattern, T.linear
     e, nb = int(scene.applied.par[f, 0]), len(scene.bodies.mass)
     h = solve_slopes(scene, t, y, e)
@@ -163,7 +174,7 @@ def add_residual_slopes(scene, T, t, y, f):
 
 
 @jitable
-def add_all_residual_slopes(scene, T, t, y):
+def add_all_residual_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add what all elements do; the slopes of states have been filled."""
     for f in range(len(scene.applied.kind)):
         if scene.applied.kind[f] == RESIDUAL:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import USER
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, vector
 from mbsim.dynamics.bodies.kinematics import place_body
 from mbsim.dynamics.expressions.jets import run, value
@@ -12,9 +17,12 @@ from mbsim.dynamics.expressions.slopes import A_STATE, DIRECTIONS, POSES
 from mbsim.dynamics.expressions.subroutines import user_result
 from mbsim.dynamics.linearization.stiffness import PUSH, add_product, sides_of
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Tangent
+
 
 @jitable
-def pushed(scene, y, body, direction, size):
+def pushed(scene: Scene, y: F1, body: int, direction: int, size: float) -> None:
     """Change one number of pose or velocity of a body in y, where `direction` is as in slopes."""
     at = BODY_SIZE * body
     axis = direction % 3
@@ -42,7 +50,7 @@ def pushed(scene, y, body, direction, size):
 
 
 @jitable
-def keep_spin(scene, y, body, axis, size):
+def keep_spin(scene: Scene, y: F1, body: int, axis: int, size: float) -> None:
     """Change the angular velocity in body axes so that a turn of the body leaves it as it is."""
     R, at = scene.work.R[body], BODY_SIZE * body + 10
     w = (y[at], y[at + 1], y[at + 2])
@@ -52,7 +60,7 @@ def keep_spin(scene, y, body, axis, size):
 
 
 @jitable
-def value_anew(scene, t, y, program):
+def value_anew(scene: Scene, t: float, y: F1, program: int) -> float:
     """Return the value of a program, where a subroutine is called for each of its results."""
     programs = scene.programs
     for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
@@ -64,7 +72,9 @@ def value_anew(scene, t, y, program):
 
 
 @jitable
-def program_rise(scene, T, t, y, program, body, row):
+def program_rise(
+    scene: Scene, T: Tangent, t: float, y: F1, program: int, body: int, row: F1
+) -> None:
     """Fill the derivatives of a program by the displacement (6) and velocity (6) of a body.
 
     Both as spatial vectors about O of the body: angular, linear.
@@ -72,9 +82,9 @@ def program_rise(scene, T, t, y, program, body, row):
     at = BODY_SIZE * body
     for direction in range(DIRECTIONS):
         if T.depends.user[program] == 1:
-            size = PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+            size = PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[SCALE_LENGTH])
             if direction >= POSES:
-                size *= scene.world.scale[1] / scene.world.scale[0]
+                size *= scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
             before = value_anew(scene, t, y, program)
             kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
             speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
@@ -102,7 +112,9 @@ def program_rise(scene, T, t, y, program, body, row):
 
 
 @jitable
-def add_program_slopes(scene, T, t, y, f, program, u):
+def add_program_slopes(
+    scene: Scene, T: Tangent, t: float, y: F1, f: int, program: int, u: F2
+) -> None:
     """Add d(value)/d(bodies and states) times the wrench u of its unit on the bodies of force f."""
     P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
     i, j = sides_of(scene, f)
@@ -127,7 +139,7 @@ def add_program_slopes(scene, T, t, y, f, program, u):
 
 
 @jitable
-def state_rise(scene, T, t, y, program, z):
+def state_rise(scene: Scene, T: Tangent, t: float, y: F1, program: int, z: int) -> float:
     """Return the derivative of a program by state z."""
     place = scene.states.place[z]
     if T.depends.user[program] == 0:
@@ -142,7 +154,7 @@ def state_rise(scene, T, t, y, program, z):
 
 
 @jitable
-def fill_state_slopes(scene, T, t, y):
+def fill_state_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Fill how the slopes of the user's own states change with bodies and with each other."""
     L, first = T.linear, len(scene.equations.program)
     for z in range(len(scene.states.program)):

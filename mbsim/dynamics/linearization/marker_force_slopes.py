@@ -7,8 +7,12 @@ here.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import MARKER_FORCE
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import MARKER_FORCE
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, F3, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
@@ -23,9 +27,12 @@ from mbsim.dynamics.linearization.stiffness import (
     sides_of,
 )
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Pattern, Tangent
+
 
 @jitable
-def add_marker_rate(scene, T, y, f, e, factor, u):
+def add_marker_rate(scene: Scene, T: Tangent, y: F1, f: int, e: V3, factor: float, u: F2) -> None:
     """Add how the rate along J's axis e, at I's origin p, changes with poses.
 
     theta_I . (arm x (e x w_I)) + theta_J . (e x v) - h . (dp - dx_J), h = e x w_J, x_J J's cg.
@@ -49,7 +56,7 @@ def add_marker_rate(scene, T, y, f, e, factor, u):
 
 
 @jitable
-def add_marker_spin(scene, T, f, e, factor, u):
+def add_marker_spin(scene: Scene, T: Tangent, f: int, e: V3, factor: float, u: F2) -> None:
     """Add how the spin about J's axis e changes as that turns: theta_J . (e x w)."""
     bi, bj = sides_of(scene, f)
     turned = cross(e, sub(vector(scene.work.w[bi]), vector(scene.work.w[bj])))
@@ -62,7 +69,7 @@ def add_marker_spin(scene, T, f, e, factor, u):
 
 
 @jitable
-def fill_units(scene, T, y, f):
+def fill_units(scene: Scene, T: Tangent, y: F1, f: int) -> None:
     """Fill `basis` with the wrenches of unit forces along J's axes and unit torques about them."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
@@ -76,7 +83,9 @@ def fill_units(scene, T, y, f):
 
 
 @jitable
-def add_column(P, blocks, nb, both, slopes, k, basis):
+def add_column(
+    P: Pattern, blocks: F3, nb: int, both: tuple[int, int], slopes: F2, k: int, basis: F3
+) -> None:
     """Add column k of the slopes by one component of displacement or velocity."""
     for r in range(6):
         if slopes[r, k] != 0.0:
@@ -85,7 +94,7 @@ def add_column(P, blocks, nb, both, slopes, k, basis):
 
 
 @jitable
-def add_marker_force_slopes(scene, T, y, f):
+def add_marker_force_slopes(scene: Scene, T: Tangent, y: F1, f: int) -> None:
     """Add a marker force."""
     P, L, nb, applied = T.pattern, T.linear, len(scene.bodies.mass), scene.applied
     j, both, table = applied.j[f], sides_of(scene, f), scene.work.slopes
@@ -111,7 +120,7 @@ def add_marker_force_slopes(scene, T, y, f):
 
 
 @jitable
-def add_marker_forces_slopes(scene, T, y):
+def add_marker_forces_slopes(scene: Scene, T: Tangent, y: F1) -> None:
     """Add all of them."""
     for f in range(len(scene.applied.kind)):
         if scene.applied.kind[f] == MARKER_FORCE:

@@ -15,11 +15,16 @@ point on the child, f = (n, F),
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import SCALE_LENGTH, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import BODY_SIZE, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
 from mbsim.dynamics.constraints.equations import fill_equation, side_place
@@ -38,12 +43,16 @@ from mbsim.dynamics.linearization.blocks import (
 from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
 from mbsim.dynamics.linearization.expression_slopes import pushed
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Pattern, Tangent
+
+
 #: Differences for the gradients of equations.
 _PUSH = 1e-7
 
 
 @jitable
-def keep_bodies(scene, L, y, dy):
+def keep_bodies(scene: Scene, L: Linear, y: F1, dy: F1) -> None:
     """Keep where bodies are, how they move, and what inertia and joints do."""
     for b in range(len(scene.bodies.mass)):
         at, R, J = BODY_SIZE * b, scene.work.R[b], scene.bodies.inertia[b]
@@ -63,13 +72,13 @@ def keep_bodies(scene, L, y, dy):
 
 
 @jitable
-def on_tree(scene, b):
+def on_tree(scene: Scene, b: int) -> bool:
     """Return whether body b is on a tree."""
     return scene.tree.of_body[b] >= 0
 
 
 @jitable
-def fill_joint_forces(scene, L):
+def fill_joint_forces(scene: Scene, L: Linear) -> None:
     """Fill f: what each joint of the tree does to its child, about O."""
     tree, sweep = scene.tree, scene.sweep
     for k in range(len(tree.body)):
@@ -97,7 +106,7 @@ def fill_joint_forces(scene, L):
 
 
 @jitable
-def write_turn(U, q, e, P, f, on_child):
+def write_turn(U: F2, q: int, e: V3, P: V3, f: F1, on_child: int) -> None:
     """Fill how S'f of a direction changes: a turn about axis e through P, which the child has."""
     n, F = (f[0], f[1], f[2]), (f[3], f[4], f[5])
     owner, point = cross(e, add(n, cross(F, P))), cross(e, F)
@@ -110,7 +119,7 @@ def write_turn(U, q, e, P, f, on_child):
 
 
 @jitable
-def fill_joint(scene, L, y, k):
+def fill_joint(scene: Scene, L: Linear, y: F1, k: int) -> None:
     """Fill directions of the joint of place k, and how their product with its force changes."""
     tree, S, U, f = scene.tree, scene.sweep.S[k], L.U[k], L.f[k]
     for q in range(6):
@@ -150,7 +159,7 @@ def fill_joint(scene, L, y, k):
 
 
 @jitable
-def couple_equations(scene, P):
+def couple_equations(scene: Scene, P: Pattern) -> bool:
     """Couple the bodies that an equation holds together."""
     eq = scene.equations
     for row in range(active_count(scene)):
@@ -168,7 +177,7 @@ def couple_equations(scene, P):
 
 
 @jitable
-def terms_behind(scene, e, term):
+def terms_behind(scene: Scene, e: int, term: int) -> tuple[int, int]:
     """Return the range of terms on whose bodies the gradient of a term depends."""
     eq = scene.equations
     if eq.general[e] == 1:
@@ -178,7 +187,7 @@ def terms_behind(scene, e, term):
 
 
 @jitable
-def find_couplings(scene, T):
+def find_couplings(scene: Scene, T: Tangent) -> bool:
     """Couple what acts on each other and order the bodies; return whether there is room."""
     P = T.pattern
     for attempt in range(2):
@@ -195,7 +204,7 @@ def find_couplings(scene, T):
 
 
 @jitable
-def clear(scene, T):
+def clear(scene: Scene, T: Tangent) -> None:
     """Start with no forces."""
     L = T.linear
     for k in range(T.pattern.count[COUPLINGS]):
@@ -210,7 +219,7 @@ def clear(scene, T):
 
 
 @jitable
-def fill_rows(scene, L, t):
+def fill_rows(scene: Scene, L: Linear, t: float) -> None:
     """Fill the gradients of the equations in use; rows of level 2, others have their own."""
     eq = scene.equations
     for row in range(active_count(scene)):
@@ -228,7 +237,16 @@ def fill_rows(scene, L, t):
 
 
 @jitable
-def take_bend(scene, L, y, e, term, origins, size, direction):
+def take_bend(
+    scene: Scene,
+    L: Linear,
+    y: F1,
+    e: int,
+    term: int,
+    origins: tuple[V3, V3],
+    size: float,
+    direction: int,
+) -> None:
     """Add what one displacement made of a term's gradient, over its size, to a table by column.
 
     Rows 0 to 5 of `L.law` are the wrench on I's body, columns 0 to 5 the ways, 6 to 11 J's body.
@@ -248,14 +266,14 @@ def take_bend(scene, L, y, e, term, origins, size, direction):
 
 
 @jitable
-def place_of_origin(scene, y, m):
+def place_of_origin(scene: Scene, y: F1, m: int) -> V3:
     """Return O of the body of marker m; the global origin for ground."""
     k = side_place(scene, m)
     return origin(scene, y, k) if k >= 0 else (0.0, 0.0, 0.0)
 
 
 @jitable
-def bend_by(scene, T, t, y, row, e, term, b):
+def bend_by(scene: Scene, T: Tangent, t: float, y: F1, row: int, e: int, term: int, b: int) -> None:
     """Add how the force of a term turns as body b is displaced."""
     L, eq, P, at = T.linear, scene.equations, T.pattern, BODY_SIZE * b
     origins = (place_of_origin(scene, y, eq.i[term]), place_of_origin(scene, y, eq.j[term]))
@@ -265,7 +283,7 @@ def bend_by(scene, T, t, y, row, e, term, b):
         for j in range(12):
             L.law[i, j] = 0.0
     for direction in range(6):
-        scale_of_direction = scene.world.scale[0] if direction < 3 else 1.0
+        scale_of_direction = scene.world.scale[SCALE_LENGTH] if direction < 3 else 1.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             pushed(scene, y, b, direction, sign * _PUSH * scale_of_direction)
@@ -290,7 +308,7 @@ def bend_by(scene, T, t, y, row, e, term, b):
 
 
 @jitable
-def add_bends(scene, T, t, y):
+def add_bends(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add how the forces of equations turn with the bodies that they are fixed to."""
     eq = scene.equations
     for row in range(active_count(scene)):
@@ -309,7 +327,7 @@ def add_bends(scene, T, t, y):
 
 
 @jitable
-def linearise(scene, T, t, h, y, dy):
+def linearise(scene: Scene, T: Tangent, t: float, h: float, y: F1, dy: F1) -> int:
     """Keep the mechanism linearised at (t, y), where dy = f(t, y); return a code."""
     if not find_couplings(scene, T):
         return Code.NO_ROOM

@@ -15,16 +15,19 @@ Behind hooks of the scene, so that only scenes with such friction compile it.
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
-from mbsim.compile_model.tangent import Tangent
+from mbsim.compile_model.tangent import Keeps, Linear, Pair, Real, Tangent
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, F2, N1, N2, V3, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, scale, sub
+from mbsim.core.rotation import add, scale, sub, vector
 from mbsim.dynamics.contact.forces import contact_of, in_marker, sides
 from mbsim.dynamics.linearization.contact_slopes import ask_friction
 from mbsim.dynamics.linearization.newton_matrix import times_rate
-from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT, STEP_IN, TIME_IN
 
 #: Differences of X, as a part of the model's length, and of memory, as a part of its size.
 _PUSH_X, _PUSH = 1e-10, 1e-6
@@ -35,7 +38,7 @@ _GIVEN = 6
 
 
 @jitable
-def place_of(scene, s, j):
+def place_of(scene: Scene, s: int, j: int) -> int:
     """Return where the j-th number that slot s carries stands in y."""
     x = scene.slots.x[s]
     if x < 0:
@@ -44,17 +47,17 @@ def place_of(scene, s, j):
 
 
 @jitable
-def carried(scene, s):
+def carried(scene: Scene, s: int) -> int:
     """Return how many numbers slot s carries in y."""
     count = 3 if scene.slots.x[s] >= 0 else 0
     return count + scene.contacts.carried[contact_of(scene, s)]
 
 
 @jitable
-def ask_at(scene, y, s, around, given, out):
+def ask_at(scene: Scene, y: F1, s: int, around: tuple[V3, V3], given: F1, out: F1) -> int:
     """Copy forces and rates of memory for these arguments into `out`; return a code."""
     law_in, law_out, c = scene.work.law_in, scene.work.law_out, contact_of(scene, s)
-    code = ask_friction(scene, law_in[0], law_in[1], y, s, c, around, given)
+    code = ask_friction(scene, law_in[TIME_IN], law_in[STEP_IN], y, s, c, around, given)
     for k in range(5):
         out[k] = law_out[k]
     at = 5
@@ -69,24 +72,27 @@ def ask_at(scene, y, s, around, given, out):
 
 
 @jitable
-def push_of(scene, y, s, given, column):
+def push_of(scene: Scene, y: F1, s: int, given: F1, column: int) -> float:
     """Return by how much an argument of friction is changed for a difference."""
     if column >= _GIVEN:
         j = column - _GIVEN
         if scene.slots.x[s] >= 0 and j < 3:
-            length = scene.world.scale[0] if j < 2 else 1.0
+            length = scene.world.scale[SCALE_LENGTH] if j < 2 else 1.0
             return _PUSH_X * (length + abs(y[place_of(scene, s, j)]))
         size = scene.work.law_out[SIZE_OUT]
         return _PUSH * (size if size > 0.0 else 1.0)
     if column < 2:
-        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1]
+        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[SCALE_SPEED]
     if column < 5:
-        return 1e-6 * abs(given[column]) + 1e-8 * scene.world.scale[1] / scene.world.scale[0]
+        return (
+            1e-6 * abs(given[column])
+            + 1e-8 * scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
+        )
     return 1e-6 * given[column] if given[column] > 0.0 else 1e-6
 
 
 @jitable
-def take_known(L, table):
+def take_known(L: Linear, table: F2) -> int:
     """Take what is known where X alone is carried, whose rates are slip; return the next column."""
     for column in range(_GIVEN):
         for row in range(5):
@@ -97,7 +103,7 @@ def take_known(L, table):
 
 
 @jitable
-def fill(scene, T, y):
+def fill(scene: Scene, T: Tangent, y: F1) -> int:
     """Keep how friction in the slot named last in `held` depends on what it carries."""
     K, L = T.keeps, T.linear
     count = K.held[len(K.held) - 1]
@@ -107,8 +113,8 @@ def fill(scene, T, y):
     point, around = scene.work.points[s], ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if scene.contacts.framed[contact_of(scene, s)] == 1:
         p, half = (
-            (point[1], point[2], point[3]),
-            scale(0.5 * point[0], (point[4], point[5], point[6])),
+            vector(point[AT_POINT:]),
+            scale(0.5 * point[AT_DEPTH], vector(point[AT_NORMAL:])),
         )
         around = (in_marker(scene, y, gi, sub(p, half)), in_marker(scene, y, gj, add(p, half)))
     first = 0 if scene.slots.z[s] >= 0 else take_known(L, table)
@@ -145,7 +151,7 @@ def fill(scene, T, y):
 
 
 @jitable
-def invert(A, Z, n):
+def invert(A: N2, Z: N2, n: int) -> None:
     """Write the inverse of the leading n x n part of A, which is destroyed, into Z."""
     for i in range(n):
         for j in range(n):
@@ -171,7 +177,7 @@ def invert(A, Z, n):
 
 
 @jitable
-def count_of(K, k):
+def count_of(K: Keeps, k: int) -> int:
     """Return how many numbers the k-th slot held carries."""
     n = 0
     while n < K.carries.shape[1] and K.carries[k, n] >= 0:
@@ -180,7 +186,7 @@ def count_of(K, k):
 
 
 @jitable
-def follow(K, k, n, Z, row, through, part):
+def follow(K: Keeps, k: int, n: int, Z: N2, row: int, through: N1, part: N1) -> bool:
     """Write a row of C Z B into `part`, the force `row` by each argument; return whether any."""
     some = False
     for j in range(n):
@@ -196,8 +202,11 @@ def follow(K, k, n, Z, row, through, part):
 
 
 @jitable
-def add_to_matrix(scene, T, M):
-    """Form Z of every slot, and add C Z B to the matrix."""
+def add_to_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:  # noqa: C901
+    """Form Z of every slot, and add C Z B to the matrix.
+
+    Many branches because the sums of one triple product stand in one another, in its scratch.
+    """
     K, P, nb = T.keeps, T.pattern, len(scene.bodies.mass)
     for k in range(K.held[len(K.held) - 1]):
         n, Z, A = count_of(K, k), M.keep[k], M.keep[len(M.keep) - 1]
@@ -244,7 +253,7 @@ def add_to_matrix(scene, T, M):
 
 
 @jitable
-def drive(scene, T, M, r, k, e, with_moves):
+def drive(scene: Scene, T: Tangent, M: Real | Pair, r: F1, k: int, e: N1, with_moves: bool) -> None:
     """Fill e with B (du, dN) + r of slot k; `with_moves`: by displacements too, else by rates."""
     K, nb, pair = T.keeps, len(scene.bodies.mass), T.keeps.body[k]
     n = count_of(K, k)
@@ -276,7 +285,7 @@ def drive(scene, T, M, r, k, e, with_moves):
 
 
 @jitable
-def add_to_right_side(scene, T, M, r):
+def add_to_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: F1) -> None:
     """Add what residuals ask of friction: C Z (B (du, dN) + r), du and dN by rates alone."""
     K, nb = T.keeps, len(scene.bodies.mass)
     for k in range(K.held[len(K.held) - 1]):
@@ -296,7 +305,7 @@ def add_to_right_side(scene, T, M, r):
 
 
 @jitable
-def recover(scene, T, M, r, d):
+def recover(scene: Scene, T: Tangent, M: Real | Pair, r: F1, d: F1) -> None:
     """Write how what slots carry changes; M.g holds the displacements."""
     K = T.keeps
     for k in range(K.held[len(K.held) - 1]):
@@ -309,7 +318,7 @@ def recover(scene, T, M, r, d):
             d[K.carries[k, i]] = total
 
 
-def serve_memory(context, what, r, d):
+def serve_memory(context: int, what: int, r: Pointer, d: Pointer) -> int:
     """What friction with memory does in real systems (`Memory`)."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -326,7 +335,7 @@ def serve_memory(context, what, r, d):
     return 0
 
 
-def serve_memory_pair(context, what, r, d):
+def serve_memory_pair(context: int, what: int, r: Pointer, d: Pointer) -> int:
     """The same of complex ones."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)

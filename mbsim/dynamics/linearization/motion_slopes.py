@@ -6,8 +6,13 @@ poses, of C a + s(q, v) with poses and velocities; a, the accelerations, as they
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
 from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, side_place
@@ -16,12 +21,16 @@ from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
 from mbsim.dynamics.linearization.expression_slopes import keep_spin, pushed
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Tangent
+
+
 #: Differences of poses [part of the length, rad] and of velocities (likewise, a time).
 _PUSH = 1e-7
 
 
 @jitable
-def acceleration_along(scene, L, y, e):
+def acceleration_along(scene: Scene, L: Linear, y: F1, e: int) -> float:
     """Return C times the accelerations of the bodies, which stay as they are."""
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for term in range(eq.first[e], eq.first[e + 1]):
@@ -41,7 +50,7 @@ def acceleration_along(scene, L, y, e):
 
 
 @jitable
-def held_value(scene, L, t, y, e):
+def held_value(scene: Scene, L: Linear, t: float, y: F1, e: int) -> float:
     """Return the velocity or acceleration that equation e holds."""
     fill_equation(scene, t, y, e)
     if scene.equations.level[e] == 1:
@@ -50,15 +59,15 @@ def held_value(scene, L, t, y, e):
 
 
 @jitable
-def drive_by(scene, L, t, y, row, e, b):
+def drive_by(scene: Scene, L: Linear, t: float, y: F1, row: int, e: int, b: int) -> None:
     """Fill the rows of equation e for body b."""
     at, rise = BODY_SIZE * b, L.rise
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
     speed = (y[at + 7], y[at + 8], y[at + 9], y[at + 10], y[at + 11], y[at + 12])
     for direction in range(DIRECTIONS):
-        size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[0])
+        size = _PUSH * (1.0 if direction % POSES >= 3 else scene.world.scale[SCALE_LENGTH])
         if direction >= POSES:
-            size *= scene.world.scale[1] / scene.world.scale[0]
+            size *= scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
         change = 0.0
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
@@ -92,7 +101,7 @@ def drive_by(scene, L, t, y, row, e, b):
 
 
 @jitable
-def slip_row(scene, L, row, e):
+def slip_row(scene: Scene, L: Linear, row: int, e: int) -> None:
     """Fill the row of slip in a contact that is held: its gradient, where it is now."""
     eq = scene.equations
     for term in range(eq.first[e], eq.first[e + 1]):
@@ -104,7 +113,7 @@ def slip_row(scene, L, row, e):
 
 
 @jitable
-def add_motion_rows(scene, T, t, y):
+def add_motion_rows(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Fill the rows of all motions in use that hold velocities or accelerations."""
     eq = scene.equations
     for row in range(active_count(scene)):

@@ -24,11 +24,15 @@ Both are taken over c1 or c2, so that rows of the border have one size.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from mbsim.arrays.hooks import Memory, note_failure
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import N1, N2, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.linearization.blocks import (
@@ -40,9 +44,12 @@ from mbsim.dynamics.linearization.blocks import (
     solve_small,
 )
 
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Pair, Real, Tangent
+
 
 @jitable
-def fill_turns(T, M, h):
+def fill_turns(T: Tangent, M: Real | Pair, h: float) -> None:
     """Fill B of every body."""
     L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
     for b in range(len(L.w)):
@@ -60,7 +67,7 @@ def fill_turns(T, M, h):
 
 
 @jitable
-def times_rate(L, M, b, out):
+def times_rate(L: Linear, M: Real | Pair, b: int, out: N2) -> None:
     """Write E of body b, 6 x 6: rates of spin and of the point at O by xi.
 
     spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
@@ -88,7 +95,7 @@ def times_rate(L, M, b, out):
 
 
 @jitable
-def gyration(scene, L, b, u):
+def gyration(scene: Scene, L: Linear, b: int, u: tuple[complex, complex, complex]) -> V3:
     """Return how J alpha + w x J w changes with a change u of w, in body axes."""
     J, w = scene.bodies.inertia[b], vector(L.w[b])
     first = cross(u, rotate(J, w))
@@ -97,7 +104,7 @@ def gyration(scene, L, b, u):
 
 
 @jitable
-def add_inertia(scene, L, M, b, A):
+def add_inertia(scene: Scene, L: Linear, M: Real | Pair, b: int, A: N2) -> None:
     """Add inertia and the wrench that joints and equations exert on body b, by xi, to A."""
     m, c1, c2 = scene.bodies.mass[b], M.c[0, 0], M.c[0, 1]
     R, B, J = L.R[b], M.B[b], scene.bodies.inertia[b]
@@ -133,7 +140,7 @@ def add_inertia(scene, L, M, b, A):
 
 
 @jitable
-def fill_matrix(scene, T, M):
+def fill_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:
     """Fill A."""
     P, L = T.pattern, T.linear
     for k in range(P.count[COUPLINGS], P.count[BLOCKS]):
@@ -159,7 +166,7 @@ def fill_matrix(scene, T, M):
 
 
 @jitable
-def ask_memory(scene, M, what, r, d):
+def ask_memory(scene: Scene, M: Real | Pair, what: int, r: N1, d: N1) -> None:
     """Let friction that carries numbers in y add its part, see `memory_slopes`."""
     hook = scene.world.hooks[M.hook[0]]
     if hook != 0:
@@ -167,7 +174,7 @@ def ask_memory(scene, M, what, r, d):
 
 
 @jitable
-def factor(scene, T, M, h):
+def factor(scene: Scene, T: Tangent, M: Real | Pair, h: float) -> int:
     """Factor the matrix for the coefficients in M.c; return 0 or a code."""
     P, L, free = T.pattern, T.linear, scene.tree.free
     fill_turns(T, M, h)
@@ -179,20 +186,20 @@ def factor(scene, T, M, h):
 
 
 @jitable
-def bordered(scene, k):
+def bordered(scene: Scene, k: int) -> int:
     """Return the row of `Linear.column` of the k-th unknown of the border."""
     n = active_count(scene)
     return k if k < n else len(scene.equations.program) + k - n
 
 
 @jitable
-def border_count(scene):
+def border_count(scene: Scene) -> int:
     """Return the number of unknowns of the border: equations in use, then states."""
     return active_count(scene) + len(scene.states.program)
 
 
 @jitable
-def along_row(L, M, row, slope, x):
+def along_row(L: Linear, M: Real | Pair, row: int, slope: int, x: N2) -> complex:
     """Return a row of the border times displacements; of a state's slope with their rates."""
     total = 0.0 * x[0, 0]
     for b in range(len(L.w)):
@@ -215,7 +222,7 @@ def along_row(L, M, row, slope, x):
 
 
 @jitable
-def wrench_at_cg(L, row, b):
+def wrench_at_cg(L: Linear, row: int, b: int) -> tuple[V3, V3]:
     """Return force and torque, in body axes, of an equation's gradient on body b about its cg."""
     C, r = L.column[row, b], vector(L.r[b])
     force = (C[3], C[4], C[5])
@@ -224,7 +231,7 @@ def wrench_at_cg(L, row, b):
 
 
 @jitable
-def acceleration_row(L, M, row, x):
+def acceleration_row(L: Linear, M: Real | Pair, row: int, x: N2) -> complex:
     """Return what displacements make of an equation's accelerations: C (c2 dx, c2/c1 B theta)."""
     total, c2 = 0.0 * x[0, 0], M.c[0, 1]
     ratio = c2 / M.c[0, 0]
@@ -238,13 +245,13 @@ def acceleration_row(L, M, row, x):
 
 
 @jitable
-def level_of(scene, row):
+def level_of(scene: Scene, row: int) -> int:
     """Return what an equation in use holds: 2 displacements, 1 velocities, 0 accelerations."""
     return scene.equations.level[scene.equations.active[row]]
 
 
 @jitable
-def held_row(scene, L, M, row, x):
+def held_row(scene: Scene, L: Linear, M: Real | Pair, row: int, x: N2) -> complex:
     """Return what displacements make of what an equation in use holds, as a displacement."""
     level = level_of(scene, row)
     if level == 2:
@@ -256,7 +263,7 @@ def held_row(scene, L, M, row, x):
 
 
 @jitable
-def held_residual(scene, L, M, row, r):
+def held_residual(scene: Scene, L: Linear, M: Real | Pair, row: int, r: N1) -> complex:
     """Return what residuals make of the same."""
     total, level = 0.0 * M.rate[0, 0], level_of(scene, row)
     if level == 2:
@@ -275,7 +282,7 @@ def held_residual(scene, L, M, row, r):
 
 
 @jitable
-def factor_rest(scene, T, M):
+def factor_rest(scene: Scene, T: Tangent, M: Real | Pair) -> int:
     """Factor the border: what equations and states ask of the bodies."""
     P, L = T.pattern, T.linear
     held, size = active_count(scene), border_count(scene)
@@ -304,7 +311,7 @@ def factor_rest(scene, T, M):
 
 
 @jitable
-def turn_residual(L, b, r):
+def turn_residual(L: Linear, b: int, r: N1) -> tuple[complex, complex, complex]:
     """Return rho of body b: twice the vector part of conj(q) r_q, q being of unit length."""
     q, at = L.q[b], BODY_SIZE * b + 3
     s0, s1, s2, s3 = r[at], r[at + 1], r[at + 2], r[at + 3]
@@ -316,7 +323,9 @@ def turn_residual(L, b, r):
 
 
 @jitable
-def asked_of(L, M, b, r):
+def asked_of(
+    L: Linear, M: Real | Pair, b: int, r: N1
+) -> tuple[tuple[complex, complex, complex], tuple[complex, complex, complex]]:
     """Return r_a and r_alpha of body b."""
     at, form = BODY_SIZE * b, M.c[0, 3].real
     first = M.c[0, 0] if form == 0.0 else 0.0 * M.c[0, 0]
@@ -335,7 +344,7 @@ def asked_of(L, M, b, r):
 
 
 @jitable
-def ask_body(scene, L, M, b, r):
+def ask_body(scene: Scene, L: Linear, M: Real | Pair, b: int, r: N1) -> None:
     """Fill g of body b with what its residuals ask of inertia, and its rate with -e."""
     at, m, R, arm = BODY_SIZE * b, scene.bodies.mass[b], L.R[b], vector(L.r[b])
     rho = turn_residual(L, b, r)
@@ -353,7 +362,7 @@ def ask_body(scene, L, M, b, r):
 
 
 @jitable
-def fill_right_side(scene, T, M, r):
+def fill_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
     """Fill g: what residuals ask of inertia and of forces by velocities."""
     P, L = T.pattern, T.linear
     for b in range(len(P.order)):
@@ -366,7 +375,7 @@ def fill_right_side(scene, T, M, r):
 
 
 @jitable
-def solve_border_part(scene, T, M, r):
+def solve_border_part(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
     """Solve for multipliers and states, and add what they do to g, which holds displacements."""
     P, L = T.pattern, T.linear
     held, size = active_count(scene), border_count(scene)
@@ -391,7 +400,7 @@ def solve_border_part(scene, T, M, r):
 
 
 @jitable
-def write_answer(scene, T, M, r, d):
+def write_answer(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> None:
     """Write the displacements of bodies in the layout of y."""
     L, c1 = T.linear, M.c[0, 0]
     for b in range(len(L.w)):
@@ -411,7 +420,7 @@ def write_answer(scene, T, M, r, d):
 
 
 @jitable
-def solve(scene, T, M, r, d):
+def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
     """Solve for the residual r; r and d (n,) in the layout of y."""
     fill_right_side(scene, T, M, r)
     ask_memory(scene, M, Memory.RIGHT, r, d)

@@ -11,11 +11,19 @@ their points move.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, F2, F3, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_point, marker_velocity
 from mbsim.dynamics.expressions.measures import unit
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Linear, Pattern, Tangent
+
 
 #: Differences of the laws' arguments, as parts of them and of the model's speed.
 PART, PART_OF_SPEED = 1e-6, 1e-8
@@ -24,7 +32,9 @@ PUSH = 1e-7
 
 
 @jitable
-def lever(scene, linear, y, b, p, force, torque, row):
+def lever(
+    scene: Scene, linear: Linear, y: F1, b: int, p: V3, force: V3, torque: V3, row: F1
+) -> None:
     """Write the wrench of a unit: force at p and torque, about O of body b; nothing for ground."""
     if b == len(scene.bodies.mass):
         for k in range(6):
@@ -38,7 +48,7 @@ def lever(scene, linear, y, b, p, force, torque, row):
 
 
 @jitable
-def add_product(target, factor, u, v):
+def add_product(target: F2, factor: float, u: F1, v: F1) -> None:
     """Add factor u v' to a block."""
     for i in range(target.shape[0]):
         part = factor * u[i]
@@ -48,7 +58,9 @@ def add_product(target, factor, u, v):
 
 
 @jitable
-def add_two_sided(P, blocks, nb, i, j, factor, u, v):
+def add_two_sided(
+    P: Pattern, blocks: F3, nb: int, i: int, j: int, factor: float, u: F2, v: F2
+) -> None:
     """Add factor u v' of a force between bodies i and j; rows 0 of u and v are of i, 1 of j."""
     for of in range(2):
         a = i if of == 0 else j
@@ -60,14 +72,14 @@ def add_two_sided(P, blocks, nb, i, j, factor, u, v):
 
 
 @jitable
-def sides_of(scene, f):
+def sides_of(scene: Scene, f: int) -> tuple[int, int]:
     """Return the bodies that applied force f acts on; ground for what acts on I alone."""
     i, j = scene.markers.body[scene.applied.i[f]], scene.markers.body[scene.applied.j[f]]
     return i, (len(scene.bodies.mass) if scene.applied.alone[f] == 1 else j)
 
 
 @jitable
-def fill_unit(scene, T, y, f, force, torque, at_j):
+def fill_unit(scene: Scene, T: Tangent, y: F1, f: int, force: V3, torque: V3, at_j: int) -> F2:
     """Fill the wrenches of a unit force and torque: on I at its origin, on J at its own or I's."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
@@ -79,13 +91,15 @@ def fill_unit(scene, T, y, f, force, torque, at_j):
 
 
 @jitable
-def from_origin(scene, L, y, b, p):
+def from_origin(scene: Scene, L: Linear, y: F1, b: int, p: V3) -> V3:
     """Return point p from O of body b."""
     return add(sub(p, position(scene, y, b)), vector(L.r[b]))
 
 
 @jitable
-def add_turn(scene, T, y, b, by, p, force, torque, sign):
+def add_turn(
+    scene: Scene, T: Tangent, y: F1, b: int, by: int, p: V3, force: V3, torque: V3, sign: float
+) -> None:
     """Add that force at p and torque on body b turn with body `by`."""
     nb = len(scene.bodies.mass)
     if b == nb or by == nb:
@@ -100,7 +114,9 @@ def add_turn(scene, T, y, b, by, p, force, torque, sign):
 
 
 @jitable
-def add_lever(scene, T, y, b, by, p, force, sign):
+def add_lever(
+    scene: Scene, T: Tangent, y: F1, b: int, by: int, p: V3, force: V3, sign: float
+) -> None:
     """Add that the point p of a force on body b moves with body `by`, less that b's cg moves.
 
     The balance of inertia takes all forces along with the cg.
@@ -113,7 +129,7 @@ def add_lever(scene, T, y, b, by, p, force, sign):
 
 
 @jitable
-def carry(scene, T, b, by, at, force, sign):
+def carry(scene: Scene, T: Tangent, b: int, by: int, at: V3, force: V3, sign: float) -> None:
     """Add the moment on body b of a force whose point, at from O, moves with body `by`."""
     block = T.linear.K[T.pattern.place[b, by]]
     for k in range(3):
@@ -124,7 +140,7 @@ def carry(scene, T, b, by, at, force, sign):
 
 
 @jitable
-def add_geometry(scene, T, y, f, axes, at_j):
+def add_geometry(scene: Scene, T: Tangent, y: F1, f: int, axes: int, at_j: int) -> None:
     """Add that force f turns with a marker's body (none if negative), and its points with theirs.
 
     `at_j`: what acts on J does so at J's origin, not at I's.
@@ -144,7 +160,7 @@ def add_geometry(scene, T, y, f, axes, at_j):
 
 
 @jitable
-def add_rate_by_pose(scene, T, f, u, by_rate, n):
+def add_rate_by_pose(scene: Scene, T: Tangent, f: int, u: F2, by_rate: float, n: V3) -> None:
     """Add how the rate n . (v_I - v_J) of a damper along n changes as the arms of points turn.
 
     theta . (arm x (n x w)); what the turning of n adds is left to its own.
@@ -164,7 +180,9 @@ def add_rate_by_pose(scene, T, f, u, by_rate, n):
 
 
 @jitable
-def add_one_sided(P, L, nb, both, b, factor, u):
+def add_one_sided(
+    P: Pattern, L: Linear, nb: int, both: tuple[int, int], b: int, factor: float, u: F2
+) -> None:
     """Add factor times the row in `L.rise`, of displacements of body b, to both bodies."""
     for other in range(2):
         a = both[other]
@@ -173,7 +191,9 @@ def add_one_sided(P, L, nb, both, b, factor, u):
 
 
 @jitable
-def add_axis_rate(scene, T, f, by_rate, n, u, turns):
+def add_axis_rate(
+    scene: Scene, T: Tangent, f: int, by_rate: float, n: V3, u: F2, turns: bool
+) -> None:
     """Add how the rate along J's axis n changes as that turns: theta_J . (n x v)."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     b, nb, both = scene.markers.body[j], len(scene.bodies.mass), sides_of(scene, f)

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ANEW,
     AUDIT_EVERY,
     AUDIT_TOL,
     AUDIT_UNTIL,
-    BODY_SIZE,
     CLOSED_AT,
     CONE,
     CONTACT_THEN,
@@ -57,14 +56,18 @@ from mbsim.arrays.scene import (
     WORST_OPEN,
     WORST_TIME,
 )
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
+from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
 from mbsim.dynamics.pipeline.output import fill_energy
-from mbsim.dynamics.pipeline.scales import fill_squares
+from mbsim.geometry.catalog import AT_NORMAL
 
 #: Rounding of a sum of energies or momenta, over the sum of their sizes.
 ROUNDING = 1e-13
@@ -83,7 +86,7 @@ MASS, SHIFT, FLOW, TURN, SPEEDS, SPINS = 0, 1, 4, 7, 10, 11
 
 
 @jitable
-def note(scene, row, value, allowed, t, element):
+def note(scene: Scene, row: int, value: float, allowed: float, t: float, element: int) -> None:
     """Keep a value if it is larger over what is allowed than those before."""
     found = scene.audit.found[row]
     if not value * found[FOUND_ALLOWED] <= found[FOUND_VALUE] * allowed:
@@ -92,7 +95,7 @@ def note(scene, row, value, allowed, t, element):
 
 
 @jitable
-def hardest(scene):
+def hardest(scene: Scene) -> int:
     """Return the contact that presses hardest, their number for none."""
     hit, largest, found = scene.work.hit, 0.0, len(scene.contacts.id)
     for k in range(hit[len(hit) - 1]):
@@ -103,7 +106,7 @@ def hardest(scene):
 
 
 @jitable
-def examine_energy(scene, t, y, steps, local):
+def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the energy with what it was; `local` is the sum of local errors of those steps."""
     audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
     fill_energy(scene, y, energy)
@@ -143,7 +146,7 @@ def examine_energy(scene, t, y, steps, local):
 
 
 @jitable
-def examine_momentum(scene, t, y, steps, local):
+def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the momentum of groups that ground does not touch with what their weight gives."""
     audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
     sums = audit.sums
@@ -204,7 +207,7 @@ def examine_momentum(scene, t, y, steps, local):
 
 
 @jitable
-def own_time(scene, e):
+def own_time(scene: Scene, e: int) -> float:
     """Return L/V of the bodies that equation e holds."""
     eq, k = scene.equations, scene.equations.first[e]
     b = scene.markers.body[eq.i[k]]
@@ -216,7 +219,7 @@ def own_time(scene, e):
 
 
 @jitable
-def examine_equations(scene, t):
+def examine_equations(scene: Scene, t: float) -> None:
     """Look at the residuals of the equations in use, and at what slips although it is held."""
     eq, sweep = scene.equations, scene.sweep
     allowed = scene.audit.plan[AUDIT_TOL] + CLOSED
@@ -235,7 +238,7 @@ def examine_equations(scene, t):
 
 
 @jitable
-def examine_fold(scene, t):
+def examine_fold(scene: Scene, t: float) -> None:
     """Look at how far velocities were off when a fold was left behind."""
     quality, tol = scene.sweep.quality, scene.audit.plan[AUDIT_TOL]
     count = 0
@@ -245,7 +248,7 @@ def examine_fold(scene, t):
 
 
 @jitable
-def examine_friction(scene, t):
+def examine_friction(scene: Scene, t: float) -> None:
     """Look whether friction is within its cone at every incident."""
     audit, work, hit = scene.audit, scene.work, scene.work.hit
     for k in range(hit[len(hit) - 1]):
@@ -253,7 +256,7 @@ def examine_friction(scene, t):
         c = contact_of(scene, s)
         if audit.cone[c] == math.inf:
             continue
-        force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, 4:7])
+        force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, AT_NORMAL:])
         normal = dot(force, n)
         rubs = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
@@ -264,7 +267,7 @@ def examine_friction(scene, t):
 
 
 @jitable
-def examine(scene, t, h, y):
+def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     """Take a sample at an accepted step that is due for one; of no length, h = 0, begin anew."""
     audit, tally = scene.audit, scene.audit.tally
     hits = scene.work.hit[len(scene.work.hit) - 1]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
 from mbsim.arrays.hooks import Hook, Joints
-from mbsim.arrays.scene import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, vector
@@ -28,13 +30,13 @@ from mbsim.dynamics.forces.dry_friction import show_sticking
 
 
 @jitable
-def constrain(scene, t, y, dy):
+def constrain(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
     prepare(scene, y)
     hold(scene, t, y)
-    if scene.world.hooks[Hook.LATE] != 0:
+    if scene.world.hooks[Hook.REACTION_FORCES] != 0:
         # friction follows from reactions, and these from friction
-        code = call_int(scene.world.hooks[Hook.LATE], (scene, t, y, dy))
+        code = call_int(scene.world.hooks[Hook.REACTION_FORCES], (scene, t, y, dy))
         if code != 0:
             return code
     show_sticking(scene)
@@ -48,7 +50,7 @@ def constrain(scene, t, y, dy):
 
 
 @jitable
-def hold_all(scene, t, y):
+def hold_all(scene: Scene, t: float, y: F1) -> None:
     """Fill accelerations and multipliers as if nothing was released: reactions are those."""
     quality = scene.sweep.quality
     begins = quality[FOLD_BEGINS]
@@ -58,7 +60,7 @@ def hold_all(scene, t, y):
 
 
 @jitable
-def return_to_equations(scene, t, y):
+def return_to_equations(scene: Scene, t: float, y: F1) -> None:
     """Bring y back onto what was released while a loop passed a fold; note how far off that was.
 
     What was foreseen is off along the constraints as much as across them, which is seen here.
@@ -81,7 +83,7 @@ def return_to_equations(scene, t, y):
 
 
 @jitable
-def serve(scene, what, t, y, dy):
+def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)

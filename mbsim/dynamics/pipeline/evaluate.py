@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
-from mbsim.arrays.scene import BODY_SIZE, NEAR_FOLD, NOW, WITHIN
+from mbsim.arrays.codes import NEAR_FOLD, NOW, WITHIN
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.detection import find_contacts
@@ -16,7 +19,7 @@ from mbsim.dynamics.contact.forces import add_contact, contact_of
 
 
 @jitable
-def add_gravity(scene):
+def add_gravity(scene: Scene) -> None:
     """Start the forces of every body with its weight."""
     bodies, work, g = scene.bodies, scene.work, scene.world.gravity
     for b in range(len(bodies.mass) + 1):
@@ -28,7 +31,7 @@ def add_gravity(scene):
 
 
 @jitable
-def add_contacts(scene, t, h, y, dy):
+def add_contacts(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     """Add the forces of every touching slot; return 0 or a law's code."""
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
         dy[k] = 0.0
@@ -42,7 +45,7 @@ def add_contacts(scene, t, h, y, dy):
 
 
 @jitable
-def evaluate(scene, t, h, y, dy):
+def evaluate(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     """Fill dy = f(t, y), `h` after the committed state; return 0 or why it cannot be."""
     # where things are
     place_bodies(scene, y)
@@ -77,13 +80,13 @@ def evaluate(scene, t, h, y, dy):
 
 
 @jitable
-def evaluate_past(scene, t, h, y, dy):
+def evaluate_past(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = WITHIN
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
-    code = evaluate(scene, t, h, y, dy)
-    if code == 0 and scene.world.hooks[Hook.HELD] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, y)))
+    code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, h, y, dy))
+    if code == 0 and scene.world.hooks[Hook.STICKING] != 0:
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, y)))
     scene.world.past[0] = NOW
     return failure_or(scene, code)

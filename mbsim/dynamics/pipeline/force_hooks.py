@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import FOLD_HALT
 from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import FOLD_HALT, Scene
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
 from mbsim.dynamics.events.step_limits import longest_step
@@ -16,27 +18,27 @@ from mbsim.dynamics.forces.applied import add_applied
 from mbsim.dynamics.forces.dry_friction import serve_dry
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
-from mbsim.dynamics.forces.reaction_forces import add_late
+from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
 from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
 from mbsim.dynamics.stiction.rigid_contact import serve_sticking
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
 
 @jitable
-def drive(scene, t, y, dy):
+def drive(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add gravity over time and fill the slopes of states; return 0 or a code."""
     add_weight(scene, t, y, dy)
     return failure_or(scene, add_slopes(scene, t, y, dy))
 
 
-def drive_alone(context, t, y, dy):
+def drive_alone(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """What acts where there are no forces between markers."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return drive(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
-def act(context, t, y, dy):
+def act(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """The forces between markers, and the same."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -45,80 +47,80 @@ def act(context, t, y, dy):
     return code if code != 0 else drive(scene, t, a, b)
 
 
-def act_by_marker_force(context, t, y, f):
+def act_by_marker_force(context: int, t: float, y: Pointer, f: int) -> int:
     """A marker force."""
     scene = view(context, Scene)
     return add_marker_force(scene, vector_at(y, scene.rows.y.shape[1]), f)
 
 
-def act_by_vector_force(context, t, y, f):
+def act_by_vector_force(context: int, t: float, y: Pointer, f: int) -> int:
     """A vector force."""
     scene = view(context, Scene)
     return add_vector_force(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
 
-def act_by_wrench(context, t, y, f):
+def act_by_wrench(context: int, t: float, y: Pointer, f: int) -> int:
     """One or the other, where a scene has both."""
     scene = view(context, Scene)
     return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
 
-def rub(context, t, y, dy):
+def rub(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """Friction in joints, and the accelerations with it."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return add_friction(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
-def settle(context, t, y, dy):
+def settle(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """Forces that need reactions, with friction in joints, and the accelerations with them."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    return add_late(scene, t, vector_at(y, n), vector_at(dy, n))
+    return add_reaction_forces(scene, t, vector_at(y, n), vector_at(dy, n))
 
 
-def express(context, t, y, program, body, direction):
+def express(context: int, t: float, y: Pointer, program: int, body: int, direction: int) -> int:
     """The jet of an expression."""
     scene = view(context, Scene)
     return interpret(scene, t, vector_at(y, scene.rows.y.shape[1]), program, body, direction)
 
 
-def evaluate_expression(context, t, y, program):
+def evaluate_expression(context: int, t: float, y: Pointer, program: int) -> float:
     """The value of an expression."""
     scene = view(context, Scene)
     return evaluate_program(scene, t, vector_at(y, scene.rows.y.shape[1]), program)
 
 
-def evaluate_requests(context, t, y):
+def evaluate_requests(context: int, t: float, y: Pointer) -> int:
     """The expressions of requests at an output row."""
     scene = view(context, Scene)
     return failure_or(scene, fill_values(scene, t, vector_at(y, scene.rows.y.shape[1])))
 
 
-def commit_turns(context):
+def commit_turns(context: int) -> int:
     """The angles of the committed state."""
     return commit_angles(view(context, Scene))
 
 
-def serve_dry_alone(context, what, t, y):
+def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:
     """What dry friction keeps of an accepted step, and what it holds."""
     scene = view(context, Scene)
     return serve_dry(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
-def serve_rigid_alone(context, what, t, y):
+def serve_rigid_alone(context: int, what: int, t: float, y: Pointer) -> int:
     """The same where some is rigid."""
     scene = view(context, Scene)
     return serve_rigid(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
-def serve_held_contacts(context, what, t, y):
+def serve_sticking_contacts(context: int, what: int, t: float, y: Pointer) -> int:
     """What contacts do whose friction is rigid."""
     scene = view(context, Scene)
     return serve_sticking(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
-def limit_turn(context, t, h, a, b):
+def limit_turn(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]

@@ -22,15 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from mbsim.arrays.codes import DRY_SLIDE, DRY_TURN, MARKER_FORCE, RESIDUAL, VECTOR_FORCE
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import (
-    DRY_SLIDE,
-    DRY_TURN,
-    MARKER_FORCE,
-    RESIDUAL,
-    VECTOR_FORCE,
-    Scene,
-)
+from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core import jit
 from mbsim.core.problem import HOOK
@@ -140,29 +134,29 @@ def _joints(scene: Scene) -> Callable[..., Any]:
     return serve_joints if len(scene.equations.program) > 0 or settles else serve_tree
 
 
-def _has_held(scene: Scene, method: Method) -> bool:
+def _has_sticking(scene: Scene, method: Method) -> bool:
     return bool(scene.contacts.rigid.any())
 
 
-def _held(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import serve_held_contacts
+def _sticking(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.force_hooks import serve_sticking_contacts
 
-    return serve_held_contacts
-
-
-def _has_late(scene: Scene, method: Method) -> bool:
-    return len(scene.applied.late) > 0 or bool((scene.applied.connection >= 0).any())
+    return serve_sticking_contacts
 
 
-def _late(scene: Scene) -> Callable[..., Any]:
+def _has_reaction_forces(scene: Scene, method: Method) -> bool:
+    return len(scene.applied.by_reactions) > 0 or bool((scene.applied.connection >= 0).any())
+
+
+def _reaction_forces(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline.force_hooks import rub, settle
 
     # forces by reactions are compiled with all that they need
-    return settle if len(scene.applied.late) > 0 else rub
+    return settle if len(scene.applied.by_reactions) > 0 else rub
 
 
-def _has_switching(scene: Scene, method: Method) -> bool:
-    return len(scene.switching.program) > 0 and scene.world.fixed_step[0] == 0
+def _always(scene: Scene, method: Method) -> bool:
+    return True
 
 
 def _evaluate(scene: Scene) -> Callable[..., Any]:
@@ -319,26 +313,26 @@ TABLE = (
         "does what joints are asked for: `Joints`",
     ),
     Row(
-        Hook.HELD,
+        Hook.STICKING,
         _KEEPS,
-        _has_held,
-        _held,
-        "does what contacts are asked for whose friction is rigid: `Held`",
+        _has_sticking,
+        _sticking,
+        "does what contacts are asked for whose friction is rigid: `Sticking`",
         "an answer, or less a code",
     ),
     Row(
-        Hook.LATE,
+        Hook.REACTION_FORCES,
         _FORCES,
-        _has_late,
-        _late,
+        _has_reaction_forces,
+        _reaction_forces,
         "finds forces that follow from reactions, and the accelerations with them",
     ),
     Row(
         Hook.EVALUATE,
         HOOK,
-        _has_switching,
+        _always,
         _evaluate,
-        "evaluates y' at a point that is no step's, to see what branch forces are on there",
+        "evaluates y' at a point that is no step's: of a row, within one, of another branch",
     ),
     # linearisation
     Row(

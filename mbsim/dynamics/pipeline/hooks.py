@@ -1,39 +1,30 @@
-"""The mechanism as a `Problem`: its hooks behind addresses, all given one packed `Scene`."""
+"""What an integrator calls of a mechanism (`core.problem`): all are given one packed `Scene`."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, failure_or
-from mbsim.arrays.scene import (
-    BODY_SIZE,
-    ERROR_NOW,
-    FOLD_HALT,
-    FOLDS,
-    HELD_OTHERWISE,
-    LISTINGS,
-    Scene,
-)
-from mbsim.core.address import call_int, pack, vector_at, view
+from mbsim.arrays.codes import ERROR_NOW, FOLD_HALT, FOLDS, HELD_OTHERWISE, LISTINGS
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import Pointer
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import (
     ALONG,
     BY_CHECK,
     FRICTION_ALONE,
     FULL,
     IMPACTS_ALONE,
-    Problem,
     Taken,
-    addresses,
 )
+from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import commit, first_depth, reversal, watch_peaks
 from mbsim.dynamics.events.stability import stable_step
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
-from mbsim.dynamics.pipeline.hook_table import fill
 from mbsim.dynamics.pipeline.output import (
     find_fault,
     friction_left,
@@ -42,17 +33,16 @@ from mbsim.dynamics.pipeline.output import (
     scaled_error,
     write_row,
 )
-from mbsim.dynamics.pipeline.scales import take_speeds
 
 
-def rhs(context, t, h, a, b):
+def rhs(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """f(t, y)."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return failure_or(scene, evaluate(scene, t, h, vector_at(a, n), vector_at(b, n)))
 
 
-def _project(context, t, h, a, b):
+def _project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Quaternions back to unit length, and bodies onto their constraints."""
     scene = view(context, Scene)
     y = vector_at(a, scene.rows.y.shape[1])
@@ -68,7 +58,7 @@ def _project(context, t, h, a, b):
     return 0
 
 
-def _norm(context, t, h, a, b):
+def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The scaled local error."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -82,7 +72,7 @@ def _norm(context, t, h, a, b):
     return error
 
 
-def _check(context, t, h, a, b):
+def _check(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The guard of first penetration."""
     scene = view(context, Scene)
     part = first_depth(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
@@ -90,13 +80,13 @@ def _check(context, t, h, a, b):
     return part
 
 
-def _commit(context, t, h, a, b):
+def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The incident table, events and peaks."""
     scene = view(context, Scene)
     listings, passed = scene.log.counters[LISTINGS], scene.sweep.quality[FOLDS] == 1.0
-    if scene.world.hooks[Hook.HELD] != 0:
+    if scene.world.hooks[Hook.STICKING] != 0:
         # before equations may be chosen anew
-        answer_of(scene, call_int(scene.world.hooks[Hook.HELD], (scene, Held.SHARE, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, a)))
     if scene.world.hooks[Hook.JOINTS] != 0:
         code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
         if code != 0:
@@ -123,7 +113,7 @@ def _commit(context, t, h, a, b):
     return word if code == 0 else -code
 
 
-def _look(context, t, h, a, b):
+def _look(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Peaks at an inner point of a step."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -135,12 +125,12 @@ def _look(context, t, h, a, b):
     return failure_or(scene, code)
 
 
-def _inner(context, t, h, a, b):
+def _inner(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """Where in the step a contact turned from closing to opening."""
     return reversal(view(context, Scene), h)
 
 
-def _limit(context, t, h, a, b):
+def _limit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -150,7 +140,7 @@ def _limit(context, t, h, a, b):
     return min(longest, halt - t) if halt > t else longest
 
 
-def _output(context, t, h, a, b):
+def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """A row of results at an interpolated, projected state."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -167,7 +157,7 @@ def _output(context, t, h, a, b):
     return FULL if full else 0
 
 
-def _reject(context, t, h, a, b):
+def _reject(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
@@ -178,7 +168,7 @@ def _reject(context, t, h, a, b):
     return 0
 
 
-def _stable(context, t, h, a, b):
+def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step for a method without error estimate, h being the tolerance."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
@@ -187,14 +177,15 @@ def _stable(context, t, h, a, b):
     return longest
 
 
-def list_near(context, y):
+def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
     follow(scene, vector_at(y, scene.rows.y.shape[1]))
     return 0
 
 
-_HOOKS = {
+#: By their names in `Problem`; `stable` is only of a method without error estimate.
+HOOKS = {
     "rhs": rhs,
     "project": _project,
     "norm": _norm,
@@ -206,32 +197,3 @@ _HOOKS = {
     "output": _output,
     "reject": _reject,
 }
-
-
-def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
-    """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
-
-    Only a method without error estimate, `fixed_step`, needs the last hook.
-    """
-    table = pack(scene)
-    hooks = _HOOKS | {"stable": _stable} if fixed_step else dict(_HOOKS)
-    if len(scene.angles.i) > 0:
-        from mbsim.dynamics.pipeline.force_hooks import limit_turn
-
-        hooks["limit"] = limit_turn
-    if len(scene.sensors.id) > 0:
-        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
-
-        hooks["arrive"] = arrive_hook
-        if scene.sensors.located.any():
-            # where none is located, steps need not be looked into
-            hooks["happens"] = happens_hook
-    if len(scene.switching.program) > 0 and not fixed_step:
-        from mbsim.dynamics.events.switching import switching_hook
-
-        hooks["switching"] = switching_hook
-    problem = Problem(int(table.ctypes.data), **addresses(hooks))
-    fill(scene)
-    if "switching" in hooks:
-        scene.state.frozen[0] = int(len(scene.work.idle) > 0)
-    return problem, table

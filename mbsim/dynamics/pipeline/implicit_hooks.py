@@ -1,21 +1,12 @@
-"""The hooks of implicit methods, and those of derivatives of joints and forces.
-
-The linearised mechanism stands behind a hook of the scene, so its arrays are made only where a
-method asks for them.
-"""
+"""The hooks of implicit methods, and those of derivatives of joints and forces."""
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from mbsim.arrays.hooks import Hook, failure_or
-from mbsim.arrays.scene import MARKER_FORCE, Scene
-from mbsim.compile_model.program_dependence import find_depends
-from mbsim.compile_model.tangent import Tangent, make_tangent
-from mbsim.core.address import pack, vector_at, view
-from mbsim.core.problem import Problem, addresses
+from mbsim.arrays.scene import Scene
+from mbsim.compile_model.tangent import Tangent
+from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import Pointer
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
@@ -23,10 +14,9 @@ from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_s
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
-from mbsim.dynamics.pipeline.hook_table import Method, fill
 
 
-def _linearise(context, t, h, a, b):
+def _linearise(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The mechanism linearised where it has just been evaluated."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -34,7 +24,7 @@ def _linearise(context, t, h, a, b):
     return failure_or(scene, linearise(scene, T, t, h, vector_at(a, n), vector_at(b, n)))
 
 
-def _factor(context, t, h, a, b):
+def _factor(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The matrix of real coefficients."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -43,7 +33,7 @@ def _factor(context, t, h, a, b):
     return failure_or(scene, factor(scene, T, T.real, h))
 
 
-def _solve(context, t, h, a, b):
+def _solve(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The correction of a residual."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -51,7 +41,7 @@ def _solve(context, t, h, a, b):
     return failure_or(scene, solve(scene, T, T.real, vector_at(a, n), vector_at(b, n)))
 
 
-def _factor_pair(context, t, h, a, b):
+def _factor_pair(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The matrix of complex coefficients."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -61,7 +51,7 @@ def _factor_pair(context, t, h, a, b):
     return failure_or(scene, factor(scene, T, T.pair, h))
 
 
-def _solve_pair(context, t, h, a, b):
+def _solve_pair(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The correction of a complex residual: real parts, then imaginary ones."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -76,7 +66,7 @@ def _solve_pair(context, t, h, a, b):
     return failure_or(scene, code)
 
 
-def slopes(context, t, y):
+def slopes(context: int, t: float, y: Pointer) -> int:
     """The derivatives of forces between markers and of states' slopes."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -86,7 +76,7 @@ def slopes(context, t, y):
     return code
 
 
-def slopes_with_marker_forces(context, t, y):
+def slopes_with_marker_forces(context: int, t: float, y: Pointer) -> int:
     """The same, of marker forces too."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -97,7 +87,7 @@ def slopes_with_marker_forces(context, t, y):
     return code
 
 
-def slopes_with_rubs(context, t, y):
+def slopes_with_rubs(context: int, t: float, y: Pointer) -> int:
     """The same, of friction in joints instead."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -108,7 +98,7 @@ def slopes_with_rubs(context, t, y):
     return code
 
 
-def slopes_with_both(context, t, y):
+def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     """The same, of both."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -120,7 +110,7 @@ def slopes_with_both(context, t, y):
     return code
 
 
-def bend(context, t, y):
+def bend(context: int, t: float, y: Pointer) -> int:
     """How the forces of equations turn with the bodies."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -128,7 +118,7 @@ def bend(context, t, y):
     return 0
 
 
-def bend_and_drive(context, t, y):
+def bend_and_drive(context: int, t: float, y: Pointer) -> int:
     """The same, and the rows of motions of velocities and accelerations."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
@@ -138,26 +128,6 @@ def bend_and_drive(context, t, y):
     return 0
 
 
-def _find_slopes(scene: Scene) -> None:
-    """Let marker forces have their slopes."""
-    from mbsim.forces.abi import slopes_address
-
-    applied = scene.applied
-    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
-        applied.slopes[f] = slopes_address(int(applied.law[f]))
-
-
-def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
-    """Return the problem with the hooks of an implicit method, and what must live with it.
-
-    `pair`: the method solves with complex coefficients as well.
-    """
-    tangent = make_tangent(scene, find_depends(scene), pair)
-    table = pack(tangent)
-    scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
-    _find_slopes(scene)
-    fill(scene, Method(tangent, pair))
-    hooks = {"linearise": _linearise, "factor": _factor, "solve": _solve}
-    if pair:
-        hooks |= {"factor_pair": _factor_pair, "solve_pair": _solve_pair}
-    return problem._replace(**addresses(hooks)), (tangent, table)
+#: By their names in `Problem`; those of a method that solves with complex coefficients as well.
+HOOKS = {"linearise": _linearise, "factor": _factor, "solve": _solve}
+PAIR_HOOKS = {"factor_pair": _factor_pair, "solve_pair": _solve_pair}

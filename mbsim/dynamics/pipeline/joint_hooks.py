@@ -7,6 +7,7 @@ import math
 from mbsim.arrays.hooks import Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -17,7 +18,7 @@ from mbsim.dynamics.pipeline.constraint_hooks import serve
 
 
 @jitable
-def serve_tree_joints(scene, what, t, y, dy):
+def serve_tree_joints(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what `constraints.serve` does, for a scene without equations."""
     if what == Joints.ACCELERATE:
         prepare(scene, y)
@@ -39,14 +40,14 @@ def serve_tree_joints(scene, what, t, y, dy):
     return 0
 
 
-def serve_joints(context, what, t, y, dy):
+def serve_joints(context: int, what: int, t: float, y: Pointer, dy: Pointer) -> int:
     """All that joints are asked for."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     return serve(scene, what, t, vector_at(y, n), vector_at(dy, n))
 
 
-def serve_tree(context, what, t, y, dy):
+def serve_tree(context: int, what: int, t: float, y: Pointer, dy: Pointer) -> int:
     """The same where the tree holds all joints."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]

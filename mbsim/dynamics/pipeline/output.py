@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Hook, Joints, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     ACTIVE,
-    BODY_SIZE,
     CONTACT_COLUMNS,
     DRIFT,
     INC_COUPLE,
@@ -15,24 +13,29 @@ from mbsim.arrays.scene import (
     INC_FROZEN,
     INC_GRAPHIC_I,
     INC_GRAPHIC_J,
-    INC_HELD,
     INC_KIND,
     INC_MEMORY,
     INC_NORMAL,
     INC_POINT,
     INC_REGION,
-    INC_SHARE,
     INC_SLOT,
     INC_STEP,
+    INC_STICKING,
     INC_TANGENT,
     INC_TOUCHES,
+    INC_WEIGHT,
     INC_X,
     STORED_ENERGY,
 )
+from mbsim.arrays.hooks import Hook, Joints, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.contact.forces import (
     ALONG_X,
     ALONG_Y,
@@ -52,8 +55,16 @@ from mbsim.dynamics.contact.forces import (
     sides,
 )
 from mbsim.dynamics.contact.points import effective_mass
-from mbsim.dynamics.pipeline.scales import fill_squares
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+)
 from mbsim.laws.catalog import BRANCHES, STICK
 from mbsim.laws.catalog import SLIP as SLIDING
 
@@ -63,7 +74,7 @@ FAST, SLIGHT = 0.2, 5e-4
 
 
 @jitable
-def fill_energy(scene, y, row):
+def fill_energy(scene: Scene, y: F1, row: F1) -> None:
     """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
     kinetic, potential, dissipated = 0.0, 0.0, 0.0
@@ -89,7 +100,7 @@ def fill_energy(scene, y, row):
 
 
 @jitable
-def fill_contacts(scene, y, row):
+def fill_contacts(scene: Scene, y: F1, row: F1) -> None:
     """Write net force, net torque about I's cg, deepest depth, fastest slip, incidents, area."""
     work = scene.work
     for k in range(len(row)):
@@ -100,7 +111,7 @@ def fill_contacts(scene, y, row):
         values, point = work.slot[s], work.points[s]
         gi = sides(scene, s)[0]
         force = vector(values[FORCE : FORCE + 3])
-        arm = sub((point[1], point[2], point[3]), position(scene, y, scene.graphics.body[gi]))
+        arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[gi]))
         moment = cross(arm, force)
         for k in range(3):
             row[at + k] += force[k]
@@ -112,7 +123,7 @@ def fill_contacts(scene, y, row):
 
 
 @jitable
-def fill_incidents(scene, h, y):
+def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
     rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
@@ -123,15 +134,15 @@ def fill_incidents(scene, h, y):
         at = scene.slots.x[s]
         row[INC_SLOT] = s
         for j in range(3):
-            row[INC_POINT + j] = work.points[s, 1 + j]
-            row[INC_NORMAL + j] = work.points[s, 4 + j]
+            row[INC_POINT + j] = work.points[s, AT_POINT + j]
+            row[INC_NORMAL + j] = work.points[s, AT_NORMAL + j]
             row[INC_COUPLE + j] = work.points[s, COUPLE + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
         row[INC_DEPTH] = work.slot[s, DEPTH]
         # what its force followed from besides y: see pipeline.replay
         pair = scene.slots.pair[s]
-        row[INC_SHARE], row[INC_STEP] = work.points[s, 7], h
+        row[INC_WEIGHT], row[INC_STEP] = work.points[s, AT_WEIGHT], h
         row[INC_FROZEN] = 1.0 if scene.state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
         row[INC_TOUCHES] = scene.pairs.touches[pair]
         row[INC_KIND] = scene.pairs.kind[pair]
@@ -151,14 +162,14 @@ def fill_incidents(scene, h, y):
         if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here
             for j in range(2):
-                row[INC_HELD + j] = work.held[s, j]
+                row[INC_STICKING + j] = work.sticking_force[s, j]
         k += 1
     rows.used[1] = k
     return k - first
 
 
 @jitable
-def write_row(scene, t, h, y, f):
+def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
     """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
     rows, work = scene.rows, scene.work
     k = rows.used[0]
@@ -189,7 +200,7 @@ def write_row(scene, t, h, y, f):
 
 
 @jitable
-def no_room(scene):
+def no_room(scene: Scene) -> bool:
     """Return whether another step or row could overflow the tables of events and incidents."""
     rows, pairs, slots = scene.rows, scene.pairs, 0
     room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
@@ -201,7 +212,7 @@ def no_room(scene):
 
 
 @jitable
-def beyond_noise(scene, b, h, dv, dw):
+def beyond_noise(scene: Scene, b: int, h: float, dv: float, dw: float) -> V2:
     """Return the squares of a velocity error less what detection noise does in a step h."""
     bodies, noise = scene.bodies, scene.work.noise
     if noise[b, 0] == 0.0:
@@ -213,7 +224,7 @@ def beyond_noise(scene, b, h, dv, dw):
 
 
 @jitable
-def speed_change(scene, e, y, b, p):
+def speed_change(scene: Scene, e: F1, y: F1, b: int, p: V3) -> V3:
     """Return by how much body b's point at p is faster with velocities that differ by e."""
     if b == len(scene.bodies.mass):
         return 0.0, 0.0, 0.0
@@ -223,7 +234,7 @@ def speed_change(scene, e, y, b, p):
 
 
 @jitable
-def friction_left(scene, e, y, turns):
+def friction_left(scene: Scene, e: F1, y: F1, turns: bool) -> float:
     """Return the largest change of friction that e causes, over the normal force.
 
     By friction's slopes where it was linearised last, 0 where none was; and, if `turns`, by a slip
@@ -236,7 +247,7 @@ def friction_left(scene, e, y, turns):
         if work.slot[s, NORMAL] <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
             continue
         gi, gj = sides(scene, s)
-        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
         tx = vector(work.t[s])
         v = sub(
             speed_change(scene, e, y, scene.graphics.body[gi], p),
@@ -258,7 +269,7 @@ def friction_left(scene, e, y, turns):
 
 
 @jitable
-def impact_left(scene, h, e, y):
+def impact_left(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest change of a closing speed that e causes, over that in the step h.
 
     That is of the motion or, where a weight is nearly balanced, what the contact's force would make
@@ -278,7 +289,7 @@ def impact_left(scene, h, e, y):
         c = contact_of(scene, s)
         least = FAST * math.sqrt(work.squares[scene.scales.of_contact[c]])
         gi, gj = sides(scene, s)
-        p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+        p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
         v = sub(
             speed_change(scene, e, y, scene.graphics.body[gi], p),
             speed_change(scene, e, y, scene.graphics.body[gj], p),
@@ -292,7 +303,7 @@ def impact_left(scene, h, e, y):
 
 
 @jitable
-def carried_error(scene, e, s):
+def carried_error(scene: Scene, e: F1, s: int) -> float:
     """Return the velocity as which e in what friction in slot s integrates counts.
 
     Where it slips that is the way of slip over the spring's length, which acts only across the
@@ -310,10 +321,10 @@ def carried_error(scene, e, s):
 
 
 @jitable
-def scaled_error(scene, h, e, y):
+def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
-    L and V are those of the group of connected bodies (`pipeline.scales`), the energy is that of
+    L and V are those of the group of connected bodies (`bodies.scales`), the energy is that of
     its heaviest body at V. Detection that is exact only to a given noise makes forces uncertain;
     what the noise of a step can do to a velocity is not chased. With h = 0, `e` is no step's error,
     and what it does to friction, over the normal force, counts as well. The worst body
@@ -372,7 +383,7 @@ def scaled_error(scene, h, e, y):
 
 
 @jitable
-def find_fault(scene):
+def find_fault(scene: Scene) -> int:
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
     worst, hardest, contact = scene.work.trouble[0], 0.0, -1
     hit = scene.work.hit

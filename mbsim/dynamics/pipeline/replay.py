@@ -7,8 +7,7 @@ same code gives the same numbers to the last bit.
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import failure_or
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     AGAIN,
     CONTACT_COLUMNS,
     INC_COUPLE,
@@ -21,25 +20,35 @@ from mbsim.arrays.scene import (
     INC_NORMAL,
     INC_POINT,
     INC_REGION,
-    INC_SHARE,
     INC_SLOT,
     INC_STEP,
     INC_TANGENT,
     INC_TOUCHES,
+    INC_WEIGHT,
     NOW,
     SLOT_COLUMNS,
-    Scene,
 )
+from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.contact.forces import add_contact
 from mbsim.dynamics.pipeline.output import fill_contacts
-from mbsim.geometry.catalog import AREA, COUPLE, MOMENT_XX, MOMENT_XY, MOMENT_YY
+from mbsim.geometry.catalog import (
+    AREA,
+    AT_DEPTH,
+    AT_WEIGHT,
+    COUPLE,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+)
 
 
 @jitable
-def put_back(scene, row):
+def put_back(scene: Scene, row: F1) -> int:
     """Put the incident of a table's row back into its slot; return the slot."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     s = int(row[INC_SLOT])
@@ -48,7 +57,7 @@ def put_back(scene, row):
     pairs.graphic_i[pair] = int(row[INC_GRAPHIC_I])
     pairs.graphic_j[pair] = int(row[INC_GRAPHIC_J])
     point = work.points[s]
-    point[0], point[7] = row[INC_DEPTH], row[INC_SHARE]
+    point[AT_DEPTH], point[AT_WEIGHT] = row[INC_DEPTH], row[INC_WEIGHT]
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         point[COUPLE + k] = row[INC_COUPLE + k]
@@ -64,7 +73,7 @@ def put_back(scene, row):
 
 
 @jitable
-def evaluate_replay(scene, t, y, dy, contacts, table):
+def evaluate_replay(scene: Scene, t: float, y: F1, dy: F1, contacts: F1, table: F2) -> int:
     """Fill `contacts` as a row has them, `table` with inputs, outputs, `Work.slot` of each.
 
     The rows of incidents lie in `Rows.incidents`. Return 0 or a law's code.
@@ -92,7 +101,7 @@ def evaluate_replay(scene, t, y, dy, contacts, table):
     return code
 
 
-def replay_hook(context, t, h, a, b):
+def replay_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Forces of a row once more: `a` is its y, `b` room for y', contacts and the table."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V2
 from mbsim.core.jitable import jitable
 
 SHARED, SLIPPING = 0.0, 1.0
@@ -39,7 +40,7 @@ MOVES = 100.0
 
 
 @jitable
-def slides(S, count, r, y, out):
+def slides(S: F2, count: int, r: int, y: F1, out: F1) -> None:
     """Write S y into out for so many rows."""
     for k in range(count):
         total = 0.0
@@ -49,7 +50,7 @@ def slides(S, count, r, y, out):
 
 
 @jitable
-def fill_newton(S, count, r, V, K, eps, inertia):
+def fill_newton(S: F2, count: int, r: int, V: F2, K: F2, eps: float, inertia: float) -> None:
     """Fill the lower part of Newton's matrix K and the gradient at V[MOTION].
 
     Forces beyond their limits are brought back to them: K is positive so.
@@ -88,7 +89,7 @@ def fill_newton(S, count, r, V, K, eps, inertia):
 
 
 @jitable
-def factor_cholesky(K, r):
+def factor_cholesky(K: F2, r: int) -> None:
     """Replace the lower part of K by its Cholesky factor; a pivot that rounding took is 1e-15."""
     for a in range(r):
         for b in range(a + 1):
@@ -102,7 +103,7 @@ def factor_cholesky(K, r):
 
 
 @jitable
-def solve_cholesky(K, r, x):
+def solve_cholesky(K: F2, r: int, x: F1) -> None:
     """Replace x by the solution with a factored K."""
     for a in range(r):
         for k in range(a):
@@ -115,7 +116,7 @@ def solve_cholesky(K, r, x):
 
 
 @jitable
-def objective(count, r, V, part, eps, inertia):
+def objective(count: int, r: int, V: F2, part: float, eps: float, inertia: float) -> float:
     """Return what is to be least at V[MOTION] and a part of the step from there."""
     total = 0.0
     for k in range(0, count, 2):
@@ -130,7 +131,7 @@ def objective(count, r, V, part, eps, inertia):
 
 
 @jitable
-def begin_motion(S, count, r, V, K, inertia):
+def begin_motion(S: F2, count: int, r: int, V: F2, K: F2, inertia: float) -> None:
     """Write the first motion: of forces least by sum f^2/c, or as if nothing rubbed."""
     y, m = V[MOTION], V[LOAD]
     for a in range(r):
@@ -150,7 +151,7 @@ def begin_motion(S, count, r, V, K, inertia):
 
 
 @jitable
-def take_forces(count, V, eps):
+def take_forces(count: int, V: F2, eps: float) -> float:
     """Let forces follow Newton's step; return the largest over its limit."""
     worst = 0.0
     for k in range(0, count, 2):
@@ -169,7 +170,7 @@ def take_forces(count, V, eps):
 
 
 @jitable
-def solve_cones(S, count, r, V, K, inertia):
+def solve_cones(S: F2, count: int, r: int, V: F2, K: F2, inertia: float) -> V2:
     """Solve one of the two problems.
 
     Parameters

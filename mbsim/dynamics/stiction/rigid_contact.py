@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Held, Hook, note_failure
-from mbsim.arrays.scene import SLIP as SLIP_EVENT
-from mbsim.arrays.scene import STICK as STICK_EVENT
-from mbsim.arrays.scene import TOLERANCE
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, TOLERANCE
+from mbsim.arrays.codes import SLIP as SLIP_EVENT
+from mbsim.arrays.codes import STICK as STICK_EVENT
+from mbsim.arrays.hooks import Hook, Sticking, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.in_use import active_count
@@ -39,9 +41,10 @@ from mbsim.dynamics.stiction.rigid_shares import (
     fill_slip,
     first_of_slots,
     most_capacity,
-    share_held,
+    share_sticking,
 )
-from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_held
+from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_sticking
+from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
 
@@ -59,11 +62,11 @@ OVER = 1e-5
 
 
 @jitable
-def slip_of(scene, y, s):
+def slip_of(scene: Scene, y: F1, s: int) -> V2:
     """Return slip along x and y of slot s at the point evaluated last."""
     gi, gj = sides(scene, s)
     point = scene.work.points[s]
-    p, n = (point[1], point[2], point[3]), (point[4], point[5], point[6])
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     v = sub(
         velocity_at(scene, y, scene.graphics.body[gi], p),
         velocity_at(scene, y, scene.graphics.body[gj], p),
@@ -73,13 +76,13 @@ def slip_of(scene, y, s):
 
 
 @jitable
-def settled(scene):
+def settled(scene: Scene) -> float:
     """Return what slip is none to the tolerance."""
-    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[1]
+    return SETTLED * scene.world.scale[TOLERANCE] * scene.world.scale[SCALE_SPEED]
 
 
 @jitable
-def held_part(scene):
+def sticking_part(scene: Scene) -> float:
     """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
 
     What presses next to nothing has no limit of its own: the least is a part of the largest.
@@ -88,7 +91,7 @@ def held_part(scene):
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue
-        held, able = scene.work.held[slot[e]], max(capacity(scene, slot[e]), least)
+        held, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
         force = math.hypot(held[0], held[1])
         if able > 0.0:
             part = max(part, force / able)
@@ -98,7 +101,7 @@ def held_part(scene):
 
 
 @jitable
-def onward(scene, s, v):
+def onward(scene: Scene, s: int, v: V2) -> float:
     """Return the part of slip along the direction in which slot s began to slip."""
     kept = scene.state.memory[s]
     size = math.hypot(kept[KEPT_X], kept[KEPT_Y])
@@ -106,15 +109,15 @@ def onward(scene, s, v):
 
 
 @jitable
-def rest(scene):
+def rest(scene: Scene) -> float:
     """Return what is no slip but rounding."""
-    return ROUNDING * scene.world.scale[1]
+    return ROUNDING * scene.world.scale[SCALE_SPEED]
 
 
 @jitable
-def ask_held(scene, y):
+def ask_sticking(scene: Scene, y: F1) -> int:
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
-    if held_part(scene) > 1.0:
+    if sticking_part(scene) > 1.0:
         return 1
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -126,19 +129,19 @@ def ask_held(scene, y):
 
 
 @jitable
-def load_held(scene):
+def load_sticking(scene: Scene) -> int:
     """Return the largest force that holds a slot, in millionths of what holds at most."""
-    return int(1e6 * min(held_part(scene), 1e6))
+    return int(1e6 * min(sticking_part(scene), 1e6))
 
 
 @jitable
-def goes_back(scene, s, along):
+def goes_back(scene: Scene, s: int, along: float) -> bool:
     """Return whether slot s goes back that slips by so much along the way it had."""
     return along < -(rest(scene) + BEYOND * scene.state.memory[s, KEPT_PLAY])
 
 
 @jitable
-def let_slip(scene, s, x, y, speed, play):
+def let_slip(scene: Scene, s: int, x: float, y: float, speed: float, play: float) -> None:
     """Let slot s slip along (x, y) from here on, at a speed, let go with some play."""
     kept = scene.state.memory[s]
     size = (rest(scene) + settled(scene) + BEYOND**2 * play) / math.hypot(x, y)
@@ -147,14 +150,14 @@ def let_slip(scene, s, x, y, speed, play):
 
 
 @jitable
-def let_stick(scene, s):
+def let_stick(scene: Scene, s: int) -> None:
     """Let slot s stick from here on."""
     kept = scene.state.memory[s]
     kept[KEPT_MODE], kept[KEPT_SPEED], kept[KEPT_PLAY] = STICK, 0.0, 0.0
 
 
 @jitable
-def begin_slot(scene, y, s):
+def begin_slot(scene: Scene, y: F1, s: int) -> int:
     """Set the mode of slot s, which does not stick; return 1 where it turns.
 
     What turns at a speed that the tolerance explains has come to rest, and so has what went back:
@@ -179,7 +182,7 @@ def begin_slot(scene, y, s):
 
 
 @jitable
-def came_to_rest(scene, pair):
+def came_to_rest(scene: Scene, pair: int) -> bool:
     """Return whether a slot of a pair sticks that did not."""
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -191,14 +194,14 @@ def came_to_rest(scene, pair):
 
 
 @jitable
-def begin_held(scene, y):
+def begin_sticking(scene: Scene, y: F1) -> int:
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
     What is at rest is first taken to stick wherever something changes, and what is as good as at
-    rest beside what comes to rest: what of it slips is found for all together (`release_held`).
+    rest beside what comes to rest: what of it slips is found for all together (`release_sticking`).
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
-    changed, held, begun = 1 if held_part(scene) > 1.0 else 0, 0, 0
+    changed, held, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
     for e in range(first, len(slot), 2):
         s = slot[e]
         mode = state.memory[s, KEPT_MODE]
@@ -224,19 +227,19 @@ def begin_held(scene, y):
 
 
 @jitable
-def was_sticking(scene, s):
+def was_sticking(scene: Scene, s: int) -> bool:
     """Return whether slot s has been held so far."""
     return scene.state.before[s, KEPT_MODE] == STICK
 
 
 @jitable
-def hold_implied(scene, t, y):
+def hold_implied(scene: Scene, t: float, y: F1) -> None:
     """Let all slots stick whose slip those that stick imply: they move by rounding at most.
 
     What has been released for this very change does slip.
     """
     slot, first = scene.equations.slot, first_of_slots(scene)
-    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
     for e in range(first, len(slot), 2):
         s, implied = slot[e], True
         kept = scene.state.memory[s]
@@ -254,26 +257,26 @@ def hold_implied(scene, t, y):
 
 
 @jitable
-def fill_sliding(scene, t, y, count):
+def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
     """Fill what friction would be where the slots of so many rows slid against what holds them."""
     cone = scene.sweep.cone
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
-        x, z = scene.work.held[s, 0], scene.work.held[s, 1]
+        x, z = scene.work.sticking_force[s, 0], scene.work.sticking_force[s, 1]
         let_slip(scene, s, -x if x != 0.0 or z != 0.0 else 1.0, -z, 0.0, 0.0)
     code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
     note_failure(scene, code)
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
         point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
-        n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+        n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
         rubs = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
         cone[SLIDING, k] = rubs if scene.work.touching[s] == 1 else 0.0
         let_stick(scene, s)
 
 
 @jitable
-def solve_slips(scene, count, r):
+def solve_slips(scene: Scene, count: int, r: int) -> float:
     """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
     cone, most, grows = scene.sweep.cone, 0.0, True
     for k in range(count // 2):
@@ -294,11 +297,11 @@ def solve_slips(scene, count, r):
 
 
 @jitable
-def release_held(scene, t, y):
+def release_sticking(scene: Scene, t: float, y: F1) -> int:
     """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
     hold_implied(scene, t, y)
-    share_held(scene, t, y)
-    if held_part(scene) <= 1.0:
+    share_sticking(scene, t, y)
+    if sticking_part(scene) <= 1.0:
         return 0
     count, r = fill_cones(scene, t, y, most_capacity(scene))
     fill_sliding(scene, t, y, count)
@@ -314,12 +317,12 @@ def release_held(scene, t, y):
         # sliding would rub more than sticking holds: it goes on to stick
         code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
         note_failure(scene, code)
-        share_held(scene, t, y)
+        share_sticking(scene, t, y)
     return released
 
 
 @jitable
-def record_held(scene, t):
+def record_sticking(scene: Scene, t: float) -> None:
     """Append events of the slots that go on otherwise than before."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -341,7 +344,7 @@ def record_held(scene, t):
 
 
 @jitable
-def changed_held(scene):
+def changed_sticking(scene: Scene) -> int:
     """Return 1 if other slots stick than in the last step, else 0."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -353,24 +356,24 @@ def changed_held(scene):
 
 
 @jitable
-def serve_sticking(scene, what, t, y):
-    """Do what contacts with rigid friction are asked for (`Held`); return an answer or 0."""
-    if what == Held.PLACE:
-        place_held(scene, t, y)
-    elif what == Held.SHARE:
-        share_held(scene, t, y)
-    elif what == Held.ASK:
-        share_held(scene, t, y)
-        return ask_held(scene, y)
-    elif what == Held.BEGIN:
-        return begin_held(scene, y)
-    elif what == Held.RELEASE:
-        return release_held(scene, t, y)
-    elif what == Held.RECORD:
-        record_held(scene, t)
-    elif what == Held.CHANGED:
-        return changed_held(scene)
-    elif what == Held.LOAD:
-        share_held(scene, t, y)
-        return load_held(scene)
+def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
+    """Do what contacts with rigid friction are asked for (`Sticking`); return an answer or 0."""
+    if what == Sticking.PLACE:
+        place_sticking(scene, t, y)
+    elif what == Sticking.SHARE:
+        share_sticking(scene, t, y)
+    elif what == Sticking.ASK:
+        share_sticking(scene, t, y)
+        return ask_sticking(scene, y)
+    elif what == Sticking.BEGIN:
+        return begin_sticking(scene, y)
+    elif what == Sticking.RELEASE:
+        return release_sticking(scene, t, y)
+    elif what == Sticking.RECORD:
+        record_sticking(scene, t)
+    elif what == Sticking.CHANGED:
+        return changed_sticking(scene)
+    elif what == Sticking.LOAD:
+        share_sticking(scene, t, y)
+        return load_sticking(scene)
     return 0

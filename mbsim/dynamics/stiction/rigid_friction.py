@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
-from mbsim.arrays.scene import (
+from mbsim.arrays.codes import (
     HELD_OTHERWISE,
     SLIDER,
     SLIDER_BEFORE,
@@ -22,7 +21,10 @@ from mbsim.arrays.scene import (
     SLIP,
     STICK,
 )
+from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, note_failure
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.forces.dry_friction import (
     AT_REST,
@@ -38,7 +40,7 @@ from mbsim.laws.dry import rigid_mode
 
 
 @jitable
-def begin_or_go_on(scene, y, f):
+def begin_or_go_on(scene: Scene, y: F1, f: int) -> bool:
     """Set the mode of friction f that the point evaluated last asks for; return whether it is new.
 
     What comes to rest is first taken to stick.
@@ -57,20 +59,20 @@ def begin_or_go_on(scene, y, f):
 
 
 @jitable
-def ask_contacts(scene, what, t, y):
+def ask_contacts(scene: Scene, what: int, t: float, y: F1) -> int:
     """Return what contacts answer whose friction is rigid; 0 if there are none, or it fails."""
-    hook = scene.world.hooks[Hook.HELD]
+    hook = scene.world.hooks[Hook.STICKING]
     return answer_of(scene, call_int(hook, (scene, what, t, y))) if hook != 0 else 0
 
 
 @jitable
-def ask_joints(scene, what, t, y):
+def ask_joints(scene: Scene, what: int, t: float, y: F1) -> None:
     """Ask joints for something; a failure is noted."""
     note_failure(scene, call_int(scene.world.hooks[Hook.JOINTS], (scene, what, t, y, y)))
 
 
 @jitable
-def hold_sticking(scene, t, y):
+def hold_sticking(scene: Scene, t: float, y: F1) -> int:
     """Take the equations of what sticks into use, bring y onto them and evaluate; return a code."""
     ask_joints(scene, Joints.CHOOSE, t, y)
     ask_joints(scene, Joints.PROJECT, t, y)
@@ -78,7 +80,7 @@ def hold_sticking(scene, t, y):
 
 
 @jitable
-def release(scene):
+def release(scene: Scene) -> int:
     """Let slide what has just come to rest and needs more than the limit; return how many."""
     count = 0
     for f in range(len(scene.applied.kind)):
@@ -95,24 +97,24 @@ def release(scene):
 
 
 @jitable
-def commit_rigid(scene, t, y):
+def commit_rigid(scene: Scene, t: float, y: F1) -> int:
     """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
-    changed = ask_contacts(scene, Held.BEGIN, t, y) == 1
+    changed = ask_contacts(scene, Sticking.BEGIN, t, y) == 1
     for f in range(len(scene.applied.kind)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
-        ask_contacts(scene, Held.RECORD, t, y)
+        ask_contacts(scene, Sticking.RECORD, t, y)
         return 0
     # one more slides each time, so this ends
     code = hold_sticking(scene, t, y)
     while code == 0:
         # contacts are asked for all of theirs at once, under what the rest does
-        if release(scene) == 0 and ask_contacts(scene, Held.RELEASE, t, y) == 0:
+        if release(scene) == 0 and ask_contacts(scene, Sticking.RELEASE, t, y) == 0:
             break
         code = hold_sticking(scene, t, y)
     note_failure(scene, code)
-    ask_contacts(scene, Held.RECORD, t, y)
+    ask_contacts(scene, Sticking.RECORD, t, y)
     for f in range(len(scene.applied.kind)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
@@ -126,9 +128,9 @@ def commit_rigid(scene, t, y):
 
 
 @jitable
-def hold_again(scene, t, y):
+def hold_again(scene: Scene, t: float, y: F1) -> None:
     """Take into use what holds at the point to be evaluated, where the last step changed that."""
-    kept, contacts = scene.state.dry, ask_contacts(scene, Held.CHANGED, t, y)
+    kept, contacts = scene.state.dry, ask_contacts(scene, Sticking.CHANGED, t, y)
     if contacts == 1:
         ask_joints(scene, Joints.CHOOSE, t, y)
         return
@@ -139,7 +141,7 @@ def hold_again(scene, t, y):
 
 
 @jitable
-def serve_rigid(scene, what, t, y):
+def serve_rigid(scene: Scene, what: int, t: float, y: F1) -> int:
     """Do what dry friction is asked for (`Dry`); return 0, HELD_OTHERWISE, or less a code."""
     if what == Dry.KEEP:
         commit_dry(scene, t, y)

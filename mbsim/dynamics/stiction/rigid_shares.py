@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import CONE_ROWS
+from mbsim.arrays.codes import CONE_ROWS
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, scale, vector
 from mbsim.dynamics.constraints.equations import add_wrench, along, fill_equation
@@ -12,6 +14,7 @@ from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
 from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
+from mbsim.geometry.catalog import AT_NORMAL
 
 #: What presses less than this part of what presses most counts as that: no limit is 0.
 LEAST_PART = 1e-9
@@ -20,13 +23,13 @@ STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
 
 
 @jitable
-def first_of_slots(scene):
+def first_of_slots(scene: Scene) -> int:
     """Return the first equation of slots: they are the last."""
     return len(scene.equations.slot) - len(scene.sweep.share)
 
 
 @jitable
-def fill_slip(scene, t, y, e, first, row):
+def fill_slip(scene: Scene, t: float, y: F1, e: int, first: int, row: F1) -> float:
     """Fill row e of S of `stiction.cones`, from the equation in use `first` on.
 
     Of A = L L' of the equations in use and b how they act on e, it is the end of L^-1 b. Returns
@@ -53,7 +56,7 @@ def fill_slip(scene, t, y, e, first, row):
 
 
 @jitable
-def fill_load(scene, first, m):
+def fill_load(scene: Scene, first: int, m: F1) -> None:
     """Fill what is held of m of `stiction.cones`: L' times the multipliers."""
     sweep, n = scene.sweep, active_count(scene)
     for k in range(first, n):
@@ -65,14 +68,14 @@ def fill_load(scene, first, m):
 
 
 @jitable
-def capacity(scene, s):
+def capacity(scene: Scene, s: int) -> float:
     """Return what slot s holds at most."""
     held = scene.contacts.friction_par[contact_of(scene, s), 0]
     return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
 
 
 @jitable
-def most_capacity(scene):
+def most_capacity(scene: Scene) -> float:
     """Return what the slot that sticks best holds at most."""
     slot, most = scene.equations.slot, 0.0
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -82,7 +85,7 @@ def most_capacity(scene):
 
 
 @jitable
-def fill_cones(scene, t, y, most):
+def fill_cones(scene: Scene, t: float, y: F1, most: float) -> tuple[int, int]:
     """Fill limits, slips and load of all slots that stick; return rows and equations in use.
 
     p and multipliers stay.
@@ -109,7 +112,7 @@ def fill_cones(scene, t, y, most):
 
 
 @jitable
-def is_loaded(scene, r):
+def is_loaded(scene: Scene, r: int) -> bool:
     """Return whether anything is to be held."""
     for k in range(r):
         if scene.sweep.cone[LOAD, k] != 0.0:
@@ -118,7 +121,7 @@ def is_loaded(scene, r):
 
 
 @jitable
-def spread(scene, t, y, most):
+def spread(scene: Scene, t: float, y: F1, most: float) -> None:
     """Share what is held out over all slots that stick, in `Work.held`."""
     sweep, slot = scene.sweep, scene.equations.slot
     count, r = fill_cones(scene, t, y, most)
@@ -127,13 +130,13 @@ def spread(scene, t, y, most):
     level, _ = solve_cones(sweep.share, count, r, sweep.cone, sweep.mix, SHARED)
     for k in range(count):
         s = slot[int(sweep.cone[WHICH, k // 2])]
-        scene.work.held[s, k % 2] = sweep.cone[HELD_BY, k] / level
+        scene.work.sticking_force[s, k % 2] = sweep.cone[HELD_BY, k] / level
 
 
 @jitable
-def share_held(scene, t, y):
+def share_sticking(scene: Scene, t: float, y: F1) -> None:
     """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
-    held, active, first = scene.work.held, scene.equations.active, first_of_slots(scene)
+    held, active, first = scene.work.sticking_force, scene.equations.active, first_of_slots(scene)
     slot, count = scene.equations.slot, 0
     for e in range(first, len(slot), 2):
         held[slot[e], 0] = held[slot[e], 1] = 0.0
@@ -153,11 +156,11 @@ def share_held(scene, t, y):
 
 
 @jitable
-def show_sticking(scene, s):
+def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
-    row, held = scene.work.slot[s], scene.work.held[s]
+    row, held = scene.work.slot[s], scene.work.sticking_force[s]
     point = scene.work.points[s]
-    n, tx = (point[4], point[5], point[6]), vector(scene.work.t[s])
+    n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
     rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))
     force = add(scale(row[NORMAL], n), rubs)
     for k in range(3):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.constraints.selection import sticks
-from mbsim.dynamics.contact.forces import contact_of, sides, tangent
+from mbsim.dynamics.contact.forces import contact_of, sides
+from mbsim.dynamics.contact.frames import tangent
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
@@ -20,7 +24,7 @@ SMOOTH = 1e-8
 
 
 @jitable
-def move_on(scene, y, b, time):
+def move_on(scene: Scene, y: F1, b: int, time: float) -> None:
     """Let body b go on for a time as it moves."""
     if b == len(scene.bodies.mass):
         return
@@ -37,14 +41,14 @@ def move_on(scene, y, b, time):
 
 
 @jitable
-def pose(scene, y, b):
+def pose(scene: Scene, y: F1, b: int) -> tuple[float, ...]:
     """Return position and quaternion of body b; anything for ground."""
     at = BODY_SIZE * b if b < len(scene.bodies.mass) else 0
     return (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
 
 
 @jitable
-def put_pose(scene, y, b, kept):
+def put_pose(scene: Scene, y: F1, b: int, kept: tuple[float, ...]) -> None:
     """Put body b back to a pose."""
     if b == len(scene.bodies.mass):
         return
@@ -54,7 +58,7 @@ def put_pose(scene, y, b, kept):
 
 
 @jitable
-def look(scene, y, pair, row):
+def look(scene: Scene, y: F1, pair: int, row: int) -> None:
     """Fill a row of `Work.look` with the candidates of a pair."""
     pairs, kinds, graphics, work = scene.pairs, scene.kinds, scene.graphics, scene.work
     kind, i, j = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
@@ -71,7 +75,7 @@ def look(scene, y, pair, row):
 
 
 @jitable
-def look_around(scene, y, pair, moment):
+def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
     """Fill all rows of `Work.look`: now, a moment later, a moment before."""
     graphics, pairs = scene.graphics, scene.pairs
     bi = graphics.body[pairs.graphic_i[pair]]
@@ -89,16 +93,16 @@ def look_around(scene, y, pair, moment):
 
 
 @jitable
-def fill_hold(scene, t, y, s, moment):
+def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
-    points, row = scene.work.look, scene.work.hold[s]
+    points, row = scene.work.look, scene.work.sticking_point[s]
     k = s - scene.pairs.slot[scene.slots.pair[s]]
     now, later, before = points[0, k], points[1, k], points[2, k]
     ahead = sub(vector(later[1:4]), vector(now[1:4]))
     back = sub(vector(now[1:4]), vector(before[1:4]))
     jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
     first, last, time = 2, 1, 2.0 * moment
-    if jump > 0.1 * way + SMOOTH * scene.world.scale[0]:
+    if jump > 0.1 * way + SMOOTH * scene.world.scale[SCALE_LENGTH]:
         # the shapes touch at another corner: the side on which they do not
         if norm(ahead) < norm(back):
             first, time = 0, moment
@@ -115,10 +119,10 @@ def fill_hold(scene, t, y, s, moment):
 
 
 @jitable
-def place_held(scene, t, y):
+def place_sticking(scene: Scene, t: float, y: F1) -> None:
     """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
     slot, last = scene.equations.slot, -1
-    moment = MOMENT * scene.world.scale[0] / scene.world.scale[1]
+    moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue

@@ -239,7 +239,7 @@ def _right_sides(
 
 
 @jitable
-def _linear_system(
+def _linear_system(  # noqa: C901
     system: DelassusSystem, rho: Vector, shift: float, point: Point, jacobian: Jacobian, x: Vector
 ) -> None:
     """Write Newton's matrix and right side of the contacts of `jacobian`.
@@ -251,6 +251,7 @@ def _linear_system(
         slip: c ((I - g P) dr_T - mu e dr_N) + c g rho P W_T dr = -c (r_T - mu r_N e).
 
     Open contacts have dr = -r; of those that are not in the matrix that is on the right side.
+    Many branches because a block is formed whole while it is at hand, row and column.
     """
     ptr, col, val = system.ptr, system.col, system.val
     number, nodes, jac = jacobian.number, jacobian.nodes, jacobian.val

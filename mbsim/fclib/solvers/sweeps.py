@@ -162,7 +162,7 @@ def _errors(
 
 
 @jitable
-def gauss_seidel(
+def gauss_seidel(  # noqa: C901
     system: DelassusSystem, r: Vector, goal: Goal, sweeps: int, every: int, history: Vector
 ) -> tuple[int, float, float, int]:
     """Sweep until the error is at most `tol` and |F|/|q| at most `tol_q` (`Goal`).
@@ -173,6 +173,7 @@ def gauss_seidel(
     The error is looked at after every `every` sweeps, and when a sweep changes less than `tol`
     of the impulses. `history` gets rows (sweeps done, error, |F|/|q|) as long as it has room.
     Returns sweeps done, error, |F|/|q| and the number of rows.
+    Many branches because each of these reasons to go on or to stop is weighed after every look.
     """
     tol, tol_q = goal.tol, goal.tol_q
     nc, m = len(system.mu), len(system.q)

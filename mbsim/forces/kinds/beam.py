@@ -20,13 +20,14 @@ and C is `cratio` K or `cmatrix`. Bending is small, what carries the beam along 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from mbsim.core.arrays import F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Motion, Parameter, Values, force
 from mbsim.forces.turning import turned_back
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -39,7 +40,7 @@ _K, _C, _F0 = 1, 37, 73
 _ROUNDING = 1e-12
 
 
-def _stiffness(values):
+def _stiffness(values: Values) -> F2:
     """Return K, shape (6, 6)."""
     L, E, G, A = (values[name] for name in ("length", "E", "G", "area"))
     K = np.zeros((6, 6))
@@ -53,7 +54,7 @@ def _stiffness(values):
     return K
 
 
-def _damping(values):
+def _damping(values: Values) -> F2:
     """Return C, shape (6, 6); `cmatrix` has its columns from the diagonal down."""
     if not values["cmatrix"]:
         return values["cratio"] * _stiffness(values)
@@ -62,7 +63,7 @@ def _damping(values):
     return C + np.tril(C, -1).T
 
 
-def _check(values) -> Iterator[Finding]:
+def _check(values: Values) -> Iterator[Finding]:
     if not values["cmatrix"]:
         return
     if values["cratio"]:
@@ -75,14 +76,14 @@ def _check(values) -> Iterator[Finding]:
         yield Finding(message, "cmatrix")
 
 
-def _constants(values):
+def _constants(values: Values) -> Sequence[float]:
     """Return length, K and C by rows, preload."""
     preload = [values[name] for name in _PRELOAD]
     return (values["length"], *_stiffness(values).flat, *_damping(values).flat, *preload)
 
 
 @jitable
-def _times(par, first, a, b):
+def _times(par: Sequence[float], first: int, a: V3, b: V3) -> tuple[V3, V3]:
     """Return the two halves of the 6 x 6 matrix from `first` on times (a, b)."""
     out = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(3):
@@ -97,13 +98,13 @@ def _times(par, first, a, b):
 
 
 @jitable
-def _elastic(d, theta, par):
+def _elastic(d: V3, theta: V3, par: Sequence[float]) -> tuple[V3, V3]:
     """Return what the beam's own force and torque on I are less than the preload."""
     bent = _times(par, _K, (d[0] - par[0], d[1], d[2]), theta)
     return bent[0], turned_back(theta, bent[1])
 
 
-def _wrench(motion, par):
+def _wrench(motion: Motion, par: Sequence[float]) -> tuple[V3, V3, float, float]:
     d, theta, v, w = motion.d, motion.theta, motion.v, motion.w
     q = (d[0] - par[0], d[1], d[2])
     bent = _times(par, _K, q, theta)
@@ -118,7 +119,7 @@ def _wrench(motion, par):
     return force, torque, stored, lost
 
 
-def _slopes(motion, par, K, D):
+def _slopes(motion: Motion, par: Sequence[float], K: F2, D: F2) -> None:
     d, theta = motion.d, motion.theta
     for r in range(6):
         for k in range(6):
@@ -137,14 +138,16 @@ def _slopes(motion, par, K, D):
             K[3 + r, 3 + k] = (up[1][r] - low[1][r]) / (2.0 * _PUSH)
 
 
-def _bounds(par) -> Bounds:
+def _bounds(par: Sequence[float]) -> Bounds:
     """Return twice the halves of the diagonals: no less than a semidefinite matrix as a whole."""
     made = []
     for first in (_K, _C):
         matrix = np.reshape(par[first : first + 36], (6, 6))
         for half in (matrix[:3, :3], matrix[3:, 3:]):
             made.append(2.0 * float(np.linalg.norm(half, 2)))
-    return Bounds(*made, force=norm(par[_F0 : _F0 + 3]), rest=(par[0], 0.0, 0.0))
+    k, turning_k, c, turning_c = made
+    load = norm((par[_F0], par[_F0 + 1], par[_F0 + 2]))
+    return Bounds(k, turning_k, c, turning_c, force=load, rest=(par[0], 0.0, 0.0))
 
 
 force(

@@ -10,11 +10,12 @@ no potential: its work counts as lost, with the sign turned.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from mbsim.core.arrays import F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Motion, Parameter, Values, force
 from mbsim.forces.turning import turned_back, turning_torque
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -36,18 +37,18 @@ def _unit(name: str, along: str, about: str) -> str:
 _PUSH = 1e-7
 
 
-def _check(values) -> Iterator[Finding]:
+def _check(values: Values) -> Iterator[Finding]:
     if not any(values.values()):
         message = "all stiffnesses, dampings and preloads are 0: the bushing does nothing"
         yield Finding(message, warns=True)
 
 
-def _constants(values):
+def _constants(values: Values) -> Sequence[float]:
     """Return six stiffnesses, six dampings, six preloads."""
     return tuple(values[name] for name in (*_STIFFNESS, *_DAMPING, *_PRELOAD))
 
 
-def _wrench(motion, par):
+def _wrench(motion: Motion, par: Sequence[float]) -> tuple[V3, V3, float, float]:
     d, theta, v, w = motion.d, motion.theta, motion.v, motion.w
     spring = turning_torque(theta, (par[3], par[4], par[5]))
     force = (
@@ -69,7 +70,7 @@ def _wrench(motion, par):
 
 
 @jitable
-def _turning_rise(theta, k, axis):
+def _turning_rise(theta: V3, k: V3, axis: int) -> V3:
     """Return how the spring's torque rises as I turns about J's axis e [per rad].
 
     d theta = J(theta)^-1 e, which is J^-T of -theta; the torque is asked at neighbouring theta.
@@ -85,7 +86,7 @@ def _turning_rise(theta, k, axis):
     )
 
 
-def _slopes(motion, par, K, D):
+def _slopes(motion: Motion, par: Sequence[float], K: F2, D: F2) -> None:
     for k in range(6):
         D[k, k] = par[6 + k]
     for k in range(3):
@@ -95,9 +96,9 @@ def _slopes(motion, par, K, D):
             K[3 + row, 3 + k] = rise[row]
 
 
-def _bounds(par) -> Bounds:
-    groups = (max(par[3 * k : 3 * k + 3]) for k in range(4))
-    return Bounds(*groups, force=norm(par[12:15]))
+def _bounds(par: Sequence[float]) -> Bounds:
+    k, turning_k, c, turning_c = (max(par[3 * g : 3 * g + 3]) for g in range(4))
+    return Bounds(k, turning_k, c, turning_c, force=norm((par[12], par[13], par[14])))
 
 
 force(

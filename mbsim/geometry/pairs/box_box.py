@@ -16,9 +16,9 @@ that meet there and lies on the line along which they push, so that its force ha
     corner of J on I's face   the same with I's face
     edge of I on edge of J    normal u x e of the edges, distance of their lines
 
-A corner has share 1; a crossing of two edges has the polygon's exterior angle over a right
+A corner has weight 1; a crossing of two edges has the polygon's exterior angle over a right
 angle, so that a corner that passes over an edge of the other box becomes two crossings with
-shares that add up to 1, and all shares add up to 4. At that moment the normals differ by the
+weights that add up to 1, and all weights add up to 4. At that moment the normals differ by the
 tilt of the faces against each other, as they do for rigid boxes; depths differ by its square.
 """
 
@@ -28,6 +28,7 @@ import math
 
 import numpy as np
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_couple, put_point, region
@@ -35,10 +36,10 @@ from mbsim.geometry.crossing import (
     EDGES_MEET,
     FACE_OF_I,
     FACE_OF_J,
-    LEAST_SHARE,
+    LEAST_WEIGHT,
     middle_of_lines,
-    share_of_crossing,
     turning,
+    weight_of_crossing,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
 from mbsim.geometry.region import polygon_area
@@ -60,7 +61,7 @@ _T, _OVERLAP, _AXES = 9, 12, 15
 
 
 @jitable
-def _relative_pose(frame_i, frame_j, s):
+def _relative_pose(frame_i: F1, frame_j: F1, s: F1) -> None:
     """Fill R and t."""
     apart = sub(vector(frame_i), vector(frame_j))
     for j in range(3):
@@ -71,7 +72,7 @@ def _relative_pose(frame_i, frame_j, s):
 
 
 @jitable
-def _face_overlaps(hi, hj, s):
+def _face_overlaps(hi: F1, hj: F1, s: F1) -> float:
     """Fill the overlaps along the faces' normals, J's then I's; return the least."""
     least = math.inf
     for k in range(3):
@@ -95,7 +96,7 @@ def _face_overlaps(hi, hj, s):
 
 
 @jitable
-def _edge_overlaps(hi, hj, s):
+def _edge_overlaps(hi: F1, hj: F1, s: F1) -> float:
     """Fill the overlaps along i x j of every two edges, inf if parallel; return the least."""
     least = math.inf
     for i in range(3):
@@ -117,7 +118,7 @@ def _edge_overlaps(hi, hj, s):
 
 
 @jitable
-def _direction(s, a):
+def _direction(s: F1, a: int) -> V3:
     """Return axis a of the 15 as a unit vector from J into I, in J's axes."""
     if a < 3:
         n = (1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0, 1.0 if a == 2 else 0.0)
@@ -136,7 +137,7 @@ def _direction(s, a):
 
 
 @jitable
-def _least(s):
+def _least(s: F1) -> int:
     """Return the axis of least overlap."""
     best = 0
     for a in range(1, _AXES):
@@ -147,7 +148,7 @@ def _least(s):
 
 
 @jitable
-def _steepest(a, b, c):
+def _steepest(a: float, b: float, c: float) -> int:
     """Return which of three components is largest in size."""
     a, b, c = abs(a), abs(b), abs(c)
     if a >= b and a >= c:
@@ -156,14 +157,14 @@ def _steepest(a, b, c):
 
 
 @jitable
-def _diagonal(k, sign, a, b):
+def _diagonal(k: int, sign: float, a: float, b: float) -> int:
     """Return which of a box's 4 diagonals has the corner with these signs on axes k, k+1, k+2."""
     bits = (sign > 0.0) << k | (a > 0.0) << ((k + 1) % 3) | (b > 0.0) << ((k + 2) % 3)
     return 7 - bits if bits & 4 else bits
 
 
 @jitable
-def _corner_of_i(k, sign, corner):
+def _corner_of_i(k: int, sign: float, corner: int) -> int:
     """Return the diagonal of I's corner 0..3 of the polygon: (-p, -q), (p, -q), (p, q), (-p, q)."""
     # q = -sign i_o
     return _diagonal(
@@ -175,7 +176,7 @@ def _corner_of_i(k, sign, corner):
 
 
 @jitable
-def _corner_of_j(k, sign, side):
+def _corner_of_j(k: int, sign: float, side: int) -> int:
     """Return the diagonal of J's corner behind side 0..3: (a, b), (-a, b), (-a, -b), (a, -b)."""
     return _diagonal(
         k,
@@ -186,18 +187,18 @@ def _corner_of_j(k, sign, side):
 
 
 @jitable
-def _edge_normal(u, e, n):
+def _edge_normal(u: V3, e: V3, n: V3) -> V3:
     """Return the unit normal of an edge along u and one along e, on the side of n."""
     g = cross(u, e)
     square = dot(g, g)
     if square <= PARALLEL:
-        # edges that lie on each other have no share either
+        # edges that lie on each other have no weight either
         return n
     return scale((1.0 if dot(g, n) >= 0.0 else -1.0) / math.sqrt(square), g)
 
 
 @jitable
-def _turning(s, a, n, m, o, k, sign):
+def _turning(s: F1, a: int, n: V3, m: int, o: int, k: int, sign: float) -> tuple[int, V3, V3]:
     """Return how the axis a of the 15 turns as I does, along a, b and J's normal."""
     if a < 6:
         return turning(FACE_OF_J if a < 3 else FACE_OF_I, n, n, n)
@@ -207,7 +208,7 @@ def _turning(s, a, n, m, o, k, sign):
 
 
 @jitable
-def _to_global(frame_j, d, m, o, k, sign):
+def _to_global(frame_j: F1, d: V3, m: int, o: int, k: int, sign: float) -> V3:
     """Return a vector along a, b and J's normal in global axes."""
     return add(
         scale(d[0], axis(frame_j, m)),
@@ -216,14 +217,16 @@ def _to_global(frame_j, d, m, o, k, sign):
 
 
 @jitable
-def _apart(points, frame_j, distance):
+def _apart(points: F2, frame_j: F1, distance: float) -> None:
     """Write the same lower bound of the distance into every row."""
     for row in range(BOX_BOX_SLOTS):
         put_point(points[row], -distance, vector(frame_j), axis(frame_j, 2))
 
 
 @jitable
-def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
+def _manifold(
+    frame_j: F1, hi: F1, hj: F1, s: F1, best: int, n: V3, points: F2, with_area: bool
+) -> float:
     """Write the vertices of the two faces' common polygon, seen along n, into their rows.
 
     n is the axis `best` of the 15. Return the area of what overlaps of the polygon, seen along n,
@@ -291,7 +294,7 @@ def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
         # the points of J's and I's surface that lie on each other
         on_j = (x, y, hj[kj])
         on_i = sub(on_j, scale(depth, way))
-        share, couple = 1.0, (0.0, 0.0, 0.0)
+        weight, couple = 1.0, (0.0, 0.0, 0.0)
         if before >= 4 and after >= 4:
             row = 8 + _corner_of_j(kj, sj, before - 4)
             # against I's face
@@ -319,16 +322,16 @@ def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
                 else (-1.0 if side == 1 else 1.0, 0.0, 0.0)
             )
             g = _edge_normal(u, e, way)
-            share, couple = share_of_crossing(
+            weight, couple = weight_of_crossing(
                 u, e, way, ends, (out_i, cross(out_i, u)), (out_j, cross(e, out_j)), turn
             )
             d = depth * dot(g, way)
             middle = middle_of_lines(on_i, u, e, g, scale(depth, way), d)
         before = after
-        if share <= LEAST_SHARE:
+        if weight <= LEAST_WEIGHT:
             continue
         p = add(vector(frame_j), _to_global(frame_j, middle, mj, oj, kj, sj))
-        put_point(points[row], d, p, _to_global(frame_j, g, mj, oj, kj, sj), share)
+        put_point(points[row], d, p, _to_global(frame_j, g, mj, oj, kj, sj), weight)
         put_couple(points[row], _to_global(frame_j, couple, mj, oj, kj, sj))
     if not with_area:
         return 0.0
@@ -337,7 +340,9 @@ def _manifold(frame_j, hi, hj, s, best, n, points, with_area):
 
 
 @jitable
-def _box_on_box(frame_i, size_i, frame_j, size_j, points, with_area):
+def _box_on_box(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2, with_area: bool
+) -> float:
     """Write the common polygon of two faces; return its area if that is asked for."""
     s = np.empty(_OVERLAP + _AXES)
     _relative_pose(frame_i, frame_j, s)
@@ -358,14 +363,16 @@ def _box_on_box(frame_i, size_i, frame_j, size_j, points, with_area):
 
 
 @pair("BOX", "BOX", slots=BOX_BOX_SLOTS, regroups=True)
-def box_box(frame_i, size_i, frame_j, size_j, points):
+def box_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The common polygon of two faces; apart, the largest gap along a face's or edges' axis."""
     _box_on_box(frame_i, size_i, frame_j, size_j, points, False)
     return BOX_BOX_SLOTS
 
 
 @region("BOX", "BOX", whole=4.0)
-def box_box_region(frame_i, size_i, frame_j, size_j, points):
+def box_box_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The common polygon of two faces, and its area."""
     area = _box_on_box(frame_i, size_i, frame_j, size_j, points, True)
     return BOX_BOX_SLOTS, area

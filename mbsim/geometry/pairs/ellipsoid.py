@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
@@ -9,6 +10,7 @@ from mbsim.geometry.convex import (
     BOX,
     ELLIPSOID,
     ROTOR,
+    Shape,
     along_circle,
     between_round,
     far,
@@ -23,7 +25,7 @@ from mbsim.geometry.pairs.revolution import cylinder_size
 
 
 @pair("ELLIPSOID", "PLANE", slots=1)
-def ellipsoid_plane(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The lowest point of the ellipsoid, where its normal is that of the plane."""
     n = axis(frame_j, 2)
     low = far(placed(ELLIPSOID, frame_i, vector(size_i)), scale(-1.0, n))
@@ -33,7 +35,7 @@ def ellipsoid_plane(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def put_under(i, f, n, points):
+def put_under(i: Shape, f: float, n: V3, points: F2) -> int:
     """Write the one point below ellipsoid I, whose lowest point against n is unique."""
     low = far(i, scale(-1.0, n))
     put_point(points[0], f, add(low, scale(0.5 * f, n)), n)
@@ -41,7 +43,7 @@ def put_under(i, f, n, points):
 
 
 @jitable
-def first_normal(i, j):
+def first_normal(i: Shape, j: Shape) -> V3:
     """Return the direction of (A_I^2 + A_J^2)^-1 c, the normal of the ellipsoid of that sum at c.
 
     c runs between the centres. It is exact for two spheres, and for two alike and alike turned.
@@ -77,13 +79,13 @@ def first_normal(i, j):
 
 
 @jitable
-def smallest(size):
+def smallest(size: V3) -> float:
     """Return the least of three lengths."""
     return min(size[0], min(size[1], size[2]))
 
 
 @jitable
-def round_on_round(i, j, points):
+def round_on_round(i: Shape, j: Shape, points: F2) -> int:
     """Write the point of least overlap of two ellipsoids."""
     # beyond a tenth of the shape a bound of the distance is enough
     f, n = between_round(i, j, first_normal(i, j), 0.1 * smallest(i[5]))
@@ -100,14 +102,14 @@ def round_on_round(i, j, points):
 
 
 @pair("ELLIPSOID", "ELLIPSOID", slots=1)
-def ellipsoid_ellipsoid(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_ellipsoid(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The direction of least overlap by Newton, from a start that is exact for spheres."""
     i = placed(ELLIPSOID, frame_i, vector(size_i))
     return round_on_round(i, placed(ELLIPSOID, frame_j, vector(size_j)), points)
 
 
 @pair("ELLIPSOID", "SPHERE", slots=1)
-def ellipsoid_sphere(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_sphere(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """As two ellipsoids: a sphere has three equal semi-axes."""
     r = size_j[0]
     i = placed(ELLIPSOID, frame_i, vector(size_i))
@@ -115,7 +117,7 @@ def ellipsoid_sphere(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def over_face(i, j):
+def over_face(i: Shape, j: Shape) -> tuple[float, V3, bool]:
     """Return (f, n, found): whether the lowest point of I lies over a face of box J."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
     d = sub(far(i, scale(-1.0, n)), j[1])
@@ -128,7 +130,7 @@ def over_face(i, j):
 
 
 @pair("ELLIPSOID", "BOX", slots=1)
-def ellipsoid_box(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Over a face the face's normal; else the least over edges and corners."""
     i = placed(ELLIPSOID, frame_i, vector(size_i))
     j = placed(BOX, frame_j, vector(size_j))
@@ -153,7 +155,7 @@ def ellipsoid_box(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def ellipsoid_on_solid(i, j, points):
+def ellipsoid_on_solid(i: Shape, j: Shape, points: F2) -> int:
     """Write the point of an ellipsoid on a solid of revolution: ends, straight side, rims."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
     limit = 0.1 * smallest(i[5])
@@ -178,14 +180,14 @@ def ellipsoid_on_solid(i, j, points):
 
 
 @pair("ELLIPSOID", "CYLINDER", slots=1)
-def ellipsoid_cylinder(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_cylinder(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The least overlap with ends, side and rims of the cylinder."""
     i = placed(ELLIPSOID, frame_i, vector(size_i))
     return ellipsoid_on_solid(i, placed(ROTOR, frame_j, cylinder_size(size_j)), points)
 
 
 @pair("ELLIPSOID", "FRUSTUM", slots=1)
-def ellipsoid_frustum(frame_i, size_i, frame_j, size_j, points):
+def ellipsoid_frustum(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The least overlap with ends, side and rims of the frustum."""
     i = placed(ELLIPSOID, frame_i, vector(size_i))
     return ellipsoid_on_solid(i, placed(ROTOR, frame_j, vector(size_j)), points)

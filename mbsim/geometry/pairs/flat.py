@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point, region
@@ -11,7 +12,7 @@ BOX_SLOTS = 8
 
 
 @jitable
-def box_on_plane(frame_i, size_i, origin, n, points):
+def box_on_plane(frame_i: F1, size_i: F1, origin: V3, n: V3, points: F2) -> int:
     """Every corner below the plane is a point: up to 4 for a box that stands, row = corner."""
     centre = vector(frame_i)
     ex = scale(size_i[0], axis(frame_i, 0))
@@ -28,13 +29,15 @@ def box_on_plane(frame_i, size_i, origin, n, points):
 
 
 @pair("BOX", "PLANE", slots=BOX_SLOTS)
-def box_plane(frame_i, size_i, frame_j, size_j, points):
+def box_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The corners of the box against the plane."""
     return box_on_plane(frame_i, size_i, vector(frame_j), axis(frame_j, 2), points)
 
 
 @region("BOX", "PLANE", whole=4.0)
-def box_plane_region(frame_i, size_i, frame_j, size_j, points):
+def box_plane_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The corners, and the cut of the box with the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
     count = box_on_plane(frame_i, size_i, origin, n, points)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_point, region
-from mbsim.geometry.crossing import LEAST_SHARE
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, axis, pair, put_point, region
+from mbsim.geometry.crossing import LEAST_WEIGHT
 from mbsim.geometry.polyhedron import (
     CUBE,
     HULL_SLOTS,
@@ -27,9 +28,9 @@ from mbsim.model.hull import (
     AT_DATA,
     AT_LOOPS,
     AT_PLANES,
-    AT_SHARES,
     AT_SIDES,
     AT_STARTS,
+    AT_WEIGHTS,
     CORNERS,
     FACES,
     MOST_ROWS,
@@ -41,18 +42,18 @@ LEANS, LIES = 0.9945, 0.9994
 
 
 @jitable
-def _shares_of_patches(hull, local, points):
-    """Fill the shares of the patches of a fine mesh over a plane of normal `local`.
+def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
+    """Fill the weights of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
-    lies, the deepest corner has a share of 1. Facets of a round surface are no sides.
+    lies, the deepest corner has a weight of 1. Facets of a round surface are no sides.
     """
     rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
     loops, data = int(hull[AT_LOOPS]), int(hull[AT_DATA])
     for row in range(rows):
-        points[row, 7] = 0.0
-        if points[row, 0] > points[deepest, 0]:
+        points[row, AT_WEIGHT] = 0.0
+        if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
     for f in range(int(hull[FACES])):
         lies = step(-dot(vector(hull[planes + 4 * f :]), local), LEANS, 0.0, LIES, 1.0)
@@ -65,16 +66,16 @@ def _shares_of_patches(hull, local, points):
                 points[int(hull[data + 3 * corner + 2]), 7] += 4.0 * lies / (last - first)
     if total > 0.0:
         for row in range(rows):
-            points[row, 7] *= flat / total
-    points[deepest, 7] += 1.0 - flat
+            points[row, AT_WEIGHT] *= flat / total
+    points[deepest, AT_WEIGHT] += 1.0 - flat
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
-def mesh_plane(frame_i, size_i, frame_j, size_j, points):
+def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Every corner below the plane is a point; of a patch of corners its deepest one.
 
     A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
-    the whole force, unless a face lies flat (see `_shares_of_patches`).
+    the whole force, unless a face lies flat (see `_weights_of_patches`).
     """
     hull = floats_at(size_i[0], size_i[1])
     n = axis(frame_j, 2)
@@ -82,32 +83,32 @@ def mesh_plane(frame_i, size_i, frame_j, size_j, points):
     local = (dot(axis(frame_i, 0), n), dot(axis(frame_i, 1), n), dot(axis(frame_i, 2), n))
     rows = int(hull[ROWS])
     corners, data = int(hull[AT_CORNERS]), int(hull[AT_DATA])
-    shares = int(hull[AT_SHARES])
+    weights = int(hull[AT_WEIGHTS])
     for row in range(rows):
-        points[row, 0] = -math.inf
+        points[row, AT_DEPTH] = -math.inf
     for k in range(int(hull[CORNERS])):
         row = int(hull[data + 3 * k + 2])
         depth = -height - dot(vector(hull[corners + 3 * k :]), local)
-        if depth > points[row, 0]:
+        if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
-            points[row, 0], points[row, 1] = depth, k
+            points[row, AT_DEPTH], points[row, 1] = depth, k
     if int(hull[CORNERS]) > rows:
-        _shares_of_patches(hull, local, points)
+        _weights_of_patches(hull, local, points)
     else:
         for row in range(rows):
-            points[row, 7] = hull[shares + row]
+            points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
-        depth, k = points[row, 0], int(points[row, 1])
+        depth, k = points[row, AT_DEPTH], int(points[row, 1])
         p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
-        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, 7])
-        if points[row, 7] <= LEAST_SHARE:
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
+        if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
-            points[row, 0] = min(depth, 0.0)
+            points[row, AT_DEPTH] = min(depth, 0.0)
     return rows
 
 
 @jitable
-def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
+def _two_hulls(frame_i: F1, hull_i: F1, frame_j: F1, hull_j: F1, points: F2) -> int:
     """Write the points of two polyhedra; rows without a point hold the gap, 0 in overlap."""
     rows = hull_slots(hull_i, hull_j)
     for row in range(rows):
@@ -115,19 +116,19 @@ def _two_hulls(frame_i, hull_i, frame_j, hull_j, points):
     gap = overlapping(moved(hull_i, frame_i, frame_j), hull_j, frame_j, points)
     if gap > 0.0:
         for row in range(rows):
-            points[row, 0] = -gap
+            points[row, AT_DEPTH] = -gap
     return rows
 
 
 @pair("MESH", "MESH", slots=HULL_SLOTS, regroups=True)
-def mesh_mesh(frame_i, size_i, frame_j, size_j, points):
+def mesh_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The common polygon of the two faces that look at each other."""
     hull_i, hull_j = floats_at(size_i[0], size_i[1]), floats_at(size_j[0], size_j[1])
     return _two_hulls(frame_i, hull_i, frame_j, hull_j, points)
 
 
 @pair("MESH", "BOX", slots=HULL_SLOTS, regroups=True)
-def mesh_box(frame_i, size_i, frame_j, size_j, points):
+def mesh_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """A box is a polyhedron too."""
     box = CUBE.copy()
     corners, planes = int(box[AT_CORNERS]), int(box[AT_PLANES])
@@ -143,7 +144,7 @@ def mesh_box(frame_i, size_i, frame_j, size_j, points):
 
 
 @pair("SPHERE", "MESH", slots=1)
-def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
+def sphere_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The nearest point of the mesh to the centre; inside, the way out through the nearest face."""
     hull = floats_at(size_j[0], size_j[1])
     apart = sub(vector(frame_i), vector(frame_j))
@@ -156,7 +157,7 @@ def sphere_mesh(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def hull_cut(hull, height, n):
+def hull_cut(hull: F1, height: float, n: V3) -> float:
     """Return the area of the cut of a polyhedron with a plane of normal n in its axes.
 
     `height` is that of its origin. As of a box every face that is crossed has one side of it.
@@ -185,7 +186,9 @@ def hull_cut(hull, height, n):
 
 
 @region("MESH", "PLANE", whole=4.0)
-def mesh_plane_region(frame_i, size_i, frame_j, size_j, points):
+def mesh_plane_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The corners below the plane, and the cut of the mesh with the plane."""
     count = mesh_plane(frame_i, size_i, frame_j, size_j, points)
     hull, n = floats_at(size_i[0], size_i[1]), axis(frame_j, 2)

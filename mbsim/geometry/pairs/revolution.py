@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point, region
@@ -14,13 +15,13 @@ RIM_SLOTS = 6
 
 
 @jitable
-def cylinder_size(size):
+def cylinder_size(size: F1) -> V3:
     """Return bottom radius, top radius, half length of a cylinder."""
     return (size[0], size[0], size[1])
 
 
 @jitable
-def sphere_on_solid(frame_i, radius, frame_j, size, points):
+def sphere_on_solid(frame_i: F1, radius: float, frame_j: F1, size: V3, points: F2) -> int:
     """Write the one point of a ball against a solid of revolution: a plane problem."""
     centre = vector(frame_i)
     distance, n, _, _ = point_in_solid(vector(frame_j), axis(frame_j, 2), size, centre)
@@ -30,19 +31,19 @@ def sphere_on_solid(frame_i, radius, frame_j, size, points):
 
 
 @pair("SPHERE", "CYLINDER", slots=1)
-def sphere_cylinder(frame_i, size_i, frame_j, size_j, points):
+def sphere_cylinder(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The nearest point of the cylinder to the sphere's centre; inside, the nearest way out."""
     return sphere_on_solid(frame_i, size_i[0], frame_j, cylinder_size(size_j), points)
 
 
 @pair("SPHERE", "FRUSTUM", slots=1)
-def sphere_frustum(frame_i, size_i, frame_j, size_j, points):
+def sphere_frustum(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The nearest point of the frustum to the sphere's centre; inside, the nearest way out."""
     return sphere_on_solid(frame_i, size_i[0], frame_j, vector(size_j), points)
 
 
 @jitable
-def solid_on_plane(frame_i, size, origin, n, points):
+def solid_on_plane(frame_i: F1, size: V3, origin: V3, n: V3, points: F2) -> int:
     """On each rim its lowest point and those 120 degrees to both sides: row = rim, point.
 
     Lying, the two lowest points carry; standing, the three of one rim. Three points at equal
@@ -69,20 +70,22 @@ def solid_on_plane(frame_i, size, origin, n, points):
 
 
 @pair("CYLINDER", "PLANE", slots=RIM_SLOTS)
-def cylinder_plane(frame_i, size_i, frame_j, size_j, points):
+def cylinder_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Three points of each rim against the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
     return solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
 
 
 @pair("FRUSTUM", "PLANE", slots=RIM_SLOTS)
-def frustum_plane(frame_i, size_i, frame_j, size_j, points):
+def frustum_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Three points of each rim against the plane; the side lies on its two lowest points."""
     return solid_on_plane(frame_i, vector(size_i), vector(frame_j), axis(frame_j, 2), points)
 
 
 @region("CYLINDER", "PLANE", whole=3.0)
-def cylinder_plane_region(frame_i, size_i, frame_j, size_j, points):
+def cylinder_plane_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """Three points of each rim, and the cut of the cylinder with the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
     count = solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
@@ -90,7 +93,9 @@ def cylinder_plane_region(frame_i, size_i, frame_j, size_j, points):
 
 
 @region("FRUSTUM", "PLANE", whole=3.0)
-def frustum_plane_region(frame_i, size_i, frame_j, size_j, points):
+def frustum_plane_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """Three points of each rim, and the area of the ends below the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
     count = solid_on_plane(frame_i, vector(size_i), origin, n, points)

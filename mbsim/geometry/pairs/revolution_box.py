@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair, put_point, region
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, pair, put_point, region
 from mbsim.geometry.convex import (
     BOX,
     ROTOR,
+    Shape,
     along_circle,
     far,
     flat,
@@ -24,10 +26,10 @@ from mbsim.geometry.manifold import (
     crossing_of,
     disc_lies,
     line_lies,
-    line_share,
+    line_weight,
     put_apart,
     put_rim,
-    put_share,
+    put_weighted,
     segment_on_disc,
     share_with_one,
     side_faces,
@@ -43,13 +45,13 @@ BOX_ROWS = ARC_ROWS + 9
 
 
 @jitable
-def edge_axis(box, k):
+def edge_axis(box: Shape, k: int) -> V3:
     """Return axis k of a box."""
     return box[2] if k == 0 else (box[3] if k == 1 else box[4])
 
 
 @jitable
-def first_two(box, n):
+def first_two(box: Shape, n: V3) -> tuple[int, int, int]:
     """Return the box's axes sorted by how much they are along n: the first two, and the third."""
     a, b, c = abs(dot(box[2], n)), abs(dot(box[3], n)), abs(dot(box[4], n))
     if a >= b and a >= c:
@@ -60,7 +62,7 @@ def first_two(box, n):
 
 
 @jitable
-def over(i, j, n, margin):
+def over(i: Shape, j: Shape, n: V3, margin: float) -> bool:
     """Return whether I's lowest point lies over J's face with normal n, by `margin` from its edges.
 
     With a margin of the depth no way out to the side is shorter.
@@ -74,7 +76,7 @@ def over(i, j, n, margin):
 
 
 @jitable
-def least(i, j):
+def least(i: Shape, j: Shape) -> tuple[float, V3]:
     """Return (f, n) of the least overlap of a solid of revolution I and a box J."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
     if f < 0.0 or (f < shallow(i, j) and over(i, j, n, f)):
@@ -98,7 +100,7 @@ def least(i, j):
 
 
 @jitable
-def face_corner(j, k, sk, quarter):
+def face_corner(j: Shape, k: int, sk: float, quarter: int) -> V3:
     """Return corner 0..3 of the face of box J with outward normal sk times axis k."""
     first, second = (k + 1) % 3, (k + 2) % 3
     s1 = 1.0 if quarter == 0 or quarter == 3 else -1.0
@@ -109,7 +111,7 @@ def face_corner(j, k, sk, quarter):
 
 
 @jitable
-def clip_edge(row, ax, ay, bx, by, r):
+def clip_edge(row: F1, ax: float, ay: float, bx: float, by: float, r: float) -> int:
     """Cut one edge a-b of the face with the circle of radius r around 0.
 
     Writes into `row` enter x, y, leave x, y, on circle there (0/1 each), and returns
@@ -137,7 +139,9 @@ def clip_edge(row, ax, ay, bx, by, r):
 
 
 @jitable
-def put_corners(work, disc, n, weight):
+def put_corners(
+    work: F2, disc: tuple[V3, V3, V3, float, float, float], n: V3, weight: float
+) -> None:
     """Turn the cut edges in the rows of `work` into points where they enter and leave the disc."""
     centre, u, v, r, depth0, rise = disc
     turns = (work[1, 6], work[3, 6], work[5, 6], work[7, 6])
@@ -163,11 +167,11 @@ def put_corners(work, disc, n, weight):
             depth = depth0 + rise * x
             p = add(centre, add(scale(x, u), scale(y, v)))
             p = add(p, scale(0.5 * depth, n))
-            put_share(work[2 * e + side], depth, p, n, weight * angle / TURN)
+            put_weighted(work[2 * e + side], depth, p, n, weight * angle / TURN)
 
 
 @jitable
-def disc_on_face(i, j, end, k, n, f, points):
+def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: F2) -> float:
     """Write the patch of an end disc of I on face k of box J.
 
     Returns the part of the force that it carries, -1 where there is none.
@@ -254,7 +258,7 @@ def disc_on_face(i, j, end, k, n, f, points):
 
 
 @jitable
-def line_on_face(i, j, k, n, f, points):
+def line_on_face(i: Shape, j: Shape, k: int, n: V3, f: float, points: F2) -> float:
     """Write the ends of the part of I's side line that lies over face k of box J.
 
     Returns the part of the force that they carry, -1 where nothing lies over it.
@@ -283,18 +287,20 @@ def line_on_face(i, j, k, n, f, points):
     # a rim on an edge: which side of it rounding leaves a line on tells nothing
     if last - first <= 1e-9:
         return -1.0
-    share = line_share((last - first) * norm(way), widest(i[5]))
+    weight = line_weight((last - first) * norm(way), widest(i[5]))
     for row in range(2):
         s = first if row == 0 else last
         depth = depth_low + s * (depth_high - depth_low)
         p = add(add(low, scale(s, way)), scale(0.5 * depth, n))
-        put_point(points[row], depth, p, n, share)
+        put_point(points[row], depth, p, n, weight)
     rise = depth_high - depth_low
     return line_lies(first * rise, last * rise, f) * side_faces(n, out)
 
 
 @jitable
-def side_on_edge(i, j, axes, n, f, points):
+def side_on_edge(
+    i: Shape, j: Shape, axes: tuple[int, int, int], n: V3, f: float, points: F2
+) -> float:
     """Write the side of I on the edge of box J that faces it: both ends, or the crossing.
 
     Where they are parallel to within the depth the ends carry; the more they cross the more
@@ -318,26 +324,26 @@ def side_on_edge(i, j, axes, n, f, points):
         return -1.0
     if first >= last:
         return -1.0
-    share = line_share(last - first, widest(i[5]))
+    weight = line_weight(last - first, widest(i[5]))
     x0, x1 = add(q, scale(first, e)), add(q, scale(last, e))
     d0, n0 = side_distance(i, x0)
     d1, n1 = side_distance(i, x1)
     both = min(1.0, max(0.0, min(-d0, -d1) / max(f, 1e-300)))
     # row 0 is towards the bottom of the solid
     flip = rise < 0.0
-    put_share(points[1 if flip else 0], -d0, sub(x0, scale(0.5 * d0, n0)), scale(-1.0, n0),
-              share * both)  # fmt: skip
-    put_share(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
-              share * both)  # fmt: skip
+    put_weighted(points[1 if flip else 0], -d0, sub(x0, scale(0.5 * d0, n0)), scale(-1.0, n0),
+              weight * both)  # fmt: skip
+    put_weighted(points[0 if flip else 1], -d1, sub(x1, scale(0.5 * d1, n1)), scale(-1.0, n1),
+              weight * both)  # fmt: skip
     if both == 0.0:
         x0, x1 = sub(q, scale(half, e)), add(q, scale(half, e))
     x = add(x0, scale(crossing_of(low, high, x0, x1, n), sub(x1, x0)))
-    put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
+    put_weighted(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
     return side_faces(n, out)
 
 
 @jitable
-def solid_on_box(i, j, points):
+def solid_on_box(i: Shape, j: Shape, points: F2) -> int:
     """Write the points of a solid of revolution I on a box J."""
     f, n = least(i, j)
     middle = scale(0.5, add(far(i, scale(-1.0, n)), far(j, n)))
@@ -373,7 +379,7 @@ def solid_on_box(i, j, points):
 
 
 @jitable
-def middle_of_one(i, j, axes, n, f):
+def middle_of_one(i: Shape, j: Shape, axes: tuple[int, int, int], n: V3, f: float) -> V3:
     """Return the place of one point: at a rim, a corner, or where side and edge cross."""
     low, high = far(i, scale(-1.0, n)), far(j, n)
     if pointed(i, scale(-1.0, n)) > 1e-6:
@@ -389,40 +395,42 @@ def middle_of_one(i, j, axes, n, f):
 
 
 @pair("CYLINDER", "BOX", slots=BOX_ROWS, regroups=True)
-def cylinder_box(frame_i, size_i, frame_j, size_j, points):
+def cylinder_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Standing, lying, leaning or rolling over an edge."""
     i = placed(ROTOR, frame_i, cylinder_size(size_i))
     return solid_on_box(i, placed(BOX, frame_j, vector(size_j)), points)
 
 
 @pair("FRUSTUM", "BOX", slots=BOX_ROWS, regroups=True)
-def frustum_box(frame_i, size_i, frame_j, size_j, points):
+def frustum_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Standing, lying, leaning or rolling over an edge."""
     i = placed(ROTOR, frame_i, vector(size_i))
     return solid_on_box(i, placed(BOX, frame_j, vector(size_j)), points)
 
 
 @jitable
-def face_below(j, points, count):
+def face_below(j: Shape, points: F2, count: int) -> tuple[bool, tuple[V3, V3, V3, V3]]:
     """Return whether some row touches, and the face of box J that looks most along its normal.
 
     The face is its centre, its half edges and its outward normal.
     """
     deepest = 0
     for row in range(1, count):
-        if points[row, 0] > points[deepest, 0]:
+        if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
-    n = vector(points[deepest, 4:7])
+    n = vector(points[deepest, AT_NORMAL:])
     k = first_two(j, n)[0]
     k1, k2 = (k + 1) % 3, (k + 2) % 3
     o = edge_axis(j, k)
     o = scale(1.0 if dot(o, n) >= 0.0 else -1.0, o)
     a, b = scale(j[5][k1], edge_axis(j, k1)), scale(j[5][k2], edge_axis(j, k2))
-    return points[deepest, 0] > 0.0, (add(j[1], scale(j[5][k], o)), a, b, o)
+    return points[deepest, AT_DEPTH] > 0.0, (add(j[1], scale(j[5][k], o)), a, b, o)
 
 
 @region("CYLINDER", "BOX", whole=3.0)
-def cylinder_box_region(frame_i, size_i, frame_j, size_j, points):
+def cylinder_box_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The points, and the cut of the cylinder with the box's face."""
     j = placed(BOX, frame_j, vector(size_j))
     count = solid_on_box(placed(ROTOR, frame_i, cylinder_size(size_i)), j, points)
@@ -432,7 +440,9 @@ def cylinder_box_region(frame_i, size_i, frame_j, size_j, points):
 
 
 @region("FRUSTUM", "BOX", whole=3.0)
-def frustum_box_region(frame_i, size_i, frame_j, size_j, points):
+def frustum_box_region(
+    frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
+) -> tuple[int, float]:
     """The points, and the part of an end that is below the box's face."""
     i, j = placed(ROTOR, frame_i, vector(size_i)), placed(BOX, frame_j, vector(size_j))
     count = solid_on_box(i, j, points)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import pair
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, pair
 from mbsim.geometry.convex import (
     ROTOR,
+    Shape,
     along_circle,
     between_round,
     far,
@@ -25,10 +27,10 @@ from mbsim.geometry.manifold import (
     crossing_of,
     disc_lies,
     fade,
-    line_share,
+    line_weight,
     put_apart,
     put_rim,
-    put_share,
+    put_weighted,
     segment_on_disc,
     share_with_one,
     turn_of,
@@ -41,7 +43,7 @@ PAIR_ROWS = 2 * ARC_ROWS + 3
 
 
 @jitable
-def lies_on_end(shape, o, p, margin):
+def lies_on_end(shape: Shape, o: V3, p: V3, margin: float) -> bool:
     """Return whether p lies over the end disc with outward normal o, by `margin` from its rim."""
     d = sub(p, shape[1])
     across = sub(d, scale(dot(d, o), o))
@@ -50,7 +52,7 @@ def lies_on_end(shape, o, p, margin):
 
 
 @jitable
-def lines_meet(i, j, n):
+def lines_meet(i: Shape, j: Shape, n: V3) -> bool:
     """Return whether the straight lines of both sides along n cross, seen along n.
 
     Parallel ones do where they have a part in common.
@@ -69,7 +71,7 @@ def lines_meet(i, j, n):
 
 
 @jitable
-def rim_over_side(other, shape, d, p, margin):
+def rim_over_side(other: Shape, shape: Shape, d: V3, p: V3, margin: float) -> bool:
     """Return whether d is a normal of the side of `shape`, and p of `other` lies over that side.
 
     Then no direction nearby overlaps less.
@@ -81,7 +83,7 @@ def rim_over_side(other, shape, d, p, margin):
 
 
 @jitable
-def least(i, j):
+def least(i: Shape, j: Shape) -> tuple[float, V3]:
     """Return (f, n) of the least overlap of two solids of revolution."""
     f, n = flat(i, j, j, 1.0, 1e300, (0.0, 0.0, 1.0))
     if f < 0.0 or (f < shallow(i, j) and lies_on_end(j, n, far(i, scale(-1.0, n)), f)):
@@ -117,7 +119,7 @@ def least(i, j):
 
 
 @jitable
-def plane_of(shape, end):
+def plane_of(shape: Shape, end: int) -> tuple[V3, float, V3, V3, V3]:
     """Return an end's disc as (centre, radius, outward normal, u, v), u and v in its plane."""
     centre, o, r = end_disc(shape, end)
     u = shape[2]
@@ -125,7 +127,7 @@ def plane_of(shape, end):
 
 
 @jitable
-def seen_on(disc, p, n):
+def seen_on(disc: tuple[V3, float, V3, V3, V3], p: V3, n: V3) -> V2:
     """Return the place (x, y) of point p on the plane of a disc, seen along n."""
     centre, _, o, u, v = disc
     d = sub(p, centre)
@@ -134,7 +136,9 @@ def seen_on(disc, p, n):
 
 
 @jitable
-def rims_cross(a, b, n, sign):
+def rims_cross(
+    a: tuple[V3, float, V3, V3, V3], b: tuple[V3, float, V3, V3, V3], n: V3, sign: float
+) -> tuple[bool, V3]:
     """Return (found, point on the plane of disc a) where both rims cross, seen along n.
 
     Two circles first; Newton on |x| = r_a and |seen on b| = r_b makes it exact for the ellipse
@@ -169,7 +173,19 @@ def rims_cross(a, b, n, sign):
 
 
 @jitable
-def put_disc(points, first, arcs, own, other, n, side, start, stop, crossed, f):
+def put_disc(
+    points: F2,
+    first: int,
+    arcs: F2,
+    own: tuple[V3, float, V3, V3, V3],
+    other: tuple[V3, float, V3, V3, V3],
+    n: V3,
+    side: float,
+    start: V3,
+    stop: V3,
+    crossed: bool,
+    f: float,
+) -> None:
     """Write the points of a disc's rim over the other disc, from `start` round to `stop`.
 
     `arcs` is a row to work in; `side` is 1 for the disc of I, -1 for that of J. Many arguments
@@ -196,7 +212,7 @@ def put_disc(points, first, arcs, own, other, n, side, start, stop, crossed, f):
 
 
 @jitable
-def end_on_end(i, j, end_i, end_j, n, f, points):
+def end_on_end(i: Shape, j: Shape, end_i: int, end_j: int, n: V3, f: float, points: F2) -> float:
     """Write the patch of two end discs; return the part of the force it carries, -1 for none."""
     a, b = plane_of(i, end_i), plane_of(j, end_j)
     crossed, start = rims_cross(a, b, n, -1.0)
@@ -226,12 +242,12 @@ def end_on_end(i, j, end_i, end_j, n, f, points):
             if k == 0:
                 turn = turn_of(cy - y, x - cx, -y, x)
             middle = add(p, scale(0.5 * depth, n))
-            put_share(points[2 * ARC_ROWS + k], depth, middle, n, 3.0 * turn / TURN)
+            put_weighted(points[2 * ARC_ROWS + k], depth, middle, n, 3.0 * turn / TURN)
     return disc_lies(min(a[1], b[1]), norm(cross(a[2], b[2])), f)
 
 
 @jitable
-def put_ball(row, i, j, x, share):
+def put_ball(row: F1, i: Shape, j: Shape, x: V3, weight: float) -> float:
     """Write the contact of J's ball that touches its side from within at x, with the side of I."""
     inward, out = side_distance(j, x)
     # the ball's centre is where the normal at x meets the axis
@@ -244,12 +260,12 @@ def put_ball(row, i, j, x, share):
     distance, away = side_distance(i, centre)
     n = scale(-1.0, away)
     depth = radius - distance
-    put_share(row, depth, add(centre, scale(0.5 * (radius + distance), n)), n, share)
+    put_weighted(row, depth, add(centre, scale(0.5 * (radius + distance), n)), n, weight)
     return depth
 
 
 @jitable
-def side_by_side(i, j, n, f, points):
+def side_by_side(i: Shape, j: Shape, n: V3, f: float, points: F2) -> float:
     """Write two sides along each other: the ends of the common part, or where they cross.
 
     Returns the part of the force that these carry, -1 where the sides have no part in common.
@@ -269,28 +285,28 @@ def side_by_side(i, j, n, f, points):
     if first >= last:
         return -1.0
     # the smaller radius tells a line from a point
-    share = line_share(last - first, min(widest(i[5]), widest(j[5])))
+    weight = line_weight(last - first, min(widest(i[5]), widest(j[5])))
     x0, x1 = add(low_j, scale(first, t)), add(low_j, scale(last, t))
     d0 = put_ball(points[0], i, j, x0, 1.0)
     d1 = put_ball(points[1], i, j, x1, 1.0)
     both = min(1.0, max(0.0, min(d0, d1) / max(f, 1e-300))) * fade(1.0 - 10.0 * off)
     for row in range(2):
-        points[row, 0] = min(points[row, 0], f)
-        points[row, 7] = share * both
-        if share * both < 1e-6:
-            points[row, 0] = -length
-            points[row, 7] = 1.0
+        points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
+        points[row, AT_WEIGHT] = weight * both
+        if weight * both < 1e-6:
+            points[row, AT_DEPTH] = -length
+            points[row, AT_WEIGHT] = 1.0
     x = add(low_j, scale(length * crossing_of(low_i, high_i, low_j, high_j, n), t))
     if both > 0.0:
         # between the ends, also where the lines are so parallel that they cross nowhere
         x = add(x0, scale(crossing_of(low_i, high_i, x0, x1, n), sub(x1, x0)))
-    put_share(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
+    put_weighted(points[2], f, sub(x, scale(0.5 * f, n)), n, 1.0 - both)
     # where a rim presses it is the one point
     return fade(1.0 - 10.0 * off)
 
 
 @jitable
-def solid_on_solid(i, j, points):
+def solid_on_solid(i: Shape, j: Shape, points: F2) -> int:
     """Write the points of a solid of revolution I on another J."""
     f, n = least(i, j)
     middle = scale(0.5, add(far(i, scale(-1.0, n)), far(j, n)))
@@ -320,21 +336,21 @@ def solid_on_solid(i, j, points):
 
 
 @pair("CYLINDER", "CYLINDER", slots=PAIR_ROWS, regroups=True)
-def cylinder_cylinder(frame_i, size_i, frame_j, size_j, points):
+def cylinder_cylinder(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """End on end, side by side, crossed, side on end, rim on rim."""
     i = placed(ROTOR, frame_i, cylinder_size(size_i))
     return solid_on_solid(i, placed(ROTOR, frame_j, cylinder_size(size_j)), points)
 
 
 @pair("FRUSTUM", "CYLINDER", slots=PAIR_ROWS, regroups=True)
-def frustum_cylinder(frame_i, size_i, frame_j, size_j, points):
+def frustum_cylinder(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """End on end, side by side, crossed, side on end, rim on rim."""
     i = placed(ROTOR, frame_i, vector(size_i))
     return solid_on_solid(i, placed(ROTOR, frame_j, cylinder_size(size_j)), points)
 
 
 @pair("FRUSTUM", "FRUSTUM", slots=PAIR_ROWS, regroups=True)
-def frustum_frustum(frame_i, size_i, frame_j, size_j, points):
+def frustum_frustum(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """End on end, side by side, crossed, side on end, rim on rim."""
     i = placed(ROTOR, frame_i, vector(size_i))
     return solid_on_solid(i, placed(ROTOR, frame_j, vector(size_j)), points)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
 
 
 @pair("SPHERE", "PLANE", slots=1)
-def sphere_plane(frame_i, size_i, frame_j, size_j, points):
+def sphere_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Depth r - z, normal the plane's; the deepest point of the sphere is below its centre."""
     n = axis(frame_j, 2)
     centre = vector(frame_i)
@@ -20,7 +21,7 @@ def sphere_plane(frame_i, size_i, frame_j, size_j, points):
 
 
 @pair("SPHERE", "SPHERE", slots=1)
-def sphere_sphere(frame_i, size_i, frame_j, size_j, points):
+def sphere_sphere(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Depth r_i + r_j - distance, normal along the line of centres."""
     apart = sub(vector(frame_i), vector(frame_j))
     distance = norm(apart)
@@ -32,13 +33,13 @@ def sphere_sphere(frame_i, size_i, frame_j, size_j, points):
 
 
 @jitable
-def _clamp(value, half):
+def _clamp(value: float, half: float) -> float:
     """Return `value` limited to [-half, half]."""
     return max(-half, min(half, value))
 
 
 @pair("SPHERE", "BOX", slots=1)
-def sphere_box(frame_i, size_i, frame_j, size_j, points):
+def sphere_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The nearest point of the box to the centre; inside, the way out through the nearest face."""
     centre = vector(frame_i)
     apart = sub(centre, vector(frame_j))

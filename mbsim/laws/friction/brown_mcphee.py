@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.core.arrays import V5
+from mbsim.laws.catalog import FrictionInput, Parameter, friction_law
 from mbsim.laws.curves import against, tanh_ratio
 
 
@@ -22,7 +23,13 @@ from mbsim.laws.curves import against, tanh_ratio
     "stiction_trans_vel",
     Parameter("viscous_coef", 0.0, about="force per slip speed, whatever N is", unit="F T/L"),
 )
-def brown_mcphee(inputs, mu_static, mu_dynamic, stiction_trans_vel, viscous_coef):
+def brown_mcphee(
+    inputs: FrictionInput,
+    mu_static: float,
+    mu_dynamic: float,
+    stiction_trans_vel: float,
+    viscous_coef: float,
+) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I."""
     speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
     u = speed / stiction_trans_vel

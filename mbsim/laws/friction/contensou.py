@@ -23,8 +23,9 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V2, V3, V5
 from mbsim.core.jitable import jitable
-from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.laws.catalog import FrictionInput, Parameter, friction_law
 from mbsim.laws.curves import tanh_ratio
 
 #: Up to this modulus what cancels in m of a disc that mostly slides is left out.
@@ -32,7 +33,7 @@ _SLIDES = 0.02
 
 
 @jitable
-def elliptic(k):
+def elliptic(k: float) -> V3:
     """Return K, E and (K - E)/k^2 of modulus k, 0 <= k <= 1, by the arithmetic-geometric mean.
 
     At 1 - k < 1e-17 K counts as it is there; it has no weight then.
@@ -55,7 +56,7 @@ def elliptic(k):
 
 
 @jitable
-def disc_friction(v, w):
+def disc_friction(v: float, w: float) -> V2:
     """Return f/v and m/w for v = slip and w = |R spin|, not both 0, scaled by sqrt(v^2 + w^2)."""
     total = math.hypot(v, w)
     if v <= w:
@@ -89,7 +90,9 @@ def disc_friction(v, w):
         usual="of the area",
     ),
 )
-def contensou(inputs, mu_dynamic, friction_trans_vel, patch_radius):
+def contensou(
+    inputs: FrictionInput, mu_dynamic: float, friction_trans_vel: float, patch_radius: float
+) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I."""
     R = patch_radius if patch_radius > 0.0 else inputs.radius
     v, turn = math.hypot(inputs.xdot[0], inputs.xdot[1]), R * inputs.xdot[2]

@@ -16,27 +16,34 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V5
 from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
-from mbsim.laws.catalog import friction_law
+from mbsim.laws.catalog import FrictionInput, friction_law
 
 
 @jitable
-def _ramp_ratio(speed, mu, transition):
+def _ramp_ratio(speed: float, mu: float, transition: float) -> float:
     """Return mu(v)/v [T/L] on the first branch, v <= transition."""
     u = speed / transition
     return 0.5 * mu * (3.0 - u * u) / transition
 
 
 @jitable
-def _against_slip(inputs, ratio):
+def _against_slip(inputs: FrictionInput, ratio: float) -> V5:
     """Return the force against slip with |F| = ratio |v| N, no torque."""
     pull = -ratio * inputs.nforce
     return (pull * inputs.xdot[0], pull * inputs.xdot[1], 0.0, 0.0, 0.0)
 
 
 @friction_law("COULOMB_ON", "mu_static", "mu_dynamic", "stiction_trans_vel", "friction_trans_vel")
-def coulomb_on(inputs, mu_static, mu_dynamic, stiction_trans_vel, friction_trans_vel):
+def coulomb_on(
+    inputs: FrictionInput,
+    mu_static: float,
+    mu_dynamic: float,
+    stiction_trans_vel: float,
+    friction_trans_vel: float,
+) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I: static peak at vs, dynamic value from vd on."""
     speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
     if speed <= stiction_trans_vel:
@@ -49,7 +56,7 @@ def coulomb_on(inputs, mu_static, mu_dynamic, stiction_trans_vel, friction_trans
 
 
 @friction_law("COULOMB_DYNAMICONLY", "mu_dynamic", "friction_trans_vel")
-def coulomb_dynamic_only(inputs, mu_dynamic, friction_trans_vel):
+def coulomb_dynamic_only(inputs: FrictionInput, mu_dynamic: float, friction_trans_vel: float) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I: one ramp from 0 to mu_dynamic at vd."""
     speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
     if speed <= friction_trans_vel:

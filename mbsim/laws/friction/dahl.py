@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import FASTEST, LASTS, SLIP, Parameter, friction_law
+from mbsim.laws.catalog import FASTEST, LASTS, SLIP, FrictionInput, Parameter, friction_law
 
 
 @friction_law(
@@ -26,7 +26,9 @@ from mbsim.laws.catalog import FASTEST, LASTS, SLIP, Parameter, friction_law
     memory=2,
     carried=2,
 )
-def dahl(inputs, memory, mu_dynamic, bristle_stiffness):
+def dahl(
+    inputs: FrictionInput, memory: tuple[float, ...], mu_dynamic: float, bristle_stiffness: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return (Fx, Fy, Mx, My, Tz, energy of the spring, mode) and the rate of the stretch."""
     z, v = memory, inputs.xdot
     limit = mu_dynamic * inputs.nforce

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import FASTEST, LASTS, SLIP, Parameter, friction_law
+from mbsim.core.arrays import V2
+from mbsim.laws.catalog import FASTEST, LASTS, SLIP, FrictionInput, Parameter, friction_law
 from mbsim.laws.curves import stribeck as falling
 
 
@@ -42,16 +43,16 @@ from mbsim.laws.curves import stribeck as falling
     carried=2,
 )
 def lugre(
-    inputs,
-    memory,
-    mu_static,
-    mu_dynamic,
-    stribeck_vel,
-    bristle_stiffness,
-    bristle_damping,
-    viscous_coef,
-    damping_trans_vel,
-):
+    inputs: FrictionInput,
+    memory: V2,
+    mu_static: float,
+    mu_dynamic: float,
+    stribeck_vel: float,
+    bristle_stiffness: float,
+    bristle_damping: float,
+    viscous_coef: float,
+    damping_trans_vel: float,
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return (Fx, Fy, Mx, My, Tz, energy of the bristles, mode) and the rate of their bend."""
     z, v = memory, inputs.xdot
     speed = math.hypot(v[0], v[1])

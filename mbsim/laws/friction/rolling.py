@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.core.arrays import V5
+from mbsim.laws.catalog import FrictionInput, Parameter, friction_law
 from mbsim.laws.friction.coulomb import coulomb_on
 
 
@@ -32,14 +33,14 @@ from mbsim.laws.friction.coulomb import coulomb_on
     ),
 )
 def coulomb_rolling(
-    inputs,
-    mu_static,
-    mu_dynamic,
-    stiction_trans_vel,
-    friction_trans_vel,
-    rolling_arm,
-    rolling_trans_vel,
-):
+    inputs: FrictionInput,
+    mu_static: float,
+    mu_dynamic: float,
+    stiction_trans_vel: float,
+    friction_trans_vel: float,
+    rolling_arm: float,
+    rolling_trans_vel: float,
+) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I."""
     fx, fy, _, _, _ = coulomb_on(
         inputs, mu_static, mu_dynamic, stiction_trans_vel, friction_trans_vel

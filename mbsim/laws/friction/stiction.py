@@ -49,6 +49,7 @@ from mbsim.laws.catalog import (
     SLIP,
     STICK,
     UNDECIDED,
+    FrictionInput,
     FrictionLaw,
     Parameter,
     friction_law,
@@ -77,7 +78,14 @@ _Z, _M, _W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
 
 
 @jitable
-def _turn(inputs, memory, mu, k, damping, radius):
+def _turn(
+    inputs: FrictionInput,
+    memory: tuple[float, ...],
+    mu: float,
+    k: float,
+    damping: float,
+    radius: float,
+) -> tuple[float, float, float, int]:
     """Return the torque about the normal, the twist left, the sign of its slip, and if that is so.
 
     The last is 0 where the sign follows only from how fast N changes.
@@ -102,7 +110,7 @@ def _turn(inputs, memory, mu, k, damping, radius):
 
 
 @jitable
-def _dynamic_limit(inputs, mu_dynamic):
+def _dynamic_limit(inputs: FrictionInput, mu_dynamic: float) -> float:
     """Return the friction of sliding: that of the user's function, where there is one."""
     return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
 
@@ -118,13 +126,15 @@ STRAIGHT, PART = 1e-6, 0.7
 
 
 @jitable
-def _least_speed(across, speed):
+def _least_speed(across: float, speed: float) -> float:
     """Return what slip across d is compared with at least."""
     return PART * speed * max(0.0, 1.0 - abs(across) / (STRAIGHT * speed)) if speed > 0.0 else 0.0
 
 
 @jitable
-def rigid(inputs, memory, mu_static, mu_dynamic):
+def rigid(
+    inputs: FrictionInput, memory: tuple[float, ...], mu_static: float, mu_dynamic: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the same where k is infinite; what holds is not told but asked for by equations."""
     mode, dx, dy = memory[KEPT_MODE], memory[KEPT_X], memory[KEPT_Y]
     if mode == STICK:
@@ -196,17 +206,17 @@ def rigid(inputs, memory, mu_static, mu_dynamic):
     ),
 )
 def stiction(  # noqa: C901
-    inputs,
-    memory,
-    mu_static,
-    mu_dynamic,
-    tangential_stiffness,
-    tangential_damping,
-    poisson_ratio,
-    rotational_stiffness,
-    torsion_radius,
-    incremental,
-):
+    inputs: FrictionInput,
+    memory: tuple[float, ...],
+    mu_static: float,
+    mu_dynamic: float,
+    tangential_stiffness: float,
+    tangential_damping: float,
+    poisson_ratio: float,
+    rotational_stiffness: float,
+    torsion_radius: float,
+    incremental: float,
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return (Fx, ..., energy of the springs, mode, branch, size, unit) and what is kept, rates.
 
     Long, and with many branches, because sticking and slipping begin from the same memory and end

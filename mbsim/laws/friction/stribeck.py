@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 
-from mbsim.laws.catalog import Parameter, friction_law
+from mbsim.core.arrays import V5
+from mbsim.laws.catalog import FrictionInput, Parameter, friction_law
 from mbsim.laws.curves import against, tanh_ratio
 from mbsim.laws.curves import stribeck as falling
 
@@ -25,14 +26,14 @@ from mbsim.laws.curves import stribeck as falling
     Parameter("viscous_coef", 0.0, about="force per slip speed, whatever N is", unit="F T/L"),
 )
 def stribeck(
-    inputs,
-    mu_static,
-    mu_dynamic,
-    stiction_trans_vel,
-    stribeck_vel,
-    stribeck_exponent,
-    viscous_coef,
-):
+    inputs: FrictionInput,
+    mu_static: float,
+    mu_dynamic: float,
+    stiction_trans_vel: float,
+    stribeck_vel: float,
+    stribeck_exponent: float,
+    viscous_coef: float,
+) -> V5:
     """Return Fx, Fy, Mx, My, Tz on I."""
     speed = math.hypot(inputs.xdot[0], inputs.xdot[1])
     mu = falling(speed, mu_static, mu_dynamic, stribeck_vel, stribeck_exponent)

@@ -12,15 +12,22 @@ Source: K. L. Johnson, Contact Mechanics, Cambridge 1985, sections 4.2 and 11.4;
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from mbsim.core.arrays import V2, V3
 from mbsim.laws.catalog import normal_law
 from mbsim.laws.restitution import dissipation_of, hunt_crossley
 from mbsim.laws.spring import power_spring
 
 
 def hertz_stiffness(
-    i_elastic_modulus, j_elastic_modulus, i_poisson_ratio, j_poisson_ratio, i_radius, j_radius
-):
+    i_elastic_modulus: float,
+    j_elastic_modulus: float,
+    i_poisson_ratio: float,
+    j_poisson_ratio: float,
+    i_radius: float,
+    j_radius: float,
+) -> float:
     """Return k [F/L^1.5] of moduli [F/L^2] and radii [L]; no modulus is rigid, inf is flat."""
     compliance = 0.0
     if i_elastic_modulus is not None:
@@ -31,7 +38,7 @@ def hertz_stiffness(
     return 4.0 / 3.0 / compliance / math.sqrt(curvature)
 
 
-def hertz_constants(stiffness, *attributes):
+def hertz_constants(stiffness: float, *attributes: Any) -> V2:
     """Return stiffness k, given or of the materials, and dissipation a, given or by a rebound."""
     *materials, damping, restitution_coef, ref_velocity = attributes
     if materials[0] is not None or materials[1] is not None:
@@ -44,8 +51,9 @@ def hertz_constants(stiffness, *attributes):
     *("stiffness", "i_elastic_modulus", "j_elastic_modulus", "i_poisson_ratio", "j_poisson_ratio"),
     *("i_radius", "j_radius", "damping", "restitution_coef", "ref_velocity"),
     constants=hertz_constants,
+    of_shapes=True,
 )
-def hertz(depth, depth_rate, stiffness, dissipation):
+def hertz(depth: float, depth_rate: float, stiffness: float, dissipation: float) -> V3:
     """Return force [F], force at rate 0 [F] and stored energy [F L].
 
     `depth` [L] > 0 is overlap, `depth_rate` [L/T] > 0 is closing; `stiffness` [F/L^1.5],

@@ -10,18 +10,21 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V3, V4
 from mbsim.core.blend import step
 from mbsim.laws.catalog import normal_law
 from mbsim.laws.spring import power_spring
 
 
-def impact_constants(stiffness, exponent, damping, dmax):
+def impact_constants(stiffness: float, exponent: float, damping: float, dmax: float) -> V4:
     """Return the attributes as they are; dmax may be absent where there is no damping."""
     return stiffness, exponent, damping, math.inf if dmax is None else dmax
 
 
 @normal_law("IMPACT", "stiffness", "exponent", "damping", "dmax", constants=impact_constants)
-def impact(depth, depth_rate, stiffness, exponent, damping, dmax):
+def impact(
+    depth: float, depth_rate: float, stiffness: float, exponent: float, damping: float, dmax: float
+) -> V3:
     """Return force [F], force at rate 0 [F] and stored energy [F L].
 
     `depth` [L] > 0 is overlap, `depth_rate` [L/T] > 0 is closing; `stiffness` [F/L^e],

@@ -18,11 +18,12 @@ ratio of stiffnesses is that of O. R. Walton, R. L. Braun, J. Rheol. 30 (1986) 9
 
 from __future__ import annotations
 
+from mbsim.core.arrays import V3
 from mbsim.core.blend import step
 from mbsim.laws.catalog import normal_law
 
 
-def poisson_constants(penalty, restitution_coef, normal_trans_vel):
+def poisson_constants(penalty: float, restitution_coef: float, normal_trans_vel: float) -> V3:
     """Return stiffness on compression, stiffness on release and the half width of the blend."""
     e = restitution_coef or 0.0
     return penalty, e * e * penalty, normal_trans_vel
@@ -33,7 +34,9 @@ def poisson_constants(penalty, restitution_coef, normal_trans_vel):
     *("penalty", "restitution_coef", "normal_trans_vel"),
     constants=poisson_constants,
 )
-def poisson(depth, depth_rate, penalty, release, normal_trans_vel):
+def poisson(
+    depth: float, depth_rate: float, penalty: float, release: float, normal_trans_vel: float
+) -> V3:
     """Return force [F], force at rate 0 [F] and stored energy [F L].
 
     `depth` [L] > 0 is overlap, `depth_rate` [L/T] > 0 is closing; `penalty` and `release`

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mbsim.core import jit
+from mbsim.core.code_cache import trusted_root
 from mbsim.plugins.adapters.friction import friction_address
 from mbsim.plugins.compile.rewrite import rewritten
 from mbsim.plugins.compile.whitelist import Refused, check, module_globals
@@ -99,7 +100,7 @@ def _module(text: str) -> types.ModuleType:
     name = f"mbsim_plugin_{digest}"
     if name in sys.modules:
         return sys.modules[name]
-    file = jit.cache_root() / "plugins" / f"{name}.py"
+    file = trusted_root() / "plugins" / f"{name}.py"
     _write(file, text)
     module = types.ModuleType(name)
     module.__file__ = str(file)
@@ -117,7 +118,7 @@ def _write(file: Path, text: str) -> None:
     """Write a file unless it is there; two processes may do so at once."""
     if file.is_file() and file.read_bytes() == text.encode():
         return
-    file.parent.mkdir(parents=True, exist_ok=True)
+    file.parent.mkdir(mode=0o700, exist_ok=True)
     draft = file.with_suffix(f".{os.getpid()}.tmp")
     draft.write_bytes(text.encode())
     draft.replace(file)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from mbsim.errors import ModelError
+from mbsim.plugins.permission import check
 
 SUFFIX = ".m"
 _PROGRAMS = ("octave-cli", "octave")
@@ -105,6 +106,7 @@ def read_octave(path: Path, name: str, element: str) -> OctaveFile:
         If it is not there, or is named otherwise than its function.
     """
     path = path.absolute()
+    check(path, element)
     if not path.is_file():
         raise ModelError(f"{element}: {path}: No such file or directory")
     if path.suffix.lower() != SUFFIX:

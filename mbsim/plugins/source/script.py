@@ -19,6 +19,7 @@ from typing import Any
 
 from mbsim.errors import ModelError
 from mbsim.plugins.helpers import namespace
+from mbsim.plugins.permission import check
 from mbsim.plugins.source.diagnose import diagnose
 from mbsim.plugins.source.shared_library import is_library
 
@@ -100,6 +101,7 @@ def user_function(
 def load_script(path: Path, element: str, scripts: Scripts) -> Script:
     """Return a file of Python, run at most once for one `scripts`."""
     path = path.absolute()
+    check(path, element)
     if path in scripts:
         return scripts[path]
     if is_library(path):

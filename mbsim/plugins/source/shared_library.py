@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.errors import ModelError
+from mbsim.plugins.permission import check
 from mbsim.plugins.source.symbols import ends_the_process, functions_of
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ class Library:
         ModelError
             If the system cannot load it: what it needs is missing, or it is no library.
         """
+        check(self.path, self.element)
         try:
             return ctypes.CDLL(str(self.path))
         except OSError as error:

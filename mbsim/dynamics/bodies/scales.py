@@ -8,8 +8,10 @@ an error is judged.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import BODY_SIZE
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, vector
 
 #: Of the largest speed so far: what moves fast for a moment is judged by less for long.
@@ -17,7 +19,7 @@ PART = 0.1
 
 
 @jitable
-def take_speeds(scene, y, speeds):
+def take_speeds(scene: Scene, y: F1, speeds: F1) -> None:
     """Raise PART of the speeds (groups,) to that of the bodies at y: of the cg, and of turning."""
     scales = scene.scales
     for b in range(len(scales.group)):
@@ -30,7 +32,7 @@ def take_speeds(scene, y, speeds):
 
 
 @jitable
-def fill_squares(scene, y):
+def fill_squares(scene: Scene, y: F1) -> None:
     """Fill V^2 of all groups for an error at y."""
     scales, squares = scene.scales, scene.work.squares
     g = norm(vector(scene.world.gravity))

@@ -1,0 +1,75 @@
+"""A mechanism as a `Problem`: its hooks behind addresses, all given one packed `Scene`.
+
+The linearised mechanism stands behind a hook of the scene, so its arrays are made only where a
+method asks for them. What a scene or a method lacks is not imported.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbsim.arrays.codes import MARKER_FORCE
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import pack
+from mbsim.core.problem import Problem, addresses
+from mbsim.dynamics.pipeline.hook_table import Method, fill
+from mbsim.dynamics.pipeline.hooks import HOOKS, stable
+
+
+def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
+    """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
+
+    Only a method without error estimate, `fixed_step`, needs the last hook.
+    """
+    table = pack(scene)
+    hooks = HOOKS | {"stable": stable} if fixed_step else dict(HOOKS)
+    if len(scene.angles.i) > 0:
+        from mbsim.dynamics.pipeline.force_hooks import limit_turn
+
+        hooks["limit"] = limit_turn
+    if len(scene.sensors.id) > 0:
+        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
+
+        hooks["arrive"] = arrive_hook
+        if scene.sensors.located.any():
+            # where none is located, steps need not be looked into
+            hooks["happens"] = happens_hook
+    if len(scene.switching.program) > 0 and not fixed_step:
+        from mbsim.dynamics.events.switching import switching_hook
+
+        hooks["switching"] = switching_hook
+    problem = Problem(int(table.ctypes.data), **addresses(hooks))
+    fill(scene)
+    if "switching" in hooks:
+        scene.state.frozen[0] = int(len(scene.work.idle) > 0)
+    return problem, table
+
+
+def _find_slopes(scene: Scene) -> None:
+    """Let marker forces have their slopes."""
+    from mbsim.forces.abi import slopes_address
+
+    applied = scene.applied
+    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
+        applied.slopes[f] = slopes_address(int(applied.law[f]))
+
+
+def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
+    """Return the problem with the hooks of an implicit method, and what must live with it.
+
+    `pair`: the method solves with complex coefficients as well.
+    """
+    from mbsim.compile_model.program_dependence import find_depends
+    from mbsim.compile_model.tangent import make_tangent
+    from mbsim.dynamics.pipeline import implicit_hooks as of
+
+    tangent = make_tangent(scene, find_depends(scene), pair)
+    table = pack(tangent)
+    scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
+    _find_slopes(scene)
+    fill(scene, Method(tangent, pair))
+    hooks = of.HOOKS | of.PAIR_HOOKS if pair else of.HOOKS
+    return problem._replace(**addresses(hooks)), (tangent, table)

@@ -1,0 +1,218 @@
+"""`PartFile`: a file that grows hidden and is published whole, at the cost of what is new.
+
+HDF5 promises nothing of a file whose writer was killed, so the growing file is never the one
+that others see. Two files take turns: the part file grows, `publish` renames it over the
+published one, whose last state, kept by a second name, is brought up to date with the bytes
+written since and becomes the next part file. A kill at any instant leaves the published file
+as it was or as it is now. Nothing is copied whole, unless somebody is reading the older file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from mbsim.results.files import create, locked, unlocked
+
+#: Bytes copied at a time.
+_PIECE = 1 << 20
+
+
+class PartFile:
+    """Bytes of an HDF5 file as h5py's driver for Python files writes them.
+
+    A failure to write is kept in `failure`, and later writes do nothing: HDF5 cannot be left
+    where one of its own writes fails.
+
+    Parameters
+    ----------
+    target : Path
+        The published file; the part file is ``.<name>.part`` beside it.
+    resume : bool
+        Begin with what `target` holds.
+    """
+
+    def __init__(self, target: Path, resume: bool = False) -> None:
+        self.target = target
+        self.path = target.with_name(f".{target.name}.part")
+        self._older = target.with_name(f".{target.name}.older")
+        self.failure: OSError | None = None
+        self._at = 0
+        #: Where bytes were written since both files held the same: [first, end].
+        self._new: list[list[int]] = []
+        self._published: tuple[int, int] | None = None  # device and inode of the other file
+        self._fd = create(self.path)
+        locked(self._fd)
+        if resume:
+            self._copy_from(target)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Set where the next bytes are read or written, from the start or the end."""
+        self._at = offset if whence == os.SEEK_SET else self._size() + offset
+        return self._at
+
+    def tell(self) -> int:
+        """Return where the next bytes are read or written."""
+        return self._at
+
+    def _size(self) -> int:
+        return os.fstat(self._fd).st_size
+
+    def read(self, size: int = -1) -> bytes:
+        """Return up to so many bytes."""
+        return os.pread(self._fd, self._size() if size < 0 else size, self._at)
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer; what was never written is zero."""
+        found = os.preadv(self._fd, [buffer], self._at)
+        if found < len(buffer):
+            buffer[found:] = bytes(len(buffer) - found)
+        return len(buffer)
+
+    def write(self, data: Any) -> int:
+        """Write all bytes, or keep why they could not be."""
+        first, size = self._at, len(data)
+        view = memoryview(data)
+        try:
+            while self.failure is None and len(view):
+                done = os.pwrite(self._fd, view, self._at)
+                view = view[done:]
+                self._at += done
+        except OSError as error:
+            self.failure = error
+        if self._new and self._new[-1][0] <= first <= self._new[-1][1]:
+            self._new[-1][1] = max(self._new[-1][1], first + size)
+        else:
+            self._new.append([first, first + size])
+        return size
+
+    def truncate(self, size: int) -> None:
+        """Set the file's size."""
+        if self.failure is None:
+            try:
+                os.ftruncate(self._fd, size)
+            except OSError as error:
+                self.failure = error
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def room(self) -> int:
+        """Return how many bytes are free on the disk."""
+        if not hasattr(os, "fstatvfs"):
+            return shutil.disk_usage(self.path.parent).free
+        found = os.fstatvfs(self._fd)
+        return found.f_bavail * found.f_frsize
+
+    def check(self) -> None:
+        """Raise the failure to write, if there was one."""
+        if self.failure is not None:
+            raise self.failure
+
+    def publish(self, last: bool = False) -> None:
+        """Put what is written in the place of `target`, and go on in another file.
+
+        Parameters
+        ----------
+        last : bool
+            No more bytes will follow: there is no other file.
+
+        Raises
+        ------
+        OSError
+            Where the disk fails; what was published stays.
+        """
+        self.check()
+        os.fsync(self._fd)
+        self.discard(self._older)
+        kept = not last and self._keep()
+        # readers that ask HDF5 for a lock get one as soon as the file has its name
+        unlocked(self._fd)
+        os.replace(self.path, self.target)
+        done, self._fd = self._fd, -1
+        try:
+            found = os.fstat(done)
+            self._published = found.st_dev, found.st_ino
+            if not last:
+                self._follow(done, kept)
+        finally:
+            os.close(done)
+
+    def _keep(self) -> bool:
+        """Give the published file a second name; return whether it is there and ours."""
+        if self._published is None:
+            return False
+        try:
+            os.link(self.target, self._older, follow_symlinks=False)
+            found = os.stat(self._older, follow_symlinks=False)
+        except (OSError, NotImplementedError):
+            return False
+        return (found.st_dev, found.st_ino) == self._published
+
+    def _follow(self, done: int, kept: bool) -> None:
+        """Make the next part file: the older one with what is new in `done`, else a whole copy."""
+        if kept:
+            self._fd = os.open(self._older, os.O_RDWR)
+            # somebody who reads it has it locked; where no lock can be had nobody knows
+            if locked(self._fd):
+                for first, end in _merged(self._new):
+                    _copy(done, self._fd, first, end)
+                os.ftruncate(self._fd, os.fstat(done).st_size)
+                os.replace(self._older, self.path)
+                self._new = []
+                return
+            os.close(self._fd)
+            self._fd = -1
+        self.discard(self._older)
+        self._fd = create(self.path)
+        locked(self._fd)
+        self._copy_from(self.target)
+
+    def _copy_from(self, path: Path) -> None:
+        """Fill the part file with another's bytes."""
+        with path.open("rb") as source:
+            _copy(source.fileno(), self._fd, 0, os.fstat(source.fileno()).st_size)
+        self._new = []
+
+    @staticmethod
+    def discard(path: Path) -> None:
+        """Remove a file if it is there."""
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+    def close(self) -> None:
+        """Let go of the part file and remove it; what was published stays."""
+        if self.failure is None:
+            self.failure = OSError("the file is closed")
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
+        self.discard(self.path)
+        self.discard(self._older)
+
+
+def _merged(ranges: list[list[int]]) -> list[list[int]]:
+    """Return ranges in order, those that touch as one."""
+    found: list[list[int]] = []
+    for first, end in sorted(ranges):
+        if found and first <= found[-1][1]:
+            found[-1][1] = max(found[-1][1], end)
+        else:
+            found.append([first, end])
+    return found
+
+
+def _copy(source: int, target: int, first: int, end: int) -> None:
+    """Copy bytes of one open file to the same place of another; ends where the source does."""
+    while first < end:
+        piece = os.pread(source, min(_PIECE, end - first), first)
+        if not piece:
+            return
+        view = memoryview(piece)
+        while len(view):
+            done = os.pwrite(target, view, first)
+            view = view[done:]
+            first += done

@@ -1,0 +1,178 @@
+"""What a run records, by name: of every kind of element one dataset a signal, ids in columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.arrays.codes import CONTACT_COLUMNS
+from mbsim.results.asked import Asked
+from mbsim.results.blocks import Block, Table, events_table, nothing
+from mbsim.results.elements import GROUPS, acting, facts
+from mbsim.results.forces import Forces
+from mbsim.results.motion import motion
+from mbsim.results.requests import columns_of, measures_of, request_table
+from mbsim.results.watch import energies
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+
+
+def groups(system: System) -> dict[str, list[int]]:
+    """Return the ids of everything whose signals stand side by side, by group."""
+    found = {
+        "bodies": list(system.body_ids),
+        "contacts": list(system.contact_ids),
+        "diffs": list(system.model.differentials),
+    }
+    for statement, id in acting(system):
+        found.setdefault(GROUPS[statement].path, []).append(id)
+    return {group: ids for group, ids in found.items() if ids}
+
+
+def facts_of(system: System, asked: Asked) -> dict[str, Table]:
+    """Return ids, labels and types of all elements with columns, by dataset."""
+    model = system.model
+    tables: dict[str, Any] = {
+        "bodies": model.bodies,
+        "contacts": model.contacts,
+        "diffs": model.differentials,
+    }
+    about = dict(facts(model))
+    found: dict[str, Table] = {}
+    for group, ids in groups(system).items():
+        kept = [ids[k] for k in asked.elements(group, ids)]
+        if not kept:
+            continue
+        found[f"{group}/id"] = np.array(kept, dtype=np.int64)
+        labelled = (
+            {f"{group}/{id}": {"label": tables[group][id].label} for id in kept}
+            if (group in tables)
+            else about
+        )
+        for name in ("label", "type"):
+            texts = [labelled.get(f"{group}/{id}", {}).get(name, "") for id in kept]
+            if any(texts):
+                found[f"{group}/{name}"] = np.array(texts, dtype=object)
+    return found
+
+
+def without_rows(system: System) -> dict[str, dict[str, str]]:
+    """Return label and type of elements that have no row, by group: they hold nothing."""
+    there = groups(system)
+    return {
+        name: found
+        for name, found in facts(system.model)
+        for group, _, id in [name.partition("/")]
+        if int(id) not in there.get(group, ())
+    }
+
+
+def names_of(system: System) -> list[str]:
+    """Return the names of all signals that this model has."""
+    stacked = groups(system)
+    return [
+        name
+        for stored, _ in signals(system, nothing(system), Asked())
+        for group, _, signal in [stored.partition("/")]
+        for name in (
+            [f"{group}/{id}/{signal}" for id in stacked[group]]
+            if group in stacked and "/" not in signal
+            else [stored]
+        )
+    ]
+
+
+def request_columns(system: System) -> dict[str, dict[str, Any]]:
+    """Return what the columns of the requests are, by dataset."""
+    about: dict[str, dict[str, Any]] = {}
+    for request in system.model.requests.values():
+        about[f"requests/{request.id}"] = {
+            "columns": columns_of(request),
+            "type": request.type,
+            "label": request.label or request.comment,
+        }
+        if request.type == "EXPRESSION":
+            about[f"requests/{request.id}"]["measures"] = measures_of(request)
+    return about
+
+
+def signals(
+    system: System, block: Block, asked: Asked, incidents: int = 0, first: bool = True
+) -> Iterator[tuple[str, Table]]:
+    """Yield the rows of every dataset that was asked for."""
+    yield "time", block.time
+    bodies = motion(system.body_ids, block.y, block.accel)
+    yield from asked.stacked(
+        "bodies",
+        system.body_ids,
+        {
+            "position": lambda: bodies.p,
+            "quaternion": lambda: bodies.q,
+            "velocity": lambda: bodies.v,
+            "angular_velocity": lambda: bodies.w,
+            "acceleration": lambda: bodies.a,
+        },
+    )
+    yield from _contacts(system, block, asked)
+    yield from _elements(system, block, asked)
+    states = list(system.model.differentials)
+    places = np.asarray(system.scene.states.place[: len(states)], dtype=np.int64)
+    yield from asked.stacked("diffs", states, {"value": lambda: block.y[:, places]})
+    for name, column in system.unknowns():
+        if asked(name):
+            yield name, block.value[:, column]
+    forces = Forces(system, bodies, block.joint, block.applied, block.contact)
+    for request in system.model.requests.values():
+        markers = system.placement.markers
+        yield f"requests/{request.id}", request_table(request, markers, forces, block.value)
+    for k, name in enumerate(energies(system)):
+        if asked(f"energy/{name}"):
+            yield f"energy/{name}", block.energy[:, k]
+    if asked("state/y"):
+        yield "state/y", block.y
+        ends = incidents + np.cumsum(block.incident_count, dtype=np.int64)
+        # row k has incidents[offsets[k] : offsets[k + 1]]
+        yield "state/incident_offsets", np.append(0, ends) if first else ends
+        yield "state/incidents", block.incidents
+    yield "events", events_table(block.events)
+
+
+def _contacts(system: System, block: Block, asked: Asked) -> Iterator[tuple[str, Table]]:
+    """Yield the rows of contacts."""
+    ids = system.contact_ids
+    rows = block.contact.reshape(len(block.time), len(ids), CONTACT_COLUMNS)
+    yield from asked.stacked(
+        "contacts",
+        ids,
+        {
+            "force": lambda: rows[..., 0:3],
+            "torque": lambda: rows[..., 3:6],
+            "penetration": lambda: rows[..., 6],
+            "slip_speed": lambda: rows[..., 7],
+            "incidents": lambda: rows[..., 8].astype(np.int64),
+            "area": lambda: rows[..., 9],
+        },
+    )
+
+
+def _elements(system: System, block: Block, asked: Asked) -> Iterator[tuple[str, Table]]:
+    """Yield the rows of everything between markers, element by element in its group's order."""
+    elements = acting(system)
+    wrenches = block.wrenches.reshape(len(block.time), len(elements), 6)
+    columns: dict[str, dict[int, int]] = {}
+    for k, (statement, id) in enumerate(elements):
+        columns.setdefault(GROUPS[statement].path, {})[id] = k
+    for group, of in columns.items():
+        places = list(of.values())
+        part = {"force": slice(0, 3), "torque": slice(3, 6)}
+        tables = {name: partial(_columns_of, wrenches, places, part[name]) for name in part}
+        yield from asked.stacked(group, list(of), tables)
+
+
+def _columns_of(wrenches: Table, places: list[int], part: slice) -> Table:
+    """Return forces or torques of some elements, (rows, elements, 3)."""
+    return wrenches[:, places, part]

@@ -1,0 +1,215 @@
+"""What a result folder holds whatever happens: one run, checked numbers, what fitted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
+from mbsim.errors import ModelError, ResultsError
+from mbsim.results.going_on import completed
+from mbsim.results.part_file import PartFile
+from mbsim.results.reading import end_state, open_results
+from mbsim.results.recorder import Recorder
+
+
+def recording(folder: Path, rows: int = 10, **options: Any) -> Recorder:
+    """Return a recorder that has taken rows of a fake run."""
+    system = fake_system(folder / "deck")
+    recorder = Recorder(system, SETTINGS, folder, **options)
+    add_rows(system, 0, rows)
+    recorder.take()
+    return recorder
+
+
+def close(recorder: Recorder, **options: Any) -> None:
+    """End a run."""
+    log = recorder.system.scene.log.contacts
+    recorder.close("finished", {"steps": 1}, log, **options).close()
+
+
+def test_one_changed_number_in_a_checkpoint_is_refused(tmp_path: Path) -> None:
+    recorder = recording(tmp_path)
+    recorder.flush(checkpoint(10))
+    recorder.abandon()
+    whole = (tmp_path / "deck.h5").read_bytes()
+    with h5py.File(tmp_path / "deck.h5", "r") as file:
+        names: list[str] = []
+        group = file["checkpoint"]
+        group.visit(lambda n: names.append(n) if hasattr(group[n], "size") else None)
+        names = [name for name in names if group[name].size]
+    assert len(names) > 3
+    for name in names:
+        (tmp_path / "deck.h5").write_bytes(whole)
+        with h5py.File(tmp_path / "deck.h5", "r+") as file:
+            table = file[f"checkpoint/{name}"]
+            raw = bytearray(np.asarray(table[()]).tobytes())
+            raw[0] ^= 1
+            table[...] = np.frombuffer(bytes(raw), dtype=table.dtype).reshape(table.shape)
+        with pytest.raises(ModelError, match="checkpoint is damaged"):
+            Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
+
+
+def test_a_damaged_signal_is_told(tmp_path: Path) -> None:
+    close(recording(tmp_path))
+    with h5py.File(tmp_path / "deck.h5", "r") as file:
+        chunk = file["bodies/position"].id.get_chunk_info(0)
+    with (tmp_path / "deck.h5").open("r+b") as raw:
+        raw.seek(chunk.byte_offset + 5)
+        raw.write(b"\x42")
+    with open_results(tmp_path / "deck.h5") as results:
+        assert len(results["bodies/2/velocity"]) == 10
+        with pytest.raises(ResultsError, match="damaged"):
+            results["bodies/2/position"]
+
+
+def test_a_rerun_leaves_nothing_of_the_old_one(tmp_path: Path) -> None:
+    for name in ("deck.csv", "deck.log"):
+        (tmp_path / name).write_text("old")
+    close(recording(tmp_path))
+    recorder = recording(tmp_path)
+    (tmp_path / "deck.log").write_text("old")
+    # until there is a first row to see, the old run is whole
+    assert (tmp_path / "deck.log").exists()
+    recorder.flush(checkpoint(10))
+    assert not (tmp_path / "deck.log").exists()
+    assert not (tmp_path / "deck.csv").exists()
+    with open_results(tmp_path / "deck.h5") as results:
+        assert results.status == "running"
+
+
+def test_finished_is_written_last(tmp_path: Path) -> None:
+    seen = []
+
+    def write_log() -> None:
+        assert (tmp_path / "deck.csv").is_file()
+        with open_results(tmp_path / "deck.h5") as results:
+            seen.append(results.status)
+
+    recorder = recording(tmp_path)
+    recorder.flush(checkpoint(10))
+    close(recorder, write_log=write_log)
+    assert seen == ["running"]
+    with open_results(tmp_path / "deck.h5") as results:
+        assert results.status == "finished"
+        assert not results.has_checkpoint
+
+
+def test_a_run_whose_log_fails_can_go_on(tmp_path: Path) -> None:
+    def write_log() -> None:
+        raise ResultsError("deck.log: no space left on device")
+
+    recorder = recording(tmp_path)
+    with pytest.raises(ResultsError, match=r"deck\.log"):
+        close(recorder, checkpoint=lambda: checkpoint(10), write_log=write_log)
+    with open_results(tmp_path / "deck.h5") as results:
+        assert (results.status, len(results["time"])) == ("interrupted", 10)
+    close(Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True))
+    with open_results(tmp_path / "deck.h5") as results:
+        assert (results.status, len(results["time"])) == ("finished", 10)
+
+
+def test_a_missing_csv_is_written_again(tmp_path: Path) -> None:
+    recorder = recording(tmp_path)
+    close(recorder)
+    text = (tmp_path / "deck.csv").read_text()
+    model = recorder.system.model
+    assert completed(model, tmp_path, print) is None
+    (tmp_path / "deck.csv").unlink()
+    # of another model's results nothing is made
+    assert completed(model, tmp_path, print) is None
+    with h5py.File(tmp_path / "deck.h5", "r+") as file:
+        file.attrs["model_sha256"] = model.sha256
+    results = completed(model, tmp_path, lambda line: None)
+    assert results is not None
+    results.close()
+    assert (tmp_path / "deck.csv").read_text() == text
+
+
+@pytest.mark.parametrize("flushed", [0, 5])
+def test_what_fits_on_a_full_disk_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flushed: int
+) -> None:
+    system = fake_system(tmp_path / "deck")
+    recorder = Recorder(system, SETTINGS, tmp_path)
+    if flushed:
+        add_rows(system, 0, flushed)
+        recorder.take()
+        recorder.flush(checkpoint(flushed))
+    add_rows(system, flushed, 60 - flushed)
+    recorder.take()
+    size = sum(table.nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    monkeypatch.setattr(PartFile, "room", lambda part: (1 << 18) + int(0.7 * size))
+    with pytest.raises(ResultsError, match=r"no space left on device; rows up to time \d"):
+        close(recorder)
+    with open_results(tmp_path / "deck.h5") as results:
+        n = len(results["time"])
+        assert flushed + 20 < n < 50
+        np.testing.assert_array_equal(results["bodies/2/position/x"], np.arange(n))
+        assert len(results["state/incident_offsets"]) == n + 1
+        assert len(results["state/incidents"]) == results["state/incident_offsets"][-1]
+        assert results.status == "failed"
+    assert not list(tmp_path.glob(".deck*"))
+
+
+def test_only_what_was_asked_is_recorded(tmp_path: Path) -> None:
+    close(recording(tmp_path, asked=["bodies/*/position", "/contacts/301/force/x", "energy"]))
+    with open_results(tmp_path / "deck.h5") as results:
+        assert set(results.signals()) == {
+            *("time", "bodies/2/position", "contacts/301/force", "requests/7"),
+            *("energy/kinetic", "energy/potential", "energy/dissipated"),
+        }
+        assert "state/y" not in results
+        assert end_state(results) == {"2": {"position": [9.0, 0.0, 0.108]}}
+
+
+def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"--signals bodies/3/position: .* bodies/2/position"):
+        recording(tmp_path, asked=["bodies/3/position", "time"])
+    assert not (tmp_path / "deck.h5").exists()
+
+
+def test_files_with_a_dataset_a_body_stay_readable(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "old.h5", "w") as file:
+        file.attrs.update(mbsim_version="0.1.0", status="finished")
+        file["time"] = np.arange(3.0)
+        for id in (2, 10):
+            for name, width in (("position", 3), ("quaternion", 4)):
+                file[f"bodies/{id}/{name}"] = np.full((3, width), float(id))
+            for name in ("velocity", "angular_velocity"):
+                file[f"bodies/{id}/{name}"] = np.zeros((3, 3))
+            file[f"bodies/{id}"].attrs["label"] = f"ball {id}"
+        file["joints/5/force"] = np.ones((3, 3))
+        file["joints/5"].attrs["type"] = "REVOLUTE"
+        file["contacts/301/peak_force"] = 7.0
+    with open_results(tmp_path / "old.h5") as results:
+        assert results.ids("bodies") == [2, 10]
+        assert results.label("bodies/10") == "ball 10"
+        assert results.attribute("joints/5", "type") == "REVOLUTE"
+        assert results["contacts/301/peak_force"] == 7.0
+        np.testing.assert_array_equal(results["bodies/10/position/z"], [10, 10, 10])
+        assert results.find("bodies/*/position/x") == [
+            "bodies/2/position/x",
+            "bodies/10/position/x",
+        ]
+        assert end_state(results)["2"]["quaternion"] == [2.0] * 4
+
+
+def test_paths_by_id_and_whole_tables(tmp_path: Path) -> None:
+    close(recording(tmp_path))
+    with open_results(tmp_path / "deck.h5") as results:
+        assert results["bodies/position"].shape == (10, 1, 3)
+        np.testing.assert_array_equal(
+            results["bodies/position"][:, 0], results["bodies/2/position"]
+        )
+        np.testing.assert_array_equal(results["bodies/id"], [2])
+        assert results["contacts/penetration"].shape == (10, 1)
+        np.testing.assert_array_equal(
+            results["contacts/301/penetration"], results["contacts/penetration"][:, 0]
+        )
+        assert "bodies/id" not in results.keys()
+        assert "bodies/3/position" not in results
