@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Contacts, Hook, answer_of
 from mbsim.arrays.scene import (
     ANEW,
     AUDIT_EVERY,
@@ -57,14 +58,15 @@ from mbsim.arrays.scene import (
     WORST_OPEN,
     WORST_TIME,
 )
+from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
+from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
 from mbsim.dynamics.pipeline.output import fill_energy
-from mbsim.dynamics.pipeline.scales import fill_squares
 
 #: Rounding of a sum of energies or momenta, over the sum of their sizes.
 ROUNDING = 1e-13
@@ -108,7 +110,10 @@ def examine_energy(scene, t, y, steps, local):
     audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
     fill_energy(scene, y, energy)
     total = energy[0] + energy[1] + energy[2] - energy[3]
-    contact, none = hardest(scene), len(scene.contacts.id)
+    none = contact = len(scene.contacts.id)
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        contact = answer_of(scene, call_int(contacts, (scene, Contacts.HARDEST, t, 0.0, y, y)))
     if tally[ANEW] == 1.0:
         tally[CLOSED_AT] = total - tally[OPEN_BY]
         tally[POTENTIAL_FIRST], tally[DISSIPATED_FIRST] = energy[1], energy[2]
@@ -143,6 +148,24 @@ def examine_energy(scene, t, y, steps, local):
 
 
 @jitable
+def mark_touched(scene):
+    """Mark the groups of bodies that ground touches."""
+    sums, hit, graphics, nb = (
+        scene.audit.sums,
+        scene.work.hit,
+        scene.graphics,
+        len(scene.bodies.mass),
+    )
+    for k in range(hit[len(hit) - 1]):
+        gi, gj = sides(scene, hit[k])
+        bi, bj = graphics.body[gi], graphics.body[gj]
+        if bi == nb and bj < nb:
+            sums[scene.scales.group[bj], SPINS + 1] = 1.0
+        elif bj == nb and bi < nb:
+            sums[scene.scales.group[bi], SPINS + 1] = 1.0
+
+
+@jitable
 def examine_momentum(scene, t, y, steps, local):
     """Compare the momentum of groups that ground does not touch with what their weight gives."""
     audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
@@ -167,14 +190,9 @@ def examine_momentum(scene, t, y, steps, local):
             row[TURN + k] += turn[k]
         row[SPEEDS] += m * norm(u)
         row[SPINS] += m * norm(d) * norm(u) + norm(spin)
-    hit, graphics = scene.work.hit, scene.graphics
-    for k in range(hit[len(hit) - 1]):
-        gi, gj = sides(scene, hit[k])
-        bi, bj = graphics.body[gi], graphics.body[gj]
-        if bi == nb and bj < nb:
-            sums[scene.scales.group[bj], SPINS + 1] = 1.0
-        elif bj == nb and bi < nb:
-            sums[scene.scales.group[bi], SPINS + 1] = 1.0
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        answer_of(scene, call_int(contacts, (scene, Contacts.TOUCHED, t, 0.0, y, y)))
     dt, gravity = t - audit.tally[TIME_THEN], vector(scene.world.gravity)
     errors = local + steps * audit.plan[AUDIT_TOL]
     for g in range(len(sums)):
@@ -289,5 +307,7 @@ def examine(scene, t, h, y):
     examine_momentum(scene, t, y, steps, local)
     if tally[ANEW] == 0.0:
         examine_equations(scene, t)
-        examine_friction(scene, t)
+        if scene.world.hooks[Hook.CONTACTS] != 0:
+            contacts = scene.world.hooks[Hook.CONTACTS]
+            answer_of(scene, call_int(contacts, (scene, Contacts.CONE, t, h, y, y)))
     tally[HITS_THEN], tally[TIME_THEN], tally[ANEW] = hits, t, 0.0
