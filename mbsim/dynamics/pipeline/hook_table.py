@@ -63,6 +63,22 @@ def _no_entry(scene: Scene) -> Callable[..., Any]:
     raise ValueError("this hook has no compiled function")
 
 
+def _has_contacts(scene: Scene, method: Method) -> bool:
+    return len(scene.contacts.id) > 0
+
+
+def _contacts(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import serve_contacts
+
+    return serve_contacts
+
+
+def _gauges(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts
+
+    return gauge_contacts
+
+
 def _has_programs(scene: Scene, method: Method) -> bool:
     return len(scene.programs.start) > 1
 
@@ -263,6 +279,14 @@ def _requests(scene: Scene) -> Callable[..., Any]:
 TABLE = (
     # evaluation
     Row(
+        Hook.CONTACTS,
+        _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
+        _has_contacts,
+        _contacts,
+        "does what contacts are asked for: `Contacts`",
+        "an answer, or less a code",
+    ),
+    Row(
         Hook.FCL,
         _INT(_INT),  # how many pairs of `Work.fcl`
         _never,
@@ -364,6 +388,14 @@ TABLE = (
         "does the same in complex systems",
     ),
     # a step is taken
+    Row(
+        Hook.GAUGES,
+        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        _has_contacts,
+        _gauges,
+        "measures contacts: `Gauges`",
+        "the measure; a failure is noted",
+    ),
     Row(
         Hook.DRY,
         _KEEPS,
