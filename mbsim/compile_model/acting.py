@@ -15,6 +15,7 @@ from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
 from mbsim.compile_model.switching import switching_table
+from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model, Subroutine
 from mbsim.model.placement import place
 
@@ -27,20 +28,18 @@ if TYPE_CHECKING:
 def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
     """Return statement, XML statement, id, subroutine and number of results of all users'."""
     found = []
-    for force in model.scalar_forces.values():
-        if force.user is not None:
-            found.append(("SFORCE", "Force_Scalar_TwoBody", force.id, force.user, 1))
+    for kind in of_form(Expressed):
+        for force in model.table(kind.name).values():
+            if force.user is not None:
+                found.append((kind.name, kind.statement, force.id, force.user, 1))
     for variable in model.variables.values():
         if variable.user is not None:
             found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
-    for statement, xml, table in (
-        ("VECTORFORCE", "Force_Vector_TwoBody", model.vector_forces),
-        ("BODYFORCE", "Force_Vector_OneBody", model.body_forces),
-    ):
-        for vector in table.values():
+    for kind in of_form(Components):
+        for vector in model.table(kind.name).values():
             if vector.user is not None:
                 count = sum(expr is not None for expr in vector.exprs)
-                found.append((statement, xml, vector.id, vector.user, count))
+                found.append((kind.name, kind.statement, vector.id, vector.user, count))
     return found
 
 
@@ -154,7 +153,7 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
-        switching_table(model, programs, applied, modes),
+        switching_table(model, programs, applied_ids, modes),
         _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
         _values(model, programs, residuals),  # the last of all

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.arrays import scene as a
+from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model
 
 if TYPE_CHECKING:
@@ -109,10 +110,8 @@ def _load_subroutines(
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Load the users' subroutines of forces and variables."""
     elements = (
-        *model.scalar_forces.values(),
         *model.variables.values(),
-        *model.vector_forces.values(),
-        *model.body_forces.values(),
+        *(e for kind in of_form(Expressed, Components) for e in model.table(kind.name).values()),
     )
     if all(element.user is None for element in elements):
         return {}

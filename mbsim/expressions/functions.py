@@ -121,12 +121,8 @@ _put(Kind.FORCE, "FM TM FX FY FZ TX TY TZ", "marker marker marker", 1)
 _put(Kind.FORCE, "JOINT", "JOINT jflag comp marker", 3)
 _put(Kind.FORCE, "JPRIM", "JPRIM jflag comp marker", 3)
 _put(Kind.FORCE, "MOTION", "MOTION jflag comp marker", 3)
-_put(Kind.FORCE, "SFORCE", "SFORCE jflag comp marker", 3)
-_put(Kind.FORCE, "SPDP", "SPRINGDAMPER jflag comp marker", 3)
 for _name in FORCES:
-    if FORCES[_name].function:
-        _put(Kind.FORCE, FORCES[_name].function, f"{_name} jflag comp marker", 3)
-_put(Kind.FORCE, "VFORCE VTORQ GFORCE", "VECTORFORCE jflag comp marker", 3)
+    _put(Kind.FORCE, FORCES[_name].functions, f"{_name} jflag comp marker", 3)
 _put(Kind.VARIABLE, "VARVAL", "VARIABLE")
 _put(Kind.VARIABLE, "DIF1", "DIFF")
 _put(Kind.STATE, "DIF", "DIFF")

@@ -479,10 +479,11 @@ class Model:
     overrides: tuple[str, ...] = field(default=(), metadata=NO_RESULT)
 
     def table(self, name: str) -> Mapping[int, Any]:
-        """Return the elements of a field by id, or those of a kind of forces between markers."""
-        if name in FORCES:
+        """Return the elements of a field by id, or those of a kind of `forces.catalog`."""
+        field = FORCES[name].table if name in FORCES else name
+        if not field:
             return self.marker_forces.get(name, {})
-        found: dict[int, Any] = getattr(self, name)
+        found: dict[int, Any] = getattr(self, field)
         return found
 
     def changed(self, changes: tuple[Change, ...]) -> Model:

@@ -87,5 +87,5 @@ def _statement(kind: ForceKind) -> Statement:
 
 
 def marker_forces() -> list[Statement]:
-    """Return the XML statements of all kinds."""
-    return [_statement(FORCES[name]) for name in FORCES]
+    """Return the XML statements of all kinds that have no reader of their own."""
+    return [_statement(kind) for name in FORCES if not (kind := FORCES[name]).table]

@@ -7,7 +7,7 @@ the manual's table. `forces.catalog` says what each function takes and returns.
 from __future__ import annotations
 
 from mbsim.core.rotation import dot, scale
-from mbsim.forces.catalog import Bounds, Parameter, force
+from mbsim.forces.catalog import Bounds, Parameter, Wrench, force
 
 
 def _constants(values):
@@ -34,8 +34,5 @@ force(
     "Force_Tether",
     "tethers",
     Parameter("stiffness", None, positive=True),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
 )

@@ -301,7 +301,7 @@ def on_i(scene, applied, row):
 @jitable
 def floats(scene, applied, row):
     """Return whether a row's J marker is a floating one, which is wherever I is."""
-    return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
+    return applied == 1 and scene.applied.form[row] == VECTOR_FORCE
 
 
 @jitable

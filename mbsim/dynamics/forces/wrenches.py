@@ -1,6 +1,6 @@
-"""Marker and vector forces: force and torque at I's origin, the opposite there on J's body.
+"""Wrenches and vector forces: force and torque at I's origin, the opposite there on J's body.
 
-What a marker force is stands in `forces.catalog`. A vector force has no potential: its work counts
+What a wrench is stands in `forces.catalog`. A vector force has no potential: its work counts
 as lost, with the sign turned.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 from numba.extending import overload
 
 from mbsim.arrays.hooks import Hook
-from mbsim.arrays.scene import LOST_POWER, MARKER_FORCE, STORED_ENERGY
+from mbsim.arrays.scene import LOST_POWER, STORED_ENERGY, WRENCH
 from mbsim.core.address import call_int
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
@@ -153,7 +153,7 @@ def add_marker_force(scene, y, f):
     """Add a force of a kind of `forces.catalog`, as `add_vector_force`; return 0 or a code."""
     applied, out = scene.applied, scene.work.wrench
     fill_motion(scene, y, f)
-    code = call_int(applied.law[f], (scene.work.motion, applied.law_par[f], out))
+    code = call_int(applied.formula[f], (scene.work.motion, applied.par[f], out))
     if code != 0:
         return code
     j = applied.j[f]
@@ -183,6 +183,6 @@ def apply(scene, y, f, force, torque, stored, lost):
 @jitable
 def add_wrench(scene, t, y, f):
     """Add a vector force or a marker force; return 0 or a code."""
-    if scene.applied.kind[f] == MARKER_FORCE:
+    if scene.applied.form[f] == WRENCH:
         return add_marker_force(scene, y, f)
     return add_vector_force(scene, t, y, f)

@@ -165,6 +165,6 @@ def add_residual_slopes(scene, T, t, y, f):
 @jitable
 def add_all_residual_slopes(scene, T, t, y):
     """Add what all elements do; the slopes of states have been filled."""
-    for f in range(len(scene.applied.kind)):
-        if scene.applied.kind[f] == RESIDUAL:
+    for f in range(len(scene.applied.form)):
+        if scene.applied.form[f] == RESIDUAL:
             add_residual_slopes(scene, T, t, y, f)

@@ -7,7 +7,7 @@ here.
 
 from __future__ import annotations
 
-from mbsim.arrays.scene import MARKER_FORCE
+from mbsim.arrays.scene import WRENCH
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, scale, sub, vector
@@ -90,7 +90,7 @@ def add_marker_force_slopes(scene, T, y, f):
     P, L, nb, applied = T.pattern, T.linear, len(scene.bodies.mass), scene.applied
     j, both, table = applied.j[f], sides_of(scene, f), scene.work.slopes
     fill_motion(scene, y, f)
-    call_int(applied.slopes[f], (scene.work.motion, applied.law_par[f], table))
+    call_int(applied.slopes[f], (scene.work.motion, applied.par[f], table))
     fill_units(scene, T, y, f)
     K, D = table[:6], table[6:]
     for k in range(6):
@@ -113,6 +113,6 @@ def add_marker_force_slopes(scene, T, y, f):
 @jitable
 def add_marker_forces_slopes(scene, T, y):
     """Add all of them."""
-    for f in range(len(scene.applied.kind)):
-        if scene.applied.kind[f] == MARKER_FORCE:
+    for f in range(len(scene.applied.form)):
+        if scene.applied.form[f] == WRENCH:
             add_marker_force_slopes(scene, T, y, f)

@@ -6,7 +6,7 @@ from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
-from mbsim.dynamics.forces.dry_friction import serve_dry
+from mbsim.dynamics.forces.applied import serve_kept
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
@@ -33,7 +33,7 @@ def keep_with_dry(context, what, t, y):
     scene = view(context, Scene)
     a = vector_at(y, scene.rows.y.shape[1])
     note_failure(scene, keep_residuals(scene, what, t, a))
-    return serve_dry(scene, what, t, a)
+    return serve_kept(scene, what, t, a)
 
 
 def keep_with_rigid(context, what, t, y):

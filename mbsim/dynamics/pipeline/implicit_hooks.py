@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.arrays.hooks import Hook, failure_or
-from mbsim.arrays.scene import MARKER_FORCE, Scene
+from mbsim.arrays.scene import WRENCH, Scene
 from mbsim.compile_model.program_dependence import find_depends
 from mbsim.compile_model.tangent import Tangent, make_tangent
 from mbsim.core.address import pack, vector_at, view
@@ -139,12 +139,12 @@ def bend_and_drive(context, t, y):
 
 
 def _find_slopes(scene: Scene) -> None:
-    """Let marker forces have their slopes."""
+    """Let wrenches have their slopes."""
     from mbsim.forces.abi import slopes_address
 
     applied = scene.applied
-    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
-        applied.slopes[f] = slopes_address(int(applied.law[f]))
+    for f in np.flatnonzero(applied.form == WRENCH):
+        applied.slopes[f] = slopes_address(int(applied.formula[f]))
 
 
 def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:

@@ -79,7 +79,7 @@ def fill_energy(scene, y, row):
         dissipated -= scene.work.slot[hit[k], HELD]
     for c in range(len(scene.contacts.id)):
         dissipated += y[len(y) - len(scene.contacts.id) + c]
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         potential += scene.work.applied[f, STORED_ENERGY]
     work, damped = scene.world.accumulators[0], scene.world.accumulators[1]
     if damped >= 0:
@@ -175,7 +175,7 @@ def write_row(scene, t, h, y, f):
     if scene.world.hooks[Hook.JOINTS] != 0:
         reacts = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.REACT, t, y, f))
         note_failure(scene, reacts)
-    for j in range(len(scene.applied.kind)):
+    for j in range(len(scene.applied.form)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
     for j in range(len(work.reaction)):

@@ -14,6 +14,7 @@ import math
 
 from mbsim.arrays.hooks import Dry, Held, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import (
+    AXIS_TORQUE,
     HELD_OTHERWISE,
     SLIDER,
     SLIDER_BEFORE,
@@ -24,17 +25,59 @@ from mbsim.arrays.scene import (
 )
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.forces.dry_friction import (
-    AT_REST,
-    STATIC,
-    commit_dry,
-    dry_motion,
-    holding_force,
-    record_dry,
-    rest_of,
-    side_of_dry,
-)
-from mbsim.laws.dry import rigid_mode
+from mbsim.dynamics.bodies.markers import marker_axis
+from mbsim.dynamics.forces.applied import commit_kept, displacement, record_mode
+from mbsim.forces.kinds.dry_friction import STATIC, rigid_mode
+
+#: Part of the model's speed that is rounding.
+ROUNDING = 1e-13
+#: What something else holds counts as at rest below so many times that: assembly leaves it.
+AT_REST = 1e4
+
+
+@jitable
+def rest_of(scene, f):
+    """Return what is no velocity of rigid friction f but rounding."""
+    scale = scene.world.scale
+    return ROUNDING * (scale[1] / scale[0] if scene.applied.form[f] == AXIS_TORQUE else scale[1])
+
+
+@jitable
+def holding_force(scene, f):
+    """Return the force against x that holds rigid friction f, no number where it need not."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        if active[r] == scene.applied.equation[f]:
+            return -scene.sweep.multiplier[r]
+    return math.nan
+
+
+@jitable
+def show_sticking(scene):
+    """Fill `Work.applied` of rigid frictions that are held; multipliers have been found."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        f = scene.equations.dry[active[r]]
+        if f < 0:
+            continue
+        n, row = marker_axis(scene, scene.applied.axes[f], 2), scene.work.applied[f]
+        first = 3 if scene.applied.form[f] == AXIS_TORQUE else 0
+        for k in range(3):
+            row[first + k] = scene.sweep.multiplier[r] * n[k]
+
+
+@jitable
+def side_of_rigid(scene, y, f):
+    """Return what rigid friction f does from here on: 0 to stick, or the sign of its slip."""
+    par, kept = scene.applied.par[f], scene.state.dry[f]
+    _, _, rate = displacement(scene, y, f)
+    if math.isnan(kept[SLIDER]):
+        return 0.0
+    force, rest = holding_force(scene, f), rest_of(scene, f)
+    if kept[SLIDES] == 0.0 and math.isnan(force):
+        # joints or motions hold it, or move it
+        return math.copysign(1.0, rate) if abs(rate) > AT_REST * rest else 0.0
+    return rigid_mode(force, rate, kept[SLIDES], par[STATIC], rest)
 
 
 @jitable
@@ -46,10 +89,10 @@ def begin_or_go_on(scene, y, f):
     kept = scene.state.dry[f]
     begins = math.isnan(kept[SLIDER])
     if begins:
-        _, _, rate = dry_motion(scene, y, f)
+        _, _, rate = displacement(scene, y, f)
         slides = math.copysign(1.0, rate) if abs(rate) > AT_REST * rest_of(scene, f) else 0.0
     else:
-        slides = side_of_dry(scene, y, f)
+        slides = side_of_rigid(scene, y, f)
     changed = begins or slides != kept[SLIDES]
     kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
     kept[SLIDER], kept[SLIDES] = 0.0, slides
@@ -81,7 +124,7 @@ def hold_sticking(scene, t, y):
 def release(scene):
     """Let slide what has just come to rest and needs more than the limit; return how many."""
     count = 0
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0 or kept[SLIDES] != 0.0:
             continue
@@ -98,7 +141,7 @@ def release(scene):
 def commit_rigid(scene, t, y):
     """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
     changed = ask_contacts(scene, Held.BEGIN, t, y) == 1
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
@@ -113,7 +156,7 @@ def commit_rigid(scene, t, y):
         code = hold_sticking(scene, t, y)
     note_failure(scene, code)
     ask_contacts(scene, Held.RECORD, t, y)
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
             continue
@@ -121,7 +164,7 @@ def commit_rigid(scene, t, y):
             # rows at the start show what holds from there on
             kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
         elif kept[SLIDES] != kept[SLIDES_BEFORE]:
-            record_dry(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
+            record_mode(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
     return HELD_OTHERWISE
 
 
@@ -132,7 +175,7 @@ def hold_again(scene, t, y):
     if contacts == 1:
         ask_joints(scene, Joints.CHOOSE, t, y)
         return
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0 and kept[f, SLIDES] != kept[f, SLIDES_BEFORE]:
             ask_joints(scene, Joints.CHOOSE, t, y)
             return
@@ -142,7 +185,7 @@ def hold_again(scene, t, y):
 def serve_rigid(scene, what, t, y):
     """Do what dry friction is asked for (`Dry`); return 0, HELD_OTHERWISE, or less a code."""
     if what == Dry.KEEP:
-        commit_dry(scene, t, y)
+        commit_kept(scene, t, y)
         return commit_rigid(scene, t, y)
     hold_again(scene, t, y)
     return 0

@@ -26,7 +26,7 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, Wrench, force
 from mbsim.forces.turning import turned_back
 
 _PRELOAD = tuple(f"preload_{axis}" for axis in ("x", "y", "z", "tx", "ty", "tz"))
@@ -160,12 +160,9 @@ force(
     Parameter("cratio"),
     Parameter("cmatrix", (), signed=True, count=21),
     *(Parameter(name, signed=True) for name in _PRELOAD),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
     check=_check,
-    function="BEAM",
+    functions="BEAM",
     adams=Adams(
         "BEAM",
         {

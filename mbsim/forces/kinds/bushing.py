@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, Wrench, force
 from mbsim.forces.turning import turned_back, turning_torque
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -95,12 +95,9 @@ force(
     "bushings",
     *(Parameter(name) for name in (*_STIFFNESS, *_DAMPING)),
     *(Parameter(name, signed=True) for name in _PRELOAD),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
     check=_check,
-    function="BUSH",
+    functions="BUSH",
     adams=Adams(
         "BUSHING",
         {

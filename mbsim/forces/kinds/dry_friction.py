@@ -1,7 +1,9 @@
-"""Dry friction of Force_DryFriction: a spring in series with a slider, or rigid.
+"""Force_DryFriction (ours; Muscade's DryFriction): a slider, with a spring in series.
 
-x is the displacement, u where the slider is, k the stiffness, F the force at which it slides on and
-F_s that at which it begins to (F unless given):
+`type` TX, TY, TZ: x is along that axis of J [L], and both bodies are pushed at I's origin; RX, RY,
+RZ: the angle about it [rad]. `friction` is the force or torque F of slip, `friction_static` the one
+F_s that begins it (F unless given), and `dx` what the spring gives until it reaches `friction`: its
+stiffness k is friction/dx. With u where the slider is,
 
     stick    f = k (x - u)                  while abs(f) <= F_s
     slip     f = F sign, u = x - f/k        while x goes on the way of the sign
@@ -12,13 +14,21 @@ the return mapping of the step: f = k (x - u), at most the limit, and at its end
 (J. C. Simo, T. J. R. Hughes, Computational Inelasticity, 1998, ch. 1). That is the friction of the
 seed, P. Maincon's DryFriction of Muscade, but for the rule by which f goes on within a step: a
 rate x' = f'/k by the integrator's own formula rings, and need not converge.
+
+dx = 0 is rigid friction, with 0 for k: here is what it does in slip; what sticks is held by an
+equation of velocity 0, its multiplier the force (`dynamics.stiction.rigid_friction`).
 """
 
 from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import AXIS_FORCE_AT_I, AXIS_TORQUE
 from mbsim.core.jitable import jitable
+from mbsim.forces.catalog import Acts, Switched, force
+
+# constants
+STIFFNESS, LIMIT, STATIC = range(3)
 
 
 @jitable
@@ -102,3 +112,58 @@ def dry_commit(x, rate, slider, slides, k, limit, static, frozen):
     elif gives == 0.0:
         return slider, mode, force
     return x - force / k, mode, force
+
+
+def _acts(values) -> Acts:
+    turns, axis = values["type"][0] == "R", "XYZ".index(values["type"][1])
+    return Acts(AXIS_TORQUE, axis, turns=True) if turns else Acts(AXIS_FORCE_AT_I, axis)
+
+
+def _constants(values):
+    """Return stiffness, 0 where it is infinite, and the forces of slip and of its begin."""
+    friction, dx, static = values["friction"], values["dx"], values["friction_static"]
+    return friction / dx if dx > 0.0 else 0.0, friction, friction if static is None else static
+
+
+@jitable
+def _against(x, par, kept):
+    """Return f against x, and 1 where it gives way to x."""
+    if par[STIFFNESS] == 0.0:
+        return kept.mode * par[LIMIT], 1.0
+    return dry_force(
+        x, kept.slider, kept.mode, par[STIFFNESS], par[LIMIT], par[STATIC], kept.frozen
+    )
+
+
+def _force(x, rate, par, kept, law):
+    size, gives = _against(x, par, kept)
+    k = par[STIFFNESS]
+    return -size, 0.5 * size * size / k if k > 0.0 else 0.0, gives * size * rate
+
+
+def _slopes(x, rate, par, kept, law):
+    _, gives = _against(x, par, kept)
+    return -par[STIFFNESS] if gives == 0.0 else 0.0, 0.0
+
+
+def _side(x, rate, par, kept, law):
+    k, limit, static = par[STIFFNESS], par[LIMIT], par[STATIC]
+    return dry_mode(x, rate, kept.slider, kept.mode, k, limit, static, 1)
+
+
+def _commit(x, rate, par, kept):
+    """Return slider, mode, and what the spring loses as it snaps from the force that slid first."""
+    k, limit, static = par[STIFFNESS], par[LIMIT], par[STATIC]
+    stored, _ = dry_force(x, kept.slider, kept.mode, k, limit, static, kept.frozen)
+    slider, mode, force = dry_commit(x, rate, kept.slider, kept.mode, k, limit, static, kept.frozen)
+    return slider, mode, 0.5 * (stored * stored - force * force) / k
+
+
+force(
+    "DRYFRICTION",
+    "Force_DryFriction",
+    "dry_frictions",
+    form=Switched(_acts, _constants, _force, _side, _slopes, _commit),
+    title="dry friction",
+    table="dry_frictions",
+)

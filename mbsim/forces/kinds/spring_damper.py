@@ -1,0 +1,51 @@
+"""Force_SpringDamper, Adams' SPRINGDAMPER: a linear spring and damper along a line or about z.
+
+    F = preload - k (x - length) - c x'
+
+`type` TRANSLATIONAL: x [L] is the distance of the markers, F > 0 pushes them apart; ROTATIONAL:
+x [rad] is the angle of I about J's z, whole turns counted, and F the torque on I about it. Stored:
+k (x - length)^2 / 2 - preload (x - length); lost: c x'^2.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.codes import AXIS_TORQUE, LINE_FORCE
+from mbsim.forces.catalog import Acts, Adams, Bounds, Scalar, force
+
+
+def _acts(values) -> Acts:
+    turns = values["type"] == "ROTATIONAL"
+    return Acts(AXIS_TORQUE, turns=True) if turns else Acts(LINE_FORCE)
+
+
+def _constants(values):
+    """Return stiffness, damping, length, preload."""
+    return tuple(values[name] for name in ("stiffness", "damping", "length", "preload"))
+
+
+def _force(x, rate, par):
+    stretch = x - par[2]
+    spring = par[3] - par[0] * stretch
+    stored = stretch * (0.5 * par[0] * stretch - par[3])
+    return spring - par[1] * rate, stored, par[1] * rate * rate
+
+
+def _slopes(x, rate, par):
+    return -par[0], -par[1]
+
+
+def _bounds(par) -> Bounds:
+    return Bounds(par[0], 0.0, par[1], 0.0, force=par[3], rest=(par[2], 0.0, 0.0))
+
+
+force(
+    "SPRINGDAMPER",
+    "Force_SpringDamper",
+    "springs",
+    form=Scalar(_acts, _constants, _force, _slopes, _bounds),
+    title="spring",
+    functions="SPDP",
+    adams=Adams("SPRINGDAMPER"),
+    table="spring_dampers",
+    changes="stiffness damping length preload",
+)
