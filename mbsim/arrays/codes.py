@@ -45,6 +45,10 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 BOUNDS = 8
 
+# columns of `Applied.par` of what slides (`Applied.keeps`): stiffness, 0 where it is rigid; the
+# force of slip, and the one that begins it
+SLIDER_STIFFNESS, SLIDER_LIMIT, SLIDER_STATIC = range(3)
+
 # second column of `Applied.late`: components 0 to 5 of a vector force, then
 SCALAR, JOINT_FRICTION = 6, 7
 

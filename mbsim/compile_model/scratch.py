@@ -29,7 +29,7 @@ class Sizes:
     forces: int
     late: int  # forces that depend on reactions
     sensors: int
-    dry_frictions: int
+    sliders: int  # forces that remember
     switching: int  # programs with branches
     values: int  # columns of requests
     memory: int  # most numbers that a law of a contact remembers
@@ -46,7 +46,7 @@ def start_state(
     """Return the incident table before anything touched."""
     nb, ng, ns, memory = n.bodies, len(graphics.body), n.slots, n.memory
     dry = np.zeros((n.forces, 4))
-    # dry friction begins without force where the first committed state is
+    # what slides begins without force where the first committed state is
     dry[:, [a.SLIDER, a.SLIDER_BEFORE]] = np.nan
     sensed = np.zeros((n.sensors, 5))
     sensed[:, a.EXCESS] = np.nan
@@ -157,7 +157,7 @@ def scratch(n: Sizes, graphics: a.Graphics) -> a.Work:
 def empty_rows(n: Sizes) -> a.Rows:
     """Return the tables in which compiled code leaves its output rows."""
     ns = n.slots
-    events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.dry_frictions
+    events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.sliders
     return a.Rows(
         time=np.zeros(ROWS),
         y=np.zeros((ROWS, n.y)),

@@ -28,7 +28,7 @@ from mbsim.compile_model.instructions import ELEMENT, NET, USER, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.expressions.elementary import NUMBER
 from mbsim.expressions.tree import Call, Expression, Node, Number
-from mbsim.forces.catalog import FORCES, Components, Expressed, Switched, of_form
+from mbsim.forces.catalog import FORCES, Components, Expressed, Switched, memories, of_form
 from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.model.elements import Model
 
@@ -129,7 +129,7 @@ def _acting(model: Model) -> Iterator[Expression]:
 
 def has_modes(model: Model) -> bool:
     """Return whether some friction is one that sticks or slips."""
-    if any(model.table(kind.name) for kind in of_form(Switched) if kind.form.commit is not None):
+    if any(model.table(kind.name) for kind in memories()):
         return True
     laws = [contact.cff_type for contact in model.contacts.values()]
     return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)

@@ -2,7 +2,7 @@
 
 Scalar   int64 f(int64 what, double x, double rate, const double *par, const double kept[3],
                  int64 law, const double *law_par, double *law_out, double *out)
-         `what` is a `catalog.Asked`. FORCE: force, stored energy, lost power, dF/dx and dF/dx',
+         `what` is a `formula.Asked`. FORCE: force, stored energy, lost power, dF/dx and dF/dx',
          which are no numbers of kinds without slopes; SIDE: on which side of its switches it is;
          COMMIT: slider, mode, energy lost
 Wrench   int64 f(const double motion[12], const double *par, double out[8])
@@ -10,7 +10,7 @@ Wrench   int64 f(const double motion[12], const double *par, double out[8])
 Slopes   int64 f(const double motion[12], const double *par, double out[12][6])
          out: K and D, see `forces.catalog`
 
-`motion` is a `catalog.Motion`: d, theta, v, w; `kept` a `catalog.Kept`; `law` the address of a
+`motion` is a `formula.Motion`: d, theta, v, w; `kept` a `formula.Kept`; `law` the address of a
 normal law, or 0. The result is 0. Numbers that are not finite are found by the caller.
 """
 
@@ -27,7 +27,8 @@ from numba.extending import overload
 from mbsim.core import jit
 from mbsim.core.address import call_int, table_at, vector_at
 from mbsim.core.jitable import jitable
-from mbsim.forces.catalog import FORCES, Asked, Kept, Motion, Switched, Wrench, ask
+from mbsim.forces.catalog import FORCES, Switched, Wrench
+from mbsim.forces.formula import Asked, Kept, Motion, ask
 
 _POINTER = types.CPointer(types.float64)
 SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER)

@@ -11,12 +11,12 @@ stored energy and lost power, F x' + the rate of what is stored + what is lost b
 ``slopes(x, rate, par)`` dF/dx and dF/dx'. A switched one keeps to a branch within a step, or has
 one for each side of its switches: ``force(x, rate, par, kept, law)``, ``slopes`` and ``side`` of
 the same, which returns a number that differs where the branch does, so that steps end there.
-`kept` is what the force remembers (`Kept`), and ``commit(x, rate, par, kept)`` returns slider and
-mode that hold behind an accepted step, and the energy that is lost there at once. `law` is the
-normal law of an element that has one, for `ask`.
+`kept` is what the force remembers (`formula.Kept`), and ``commit(x, rate, par, kept)`` returns
+slider and mode that hold behind an accepted step, and the energy that is lost there at once. `law`
+is the normal law of an element that has one, for `formula.ask`.
 
 `Wrench`: force and torque on I by how I stands and moves as seen from J. ``wrench(motion, par)``,
-with `motion` a `Motion`, returns
+with `motion` a `formula.Motion`, returns
 
     force [F], torque [F L] on I's body at I's origin, along J's axes; stored energy; lost power
 
@@ -43,39 +43,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple
 
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
+from mbsim.forces.formula import Vector
 
-Vector = tuple[float, float, float]
 Values = Mapping[str, Any]
-
-
-class Motion(NamedTuple):
-    """How marker I stands and moves as seen from marker J, along J's axes."""
-
-    d: Vector  # I's origin from J's [L]
-    theta: Vector  # rotation vector that turns J's axes into I's [rad], its length at most pi
-    v: Vector  # velocity of I's origin against J's body there [L/T]
-    w: Vector  # spin of I's body against J's [rad/T]
-
-
-class Asked(IntEnum):
-    """What the formula of a scalar force is asked for."""
-
-    FORCE = 0
-    SIDE = 1
-    COMMIT = 2
-
-
-class Kept(NamedTuple):
-    """What a switched force remembers."""
-
-    slider: float  # no number before the first step
-    mode: float  # 0, or the sign of what slides
-    frozen: float  # 1 where it keeps its mode within a step
 
 
 class Acts(NamedTuple):
@@ -87,14 +61,16 @@ class Acts(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """An attribute of the statement: a number, or `count` of them."""
+    """An attribute of the statement: a number, `count` of them, or one of `words`."""
 
     name: str
-    default: Any = 0.0  # None: it must be given
+    default: Any = 0.0  # None: it must be given, unless it is optional
     positive: bool = False  # else it may be 0 as well
     signed: bool = False  # else it may not be negative
     count: int = 1
     alias: str = ""
+    words: tuple[str, ...] = ()
+    optional: bool = False  # it is None where the deck does not give it
 
 
 class Adams(NamedTuple):
@@ -133,6 +109,10 @@ class Form:
 
     #: Fields that are called from compiled code.
     COMPILED: ClassVar[tuple[str, ...]] = ()
+
+    def is_rigid(self, values: Values) -> bool:
+        """Return whether an element of these values is held by an equation while it sticks."""
+        return False
 
 
 @dataclass(frozen=True)
@@ -194,7 +174,13 @@ class Switched(Form):
     slopes: Callable[..., Any] | None = None
     commit: Callable[..., Any] | None = None
     law: str = ""  # attribute that names its normal law
+    #: Attribute that is 0 where the force is rigid: what sticks is held by an equation.
+    rigid_by: str = ""
     bounds: None = None
+
+    def is_rigid(self, values: Values) -> bool:
+        """Return whether `rigid_by` is 0."""
+        return self.rigid_by != "" and values[self.rigid_by] == 0.0
 
     COMPILED = ("force", "side", "slopes", "commit")
 
@@ -222,6 +208,7 @@ class ForceKind(NamedTuple):
     table: str
     spellings: str
     changes: tuple[str, ...]
+    refused: Mapping[str, str]
 
 
 FORCES: Registry[ForceKind] = Registry(
@@ -234,13 +221,10 @@ def of_form(*forms: type[Form]) -> list[ForceKind]:
     return [kind for name in FORCES if isinstance((kind := FORCES[name]).form, forms)]
 
 
-def ask(law: Any, depth: float, rate: float) -> tuple[float, float, float]:
-    """Return what a normal law makes of depth and its rate: force, that at rate 0, stored energy.
-
-    Compiled code has its own form of this: `forces.abi`.
-    """
-    force, elastic, stored = law(depth, rate)
-    return force, elastic, stored
+def memories() -> list[ForceKind]:
+    """Return the kinds that remember something from step to step."""
+    kinds = [FORCES[name] for name in FORCES]
+    return [kind for kind in kinds if isinstance(kind.form, Switched) and kind.form.commit]
 
 
 def _nothing_wrong(values: Values) -> Iterable[Finding]:
@@ -260,6 +244,7 @@ def force(
     table: str = "",
     spellings: str = "",
     changes: str = "",
+    refused: Mapping[str, str] | None = None,
 ) -> None:
     """Register a kind of forces; all of these are its own words, so there are many.
 
@@ -288,6 +273,8 @@ def force(
         What requests may call it beside its name and its statement.
     changes : str, optional
         Attributes that may change between simulations.
+    refused : mapping, optional
+        Attributes that decks of others have and that are not taken, each with the reason.
     """
     for each in fields(form):
         if each.name in form.COMPILED and getattr(form, each.name) is not None:
@@ -305,5 +292,6 @@ def force(
         table,
         spellings,
         tuple(changes.split()),
+        refused or {},
     )
     FORCES.put(name, made)

@@ -23,7 +23,7 @@ _ELASTIC = "i_elastic_modulus j_elastic_modulus i_poisson_ratio j_poisson_ratio 
 #: Statement, the table of its elements, and what of them may change between simulations.
 CHANGEABLE = {
     **{
-        kind.statement: (kind.table, " ".join(kind.changes))
+        kind.statement: (kind.table or name, " ".join(kind.changes))
         for name in FORCES
         if (kind := FORCES[name]).changes
     },
@@ -60,11 +60,14 @@ def change(statement: Statement, node: Node, draft: Draft) -> None:
     kept = [a for a in before.attributes if fold(names.get(fold(a.name), a.name)) not in new]
     merged = replace(before, line=node.line, attributes=[*kept, *node.attributes])
     # warnings and notes of what did not change have been said
-    empty: dict[str, Any] = {table: {}}
+    of_kind = table in FORCES and not FORCES[table].table
+    empty: dict[str, Any] = {"marker_forces" if of_kind else table: {}}
     scratch = replace(draft, **empty, in_command=False, broken=set(), warnings=[], note_lines={})
     statement.read(merged, scratch)
     complete_motions(scratch)
-    elements: dict[int, Any] = getattr(scratch, table)
+    elements: dict[int, Any] = (
+        scratch.marker_forces.get(table, {}) if of_kind else getattr(scratch, table)
+    )
     for element in elements.values():
         draft.nodes[statement.name, key] = merged
         said = " ".join(f'{a.name}="{a.value}"' for a in node.attributes if fold(a.name) != "id")

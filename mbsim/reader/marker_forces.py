@@ -8,6 +8,7 @@ from typing import Any
 
 from mbsim.forces.catalog import FORCES, ForceKind, Parameter
 from mbsim.model import elements as el
+from mbsim.reader.keywords import spellings
 from mbsim.reader.kinds import (
     ID,
     NOT_NEGATIVE,
@@ -16,12 +17,15 @@ from mbsim.reader.kinds import (
     REALS,
     BadValueError,
     Kind,
+    keyword,
 )
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 
 def kind_of(parameter: Parameter) -> Kind:
-    """Return what one number of an attribute may be."""
+    """Return what an attribute may be, or one number of it."""
+    if parameter.words:
+        return keyword(spellings(**dict.fromkeys(parameter.words, "")))
     if parameter.signed:
         return REAL
     return POSITIVE if parameter.positive else NOT_NEGATIVE
@@ -51,7 +55,8 @@ def add_force(
 
     Attributes that must be given and are not have the value None, and their fault already.
     """
-    if None not in values.values():
+    needed = [each.name for each in kind.parameters if not each.optional]
+    if all(values[name] is not None for name in needed):
         for finding in kind.check(values):
             say = entry.warn if finding.warns else entry.fault
             say(finding.message, words.get(finding.attribute, finding.attribute))
@@ -82,7 +87,9 @@ def _statement(kind: ForceKind) -> Statement:
     }
     for each in kind.parameters:
         found = Spec(kind_of(each) if each.count == 1 else _several(each.count), alias=each.alias)
-        attributes[each.name] = replace(found, required=each.default is None)
+        needed = each.default is None and not each.optional
+        attributes[each.name] = replace(found, required=needed)
+    attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
     return Statement(kind.statement, attributes, build)
 
 

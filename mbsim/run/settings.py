@@ -243,7 +243,7 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         For an explicit method: it has no unknown for the force that holds.
     """
     contact = next((c for c in model.contacts.values() if c.rigid), None)
-    dry = next((f for f in model.dry_frictions.values() if f.dx == 0.0), None)
+    dry = next(iter(model.rigid_forces()), None)
     if (contact is None and dry is None) or method in IMPLICIT_METHODS:
         return method, []
     if contact is not None:
@@ -251,8 +251,10 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         said, instead = "tangential_stiffness=INFINITE", "a stiffness"
     else:
         assert dry is not None
-        source, name = dry.source, element_name(model.file, "Force_DryFriction", dry.id)
-        said, instead = "dx=0", "dx"
+        kind, force = dry
+        source, name = force.source, element_name(model.file, kind.statement, force.id)
+        instead = kind.form.rigid_by  # type: ignore[attr-defined]
+        said = f"{instead}=0"
     if method == AUTO:
         return IMPLICIT, [f"integrator AUTO: {IMPLICIT} from the start, for {name} is rigid"]
     raise ModelError(

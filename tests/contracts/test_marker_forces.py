@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import mbsim
 from mbsim.arrays import scene
-from mbsim.forces.catalog import FORCES, Motion, Wrench, of_form
+from mbsim.forces.catalog import FORCES, Wrench, of_form
+from mbsim.forces.formula import Motion
 
 #: Half of the difference of displacements and velocities, and rounding over it.
 STEP = 1e-5
@@ -154,3 +155,17 @@ def test_the_numbers_of_forms_have_no_order():
     ordered = re.compile(rf"[<>]=?\s*(a\.)?({names})\b|\b({names})\s*([<>+\-%]|\.\.)")
     for file in Path(mbsim.__file__).parent.rglob("*.py"):
         assert not ordered.search(file.read_text(encoding="utf-8")), file
+
+
+def test_what_is_no_force_knows_no_kind_by_name():
+    """Outside their files kinds are found in the registry: none is named where they act."""
+    names = "|".join([*FORCES, *(FORCES[name].statement for name in FORCES)])
+    known = re.compile(rf"[\"'](applied/)?({names})[\"']")
+    package = Path(mbsim.__file__).parent
+    found = [
+        f"{file.relative_to(package)}: {match.group()}"
+        for folder in ("arrays", "compile_model", "dynamics", "results", "run")
+        for file in (package / folder).rglob("*.py")
+        for match in known.finditer(file.read_text(encoding="utf-8"))
+    ]
+    assert not found

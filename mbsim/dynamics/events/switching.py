@@ -10,7 +10,15 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.hooks import Held, Hook, answer_of, failure_or, note_failure
-from mbsim.arrays.scene import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDES, Scene
+from mbsim.arrays.scene import (
+    AUDIT_TOL,
+    CHATTERING,
+    CHATTERS,
+    SIDE,
+    SLIDER_STATIC,
+    SLIDES,
+    Scene,
+)
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
@@ -39,7 +47,6 @@ from mbsim.dynamics.contact.forces import (
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import side_of
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
-from mbsim.forces.kinds.dry_friction import STATIC
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
 
@@ -163,7 +170,7 @@ def load(scene, context, t, y):
         if scene.applied.equation[f] >= 0:
             force = holding_force(scene, f)
             if not math.isnan(force):
-                most = max(most, abs(force) / scene.applied.par[f, STATIC])
+                most = max(most, abs(force) / scene.applied.par[f, SLIDER_STATIC])
     if scene.world.hooks[Hook.HELD] != 0:
         held = call_int(scene.world.hooks[Hook.HELD], (scene, Held.LOAD, t, y))
         most = max(most, 1e-6 * answer_of(scene, held))

@@ -47,7 +47,7 @@ from mbsim.dynamics.bodies.angles import followed_angle
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.wrenches import apply, velocity_at, wrench
-from mbsim.forces.catalog import Asked
+from mbsim.forces.formula import Asked
 
 
 @jitable

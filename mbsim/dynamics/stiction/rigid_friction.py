@@ -18,6 +18,7 @@ from mbsim.arrays.scene import (
     HELD_OTHERWISE,
     SLIDER,
     SLIDER_BEFORE,
+    SLIDER_STATIC,
     SLIDES,
     SLIDES_BEFORE,
     SLIP,
@@ -27,12 +28,33 @@ from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.markers import marker_axis
 from mbsim.dynamics.forces.applied import commit_kept, displacement, record_mode
-from mbsim.forces.kinds.dry_friction import STATIC, rigid_mode
 
 #: Part of the model's speed that is rounding.
 ROUNDING = 1e-13
 #: What something else holds counts as at rest below so many times that: assembly leaves it.
 AT_REST = 1e4
+
+
+@jitable
+def rigid_mode(force, rate, slides, static, rest):
+    """Return the mode that a point asks for where k is infinite.
+
+    Parameters
+    ----------
+    force : float
+        f that holds x' at 0; it counts in stick alone.
+    rate, slides, static : float
+        As of `dry_mode`.
+    rest : float
+        What x' may be the other way by rounding alone.
+
+    Returns
+    -------
+    float
+    """
+    if slides != 0.0:
+        return slides if slides * rate >= -rest else 0.0
+    return math.copysign(1.0, force) if abs(force) > static else 0.0
 
 
 @jitable
@@ -77,7 +99,7 @@ def side_of_rigid(scene, y, f):
     if kept[SLIDES] == 0.0 and math.isnan(force):
         # joints or motions hold it, or move it
         return math.copysign(1.0, rate) if abs(rate) > AT_REST * rest else 0.0
-    return rigid_mode(force, rate, kept[SLIDES], par[STATIC], rest)
+    return rigid_mode(force, rate, kept[SLIDES], par[SLIDER_STATIC], rest)
 
 
 @jitable
@@ -131,7 +153,7 @@ def release(scene):
         force = holding_force(scene, f)
         if math.isnan(force):
             continue
-        kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, STATIC], 0.0)
+        kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, SLIDER_STATIC], 0.0)
         if kept[SLIDES] != 0.0:
             count += 1
     return count

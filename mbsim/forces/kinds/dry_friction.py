@@ -22,13 +22,17 @@ equation of velocity 0, its multiplier the force (`dynamics.stiction.rigid_frict
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
-from mbsim.arrays.codes import AXIS_FORCE_AT_I, AXIS_TORQUE
+from mbsim.arrays.codes import (
+    AXIS_FORCE_AT_I,
+    AXIS_TORQUE,
+    SLIDER_LIMIT,
+    SLIDER_STATIC,
+    SLIDER_STIFFNESS,
+)
 from mbsim.core.jitable import jitable
-from mbsim.forces.catalog import Acts, Switched, force
-
-# constants
-STIFFNESS, LIMIT, STATIC = range(3)
+from mbsim.forces.catalog import Acts, Finding, Parameter, Switched, force
 
 
 @jitable
@@ -79,28 +83,6 @@ def dry_mode(x, rate, slider, slides, k, limit, static, frozen):
 
 
 @jitable
-def rigid_mode(force, rate, slides, static, rest):
-    """Return the mode that a point asks for where k is infinite.
-
-    Parameters
-    ----------
-    force : float
-        f that holds x' at 0; it counts in stick alone.
-    rate, slides, static : float
-        As of `dry_mode`.
-    rest : float
-        What x' may be the other way by rounding alone.
-
-    Returns
-    -------
-    float
-    """
-    if slides != 0.0:
-        return slides if slides * rate >= -rest else 0.0
-    return math.copysign(1.0, force) if abs(force) > static else 0.0
-
-
-@jitable
 def dry_commit(x, rate, slider, slides, k, limit, static, frozen):
     """Return slider, mode and the force that hold from here on; arguments as of `dry_mode`."""
     if math.isnan(slider):
@@ -119,6 +101,12 @@ def _acts(values) -> Acts:
     return Acts(AXIS_TORQUE, axis, turns=True) if turns else Acts(AXIS_FORCE_AT_I, axis)
 
 
+def _check(values) -> Iterator[Finding]:
+    friction, static = values["friction"], values["friction_static"]
+    if static is not None and static < friction:
+        yield Finding(f"must be a number >= friction ({friction:g})", "friction_static")
+
+
 def _constants(values):
     """Return stiffness, 0 where it is infinite, and the forces of slip and of its begin."""
     friction, dx, static = values["friction"], values["dx"], values["friction_static"]
@@ -128,32 +116,38 @@ def _constants(values):
 @jitable
 def _against(x, par, kept):
     """Return f against x, and 1 where it gives way to x."""
-    if par[STIFFNESS] == 0.0:
-        return kept.mode * par[LIMIT], 1.0
+    if par[SLIDER_STIFFNESS] == 0.0:
+        return kept.mode * par[SLIDER_LIMIT], 1.0
     return dry_force(
-        x, kept.slider, kept.mode, par[STIFFNESS], par[LIMIT], par[STATIC], kept.frozen
+        x,
+        kept.slider,
+        kept.mode,
+        par[SLIDER_STIFFNESS],
+        par[SLIDER_LIMIT],
+        par[SLIDER_STATIC],
+        kept.frozen,
     )
 
 
 def _force(x, rate, par, kept, law):
     size, gives = _against(x, par, kept)
-    k = par[STIFFNESS]
+    k = par[SLIDER_STIFFNESS]
     return -size, 0.5 * size * size / k if k > 0.0 else 0.0, gives * size * rate
 
 
 def _slopes(x, rate, par, kept, law):
     _, gives = _against(x, par, kept)
-    return -par[STIFFNESS] if gives == 0.0 else 0.0, 0.0
+    return -par[SLIDER_STIFFNESS] if gives == 0.0 else 0.0, 0.0
 
 
 def _side(x, rate, par, kept, law):
-    k, limit, static = par[STIFFNESS], par[LIMIT], par[STATIC]
+    k, limit, static = par[SLIDER_STIFFNESS], par[SLIDER_LIMIT], par[SLIDER_STATIC]
     return dry_mode(x, rate, kept.slider, kept.mode, k, limit, static, 1)
 
 
 def _commit(x, rate, par, kept):
     """Return slider, mode, and what the spring loses as it snaps from the force that slid first."""
-    k, limit, static = par[STIFFNESS], par[LIMIT], par[STATIC]
+    k, limit, static = par[SLIDER_STIFFNESS], par[SLIDER_LIMIT], par[SLIDER_STATIC]
     stored, _ = dry_force(x, kept.slider, kept.mode, k, limit, static, kept.frozen)
     slider, mode, force = dry_commit(x, rate, kept.slider, kept.mode, k, limit, static, kept.frozen)
     return slider, mode, 0.5 * (stored * stored - force * force) / k
@@ -163,7 +157,15 @@ force(
     "DRYFRICTION",
     "Force_DryFriction",
     "dry_frictions",
-    form=Switched(_acts, _constants, _force, _side, _slopes, _commit),
+    Parameter("type", None, words=("TX", "TY", "TZ", "RX", "RY", "RZ")),
+    Parameter("friction", None, positive=True),
+    Parameter("friction_static", None, positive=True, optional=True),
+    Parameter("dx"),
+    form=Switched(_acts, _constants, _force, _side, _slopes, _commit, rigid_by="dx"),
     title="dry friction",
-    table="dry_frictions",
+    check=_check,
+    refused={
+        "scale": "is Muscade's x'scale, by which it tells stick from slip; here the mode is "
+        "kept, and there is nothing to scale"
+    },
 )

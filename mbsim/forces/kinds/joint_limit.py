@@ -15,7 +15,8 @@ import math
 
 from mbsim.arrays.codes import AXIS_FORCE, AXIS_TORQUE
 from mbsim.core.jitable import jitable
-from mbsim.forces.catalog import Acts, Switched, ask, force
+from mbsim.forces.catalog import Acts, Switched, force
+from mbsim.forces.formula import ask
 
 
 def _acts(values) -> Acts:

@@ -9,13 +9,23 @@ k (x - length)^2 / 2 - preload (x - length); lost: c x'^2.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from mbsim.arrays.codes import AXIS_TORQUE, LINE_FORCE
-from mbsim.forces.catalog import Acts, Adams, Bounds, Scalar, force
+from mbsim.forces.catalog import Acts, Adams, Bounds, Finding, Parameter, Scalar, force
 
 
 def _acts(values) -> Acts:
     turns = values["type"] == "ROTATIONAL"
     return Acts(AXIS_TORQUE, turns=True) if turns else Acts(LINE_FORCE)
+
+
+def _check(values) -> Iterator[Finding]:
+    if values["stiffness"] == values["damping"] == values["preload"] == 0.0:
+        message = "stiffness, damping and preload are 0: the spring does nothing"
+        yield Finding(message, warns=True)
+    if values["type"] == "TRANSLATIONAL" and values["length"] < 0.0:
+        yield Finding("must be a number >= 0: it is a distance", "length")
 
 
 def _constants(values):
@@ -42,10 +52,15 @@ force(
     "SPRINGDAMPER",
     "Force_SpringDamper",
     "springs",
+    Parameter("type", None, words=("TRANSLATIONAL", "ROTATIONAL")),
+    Parameter("stiffness"),
+    Parameter("damping"),
+    Parameter("length", signed=True),
+    Parameter("preload", signed=True),
     form=Scalar(_acts, _constants, _force, _slopes, _bounds),
     title="spring",
+    check=_check,
     functions="SPDP",
     adams=Adams("SPRINGDAMPER"),
-    table="spring_dampers",
     changes="stiffness damping length preload",
 )
