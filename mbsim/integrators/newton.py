@@ -173,9 +173,13 @@ def is_good_enough(m: Method, size: float, rate: float) -> bool:
     """Return whether what a correction of `size` leaves is a small part of the step's error.
 
     Where corrections end in rounding, above what is asked for, no better linearisation or shorter
-    step makes them smaller.
+    step makes them smaller: one that is no smaller than half the one before is that.
     """
-    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * m.memory[TOL]
+    most = LEFT * m.memory[TOL]
+    if not size < HALF * m.memory[CORRECTION_BEFORE]:
+        # what is left is looked at besides (`OFF`)
+        return size <= most
+    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= most
 
 
 @jitable

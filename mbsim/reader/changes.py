@@ -46,7 +46,7 @@ def change(statement: Statement, node: Node, draft: Draft) -> None:
         draft.fault(node.line, label, message)
         return
     allowed = {fold(word): word for word in words.split()}
-    names = statement.spec_names()
+    names = statement.spec_names
     for attribute in node.attributes:
         name = fold(names.get(fold(attribute.name), attribute.name))
         if name not in allowed and name != "id":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 from collections.abc import Iterable
 
 from mbsim.forces.catalog import FORCES
@@ -10,6 +11,8 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.request_types import TYPES
 
 
+# names repeat: a deck of thousands of bodies has a few hundred
+@functools.lru_cache(maxsize=1 << 14)
 def fold(name: str) -> str:
     """Return `name` without case, `_` and outer blanks, the form in which names are compared."""
     return name.strip().replace("_", "").lower()

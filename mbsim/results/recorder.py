@@ -23,7 +23,13 @@ from mbsim.results.forces import check_requests
 from mbsim.results.going_on import MADE_OF, check_same, digest
 from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
-from mbsim.results.signals import facts_of, names_of, request_columns, signals
+from mbsim.results.signals import (
+    facts_of,
+    names_of,
+    request_columns,
+    signals,
+    without_rows,
+)
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch
 
@@ -110,7 +116,10 @@ class Recorder:
         self._store = Store(self._target, resume)
         self._store.update(
             values={} if resume else facts_of(system, self._asked),
-            attributes={"/": {**settings, "status": "running"}},
+            attributes={
+                "/": {**settings, "status": "running"},
+                **({} if resume else without_rows(system)),
+            },
             remove=["stats", "audit"],
         )
 

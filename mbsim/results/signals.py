@@ -60,6 +60,17 @@ def facts_of(system: System, asked: Asked) -> dict[str, Table]:
     return found
 
 
+def without_rows(system: System) -> dict[str, dict[str, str]]:
+    """Return label and type of elements that have no row, by group: they hold nothing."""
+    there = groups(system)
+    return {
+        name: found
+        for name, found in facts(system.model)
+        for group, _, id in [name.partition("/")]
+        if int(id) not in there.get(group, ())
+    }
+
+
 def names_of(system: System) -> list[str]:
     """Return the names of all signals that this model has."""
     stacked = groups(system)

@@ -169,7 +169,7 @@ class Store:
                 dataset.resize(count + len(rows), axis=0)
                 dataset[count:] = rows
             return
-        if self.target is None or rows.dtype.hasobject or not (growing or rows.size):
+        if not growing and (self.target is None or not rows.size):
             file.create_dataset(name, data=rows)
             return
         elements = tuple(max(1, size) for size in rows.shape[1:])
