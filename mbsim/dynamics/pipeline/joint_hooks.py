@@ -1,25 +1,137 @@
-"""The hook of joints; where the tree holds all of them there are no equations to compile."""
+"""What joints are asked for, behind one hook: accelerations, projection, reactions, assembly.
+
+Where the tree holds all of them there are no equations to compile.
+"""
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Joints
+from mbsim.arrays.codes import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
+from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import vector_at, view
+from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.dynamics.constraints.equations import MISMATCH, fill_matrix, hold, power_of_equations
+from mbsim.dynamics.constraints.folding import passes_fold
+from mbsim.dynamics.constraints.in_use import active_count
+from mbsim.dynamics.constraints.projection import (
+    displace,
+    prepare_equations,
+    project,
+    push,
+    speed_up,
+)
+from mbsim.dynamics.constraints.reactions import fill_reactions
+from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
-from mbsim.dynamics.pipeline.constraint_hooks import serve
+from mbsim.dynamics.stiction.rigid_friction import show_sticking
+
+
+@jitable
+def constrain(scene: Scene, t: float, y: F1, dy: F1) -> int:
+    """Replace the accelerations in y' by those that the constraints leave; return 0 or a code."""
+    prepare(scene, y)
+    hold(scene, t, y)
+    if scene.world.hooks[Hook.REACTION_FORCES] != 0:
+        # friction follows from reactions, and these from friction
+        code = call_int(scene.world.hooks[Hook.REACTION_FORCES], (scene, t, y, dy))
+        if code != 0:
+            return code
+    show_sticking(scene)
+    total = write_accelerations(scene, dy)
+    accumulators = scene.world.accumulators[0]
+    if accumulators >= 0:
+        passing = passes_fold(scene, t)
+        power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)
+        dy[accumulators] = power
+    return 0 if math.isfinite(total) else Code.NOT_FINITE
+
+
+@jitable
+def hold_all(scene: Scene, t: float, y: F1) -> None:
+    """Fill accelerations and multipliers as if nothing was released: reactions are those."""
+    quality = scene.sweep.quality
+    begins = quality[FOLD_BEGINS]
+    quality[FOLD_BEGINS] = math.inf
+    hold(scene, t, y)
+    quality[FOLD_BEGINS] = begins
+
+
+@jitable
+def return_to_equations(scene: Scene, t: float, y: F1) -> None:
+    """Bring y back onto what was released while a loop passed a fold; note how far off that was.
+
+    What was foreseen is off along the constraints as much as across them, which is seen here.
+    """
+    sweep, scales, quality, eq = scene.sweep, scene.scales, scene.sweep.quality, scene.equations
+    project(scene, t, y, 1)
+    quality[FOLD_OFF], worst = 0.0, 0.0
+    for p in range(len(scene.tree.body)):
+        g, D, r = scales.group[scene.tree.body[p]], sweep.answer[p], vector(sweep.arm[p])
+        shift = add((D[3], D[4], D[5]), cross((D[0], D[1], D[2]), r))
+        off = math.sqrt(dot(shift, shift) / scene.work.squares[g])
+        quality[FOLD_OFF] = max(quality[FOLD_OFF], off)
+    for k in range(active_count(scene)):
+        e = eq.active[k]
+        rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e]
+        if sweep.released[e] == 1 and rate >= worst:
+            worst, quality[FOLD_AT] = rate, e
+    prepare_equations(scene, t, y)
+    quality[NEAR_FOLD] = 1.0
+
+
+@jitable
+def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
+    """Do what joints are asked for (`Joints`); return 0 or a code."""
+    if what == Joints.ACCELERATE:
+        return constrain(scene, t, y, dy)
+    if what == Joints.PROJECT_TREE:
+        quality = scene.sweep.quality
+        drift, drifter = quality[DRIFT], quality[DRIFTER]
+        project(scene, t, y, 1)
+        quality[DRIFT], quality[DRIFTER] = drift, drifter
+    elif what == Joints.PROJECT or what == Joints.ALONG:
+        project(scene, t, y, 1 if what == Joints.PROJECT else 2)
+    elif what == Joints.REACT:
+        if passes_fold(scene, t):
+            hold_all(scene, t, y)
+        fill_reactions(scene, t, y)
+    elif what == Joints.KEEP:
+        code = keep_selection(scene, t, y)
+        if code == LEFT:
+            return_to_equations(scene, t, y)
+            return 0
+        return code
+    elif what == Joints.MATRIX:
+        use_all(scene, 0)
+        prepare_equations(scene, t, y)
+        fill_matrix(scene)
+        for e in range(active_count(scene)):
+            fill_size(scene, e)
+    elif what == Joints.CHOOSE:
+        prepare_equations(scene, t, y)
+        choose(scene, t, y)
+    elif what == Joints.DISPLACE:
+        push(scene)
+        displace(scene, y)
+        project_tree(scene, y)
+    elif what == Joints.SPEED_UP:
+        push(scene)
+        speed_up(scene, y)
+        carry_all(scene, y)
+    return 0
 
 
 @jitable
 def serve_tree_joints(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
-    """Do what `constraints.serve` does, for a scene without equations."""
+    """Do what `serve` does, for a scene without equations."""
     if what == Joints.ACCELERATE:
         prepare(scene, y)
         load(scene)
