@@ -251,7 +251,9 @@ def force(
     refused: Mapping[str, str] | None = None,
     about: str = "",
 ) -> None:
-    """Register a kind of forces; all of these are its own words, so there are many.
+    """Register a kind of forces.
+
+    Many arguments because all of these are the kind's own words.
 
     Parameters
     ----------

@@ -482,12 +482,8 @@ class Model:
 
     def rigid_forces(self) -> list[tuple[ForceKind, MarkerForce]]:
         """Return the applied forces that are held by an equation while they stick."""
-        return [
-            (kind, force)
-            for kind in memories()
-            for force in self.table(kind.name).values()
-            if kind.form.is_rigid(force.values)
-        ]
+        found = ((kind, force) for kind in memories() for force in self.table(kind.name).values())
+        return [(kind, force) for kind, force in found if kind.form.is_rigid(force.values)]
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""
