@@ -251,7 +251,7 @@ def force(
     refused: Mapping[str, str] | None = None,
     about: str = "",
 ) -> None:
-    """Register a kind of forces; all of these are its own words, so there are many.
+    """Register a kind of forces; many arguments because they are all that is known of one.
 
     Parameters
     ----------
