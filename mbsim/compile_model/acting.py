@@ -17,6 +17,7 @@ from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
 from mbsim.compile_model.switching import switching_table
 from mbsim.model.elements import Model
+from mbsim.model.forces import rigid_forces
 from mbsim.model.placement import place
 from mbsim.model.subroutines import wanted
 
@@ -79,7 +80,7 @@ def _link_rigid(
 
     Theirs are the last but for those of contacts.
     """
-    rigid = model.rigid_forces()
+    rigid = rigid_forces(model)
     rigid_slots = int((mechanism.equations.slot >= 0).sum())
     first = len(mechanism.equations.program) - rigid_slots - len(rigid)
     for k, (kind, force) in enumerate(rigid):

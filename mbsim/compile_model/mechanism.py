@@ -25,6 +25,7 @@ from mbsim.errors import DeckError, Fault
 from mbsim.forces.catalog import Acts, ForceKind
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Coupler, GeneralConstraint, Joint, MarkerForce, Model, Motion
+from mbsim.model.forces import rigid_forces
 from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
 
@@ -386,7 +387,7 @@ def constrain(
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
     # friction is held by none of the tree, and its equations are the last
-    rigid = model.rigid_forces()
+    rigid = rigid_forces(model)
     held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
     others = [markers.row(marker) for marker in held]
     others += [marker for grip in rigid_slots for marker in (grip.i, grip.j)]

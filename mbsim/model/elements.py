@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.expressions import Expression
-from mbsim.forces.catalog import FORCES, ForceKind, memories
+from mbsim.forces.catalog import FORCES
 from mbsim.model.forces import (
     BodyForce,
     ForceElement,
@@ -479,11 +479,6 @@ class Model:
             return self.marker_forces.get(name, {})
         found: dict[int, Any] = getattr(self, field)
         return found
-
-    def rigid_forces(self) -> list[tuple[ForceKind, MarkerForce]]:
-        """Return the applied forces that are held by an equation while they stick."""
-        found = ((kind, force) for kind in memories() for force in self.table(kind.name).values())
-        return [(kind, force) for kind, force in found if kind.form.is_rigid(force.values)]
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""

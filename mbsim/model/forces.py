@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mbsim.expressions import Expression
+from mbsim.forces.catalog import ForceKind, memories
 from mbsim.model.source import Source, Subroutine
+
+if TYPE_CHECKING:
+    from mbsim.model.elements import Model
 
 
 @dataclass(frozen=True)
@@ -166,3 +170,13 @@ class ForceElement:
     i_marker_id: int = 0
     j_marker_id: int = 0
     source: Source = Source()
+
+
+def rigid_forces(model: Model) -> list[tuple[ForceKind, MarkerForce]]:
+    """Return the applied forces that are held by an equation while they stick."""
+    return [
+        (kind, force)
+        for kind in memories()
+        for force in model.table(kind.name).values()
+        if kind.form.is_rigid(force.values)
+    ]

@@ -13,6 +13,7 @@ from mbsim.errors import ModelError
 from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual
 from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
 from mbsim.model.elements import ASIDE, Model, Simulation
+from mbsim.model.forces import rigid_forces
 from mbsim.model.names import element_name, is_adams
 
 DEFAULT_TOL = 1e-5
@@ -243,7 +244,7 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         For an explicit method: it has no unknown for the force that holds.
     """
     contact = next((c for c in model.contacts.values() if c.rigid), None)
-    dry = next(iter(model.rigid_forces()), None)
+    dry = next(iter(rigid_forces(model)), None)
     if (contact is None and dry is None) or method in IMPLICIT_METHODS:
         return method, []
     if contact is not None:
