@@ -13,8 +13,7 @@ from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.jets import fill_values
 from mbsim.dynamics.expressions.states import add_slopes
 from mbsim.dynamics.expressions.values import evaluate_program
-from mbsim.dynamics.forces.applied import add_applied
-from mbsim.dynamics.forces.dry_friction import serve_dry
+from mbsim.dynamics.forces.applied import add_applied, serve_kept
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
@@ -104,7 +103,7 @@ def commit_turns(context: int) -> int:
 def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:
     """What dry friction keeps of an accepted step, and what it holds."""
     scene = view(context, Scene)
-    return serve_dry(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
+    return serve_kept(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def serve_rigid_alone(context: int, what: int, t: float, y: Pointer) -> int:

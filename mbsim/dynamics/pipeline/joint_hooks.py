@@ -31,7 +31,7 @@ from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_s
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
-from mbsim.dynamics.forces.dry_friction import show_sticking
+from mbsim.dynamics.stiction.rigid_friction import show_sticking
 
 
 @jitable

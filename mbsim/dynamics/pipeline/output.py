@@ -89,7 +89,7 @@ def fill_energy(scene: Scene, y: F1, row: F1) -> None:
         contacts = scene.world.hooks[Hook.CONTACTS]
         answer_of(scene, call_int(contacts, (scene, Contacts.ENERGY, 0.0, 0.0, y, row)))
         potential, dissipated = row[1], row[2]
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         potential += scene.work.applied[f, STORED_ENERGY]
     work, damped = scene.world.accumulators[0], scene.world.accumulators[1]
     if damped >= 0:
@@ -198,7 +198,7 @@ def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
     if scene.world.hooks[Hook.JOINTS] != 0:
         reacts = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.REACT, t, y, f))
         note_failure(scene, reacts)
-    for j in range(len(scene.applied.kind)):
+    for j in range(len(scene.applied.form)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
     for j in range(len(work.reaction)):

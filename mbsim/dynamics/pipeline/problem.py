@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.codes import MARKER_FORCE
+from mbsim.arrays.codes import WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import pack
@@ -52,12 +52,12 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
 
 
 def _find_slopes(scene: Scene) -> None:
-    """Let marker forces have their slopes."""
+    """Let wrenches have their slopes."""
     from mbsim.forces.abi import slopes_address
 
     applied = scene.applied
-    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
-        applied.slopes[f] = slopes_address(int(applied.law[f]))
+    for f in np.flatnonzero(applied.form == WRENCH):
+        applied.slopes[f] = slopes_address(int(applied.formula[f]))
 
 
 def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
