@@ -7,6 +7,7 @@ earlier versions are kept as arrays of what their samples saw.
 
 from __future__ import annotations
 
+import ctypes
 import json
 
 import numpy as np
@@ -18,9 +19,15 @@ from helpers.audit_runs import FREE_FLIGHT, INCLINE, LOOPS
 from helpers.decks import GROUND, contact, run_in_pieces, run_model, sphere, write_deck
 from helpers.folders import MODELS
 from mbsim.arrays import codes
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
 from mbsim.cli.main import main
 from mbsim.compile_model.build import build
+from mbsim.core import jit
+from mbsim.core.address import pack, vector_at, view
+from mbsim.core.problem import HOOK
 from mbsim.dynamics.pipeline.audit import examine
+from mbsim.dynamics.pipeline.hook_table import fill
 from mbsim.integrators import scheme
 from mbsim.results.audit import ENTRIES, audit_of
 from mbsim.run import loop
@@ -223,6 +230,13 @@ def stand_in(tmp_path, scale):
     return system
 
 
+def sample(context, t, h, a, b):
+    """What a run judges itself by, at a committed state."""
+    scene = view(context, Scene)
+    examine(scene, t, h, vector_at(a, scene.rows.y.shape[1]))
+    return 0
+
+
 @pytest.mark.parametrize(
     ("run", "finds"),
     [(FREE_FLIGHT, ENERGY | {"momentum"}), (LOOPS, {"energy"}), (INCLINE, {"energy_step"})],
@@ -232,6 +246,13 @@ def test_what_earlier_versions_did_unsaid_is_told(run, finds, tmp_path):
     system = stand_in(tmp_path, run.scale)
     scene, y = system.scene, system.y0.copy()
     plan, tally, work = scene.audit.plan, scene.audit.tally, scene.work
+    # contacts answer behind an address, which compiled code alone calls
+    fill(scene, only=(Hook.CONTACTS,))
+    table, pointer = pack(scene), ctypes.c_void_p
+    form = ctypes.CFUNCTYPE(
+        ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, pointer, pointer
+    )
+    examined = form(jit.address(sample, HOOK))
     plan[codes.AUDIT_TOL] = run.tol
     for k, (steps, errors, t, speed, potential, dissipated, touches) in enumerate(run.samples):
         # the ball has 1 kg
@@ -241,7 +262,7 @@ def test_what_earlier_versions_did_unsaid_is_told(run, finds, tmp_path):
         work.slot[0] = 0.0
         tally[codes.STEPS_SINCE], tally[codes.ERRORS_SINCE] = steps - 1.0, errors
         tally[codes.ERROR_NOW] = 0.0
-        examine(scene, t, 0.0 if k == 0 else 1e-9, y)
+        examined(table.ctypes.data, t, 0.0 if k == 0 else 1e-9, y.ctypes.data, y.ctypes.data)
     audit = audit_of(system, 0.0, 0.0)
     assert audit is not None
     assert names_of(audit.warnings) >= finds
