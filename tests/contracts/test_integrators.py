@@ -419,8 +419,8 @@ def test_error_of_dop853_joins_both_estimates():
 
 @pytest.mark.parametrize("tol", [1e-7, 1e-9])
 def test_no_step_over_a_bend_is_taken_where_an_estimate_vanishes_by_chance(tol):
-    # two bends, at a thousand places in the steps: half of the errors are below 3 tol and the largest
-    # is 32 to 35 tol, but was 170 and 4600 tol
+    # two bends, at a thousand places in the steps: half of the errors are below 3 tol, the largest
+    # is 32 to 35 tol, and was 170 and 4600 tol
     problem, worst = make_problem(_strikes), 0.0
     for speed in np.linspace(1.0, 1.5, 1000):
         run = Run("DOP853", problem, y0=(0.0, speed))
