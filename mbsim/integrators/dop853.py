@@ -24,6 +24,10 @@ from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
     SHOWN,
+    THIRD,
+    THIRD_AT,
+    THIRD_BEFORE,
+    THIRD_FIRST,
     TOL,
     Method,
     Scheme,
@@ -142,6 +146,10 @@ SLOPES = np.array([_polynomial(s)[1] for s in INSIDE])
 #: From how much over tol the polynomial passes by its stages the defect is looked at, and how
 #: large that may be: a step whose own error is within tol does not get there where f is smooth.
 PASSED, DEFECT = 10.0, 20.0
+#: Where the error of order 3 over h^4 is so many times what it was in either of the two steps
+#: before, something bends sharply within the step, and this part of it counts: what is wrong then
+#: is 0.004 to 0.08 of it, as the place in the step is, and at some that of order 5 sees nothing.
+BENDS_SHARPLY, COUNTS = 100.0, 0.01
 
 
 @jitable
@@ -154,6 +162,25 @@ def combined_error(fifth: float, third: float) -> float:
     if fifth == 0.0:
         return 0.0
     return fifth * (fifth / math.sqrt(fifth * fifth + 0.01 * third * third))
+
+
+@jitable
+def least_error(m: Method, t: float, h: float, third: float) -> float:
+    """Return what the error of a step is at least, of whose error of order 3 it is `third`.
+
+    That |e5|^2 / |e3| is small means much where both are smooth, and nothing where a force bends
+    within the step: e3 is large there, and e5 may vanish by chance.
+    """
+    memory = m.memory
+    if t != memory[THIRD_AT]:
+        # what was tried last was taken
+        memory[THIRD_AT] = t
+        memory[THIRD_FIRST], memory[THIRD_BEFORE] = memory[THIRD_BEFORE], memory[THIRD]
+    memory[THIRD] = third / h**4
+    smooth = min(memory[THIRD_FIRST], memory[THIRD_BEFORE])
+    if smooth > 0.0 and memory[THIRD] > BENDS_SHARPLY * smooth:
+        return COUNTS * third
+    return 0.0
 
 
 @jitable
@@ -188,7 +215,8 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     project(p, m, t + h, h, m.trial)
     third = estimate(p, m, t, h, E3[0])
     fifth = estimate(p, m, t, h, E5[0])
-    m.memory[LAST_ERROR] = combined_error(fifth, third) / m.memory[TOL]
+    error = max(combined_error(fifth, third), least_error(m, t, h, third))
+    m.memory[LAST_ERROR] = error / m.memory[TOL]
     if not m.memory[LAST_ERROR] <= 1.0:
         return 0
     m.counts[EVALUATIONS] += 1

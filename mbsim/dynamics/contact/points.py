@@ -358,6 +358,23 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
 
 
 @jitable
+def forget_apart(scene: Scene, y: F1) -> None:
+    """Let what slots that do not touch carry be 0.
+
+    The last stages of a step that ends just before a touch may be in it, and what they gathered
+    would be there when it begins.
+    """
+    slots, touching = scene.slots, scene.work.touching
+    for s in range(len(slots.z)):
+        if touching[s] == 0 and slots.x[s] >= 0:
+            for k in range(3):
+                y[slots.x[s] + k] = 0.0
+        if touching[s] == 0 and slots.z[s] >= 0:
+            for k in range(scene.contacts.carried[contact_of(scene, s)]):
+                y[slots.z[s] + k] = 0.0
+
+
+@jitable
 def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     """Write the incident table for the accepted point; return what `commit` does."""
     state, work, pairs = scene.state, scene.work, scene.pairs
@@ -373,6 +390,7 @@ def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     for k in range(new[last]):
         pairs.touches[scene.slots.pair[new[k]]] += 1
     old[last] = new[last]
+    forget_apart(scene, y)
     return changed
 
 
