@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.codes import AXIS_TORQUE, SCALE_LENGTH
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
+from mbsim.dynamics.bodies.markers import marker_axis
 from mbsim.dynamics.constraints.equations import (
     add_wrench,
     along,
@@ -142,3 +143,17 @@ def fill_reactions(scene: Scene, t: float, y: F1) -> None:
     """Fill the reactions of all connections; the state has just been evaluated."""
     sum_reactions(scene, y)
     take_stresses(scene, fill_stresses(scene, t, y))
+
+
+@jitable
+def show_sticking(scene: Scene) -> None:
+    """Fill `Work.applied` of rigid frictions that are held; multipliers have been found."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        f = scene.equations.dry[active[r]]
+        if f < 0:
+            continue
+        n, row = marker_axis(scene, scene.applied.axes[f], 2), scene.work.applied[f]
+        first = 3 if scene.applied.form[f] == AXIS_TORQUE else 0
+        for k in range(3):
+            row[first + k] = scene.sweep.multiplier[r] * n[k]

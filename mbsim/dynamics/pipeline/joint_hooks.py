@@ -26,12 +26,11 @@ from mbsim.dynamics.constraints.projection import (
     push,
     speed_up,
 )
-from mbsim.dynamics.constraints.reactions import fill_reactions
+from mbsim.dynamics.constraints.reactions import fill_reactions, show_sticking
 from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
-from mbsim.dynamics.stiction.rigid_friction import show_sticking
 
 
 @jitable

@@ -30,7 +30,6 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.bodies.markers import marker_axis
 from mbsim.dynamics.forces.applied import commit_kept, displacement, record_mode
 
 #: Part of the model's speed that is rounding.
@@ -76,20 +75,6 @@ def holding_force(scene: Scene, f: int) -> float:
         if active[r] == scene.applied.equation[f]:
             return -scene.sweep.multiplier[r]
     return math.nan
-
-
-@jitable
-def show_sticking(scene: Scene) -> None:
-    """Fill `Work.applied` of rigid frictions that are held; multipliers have been found."""
-    active = scene.equations.active
-    for r in range(active[len(active) - 1]):
-        f = scene.equations.dry[active[r]]
-        if f < 0:
-            continue
-        n, row = marker_axis(scene, scene.applied.axes[f], 2), scene.work.applied[f]
-        first = 3 if scene.applied.form[f] == AXIS_TORQUE else 0
-        for k in range(3):
-            row[first + k] = scene.sweep.multiplier[r] * n[k]
 
 
 @jitable
