@@ -47,7 +47,7 @@ def command(topic: tuple[str, ...], listed: bool, file: Path | None) -> None:
     found = book.named(words)
     if not found and len(titled := search.titled(words)) == 1:
         found = titled
-    if not found and len(hits) == 1:
+    if not found and len(hits) == 1 and not hits[0].missing:
         found = [hits[0].page]
     if found:
         terminal.show_page(found[0], [*found, *(hit.page for hit in hits)])

@@ -78,9 +78,11 @@ class Page:
 
     def links(self) -> Iterator[tuple[int, str]]:
         """Yield line number and target of every link that is no picture."""
-        for number, line in prose(self.text):
-            for match in _LINK.finditer(line):
-                yield number, match.group(1)
+        kept = dict(prose(self.text))
+        lines = [kept.get(k, "") for k in range(1, len(self.text.splitlines()) + 1)]
+        text = "\n".join(lines)  # the words of a link may go on in the next line
+        for match in _LINK.finditer(text):
+            yield text.count("\n", 0, match.start()) + 1, match.group(1)
 
     def target(self, link: str) -> tuple[str, str]:
         """Return page name and anchor that a relative link of this page leads to."""
@@ -184,10 +186,14 @@ def fold(topic: str) -> str:
 
 
 def named(topic: str) -> list[Page]:
-    """Return the pages whose name, or whose name's last part, is `topic`."""
+    """Return the pages whose name, or whose name's last part or parts, is `topic`."""
     wanted = fold(topic)
+    if not wanted:
+        return []
     full = [page for page in pages().values() if wanted == fold(page.name)]
-    return full or [page for page in pages().values() if wanted == fold(page.short)]
+    short = full or [page for page in pages().values() if wanted == fold(page.short)]
+    ends = [page for page in pages().values() if f"/{fold(page.name)}".endswith(f"/{wanted}")]
+    return short or ends
 
 
 def page_of(topic: str) -> Page:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import posixpath
 import re
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,7 @@ from mbsim import __version__
 from mbsim.errors import ResultsError
 from mbsim.manual.book import INDEX, PAGES, Page, pages
 from mbsim.manual.mathematics import to_mathml
+from mbsim.manual.search import EMPTY, SYNONYMS
 
 _STATIC = Path(__file__).parent / "static"
 _LEXERS = {"console": "console", "xml": "xml", "python": "python", "c": "c", "toml": "toml"}
@@ -43,6 +45,7 @@ def document() -> str:
         .read_text(encoding="utf-8")
         .format(
             version=escape(__version__),
+            words=escape(json.dumps({"empty": sorted(EMPTY), "synonyms": SYNONYMS})),
             style=(_STATIC / "manual.css").read_text(encoding="utf-8") + _colours(),
             contents="\n".join(_contents(every)),
             body=body,
@@ -146,7 +149,8 @@ def _coloured(code: str, kind: str) -> str:
 
     if kind not in _LEXERS:
         return escape(code)
-    return str(highlight(code, get_lexer_by_name(_LEXERS[kind]), HtmlFormatter(nowrap=True)))
+    spans = str(highlight(code, get_lexer_by_name(_LEXERS[kind]), HtmlFormatter(nowrap=True)))
+    return spans.replace(' class="err"', "")  # `...` stands for what is left out: no error
 
 
 def _colours() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from mbsim.manual.book import Page, fold, pages
 from mbsim.manual.mathematics import to_text
@@ -23,6 +23,7 @@ def _lines(page: Page) -> Iterator[str]:
     """Yield the lines of a page; a math block becomes a block of text."""
     fence, kind = "", ""
     block: list[str] = []
+    words: list[str] = []
     for line in page.text.splitlines():
         match = _OPEN.fullmatch(line)
         if fence and line.strip() == fence:
@@ -31,11 +32,19 @@ def _lines(page: Page) -> Iterator[str]:
         elif fence:
             block.append(line)
         elif match:
+            yield from _prose(page, words)
+            words = []
             fence, kind = match.group(1), match.group(2)
             block = [f"File `{match.group(3).strip()}`:"] if _is_file(match.group(3)) else [""]
         elif not _MARKER.fullmatch(line):
-            line = _PICTURE.sub(lambda found: f"*[picture: {found.group(1)}]*", line)
-            yield _LINK.sub(lambda found: _reference(page, *found.groups()), line)
+            words.append(line)
+    yield from _prose(page, words)
+
+
+def _prose(page: Page, lines: Sequence[str]) -> list[str]:
+    """Return lines outside blocks; the words of a link may go on in the next line."""
+    text = _PICTURE.sub(lambda found: f"*[picture: {found.group(1)}]*", "\n".join(lines))
+    return _LINK.sub(lambda found: _reference(page, *found.groups()), text).splitlines()
 
 
 def _is_file(words: str) -> bool:

@@ -30,7 +30,10 @@ def show_page(page: Page, others: Sequence[Page] = ()) -> None:
 
 def show_hits(topic: str, hits: Sequence[Hit]) -> None:
     """Print pages found by words, best first, each with its line."""
-    parts: list[RenderableType] = [Text(f"{len(hits)} pages have {topic!r}; the best first:\n")]
+    have = f"{len(hits)} pages have {topic!r}"
+    if hits[0].missing:
+        have = f"no page has all of {topic!r}; {len(hits)} have most of it"
+    parts: list[RenderableType] = [Text(f"{have}; the best first:\n")]
     for hit in hits[:_SHOWN]:
         parts.append(_entry(hit.page))
         parts.append(Text(f"    {hit.line}", style="dim"))

@@ -57,9 +57,16 @@ PROBE = """
   box.dispatchEvent(new Event("input"));
   seen.hits = Array.from(document.querySelectorAll("#found a"), (each) => each.textContent);
   seen.contentsHidden = document.getElementById("contents").hidden;
-  box.value = "qwertz nowhere";
-  box.dispatchEvent(new Event("input"));
-  seen.none = document.getElementById("found").textContent;
+  const found = document.getElementById("found");
+  const search = (words) => { box.value = words; box.dispatchEvent(new Event("input")); };
+  search("sign");
+  seen.marked = Array.from(found.querySelectorAll("mark"), (each) => each.textContent);
+  search("restart");
+  seen.restart = Array.from(found.querySelectorAll("a"), (each) => each.textContent);
+  search("qwertz friction");
+  seen.most = [found.textContent, found.querySelectorAll("a").length];
+  search("qwertz");
+  seen.none = found.textContent;
   const answer = document.createElement("pre");
   answer.id = "answer";
   answer.textContent = JSON.stringify(seen);
@@ -133,7 +140,12 @@ def test_no_page_is_wider_than_the_window(seen):
 def test_search_finds_pages(seen):
     assert seen["light"]["hits"][0] == "Exit codes"
     assert seen["light"]["contentsHidden"]
-    assert "No page" in seen["light"]["none"]
+    assert "No page has any" in seen["light"]["none"]
+    assert {word.lower() for word in seen["light"]["marked"]} <= {"sign", "signs"}
+    assert "Questions" in seen["light"]["restart"]
+    said, count = seen["light"]["most"]
+    assert said.startswith("No page has all")
+    assert count > 5
 
 
 def test_nothing_goes_wrong_in_the_script(seen):

@@ -115,6 +115,31 @@ def test_words_are_searched_in_all_pages():
     assert search.search("") == []
 
 
+def test_whole_words_come_before_parts_of_others():
+    for hit in search.search("sign"):
+        assert re.search(r"\bsigns?\b", hit.page.text.lower()), hit.page.name
+    assert len(search.search("integrat")) > 1  # no page has it alone
+
+
+def test_most_words_where_no_page_has_all():
+    hits = search.search("dissipated friction qwertz")
+    assert {hit.missing for hit in hits} == {("qwertz",)}
+    output = CliRunner().invoke(main, ["manual", "dissipated", "friction", "qwertz"]).output
+    assert output.startswith("no page has all of")
+
+
+@pytest.mark.parametrize(("word", "other"), search.SYNONYMS.items())
+def test_a_synonym_finds_what_pages_say(word, other):
+    found = {hit.page.name for hit in search.search(word)}
+    assert {hit.page.name for hit in search.search(other)} <= found
+
+
+def test_a_page_by_the_end_of_its_path():
+    (page,) = book.named("statements/post_request")
+    assert page.name == "reference/statements/post_request"
+    assert book.named("ments/post_request") == book.named("") == []
+
+
 def test_what_is_nowhere_is_an_error():
     result = CliRunner().invoke(main, ["manual", "xyzzy" + "x"])
     assert result.exit_code == 2
@@ -139,6 +164,7 @@ def test_html_is_one_file(tmp_path):
     ids = set(re.findall(r'id="([^"]+)"', text))
     missing = {link for link in re.findall(r'href="#([^"]+)"', text) if link not in ids}
     assert not missing
+    assert 'class="err"' not in text
     assert text.count("<article ") == len(pages())
     result = CliRunner().invoke(main, ["manual", "--html", str(tmp_path / "no" / "manual.html")])
     assert result.exit_code == 5

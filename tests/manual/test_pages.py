@@ -80,6 +80,8 @@ def test_a_page_can_be_printed(page):
     text = for_terminal(page)
     assert "<!--" not in text
     assert "```math" not in text
+    outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    assert not re.search(r"\]\([^)\s]*\.md", outside), "a link shows its file"
 
 
 def test_tables_are_fresh():

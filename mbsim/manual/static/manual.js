@@ -50,7 +50,8 @@
   window.addEventListener("hashchange", show);
   show();
 
-  // search: all words, ranked by title, headings, text
+  // search: pages with all words, else with most, ranked by title, headings, text
+  const known = JSON.parse(box.dataset.words);
   let index = null;
   function read() {
     index = articles.map(function (page) {
@@ -65,30 +66,47 @@
     });
     index.forEach(function (each) { each.low = each.text.toLowerCase(); });
   }
+  function escaped(word) {
+    return word.replace(/[.*+?^${}()|[\]\\\/]/g, "\\$&");
+  }
+  // a word, its plural or synonym where it stands alone; as a part where no page has it so
+  function pattern(word) {
+    const other = Object.hasOwn(known.synonyms, word) ? known.synonyms[word] : word;
+    const either = "(?:" + escaped(word) + "|" + escaped(other) + ")s?";
+    const whole = new RegExp("(?<![\\p{L}\\p{N}])" + either + "(?![\\p{L}\\p{N}])", "gu");
+    return index.some(function (each) { return each.low.search(whole) >= 0; })
+      ? whole : new RegExp(escaped(word), "gu");
+  }
   function times(text, word) {
-    return text.split(word).length - 1;
+    return (text.match(word) || []).length;
   }
   function look() {
-    const words = box.value.toLowerCase().split(/\s+/).filter(Boolean);
-    found.hidden = words.length === 0;
-    contents.hidden = words.length > 0;
+    const typed = box.value.toLowerCase().split(/[\s,;?!]+/).filter(Boolean);
+    const telling = typed.filter(function (word) { return !known.empty.includes(word); });
+    const asked = telling.length ? telling : typed;
+    found.hidden = asked.length === 0;
+    contents.hidden = asked.length > 0;
     found.textContent = "";
-    if (!words.length) { return; }
+    if (!asked.length) { return; }
     if (!index) { read(); }
+    const words = asked.map(pattern);
     const hits = index.map(function (each) {
       const score = words.reduce(function (sum, word) {
         return sum + 40 * Math.min(1, times(each.title, word)) + 12 * Math.min(2, times(each.heads, word))
           + Math.min(8, times(each.low, word));
       }, 0);
       const together = words.length > 1 && each.heads.split("\n").some(function (head) {
-        return words.every(function (word) { return head.includes(word); });
+        return words.every(function (word) { return head.search(word) >= 0; });
       });
-      const all = words.every(function (word) { return each.low.includes(word); });
-      return { each: each, score: all ? score + (together ? 60 : 0) : 0 };
-    }).filter(function (hit) { return hit.score > 0; });
-    hits.sort(function (a, b) { return b.score - a.score; });
-    hits.slice(0, 30).forEach(function (hit) { found.appendChild(entry(hit.each, words[0])); });
-    if (!hits.length) { found.textContent = "No page has all of these words."; }
+      const has = words.filter(function (word) { return each.low.search(word) >= 0; });
+      return { each: each, has: has, score: score + (together ? 60 : 0) };
+    });
+    const most = Math.max.apply(null, hits.map(function (hit) { return hit.has.length; }));
+    if (!most) { found.textContent = "No page has any of these words."; return; }
+    if (most < words.length) { found.textContent = "No page has all of these words; most of them:"; }
+    const best = hits.filter(function (hit) { return hit.has.length === most; });
+    best.sort(function (a, b) { return b.score - a.score; });
+    best.slice(0, 30).forEach(function (hit) { found.appendChild(entry(hit.each, hit.has[0])); });
   }
   function entry(each, word) {
     const line = document.createElement("p");
@@ -96,11 +114,12 @@
     link.href = "#" + each.page.id;
     link.textContent = each.page.dataset.title;
     const near = document.createElement("small");
-    const at = each.low.indexOf(word);
+    const at = each.low.search(word);
+    const length = each.low.match(word)[0].length;
     const mark = document.createElement("mark");
-    mark.textContent = each.text.slice(at, at + word.length);
+    mark.textContent = each.text.slice(at, at + length);
     near.append("…" + each.text.slice(Math.max(0, at - 40), at), mark,
-      each.text.slice(at + word.length, at + word.length + 60) + "…");
+      each.text.slice(at + length, at + length + 60) + "…");
     line.append(link, near);
     return line;
   }
