@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mbsim.cli.messages import echo
+from mbsim.cli.messages import counted, echo
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -59,7 +59,7 @@ def command(model: str, overrides: tuple[str, ...]) -> None:
     from mbsim.results.log import counts, pair_texts, sequence, units_text
 
     warn(deck.warnings)
-    numbers = ", ".join(f"{count} {name}" for name, count in counts(deck).items())
+    numbers = ", ".join(counted(count, name) for name, count in counts(deck).items())
     echo(f"ok: {model}: {numbers}")
     echo(f"  units {units_text(deck)}")
     for contact_id in deck.contacts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -70,7 +71,7 @@ class Commands(click.Group):
         except MbsimError as error:
             for line in _messages(error):
                 echo(f"mbsim: error: {line}", err=True)
-            if pages := pages_of(error):
+            if pages := pages_of(error, ctx.invoked_subcommand or ""):
                 line = "; ".join(f"mbsim manual {page}" for page in pages)
                 echo(f"mbsim: see: {line}", err=True)
             ctx.exit(error.exit_code)
@@ -95,12 +96,16 @@ class Commands(click.Group):
 _MOST_PAGES = 3
 
 
-def pages_of(error: MbsimError) -> list[str]:
+def pages_of(error: MbsimError, command: str = "") -> list[str]:
     """Return the pages of the manual that tell more about an error."""
     from mbsim.manual.errors import about
 
-    texts = [fault.element for fault in error.faults] if isinstance(error, DeckError) else []
-    return about(type(error), texts or [str(error)])[:_MOST_PAGES]
+    texts = []
+    if isinstance(error, DeckError):
+        texts = [
+            f"{Path(fault.file).suffix}:{fault.line}: {fault.element}" for fault in error.faults
+        ]
+    return about(type(error), texts or [str(error)], command)[:_MOST_PAGES]
 
 
 def _messages(error: MbsimError) -> list[str]:
@@ -118,8 +123,8 @@ def main() -> None:
     `mbsim manual` is the manual; `mbsim manual TOPIC` a page, or a search.
 
     Exit codes: 0 done; 2 wrong usage or model; 3 the solver gave up; 4 a user subroutine
-    failed; 5 results could not be written; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: results up to
-    there kept.
+    failed; 5 results could not be written or read; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP: results
+    up to there kept.
     """
 
 

@@ -34,6 +34,13 @@ def echo(text: str = "", err: bool = False, nl: bool = True) -> None:
     click.echo(printable(text), err=err, nl=nl)
 
 
+def counted(count: int, name: str) -> str:
+    """Return a number of things, `name` being their plural: ``1 body``, ``2 bodies``."""
+    if count == 1:
+        name = name.removesuffix("ies") + "y" if name.endswith("ies") else name.removesuffix("s")
+    return f"{count} {name}"
+
+
 def warn(lines: Iterable[str]) -> None:
     """Print warnings."""
     for line in lines:

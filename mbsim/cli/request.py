@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from mbsim.cli.messages import echo
+from mbsim.cli.messages import counted, echo
 
 
 @click.command("request")
@@ -56,7 +56,7 @@ def command(
         sys.stdout.writelines(lines)
         return
     replace_text(output, "".join(lines))
-    echo(f"{output}: {len(columns)} columns, {len(time)} rows")
+    echo(f"{output}: {counted(len(columns), 'columns')}, {counted(len(time), 'rows')}")
 
 
 def _csv(time: list[float], columns: dict[str, list[Any]]) -> Iterator[str]:

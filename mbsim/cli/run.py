@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbsim.cli.messages import echo
+from mbsim.cli.messages import counted, echo
 from mbsim.integrators.catalog import METHODS
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _say(text: str) -> None:
 
 def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None:
     """Say what a run that ended early has kept; its error follows from `main`."""
-    from mbsim.errors import ResultsError
+    from mbsim.errors import Interrupted, ResultsError
     from mbsim.results.reading import open_results
 
     try:
@@ -164,7 +164,10 @@ def _report_failure(result_file: Path, error: MbsimError, as_json: bool) -> None
                 _print_json(results, result_file)
             else:
                 kept = len(results["time"])
-                echo(f"mbsim: {kept} rows are kept in {result_file}", err=True)
+                are = "is" if kept == 1 else "are"
+                echo(f"mbsim: {counted(kept, 'rows')} {are} kept in {result_file}", err=True)
+            if isinstance(error, Interrupted) and results.has_checkpoint:
+                echo("mbsim: the same command with --resume goes on from there", err=True)
     except ResultsError:
         return
 
@@ -192,9 +195,9 @@ def _print_summary(results: Results, result_file: Path) -> None:
     """Print a few lines for people."""
     time, stats = results["time"], results.stats
     end = f"{time[-1]:.9g}" if len(time) else "-"
-    echo(f"{results.status} at time {end}, {len(time)} rows in {result_file}")
+    echo(f"{results.status} at time {end}, {counted(len(time), 'rows')} in {result_file}")
     echo(
-        f"{stats.get('steps', 0)} steps, {stats.get('rejected', 0)} rejected, "
+        f"{counted(stats.get('steps', 0), 'steps')}, {stats.get('rejected', 0)} rejected, "
         f"{stats.get('wall_s', 0.0):.2f} s"
         + (f" ({stats['compile_s']:.1f} s of it compiling)" if stats.get("compile_s") else "")
     )

@@ -22,12 +22,15 @@ def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
     """Return ``; did you mean X?`` with the known name most like `name`, or an empty string.
 
     `likeness` is twice the letters that both have in order, over all letters of both, at least.
+    Where none is so like it, the first name that begins with it.
     """
     by_fold = {fold(word): word for word in known}
     word = fold(name)
     close = difflib.get_close_matches(word, by_fold, n=5, cutoff=likeness)
     # slips are rare in the first letter: cm_id means cg_id rather than wm_id
     close.sort(key=lambda match: match[:1] != word[:1])
+    if not close and len(word) > 1:
+        close = [match for match in by_fold if match.startswith(word)]
     return f"; did you mean {by_fold[close[0]]}?" if close else ""
 
 

@@ -41,6 +41,14 @@ def parse_real(text: str) -> float:
     return value
 
 
+def about_degrees(text: str) -> str:
+    """Return what to add to a message where an angle is given in degrees as Adams has them."""
+    number = text.rstrip("dD")
+    if number == text or not _REAL.fullmatch(number):
+        return ""
+    return f"; angles are in radians, {number} degrees are {math.radians(float(number)):.9g}"
+
+
 def parse_integer(text: str) -> int:
     """Return a whole number."""
     if not _INTEGER.fullmatch(text):

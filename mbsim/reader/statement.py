@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from mbsim.model.elements import Source
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold, nearest
-from mbsim.reader.kinds import ID, TEXT, BadValueError, Kind
+from mbsim.reader.kinds import ID, TEXT, BadValueError, Kind, about_degrees
 from mbsim.reader.parse import Attribute, Node
 
 Element = TypeVar("Element")
@@ -197,7 +197,8 @@ class Entry:
         try:
             self._values[name] = spec.kind.parse(text)
         except BadValueError as error:
-            self.fault(str(error) or f"must be {spec.kind.allowed}", name)
+            what = str(error) or f"must be {spec.kind.allowed}"
+            self.fault(what + (about_degrees(text) if spec.unit == "rad" else ""), name)
             return
         if spec.refused and not harmless:
             self.fault(spec.refused, name)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from mbsim.arrays import codes
 from mbsim.compile_model.pairing import Plans
 from mbsim.errors import ResultsError
-from mbsim.laws.catalog import NORMAL_LAWS
+from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.elements import Contact, Model
 from mbsim.model.names import element_name, statement_name
 from mbsim.results.audit import Audit
@@ -259,11 +259,16 @@ def _normal_lines(system: System, contact: Contact) -> Iterator[str]:
 
 
 def _friction_lines(system: System, contact: Contact) -> Iterator[str]:
-    """Yield which friction law a contact has, and why a user's is not compiled."""
+    """Yield a contact's friction law and the numbers it takes, or why a user's is not compiled."""
     user = system.user_friction.get(contact.id)
     if user is None:
         built_in = contact.cff_type != "COULOMB_OFF"
         yield fact("friction law", f"{contact.cff_type}, built in" if built_in else "none")
+        if built_in:
+            row = system.scene.contacts.friction_par[system.contact_ids.index(contact.id)]
+            # a row is as long as the longest law's
+            for name, value in zip(friction_law_of(contact).parameters, row, strict=False):
+                yield fact(f"  {name}", str(value) if math.isinf(value) else number(value))
         return
     yield fact("friction law", f"user {user.name}, {user.how}")
     yield fact("friction file", user.source)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _TRIES, _PAUSE = 50, 0.002
 #: What h5py raises where a file is damaged.
 _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
+#: A column of a run's .csv, and how names for `mbsim request` begin.
+_CSV_COLUMN, _OF_REQUEST = re.compile(r"(\d+)\.(F[1-8])"), re.compile(r"Force_Contact\[\d+\]\.")
 _Read = TypeVar("_Read", bound=Callable[..., Any])
 
 
@@ -220,7 +223,7 @@ class Results:
             # written once, whatever the slashes around it
             found = [name.strip("/")] if name in self else []
         if not found:
-            raise UnknownSignal(self._missing(name))
+            raise UnknownSignal(self._missing(name, signals))
         whole = found[0] if found[0] in signals else found[0].rpartition("/")[0]
         if whole not in signals:
             raise UnknownSignal(f"{self._where}: {name} is no signal over time{self._there()}")
@@ -294,7 +297,7 @@ class Results:
         """
         found = self._find(name)
         if found is None:
-            raise UnknownSignal(self._missing(name))
+            raise UnknownSignal(self._missing(name, self.keys()))
         return self._values(*found)
 
     @_reads
@@ -359,8 +362,11 @@ class Results:
     def _where(self) -> str:
         return str(self.path or "results in memory")
 
-    def _missing(self, name: str) -> str:
-        """Return what to say of a name that is not there: nearest first, then what there is."""
+    def _missing(self, name: str, known: Iterable[str]) -> str:
+        """Return what to say of a name that is not there: nearest first, then what there is.
+
+        `known` are names that may be offered.
+        """
         import h5py
 
         asked = name.strip("/")
@@ -376,8 +382,12 @@ class Results:
         if whole in signals and not is_pattern(part):
             parts = ", ".join(parts_of(signals[whole])) or "no parts"
             return f"{self._where}: no signal {name!r}; {whole} has {parts}"
-        near = nearest(asked, self.keys())
+        column = _CSV_COLUMN.fullmatch(asked)
+        written = f"requests/{column[1]}/{column[2]}" if column else ""
+        near = [written] if written and written in self else nearest(asked, known)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        if _OF_REQUEST.match(asked):
+            hint = "; names with Force_Contact[ID]. are for mbsim request"
         return f"{self._where}: no signal {name!r}{hint}{self._there()}"
 
     def _there(self) -> str:

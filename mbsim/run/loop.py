@@ -208,6 +208,13 @@ class Runner:
         self.pace = self._pace()
         self.pace.restore(saved)
 
+    @property
+    def time(self) -> float:
+        """Where the run is [T]."""
+        from mbsim.integrators import scheme
+
+        return float(self.method.memory[scheme.TIME])
+
     def _pace(self) -> Pace:
         """Return what looks whether the current Simulate gets anywhere."""
         simulation = self.settings.stages[self.stage].simulation

@@ -56,6 +56,8 @@ OF_CONTACTS = {
 _AXES = ("x", "y", "z")
 _MODES = {1.0: "stick", 2.0: "slip"}
 _NAME = re.compile(r"Force_Contact\[(\d+)\](?:\.incident\[(\d+)\])?\.([A-Za-z_]\w*)(?:/(\w+))?")
+#: How names for `mbsim plot` begin.
+_PLOTTED = re.compile(r"/?(?:time$|[a-z_]+/)")
 
 
 @dataclass
@@ -310,8 +312,9 @@ def _wanted(name: str, ids: Sequence[int]) -> Wanted:
     match = _NAME.fullmatch(name.strip())
     if match is None:
         such = f"Force_Contact[{ids[0] if ids else 1}]"
+        plotted = "; with slashes it is one for mbsim plot" if _PLOTTED.match(name.strip()) else ""
         raise ModelError(
-            f"{name}: no name of a signal; such are {such}.force and {such}.incident[0].mu"
+            f"{name}: no name of a signal{plotted}; such are {such}.force and {such}.incident[0].mu"
         )
     contact, incident, signal, part = match.groups()
     if int(contact) not in ids:
@@ -350,6 +353,10 @@ def _columns(wanted: Wanted, rows: Sequence[Row]) -> dict[str, list[Value]]:
         k = wanted.incident
         there = [row.incidents[wanted.contact][k : k + 1] for row in rows]
         known = dict(OF_INCIDENTS)
+        most = max((len(row.incidents[wanted.contact]) for row in rows), default=0)
+        if k >= most:
+            at_most = f"at most {most}, the last is incident[{most - 1}]" if most else "none"
+            raise ModelError(f"{wanted.name}: no such incident; the rows have {at_most}")
     for signals in (signals for found in there for signals in found):
         known.update(dict.fromkeys(signals.keys() - known.keys(), 1))
     if wanted.signal not in known:

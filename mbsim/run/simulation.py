@@ -187,6 +187,9 @@ def simulate(
         with _stoppable(runner), _limited(system, plugin_timeout, tell):
             if resume:
                 runner.restore(recorder.checkpoint)
+                goes_on = f"goes on at {runner.time:.6g} of {settings.end_time:.6g}"
+                tell(goes_on)
+                log.line(goes_on)
             else:
                 runner.start(allow_overlap)
             if dump_fclib is not None:

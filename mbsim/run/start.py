@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Tell = Callable[[str], None]
 
+#: Of the smaller shape's size: shapes that touch overlap by so much from rounding.
+_ROUNDING = 1e-12
+
 
 def assemble_model(
     system: System, hooks: HookCalls, t: float, y: Any, log: Tell, tell: Tell
@@ -115,12 +118,15 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
         rows = (int(pairs.graphic_i[pair]), int(pairs.graphic_j[pair]))
         graphic_i, graphic_j = (system.graphic_ids[row] for row in rows)
         k = int(scene.kinds.contact[pairs.kind[pair]])
+        sides = [scene.graphics.half[row] for row in rows]
+        if depth < _ROUNDING * min(float(side.max()) for side in sides):
+            continue
         contact = model.contacts[system.contact_ids[k]]
         name = f"Force_Contact[{contact.id}]"
         between = f"Post_Graphic[{graphic_i}] and Post_Graphic[{graphic_j}]"
         log(f"{name}: {between} overlap by {depth:.6g} at the start, slot {s}")
         # half of the smaller shape, across its thinnest side
-        half = min(float(scene.graphics.half[row].min()) for row in rows)
+        half = min(float(side.min()) for side in sides)
         ignored = contact.ignore_penetration_larger_than
         limit = half if ignored is None else min(half, ignored)
         if depth > 0.1 * limit and s == pairs.slot[pair]:

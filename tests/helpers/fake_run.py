@@ -85,7 +85,12 @@ def fake_system_of(model: Model) -> Any:
     contacts = SimpleNamespace(
         id=np.array(list(model.contacts)),
         normal_par=np.array([[c.stiffness] for c in model.contacts.values()]),
-        friction_par=np.array([[c.mu_static] for c in model.contacts.values()]),
+        friction_par=np.array(
+            [
+                [c.mu_static, c.mu_dynamic, c.stiction_trans_vel, c.friction_trans_vel]
+                for c in model.contacts.values()
+            ]
+        ),
         ignore_deeper=np.zeros(nc),
     )
     scene = SimpleNamespace(

@@ -456,6 +456,8 @@ def test_only_pictures_are_replaced(files, here):
         (["bodies/9*/position"], 2, "no signal 'bodies/9*/position'"),
         (["events"], 2, "events is no signal over time; there is bodies"),
         (["state/y"], 2, "state/y is no signal over time"),
+        (["7.F3"], 2, "did you mean requests/7/F3?"),
+        (["Force_Contact[301].force"], 2, "names with Force_Contact[ID]. are for mbsim request"),
         (["contacts/301/peak_force"], 2, "peak_force is no signal over time"),
         ([], 2, "no signal named; "),
         (["energy/kinetic", "-o", "a.pdf"], 2, "must end in .png or .svg"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -64,6 +65,7 @@ def test_a_signal_keeps_everything_and_resume_gives_the_same_run(tmp_path, metho
     _, rest = process.communicate(timeout=120)
     assert process.returncode == 128 + getattr(signal, sent), rest
     assert "Traceback" not in rest
+    assert "--resume goes on from there" in rest
     with mbsim.open_results(tmp_path / "a/deck.h5") as results:
         assert results.status == "interrupted"
         t = results["time"]
@@ -77,6 +79,10 @@ def test_a_signal_keeps_everything_and_resume_gives_the_same_run(tmp_path, metho
     assert f"integrator was {method}" in other.stderr
     resumed = cli(*arguments, "--resume")
     assert resumed.returncode == 0, resumed.stderr
+    said = re.search(r"goes on at ([\d.]+) of 40\n", resumed.stderr)
+    assert said is not None, resumed.stderr
+    assert 0.5 <= float(said[1]) < 40.0
+    assert said[0] in (tmp_path / "a/deck.log").read_text()
     straight = cli("run", deck, "-o", tmp_path / "b", *by)
     assert straight.returncode == 0, straight.stderr
     with (

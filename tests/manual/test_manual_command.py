@@ -82,6 +82,30 @@ def test_messages_name_the_page_of_the_element():
     assert errors.about(SolverError, ["Force_Contact[3]: too stiff"]) == ["force_contact"]
 
 
+@pytest.mark.parametrize(
+    ("error", "text", "command", "pages"),
+    [
+        (PluginError, "Force_Contact[3]: CFFSUB failed", "run", ["cffsub"]),
+        (PluginError, "Force_Contact[3]: oil failed", "run", ["subroutines"]),
+        (ModelError, "--resume: a.h5: no such file", "run", ["what-happens-when", "run"]),
+        (ModelError, "Force_Contact[3].mu: no", "request", ["reference/commands/request"]),
+        (DeckError, ".adm:3: GRAPHICS/1", "check", ["adams"]),
+        (DeckError, ".xml:3: Force_Contact[3]", "request", ["force_contact"]),
+    ],
+)
+def test_pages_of_options_commands_and_other_decks(error, text, command, pages):
+    assert errors.about(error, [text], command) == pages
+    assert all(len(book.named(page)) == 1 for page in pages)
+
+
+def test_a_refused_adams_statement_names_the_page_of_adams_decks(tmp_path):
+    deck = tmp_path / "deck.adm"
+    deck.write_text("title\nPART/1, GROUND\nFLEX_BODY/1\nEND\n")
+    result = CliRunner().invoke(main, ["check", str(deck)])
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1] == "mbsim: see: mbsim manual adams"
+
+
 @pytest.mark.parametrize("error", [ModelError, SolverError, PluginError, DeckError])
 def test_pages_that_messages_name_exist(error):
     for name in errors.about(error, ["something"]):

@@ -221,6 +221,16 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         BODY_LINE,
         ("Body_Rigid[2]", 'cm_id="20"', "unknown attribute", "did you mean cg_id?"),
     ),
+    "beginning of an attribute": (
+        deck(('mu_static="0.3"', 'mu="0.3"')),
+        FRICTION_LINE,
+        ("Force_Contact[301]", 'mu="0.3"', "unknown attribute", "did you mean mu_static?"),
+    ),
+    "angle in degrees": (
+        marker('psi="25D"'),
+        MARKER_LINE,
+        ('psi="25D"', "must be a number; angles are in radians, 25 degrees are 0.436332313"),
+    ),
     "attribute in two spellings": (
         deck(('mass="5"', 'mass="5" MASS="6"')),
         BODY_LINE,

@@ -17,6 +17,7 @@ from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from helpers.folders import PACKAGES
 from helpers.minimal_deck import CONTACT_LINE, MINIMAL, deck
 from mbsim.cli.main import COMMANDS, main
+from mbsim.cli.messages import counted
 from mbsim.cli.progress import Display
 from mbsim.errors import Interrupted, ModelError, PluginError, ResultsError, SolverError
 from mbsim.results.reading import Results
@@ -214,7 +215,7 @@ def test_a_real_run(model: str, tmp_path: Path) -> None:
 def test_check_of_a_good_deck(model: str) -> None:
     result = call("check", model)
     assert result.exit_code == 0
-    assert result.stdout.startswith(f"ok: {model}: 1 bodies, 2 markers, 2 graphics, 1 contacts")
+    assert result.stdout.startswith(f"ok: {model}: 1 body, 2 markers, 2 graphics, 1 contact,")
     assert "Force_Contact[301]: Post_Graphic[200] Post_Graphic[100]: closed form" in result.stdout
 
 
@@ -228,6 +229,11 @@ def test_check_lists_every_fault(tmp_path: Path) -> None:
     assert lines[2:] == ["mbsim: see: mbsim manual post_graphic; mbsim manual force_contact"]
     assert lines[0].startswith(f"mbsim: error: {path}:{CONTACT_LINE - 1}: Post_Graphic[200]")
     assert lines[1].startswith(f"mbsim: error: {path}:{CONTACT_LINE + 1}: Force_Contact[301]")
+
+
+def test_one_thing_is_not_told_as_many() -> None:
+    assert [counted(1, name) for name in ("bodies", "rows")] == ["1 body", "1 row"]
+    assert [counted(count, "bodies") for count in (0, 2)] == ["0 bodies", "2 bodies"]
 
 
 def test_check_sees_what_a_run_would_refuse(tmp_path: Path) -> None:

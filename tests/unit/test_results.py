@@ -366,8 +366,14 @@ def test_missing_names(tmp_path: Path) -> None:
     with recorded(tmp_path) as results:
         with pytest.raises(ResultsError, match="did you mean bodies/2/position"):
             results["bodies/2/postion"]
+        assert "peak_" in " ".join(results.keys())
+        with pytest.raises(UnknownSignal) as missing:
+            results.find("contacts/301/peak_forces")
+        assert "contacts/301/peak_" not in str(missing.value).partition("did you mean")[2]
         with pytest.raises(ResultsError, match=r"is a group.*acceleration"):
             results["bodies/2"]
+        with pytest.raises(ResultsError, match=r"are for mbsim request"):
+            results["Force_Contact[301].force"]
         for name in ("", "/", "nothing/like/it", "time/x", "bodies/2/position/y/z"):
             with pytest.raises(ResultsError):
                 results[name]
@@ -449,6 +455,10 @@ def test_log(tmp_path: Path) -> None:
         "normal law IMPACT, built in",
         "stiffness 1e+08",
         "friction law COULOMB_ON, built in",
+        "mu_static 0.3",
+        "mu_dynamic 0.2",
+        "stiction_trans_vel 0.01",
+        "friction_trans_vel 0.02",
         "pair Post_Graphic[200] Post_Graphic[100]: closed form SPHERE-PLANE",
         "USRMES:USER [1] INFO: hello",
         "largest force 1234.5",
