@@ -20,6 +20,7 @@ from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
+    OWN_TIME,
     STIFFNESS,
     TOL,
     WATCH,
@@ -101,7 +102,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         )
     m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / m.memory[TOL]
     if m.memory[WATCH] == 1.0:
-        m.memory[STIFFNESS] = stiffness(m, h)
+        m.memory[STIFFNESS] = stiffness(p, m, t, h)
     return 0
 
 
@@ -118,7 +119,7 @@ def rate_of(moved: float, faster: float, pulled: float) -> float:
 
 
 @jitable
-def stiffness(m: Method, h: float) -> float:
+def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     """Return the step times the rate of f between its last stages, inf where that is hidden.
 
     Of bodies alone, where there are some: what is summed up beside them has other units. The
@@ -132,12 +133,13 @@ def stiffness(m: Method, h: float) -> float:
     says nothing of the rate at the motion. For f = -r y the two are as much apart at h r = 2,
     near the bound of stability at 3.3. An error that is far below what is allowed bounds no step.
     """
-    k = m.k
-    n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(m.y)
+    k, y = m.k, m.y
+    n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(y)
     first = m.bodies[0] == 0
-    over, last, other = 0.0, np.zeros(3), np.zeros(3)
+    # in the norm of the error, which has no units: ways, changes of velocity and of f of two pairs,
+    # and the change of f over the step
+    d = np.zeros((7, len(y)))
     for i in range(n):
-        rise, change, before = k[6, i] - k[5, i], k[6, i] - k[0, i], k[5, i] - k[4, i]
         way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
         way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
         come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
@@ -145,16 +147,17 @@ def stiffness(m: Method, h: float) -> float:
         # f of a position is its velocity: that says nothing
         is_rate = first or i % BODY_SIZE >= 7
         j = 1 if is_rate else 0
-        last[j] += way * way
-        other[j] += come * come
+        d[j, i], d[3 + j, i] = h * way, h * come
         if is_rate:
-            over += change * change
-            last[2] += rise * rise
-            other[2] += before * before
-    rate = 0.0
-    for d in (last, other):
-        rate = max(rate, rate_of(h * math.sqrt(d[0]), h * math.sqrt(d[1]), math.sqrt(d[2])))
-    hidden = last[2] > HIDES * HIDES * over and m.memory[LAST_ERROR] > BOUNDS
+            d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
+            d[6, i] = k[6, i] - k[0, i]
+    size = np.empty(7)
+    for j in range(7):
+        size[j] = call_float(p.norm, (p.context, t, 0.0, d[j], y))
+    rate, own = 0.0, m.memory[OWN_TIME]
+    for j in (0, 3):
+        rate = max(rate, rate_of(own * size[j], size[j + 1], size[j + 2]))
+    hidden = size[2] > HIDES * size[6] and m.memory[LAST_ERROR] > BOUNDS
     return math.inf if hidden and h * rate < SHOWN else h * rate
 
 

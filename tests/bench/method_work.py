@@ -7,6 +7,7 @@ Without DECK the decks of `models/`, the stiff ones too; one may be a file anywh
 where OUT.jsonl ends. `table` prints a line a deck and tol: evaluations of each method with its
 Jacobians, the error of each, AUTO's work over that of the better of explicit and stiff at AUTO's
 error, by count and by time; then where a looser tol took more work than the next tighter one.
+Work is evaluations and Jacobians, those of an implicit method as IMPLICIT_WORK each.
 
 Errors are of positions, root mean square over bodies and rows in parts of the way they go, against
 the tightest run of RADAU5; `known` is how far the tightest one of DOPRI5 is from it. Seconds are
@@ -198,7 +199,7 @@ def table(options):
         for method in dict.fromkeys(r["method"] for r in good):
             runs = sorted((r for r in good if r["method"] == method), key=lambda r: -r["tol"])
             for loose, tight in itertools.pairwise(runs):
-                times = evaluations(loose) / evaluations(tight)
+                times = work(loose) / work(tight)
                 if times > SLOWER:
                     seconds = loose["loop_s"] / tight["loop_s"]
                     slower.append(
