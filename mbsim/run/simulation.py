@@ -42,8 +42,10 @@ def _stoppable(runner: Runner) -> Iterator[None]:
 
     for name in _STOPPING:
         number = getattr(signal, name, None)
-        # what `nohup` has switched off stays so
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+        # what `nohup` has switched off stays so; Ctrl-C a shell switches off for all that it starts
+        # in the background, where somebody who sends it means it
+        off = number is not None and signal.getsignal(number) is signal.SIG_IGN
+        if number is not None and not (off and name == "SIGHUP"):
             before[number] = signal.signal(number, ask)
     try:
         yield
