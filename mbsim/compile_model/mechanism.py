@@ -22,7 +22,7 @@ from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.tree import AXES, TreeJoint, empty_tree, is_plain, limb_of, nearest_flip
 from mbsim.errors import DeckError, Fault
-from mbsim.forces.catalog import Acts, ForceKind
+from mbsim.forces.catalog import ForceKind, Switched
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
 from mbsim.model.elements import Coupler, GeneralConstraint, Joint, MarkerForce, Model, Motion
 from mbsim.model.forces import rigid_forces
@@ -246,7 +246,8 @@ class _Builder:
     def add_rigid_force(self, kind: ForceKind, force: MarkerForce) -> None:
         """Add the velocity that a rigid force holds while it sticks; it is no connection."""
         i, j = self.markers.row(force.i_marker_id), self.markers.row(force.j_marker_id)
-        acts: Acts = kind.form.acts(force.values)  # type: ignore[attr-defined]
+        assert isinstance(kind.form, Switched)  # the only form that can be rigid
+        acts = kind.form.acts(force.values)
         axis = acts.axis
         if acts.turns:
             row = angle()

@@ -148,7 +148,7 @@ class PartFile:
         try:
             os.link(self.target, self._older, follow_symlinks=False)
             found = os.stat(self._older, follow_symlinks=False)
-        except (OSError, NotImplementedError):
+        except (OSError, NotImplementedError):  # a disk, or a system, without second names
             return False
         return (found.st_dev, found.st_ino) == self._published
 

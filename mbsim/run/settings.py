@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual
+from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual, Switched
 from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
 from mbsim.model.elements import ASIDE, Model, Simulation
 from mbsim.model.forces import rigid_forces
@@ -254,7 +254,8 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         assert dry is not None
         kind, force = dry
         source, name = force.source, element_name(model.file, kind.statement, force.id)
-        instead = kind.form.rigid_by  # type: ignore[attr-defined]
+        assert isinstance(kind.form, Switched)  # the only form that can be rigid
+        instead = kind.form.rigid_by
         said = f"{instead}=0"
     if method == AUTO:
         return IMPLICIT, [f"integrator AUTO: {IMPLICIT} from the start, for {name} is rigid"]

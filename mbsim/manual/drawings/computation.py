@@ -66,12 +66,12 @@ def normal_laws(figure: Figure) -> None:
 def friction_laws(figure: Figure) -> None:
     """Friction over slip speed of smoothed laws, and through a slip to and fro."""
     from mbsim.laws.catalog import FRICTION_LAWS
-    from mbsim.laws.slip_test import Conditions, cycle, sample_of, samples, steady
+    from mbsim.laws.slip_test import Conditions, Sample, cycle, sample_of, samples, steady
 
     at = Conditions()
     over_speed, to_and_fro = figure.subplots(1, 2)
 
-    def sample(name: str, own: dict[str, float]):  # type: ignore[no-untyped-def]
+    def sample(name: str, own: dict[str, float]) -> Sample:
         law = FRICTION_LAWS[name]
         values = {each.name: each.default for each in law.own if each.default is not None}
         return sample_of(law, {**values, **_MU, **own}, at)
