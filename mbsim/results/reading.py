@@ -49,7 +49,7 @@ def _damage(error: BaseException) -> str:
     return f"cannot be read, the file is damaged: {text or type(error).__name__}"
 
 
-class Side(NamedTuple):
+class Location(NamedTuple):
     """Where a signal is stored: its dataset, and its column among elements side by side."""
 
     stored: str
@@ -76,7 +76,7 @@ class Results:
         # once they were looked up
         self._signals: dict[str, int] | None = None
         self._ids: dict[str, list[int]] | None = None
-        self._table: dict[str, Side] | None = None
+        self._table: dict[str, Location] | None = None
 
     def __enter__(self) -> Results:
         return self
@@ -142,7 +142,7 @@ class Results:
     @_reads
     def keys(self) -> list[str]:
         """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
-        return sorted((*self._stored(), *self._sides()), key=order)
+        return sorted((*self._stored(), *self._columnwise()), key=order)
 
     def _stored(self) -> dict[str, h5py.Dataset]:
         """Return the datasets that hold one signal or table, by name."""
@@ -155,14 +155,14 @@ class Results:
             group, _, last = name.rpartition("/")
             if not isinstance(item, h5py.Dataset) or name.startswith("checkpoint/"):
                 return
-            # of a group whose elements stand side by side `_sides` gives the names
+            # of a group whose elements stand side by side `_columnwise` gives the names
             if "/" in group or not last or f"{group}/id" not in file:
                 found[name] = item
 
         file.visititems(note)
         return found
 
-    def _sides(self) -> dict[str, Side]:
+    def _columnwise(self) -> dict[str, Location]:
         """Return the signals whose elements stand side by side, by names with ids."""
         if self._table is None:
             self._table = {}
@@ -171,7 +171,7 @@ class Results:
                     if last in _FACTS or not hasattr(item, "shape"):
                         continue
                     for k, id in enumerate(ids):
-                        self._table[f"{group}/{id}/{last}"] = Side(f"{group}/{last}", k)
+                        self._table[f"{group}/{id}/{last}"] = Location(f"{group}/{last}", k)
         return self._table
 
     def _columns(self) -> dict[str, list[int]]:
@@ -195,9 +195,11 @@ class Results:
             # /state is the solver's own, in its own layout
             if not name.startswith("state/") and _is_signal(item, item.shape, rows):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
-        shapes = {stored: file[stored] for stored in {s.stored for s in self._sides().values()}}
-        for name, side in self._sides().items():
-            item = shapes[side.stored]
+        shapes = {
+            stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}
+        }
+        for name, location in self._columnwise().items():
+            item = shapes[location.stored]
             if item.ndim > 1 and _is_signal(item, (item.shape[0], *item.shape[2:]), rows):
                 found[name] = 1 if item.ndim == 2 else item.shape[2]
         self._signals = {name: found[name] for name in sorted(found, key=order)}
@@ -301,43 +303,43 @@ class Results:
         return self._values(*found)
 
     @_reads
-    def _values(self, side: Side, part: str | None) -> Any:
+    def _values(self, location: Location, part: str | None) -> Any:
         """Return a signal or a part of it."""
-        dataset = self._open()[side.stored]
+        dataset = self._open()[location.stored]
         index: list[Any] = [slice(None)] * dataset.ndim
-        if side.column is not None:
-            index[0 if dataset.ndim == 1 else 1] = side.column
+        if location.column is not None:
+            index[0 if dataset.ndim == 1 else 1] = location.column
         if part not in (None, "mag"):
             index[-1] = PARTS[dataset.shape[-1]][part]
         values = _plain(dataset[tuple(index)])
         return np.linalg.norm(values, axis=1) if part == "mag" else values
 
     @_reads
-    def _find(self, name: str) -> tuple[Side, str | None] | None:
+    def _find(self, name: str) -> tuple[Location, str | None] | None:
         """Return where a name is stored and the part of it asked for."""
         whole = name.strip("/")
         if not whole:
             return None
-        side = self._side(whole)
-        if side is not None:
-            return side, None
+        location = self._location(whole)
+        if location is not None:
+            return location, None
         whole, _, part = whole.rpartition("/")
-        side = self._side(whole) if whole else None
-        if side is None:
+        location = self._location(whole) if whole else None
+        if location is None:
             return None
-        dataset = self._open()[side.stored]
-        columns = dataset.ndim - (side.column is not None)
+        dataset = self._open()[location.stored]
+        columns = dataset.ndim - (location.column is not None)
         if columns != 2:
             return None
-        return (side, part) if part in parts_of(dataset.shape[-1]) else None
+        return (location, part) if part in parts_of(dataset.shape[-1]) else None
 
-    def _side(self, name: str) -> Side | None:
+    def _location(self, name: str) -> Location | None:
         """Return where a signal or table is stored."""
         import h5py
 
         file = self._open()
         if isinstance(file.get(name), h5py.Dataset):
-            return Side(name, None)
+            return Location(name, None)
         group, _, rest = name.partition("/")
         id, _, last = rest.partition("/")
         ids = self._columns().get(group)
@@ -345,7 +347,7 @@ class Results:
             return None
         if not isinstance(file.get(f"{group}/{last}"), h5py.Dataset):
             return None
-        return Side(f"{group}/{last}", ids.index(int(id)))
+        return Location(f"{group}/{last}", ids.index(int(id)))
 
     @_reads
     def last(self, group: str, signal: str) -> dict[int, Any]:

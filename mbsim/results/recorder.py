@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
-from mbsim.results.asked import Asked
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
 from mbsim.results.contact_posts import ContactPosts
@@ -20,9 +19,10 @@ from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
-from mbsim.results.going_on import MADE_OF, check_same, digest
 from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
+from mbsim.results.resume import MADE_OF, check_same, digest
+from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import (
     facts_of,
     names_of,
@@ -66,7 +66,7 @@ class Recorder:
     how : dataclass, optional
         `Settings` of the run, which those of a resumed one must equal.
     asked : sequence of str
-        What to record, see `Asked`; nothing stands for everything.
+        What to record, see `SignalFilter`; nothing stands for everything.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class Recorder:
         asked: Sequence[str] = (),
     ) -> None:
         self.system = system
-        self._asked = Asked(asked)
+        self._asked = SignalFilter(asked)
         self._identity = Identity(system, how)
         self.directory = directory
         self.checkpoint: dict[str, Table] = {}

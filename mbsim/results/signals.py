@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays.codes import CONTACT_COLUMNS
-from mbsim.results.asked import Asked
 from mbsim.results.blocks import Block, Table, events_table, nothing
 from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.forces import Forces
 from mbsim.results.motion import motion
 from mbsim.results.requests import columns_of, measures_of, request_table
+from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.watch import energies
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def groups(system: System) -> dict[str, list[int]]:
     return {group: ids for group, ids in found.items() if ids}
 
 
-def facts_of(system: System, asked: Asked) -> dict[str, Table]:
+def facts_of(system: System, asked: SignalFilter) -> dict[str, Table]:
     """Return ids, labels and types of all elements with columns, by dataset."""
     model = system.model
     tables: dict[str, Any] = {
@@ -76,7 +76,7 @@ def names_of(system: System) -> list[str]:
     stacked = groups(system)
     return [
         name
-        for stored, _ in signals(system, nothing(system), Asked())
+        for stored, _ in signals(system, nothing(system), SignalFilter())
         for group, _, signal in [stored.partition("/")]
         for name in (
             [f"{group}/{id}/{signal}" for id in stacked[group]]
@@ -101,7 +101,7 @@ def request_columns(system: System) -> dict[str, dict[str, Any]]:
 
 
 def signals(
-    system: System, block: Block, asked: Asked, incidents: int = 0, first: bool = True
+    system: System, block: Block, asked: SignalFilter, incidents: int = 0, first: bool = True
 ) -> Iterator[tuple[str, Table]]:
     """Yield the rows of every dataset that was asked for."""
     yield "time", block.time
@@ -141,7 +141,7 @@ def signals(
     yield "events", events_table(block.events)
 
 
-def _contacts(system: System, block: Block, asked: Asked) -> Iterator[tuple[str, Table]]:
+def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Table]]:
     """Yield the rows of contacts."""
     ids = system.contact_ids
     rows = block.contact.reshape(len(block.time), len(ids), CONTACT_COLUMNS)
@@ -159,7 +159,7 @@ def _contacts(system: System, block: Block, asked: Asked) -> Iterator[tuple[str,
     )
 
 
-def _elements(system: System, block: Block, asked: Asked) -> Iterator[tuple[str, Table]]:
+def _elements(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Table]]:
     """Yield the rows of everything between markers, element by element in its group's order."""
     elements = acting(system)
     wrenches = block.wrenches.reshape(len(block.time), len(elements), 6)

@@ -143,9 +143,9 @@ def simulate(
     from mbsim.compile_model.build import build
     from mbsim.core import jit
     from mbsim.plugins.permission import no_scripts
-    from mbsim.results.going_on import completed
     from mbsim.results.log import RunLog
     from mbsim.results.recorder import Recorder
+    from mbsim.results.resume import completed
 
     began = time.perf_counter()
     settings = settle(model, end_time, print_interval, integrator, tol)

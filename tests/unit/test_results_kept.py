@@ -11,10 +11,10 @@ import pytest
 
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from mbsim.errors import ModelError, ResultsError
-from mbsim.results.going_on import completed
 from mbsim.results.part_file import PartFile
 from mbsim.results.reading import end_state, open_results
 from mbsim.results.recorder import Recorder
+from mbsim.results.resume import completed
 
 
 def recording(folder: Path, rows: int = 10, **options: Any) -> Recorder:

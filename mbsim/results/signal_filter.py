@@ -1,4 +1,4 @@
-"""`Asked`: which signals a run records, of all that it could."""
+"""`SignalFilter`: which signals a run records, of all that it could."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Table = np.ndarray[Any, Any]
 _PARTS = {"mag", *(part for parts in PARTS.values() for part in parts)}
 
 
-class Asked:
+class SignalFilter:
     """Names and patterns of signals; none at all stand for every signal.
 
     Parameters
