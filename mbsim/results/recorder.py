@@ -6,8 +6,11 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
 
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
@@ -21,10 +24,11 @@ from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
 from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
-from mbsim.results.resume import MADE_OF, check_same, digest
+from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import (
     facts_of,
+    length_of,
     names_of,
     request_columns,
     signals,
@@ -94,12 +98,10 @@ class Recorder:
         self.watch = Watch(acting(system))
         self._blocks: list[Block] = []
         self._bytes = 0
-        self._rows_since_flush = 0
-        self._incidents = 0  # rows of state/incidents so far
+        self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._target: Path | None = None
-        self._shown = False  # whether the folder shows this run, not an earlier one
         self._saved: set[str] = set()  # tables of the last checkpoint
         self._posts = ContactPosts(system, system.posts) if system.posts else None
         check_requests(system.model)
@@ -109,11 +111,15 @@ class Recorder:
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
-        #: Whether another run's results are there.
+        #: Whether the folder shows this run; whether it showed another one before.
+        self.shown = False
         self.earlier = self._target is not None and not resume and self._target.exists()
         if resume:
             self.checkpoint = self._resumed(settings)
         self._store = Store(self._target, resume)
+        if resume:
+            # what a run that ended outside its loop has recorded since is recorded again
+            self._store.shorten(partial(length_of, self._written))
         self._store.update(
             values={} if resume else facts_of(system, self._asked),
             attributes={
@@ -132,17 +138,16 @@ class Recorder:
         try:
             with open_results(self._target) as results:
                 check_same(self._target, results, settings, self._identity)
-                if "state/incident_offsets" in results:
-                    self._incidents = int(results["state/incident_offsets"][-1])
                 tables = results.tables("checkpoint")
                 if results.attribute("checkpoint", "sha256") != digest(tables):
                     raise ModelError(
                         f"--resume: {self._target}: the checkpoint is damaged: its numbers are not "
                         "those that were written; start without --resume"
                     )
-                self._started = self._shown = True
+                self._started = self.shown = True
                 self._saved = set(tables)
                 tables.pop(MADE_OF, None)
+                self._written = tables.pop(WRITTEN).tolist()
                 self.watch.restore(tables)
                 return tables
         except ResultsError as error:
@@ -182,7 +187,6 @@ class Recorder:
         self.watch.add(block.time, block.energy, block.wrenches)
         self._blocks.append(block)
         self._bytes += block.bytes
-        self._rows_since_flush += n + events
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
         if self._bytes > BUFFER_BYTES:
@@ -217,12 +221,12 @@ class Recorder:
         self._save(checkpoint)
         self._show()
         self._store.publish()
-        self._rows_since_flush = 0
         self._published_at = time.monotonic()
 
     def _save(self, checkpoint: Mapping[str, Table]) -> None:
         """Write a checkpoint in the place of the last one."""
-        tables = {**checkpoint, **self.watch.saved(), MADE_OF: self._identity.packed()}
+        facts = {MADE_OF: self._identity.packed(), WRITTEN: np.array(self._written)}
+        tables = {**checkpoint, **self.watch.saved(), **facts}
         self._store.update(
             values={f"checkpoint/{name}": table for name, table in tables.items()},
             attributes={"checkpoint": {"sha256": digest(tables)}},
@@ -232,9 +236,9 @@ class Recorder:
 
     def _show(self) -> None:
         """Take away what an earlier run has left beside the file that is about to be replaced."""
-        if self._shown or self._target is None:
+        if self.shown or self._target is None or self._store.broken:
             return
-        self._shown = True
+        self.shown = True
         for suffix in (".csv", ".log"):
             with contextlib.suppress(OSError):
                 self._target.with_suffix(suffix).unlink()
@@ -270,7 +274,8 @@ class Recorder:
         audit : Audit, optional
             What the run found out about itself.
         checkpoint : callable, optional
-            Returns the state at the end, with which a run can go on whose files were not completed.
+            Returns the state at the end, with which a run can go on whose files were not completed;
+            else the last one stays.
         write_log : callable, optional
             Writes the log, after the ``.csv``.
 
@@ -288,15 +293,18 @@ class Recorder:
         }
         judged = to_attributes(audit) if audit is not None else {}
         self._store.update(values=peaks, attributes={"stats": stats, **judged})
-        # of rows after the checkpoint, a resumed run would record a second copy
-        stale = status == "finished" or self._rows_since_flush > 0
+        if self.earlier and not self.shown:
+            # else a kill would leave this run's .csv and log beside the earlier one's file
+            if checkpoint is not None:
+                self._save(checkpoint())
+            self._show()
+            self._store.publish()
         failure = self._beside(write_log)
         if failure is not None and checkpoint is not None:
             self._save(checkpoint())
-            status, stale = "interrupted", False
-        self._store.update(
-            attributes={"/": {"status": status}}, remove=["checkpoint"] if stale else []
-        )
+            status = "interrupted"
+        over = ["checkpoint"] if status == "finished" else []
+        self._store.update(attributes={"/": {"status": status}}, remove=over)
         in_memory = self._store.finish()
         if (failure := self._store.failure or failure) is not None:
             # raised once already, maybe; a caller that cleans up shall not hear another story
@@ -309,7 +317,8 @@ class Recorder:
 
     def _beside(self, write_log: Callable[[], None] | None) -> ResultsError | None:
         """Write the ``.csv`` and the log; return why that failed."""
-        self._show()
+        if self.earlier and not self.shown:
+            return None  # nothing could be published: an earlier run's files stay together
         try:
             if self._target is not None and self._store.file:
                 path = self._target.with_suffix(".csv")
@@ -330,25 +339,30 @@ class Recorder:
         self._blocks, self._bytes = [], 0
         rows = dict(self._signals(block))
         room, size = self._store.room(), sum(table.nbytes for table in rows.values())
-        short = room is not None and size > room
-        if room is not None and short:
-            block = first_rows(block, max(0, len(block.time) * room // size))
-            rows = dict(self._signals(block))
         # with the first rows, so that a run that dies has them too
         columns = {} if self._started else request_columns(self.system)
-        if not short:
-            self._store.update(rows=rows, attributes=columns, last=last)
-        elif len(block.time):
-            self._store.update(
-                rows, attributes={**columns, "/": {"status": "failed"}}, remove=["checkpoint"]
-            )
-            self._show()
-            self._store.stop(f"no space left on device; rows up to time {block.time[-1]:.9g}")
-        else:
-            self._store.stop("no space left on device")
+        if room is not None and size > room:
+            self._fill(first_rows(block, max(0, len(block.time) * room // size)), columns)
+        self._store.update(rows=rows, attributes=columns, last=last)
         self._started = True
-        self._incidents += len(block.incidents)
+        sizes = (len(block.time), len(block.incidents), len(block.events))
+        self._written = [a + b for a, b in zip(self._written, sizes, strict=True)]
+
+    def _fill(self, block: Block, columns: Mapping[str, Mapping[str, Any]]) -> NoReturn:
+        """Publish the rows for which there is room, and raise; the last checkpoint stays."""
+        said = "no space left on device"
+        if len(block.time):
+            self._store.update(dict(self._signals(block)), attributes=columns)
+            said += f"; rows up to time {block.time[-1]:.9g} are kept"
+        elif not self._started:
+            self._store.fail(said)
+        self._started = True
+        self._store.update(attributes={"/": {"status": "failed"}})
+        if self._saved:
+            said += "; with more room, --resume goes on"
+        self._show()
+        self._store.stop(said)
 
     def _signals(self, block: Block) -> Iterator[tuple[str, Table]]:
         """Yield the rows of every dataset."""
-        return signals(self.system, block, self._asked, self._incidents, not self._started)
+        return signals(self.system, block, self._asked, self._written[1], not self._started)

@@ -26,8 +26,8 @@ _DIGESTS = {
     "model_sha256": ("the model file has changed", "model"),
     **{kind.attribute: (kind.differs, name) for name, kind in KINDS.items()},
 }
-#: Where a checkpoint says what the run is made of.
-MADE_OF = "made_of"
+#: Where a checkpoint says what the run is made of, and how much it had written by then.
+MADE_OF, WRITTEN = "made_of", "written"
 
 
 def check_same(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +69,13 @@ def without_rows(system: System) -> dict[str, dict[str, str]]:
         for group, _, id in [name.partition("/")]
         if int(id) not in there.get(group, ())
     }
+
+
+def length_of(written: Sequence[int], name: str) -> int:
+    """Return how long a dataset is of which so many rows, incidents and events are written."""
+    rows, incidents, events = written
+    others = {"events": events, "state/incidents": incidents, "state/incident_offsets": rows + 1}
+    return others.get(name, rows)
 
 
 def names_of(system: System) -> list[str]:

@@ -10,9 +10,9 @@ import contextlib
 import time
 import uuid
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -105,13 +105,27 @@ class Store:
                 self.file.close()
         self._unlock()
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str) -> NoReturn:
         """Publish what is there as the last, and raise why nothing more can be written."""
-        assert self.target is not None
         self.finish()
+        self.fail(reason)
+
+    def fail(self, reason: str) -> NoReturn:
+        """Drop what is not published, and raise why nothing more can be written."""
+        self.abandon()
         if self.failure is None:
             self.failure = ResultsError(f"{self.target}: results cannot be written: {reason}")
         raise self.failure
+
+    def shorten(self, length: Callable[[str], int]) -> None:
+        """Let the datasets that grow end after so many rows, `length` taking their names."""
+
+        def shortened(name: str, item: Any) -> None:
+            if getattr(item, "maxshape", ())[:1] == (None,) and len(item) > length(name):
+                item.resize(length(name), axis=0)
+
+        with self._writing() as file:
+            file.visititems(shortened)
 
     def _unlock(self) -> None:
         if self._lock is not None:

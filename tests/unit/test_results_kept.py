@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -213,3 +214,107 @@ def test_paths_by_id_and_whole_tables(tmp_path: Path) -> None:
         )
         assert "bodies/id" not in results.keys()
         assert "bodies/3/position" not in results
+
+
+def numbers(folder: Path) -> list[float]:
+    """Return what says which rows a result has, after looking at what belongs to them."""
+    with open_results(folder / "deck.h5") as results:
+        n, offsets = len(results["time"]), results["state/incident_offsets"]
+        assert len(offsets) == n + 1
+        assert len(results["state/incidents"]) == offsets[-1]
+        np.testing.assert_array_equal(results["requests/7"][:, 1], results["bodies/2/position/x"])
+        found: list[float] = results["bodies/2/position/x"].tolist()
+        return found
+
+
+def test_a_run_goes_on_after_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = recording(tmp_path, 5)
+    system = recorder.system
+    recorder.flush(checkpoint(5))
+    add_rows(system, 5, 40)
+    recorder.take()
+    size = sum(table.nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    with monkeypatch.context() as patch:
+        patch.setattr(PartFile, "room", lambda part: (1 << 18) + int(0.7 * size))
+        with pytest.raises(ResultsError, match=r"rows up to time \d.*--resume goes on"):
+            close(recorder)
+    assert 20 < len(numbers(tmp_path)) < 45
+    system = fake_system(tmp_path / "deck")
+    again = Recorder(system, SETTINGS, tmp_path, resume=True)
+    assert again.checkpoint["stage"] == 5
+    add_rows(system, 5, 55)
+    again.take()
+    close(again)
+    assert numbers(tmp_path) == list(range(60))
+    with open_results(tmp_path / "deck.h5") as results:
+        assert results.status == "finished"
+        assert len(results["events"]) == 4
+
+
+def test_a_disk_without_room_leaves_the_earlier_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = tmp_path / "deck.log"
+    close(recording(tmp_path), write_log=lambda: log.write_text("old") and None)
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("deck.*")}
+    assert len(before) == 3
+    recorder = recording(tmp_path, 20)
+    monkeypatch.setattr(PartFile, "room", lambda part: 0)
+    with pytest.raises(ResultsError, match=r"no space left on device$"):
+        recorder.flush(checkpoint(20))
+    with pytest.raises(ResultsError, match=r"no space left on device$"):
+        close(recorder, write_log=lambda: log.write_text("new") and None)
+    assert {path.name: path.read_bytes() for path in tmp_path.glob("deck.*")} == before
+
+
+class Killed(BaseException):
+    """What a kill at a system call is to the caller."""
+
+
+@pytest.mark.parametrize("flushes", [0, 1])
+@pytest.mark.parametrize("name", ["fsync", "replace", "unlink", "open"])
+def test_a_killed_rerun_never_mixes_two_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, flushes: int
+) -> None:
+    call, ended = 0, False
+    while not ended:
+        call += 1
+        folder = tmp_path / f"{call}"
+        log = folder / "deck.log"
+        close(recording(folder), write_log=lambda log=log: log.write_text("10") and None)
+        recorder = recording(folder, 20)
+        left, plain = call, getattr(os, name)
+
+        def dying(*given: Any, **named: Any) -> Any:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                raise Killed
+            return plain(*given, **named)  # noqa: B023
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, name, dying)
+            try:
+                for _ in range(flushes):
+                    recorder.flush(checkpoint(20))
+                close(
+                    recorder,
+                    checkpoint=lambda: checkpoint(20),
+                    write_log=lambda log=log: log.write_text("20") and None,
+                )
+                ended = True
+            except Killed:
+                pass
+        rows = len(numbers(folder))
+        beside = [path for path in (log, folder / "deck.csv") if path.exists()]
+        assert rows in (10, 20)
+        if log in beside:
+            assert log.read_text() == str(rows)
+        if log.with_suffix(".csv") in beside:
+            assert len(log.with_suffix(".csv").read_text().splitlines()) == rows + 1
+        with open_results(folder / "deck.h5") as results:
+            whole = results.status == "finished" and rows == 20
+            assert results.has_checkpoint == (rows == 20 and not whole)
+        assert len(beside) == 2 or not whole
+        recorder.abandon()
+    assert call > 1
