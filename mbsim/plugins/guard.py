@@ -64,6 +64,14 @@ class Failure:
 failure = Failure()
 
 
+def code_of(error: BaseException) -> int:
+    """Return the code for an exception of a user's function; what was meant is not tried again."""
+    from mbsim.core.codes import Code
+
+    at_once = isinstance(error, (StopRun, KeyboardInterrupt))
+    return Code.STOPPED_BY_USER if at_once else Code.RAISED_INTERPRETED
+
+
 def raise_failure() -> NoReturn:
     """Raise what a user function raised inside a callback, as a `PluginError`.
 
@@ -193,7 +201,7 @@ def callback(
             return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, f"Force_Contact[{element}]", time, name, source)
-            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
+            return code_of(error)
         finally:
             host.state = outer
 
@@ -261,7 +269,7 @@ def state_callback(
             return Code.RAISED_INTERPRETED
         except BaseException as error:
             failure.store(error, title, time, name, source)
-            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
+            return code_of(error)
         finally:
             host.state = outer
 

@@ -15,7 +15,7 @@ from mbsim.laws import user_normal as at
 from mbsim.model.elements import Contact
 from mbsim.plugins import guard
 from mbsim.plugins.dependence import dependence
-from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.helpers import host
 from mbsim.plugins.permission import watched
 from mbsim.plugins.source.diagnose import reads_parameter
 from mbsim.plugins.source.find import find_source
@@ -158,7 +158,7 @@ def _callback(made: UserNormal) -> tuple[int, object]:
         except BaseException as error:
             title, source = f"Force_Contact[{made.element}]", str(made.source)
             guard.failure.store(error, title, place[at.TIME], made.name, source)
-            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
+            return guard.code_of(error)
         finally:
             host.state = outer
 

@@ -25,7 +25,7 @@ from mbsim.laws.residual import KINDS, MOST_UNKNOWNS, inputs
 from mbsim.model.elements import ForceElement
 from mbsim.plugins import guard
 from mbsim.plugins.compile.residual_trials import points, refuse_jumps, sort_unknowns
-from mbsim.plugins.helpers import StopRun, host
+from mbsim.plugins.helpers import host
 from mbsim.plugins.permission import named, not_run, watched
 from mbsim.plugins.returned import numbers
 from mbsim.plugins.source.find import find_script
@@ -212,9 +212,7 @@ def _callback(
             return 0
         except BaseException as error:
             guard.failure.store(error, f"Force_Element[{element}]", time, name, source)
-            from mbsim.core.codes import Code
-
-            return Code.STOPPED_BY_USER if isinstance(error, StopRun) else Code.RAISED_INTERPRETED
+            return guard.code_of(error)
         finally:
             host.state = outer
 

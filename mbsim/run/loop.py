@@ -6,8 +6,10 @@ to Python only with rows to keep, after a bounded number of evaluations, or to s
 
 from __future__ import annotations
 
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -87,6 +89,10 @@ class Runner:
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
         self.interrupted = 0  # number of the signal that asks for an end
+        self.storing = False  # nothing may be left half written
+        self.torn = False  # a second signal came in the midst of something: no checkpoint of that
+        self._begun = False  # whether the current Simulate has
+        self._before: dict[str, Any] | None = None  # checkpoint to go on from while it begins
         self.dump: ContactProblems | None = None
 
     def _make_detector(self) -> Any:
@@ -190,8 +196,11 @@ class Runner:
 
     def checkpoint(self) -> dict[str, Any]:
         """Return everything a run needs to go on: state, log, method, and where it is."""
+        if self._before is not None:
+            return self._before
         arrays = checkpoint.save(self.system.scene, self.method)
         arrays["stage"] = np.array(self.stage)
+        arrays["begun"] = np.array(int(self._begun))
         arrays["time"] = np.array(self.method.memory[0])
         return arrays | self.methods.saved() | self.sensing.saved() | self.pace.saved()
 
@@ -203,7 +212,7 @@ class Runner:
         # what failed when the checkpoint was written is tried anew
         self.method.counts[scheme.CODE] = 0
         self.methods.restore(saved)
-        self.stage = int(saved["stage"])
+        self.stage, self._begun = int(saved["stage"]), bool(saved["begun"])
         self.sensing.restore(saved)
         self.pace = self._pace()
         self.pace.restore(saved)
@@ -224,8 +233,9 @@ class Runner:
         """Run all Simulate statements from the current stage on."""
         first = self.stage
         for stage in range(first, len(self.settings.stages)):
-            fresh = not (resumed and stage == first)
-            self.stage = stage
+            fresh = not (resumed and stage == first and self._begun)
+            self.stage, self._begun = stage, not fresh
+            self._stop_if_asked()
             self._run_stage(self.settings.stages[stage], fresh, progress)
             if self.sensing.halted_by:
                 return
@@ -241,8 +251,41 @@ class Runner:
         # the first row of a Simulate is there anyway
         if row and not start:
             self.hooks.must(self.problem.output, t, y, error)
-            self.recorder.take()
+            self._take()
         return follows == GO_ON
+
+    @contextmanager
+    def _undisturbed(self) -> Iterator[None]:
+        """Let signals wait while something is written."""
+        self.storing = True
+        try:
+            yield
+        finally:
+            self.storing = False
+
+    def _take(self) -> None:
+        """Let the recorder have the rows that there are."""
+        with self._undisturbed():
+            self.recorder.take()
+
+    def ask_to_stop(self, number: int) -> None:
+        """Do what a signal asks for: the first ends the run in order, a second one at once."""
+        if not self.interrupted:
+            self.interrupted = number
+        elif not self.storing:
+            self.torn = True
+            raise KeyboardInterrupt
+
+    def stopped(self) -> Interrupted:
+        """Return what says that a signal ended the run, and when."""
+        where = ", in the midst of a step" if self.torn else ""
+        line = f"interrupted at time {self.time:.6g}{where}"
+        return Interrupted(line, self.interrupted or signal.SIGINT)
+
+    def _stop_if_asked(self) -> None:
+        """Raise `Interrupted` where a signal has asked for it."""
+        if self.interrupted:
+            raise self.stopped()
 
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""
@@ -276,7 +319,7 @@ class Runner:
             goes_on = self._sense(simulation.end_time, start=True)
         if len(self.sensing.times):
             self.hooks.must(self.problem.output, t, method.y, method.error)
-        self.recorder.take()
+        self._take()
         return goes_on
 
     def _look_ahead(self, stage: Stage, fresh: bool) -> None:
@@ -317,9 +360,12 @@ class Runner:
             self.pace = self._pace()
         if fresh or stage.is_static:
             if self.stage > 0:
+                self._before = self.checkpoint()
                 # the statement may have changed what acts
                 scene.audit.tally[ANEW] = 1.0
-            if not self._begin_stage(stage):
+            goes_on = self._begin_stage(stage)
+            self._begun, self._before = True, None
+            if not goes_on:
                 return
         elif not self.system.model.sensors:
             last = self.stage == len(self.settings.stages) - 1
@@ -340,21 +386,21 @@ class Runner:
             self.loop_seconds += elapsed
             done = int(method.counts[scheme.EVALUATIONS]) - before
             budget = next_budget(budget, done, elapsed)
-            self.recorder.take()
+            self._take()
             if self.dump is not None and outcome != problem.FAILED:
                 # after every step
                 budget = 1
-                self._dump()
+                with self._undisturbed():
+                    self._dump()
             if outcome == problem.DONE:
                 return
             if outcome == problem.HAPPENED and not self._sense(simulation.end_time):
                 return
             self._answer(outcome, simulation.end_time)
-            if self.interrupted:
-                now = float(method.memory[scheme.TIME])
-                raise Interrupted(f"interrupted at time {now:.6g}", self.interrupted)
+            self._stop_if_asked()
             if self.recorder.due():
-                self.recorder.flush(self.checkpoint())
+                with self._undisturbed():
+                    self.recorder.flush(self.checkpoint())
                 self.log.show()
             if progress is not None:
                 h = float(method.memory[scheme.STEP])

@@ -29,16 +29,11 @@ _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
 
 @contextmanager
 def _stoppable(runner: Runner) -> Iterator[None]:
-    """Let Ctrl-C and a scheduler's signals ask the runner to stop; a second one stops at once."""
+    """Let Ctrl-C and a scheduler's signals ask the runner to stop."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before: dict[int, Any] = {}
-
-    def ask(number: int, frame: Any) -> None:
-        if runner.interrupted:
-            raise KeyboardInterrupt
-        runner.interrupted = number
 
     for name in _STOPPING:
         number = getattr(signal, name, None)
@@ -46,7 +41,7 @@ def _stoppable(runner: Runner) -> Iterator[None]:
         # in the background, where somebody who sends it means it
         off = number is not None and signal.getsignal(number) is signal.SIG_IGN
         if number is not None and not (off and name == "SIGHUP"):
-            before[number] = signal.signal(number, ask)
+            before[number] = signal.signal(number, lambda number, _: runner.ask_to_stop(number))
     try:
         yield
     finally:
@@ -185,34 +180,44 @@ def simulate(
         host.log = log.line
     status = "failed"
     runner = Runner(system, settings, recorder, log, tell, changes)
-    try:
-        with _stoppable(runner), _limited(system, plugin_timeout, tell):
-            if resume:
-                runner.restore(recorder.checkpoint)
-                goes_on = f"goes on at {runner.time:.6g} of {settings.end_time:.6g}"
-                tell(goes_on)
-                log.line(goes_on)
-            else:
-                runner.start(allow_overlap)
-            if dump_fclib is not None:
-                runner.dump_every(dump_fclib, resume)
-            runner.run(progress, resume)
-            recorder.end()
-            if runner.dump is not None:
-                tell(f"{runner.dump.written} contact problems in {runner.dump.folder}")
-        status = "finished"
-    except Interrupted as error:
-        status = "interrupted"
-        log.line(str(error))
-        raise
-    except Exception as error:
-        log.line(f"{type(error).__name__}: {error}")
-        raise
-    finally:
-        compiled = jit.compile_seconds - compiled_before
-        results = _finish(runner, status, time.perf_counter() - began, compiled)
+    with _stoppable(runner):
+        try:
+            with _limited(system, plugin_timeout, tell):
+                if resume:
+                    _goes_on(runner)
+                else:
+                    runner.start(allow_overlap)
+                if dump_fclib is not None:
+                    runner.dump_every(dump_fclib, resume)
+                runner.run(progress, resume)
+                recorder.end()
+                runner.storing = True
+            status = "finished"
+        except Interrupted as error:
+            status = "interrupted"
+            log.line(str(error))
+            raise
+        except KeyboardInterrupt:
+            status, runner.torn = "interrupted", True
+            log.line(str(stopped := runner.stopped()))
+            raise stopped from None
+        except Exception as error:
+            log.line(f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            runner.storing = True
+            compiled = jit.compile_seconds - compiled_before
+            results = _finish(runner, status, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
+
+
+def _goes_on(runner: Runner) -> None:
+    """Put a runner where its checkpoint was written, and say so."""
+    runner.restore(runner.recorder.checkpoint)
+    line = f"goes on at {runner.time:.6g} of {runner.settings.end_time:.6g}"
+    runner.tell(line)
+    runner.log.line(line)
 
 
 def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Results | None:
@@ -231,10 +236,12 @@ def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Result
     def close_log() -> None:
         log.close(status, stats, runner.recorder.watch, audit)
 
+    if runner.dump is not None and status == "finished":
+        runner.tell(f"{runner.dump.written} contact problems in {runner.dump.folder}")
     try:
         return _keep(runner, status, stats, audit, close_log)
     except ResultsError:
-        if not log.closed:
+        if not log.closed and (runner.recorder.shown or not runner.recorder.earlier):
             with suppress(ResultsError):
                 close_log()
         raise
@@ -308,8 +315,9 @@ def _keep(
         if not recorder.earlier:
             close_log()
         return None
-    if status != "finished":
+    if status != "finished" and not runner.torn:
         recorder.flush(runner.checkpoint())
     contacts = runner.system.scene.log.contacts
-    results: Results = recorder.close(status, stats, contacts, audit, runner.checkpoint, close_log)
+    last = None if runner.torn else runner.checkpoint
+    results: Results = recorder.close(status, stats, contacts, audit, last, close_log)
     return results
