@@ -1,156 +1,187 @@
 """Runs that are killed at random instants go on as if nothing had been, bit for bit.
 
-``MBSIM_KILLS=200 python -m pytest -m slow -s tests/integration/test_kills.py`` kills so many.
+``MBSIM_KILLS=200 python -m pytest -m slow -s tests/integration/test_kills.py`` kills so many; a
+quarter as many are stopped by SIGTERM, SIGHUP or SIGINT, a tenth run out of disk. What they found
+out is printed.
 """
 
 from __future__ import annotations
 
+import functools
 import os
 import random
 import signal
-import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
-from helpers.folders import MODELS
+from helpers.ends import (
+    Changes,
+    can_go_on,
+    command,
+    hidden,
+    looked_at,
+    resized,
+    run_until,
+    same,
+    small_disk,
+    visible,
+)
+from helpers.kill_decks import CASES
 from mbsim.results.reading import open_results
 
-KILLS = int(os.environ.get("MBSIM_KILLS", "24"))
+KILLS = int(os.environ.get("MBSIM_KILLS", "25"))
 SEED = int(os.environ.get("MBSIM_KILL_SEED", "1"))
-
-#: An interpreted law with states of its own.
-STATES = """
-CFFSUB_STATES = 2
-def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, state):
-    pull = [-2e3 * x[0] - state[0], -2e3 * x[1] - state[1]]
-    return [pull[0], pull[1], 0.0], [0.9 * state[0] + xdot[0], 0.9 * state[1] + xdot[1]]
-"""
-STAGES = (
-    '<Simulate analysis_type="Transient" end_time="1.0" print_interval="0.0005"/>'
-    '<Force_Gravity grav_x="1" grav_z="-9.81"/>'
-    '<Simulate analysis_type="Transient" end_time="2.0" print_interval="0.0005"/>'
-)
+LINUX = sys.platform == "linux"
 
 
-def _of_models(name: str, *options: str) -> tuple[str, list[str]]:
-    return str(MODELS / f"{name}.xml"), list(options)
+class Straight:
+    """A run that nothing ends, and how long it takes."""
+
+    def __init__(self, folder: Path, case: str) -> None:
+        self.deck, self.options = CASES[case](folder)
+        self.out = folder / "straight"
+        self.whole = self._timed()
+        with open_results(next(self.out.glob("*.h5"))) as results:
+            compiled = results.stats["compile_s"]
+        if compiled > 0.1 * self.whole:
+            self.whole = self._timed()
+
+    def _timed(self) -> float:
+        """Run once, and return the seconds that it took."""
+        began = time.perf_counter()
+        code, said = run_until(self.line(self.out))
+        assert code == 0, said
+        return time.perf_counter() - began
+
+    def line(self, out: Path, *more: str) -> list[str]:
+        """Return the command line of such a run into another folder."""
+        return command(self.deck, self.options, out, *more)
+
+    def resume(self, out: Path) -> None:
+        """Let an ended run go on to its end, and compare."""
+        more = ["--resume"] if can_go_on(out) else []
+        code, said = run_until(self.line(out, *more))
+        assert code == 0, said
+        self.is_like(out)
+        assert not hidden(out)
+
+    def is_like(self, out: Path) -> None:
+        """Compare with another run that has finished."""
+        same(self.out, out)
+        assert visible(out) == visible(self.out)
 
 
-#: Decks whose runs take about a second or more, with every method and kind of state.
-CASES = {
-    "bowling ball, a compiled plugin": _of_models(
-        "bowling_ball", "--tol", "1e-11", "--end-time", "40"
-    ),
-    "bowling ball, interpreted": _of_models(
-        "bowling_ball", "--interpret-plugins", "--end-time", "20"
-    ),
-    "weakening, memory of a plugin": _of_models("belt_weakening", "--tol", "1e-9"),
-    "LuGre": _of_models("lugre_stick_slip", "--integrator", "RADAU5"),
-    "LuGre, explicit": _of_models("lugre_stick_slip", "--integrator", "DOP853", "--end-time", "4"),
-    "SDND121": _of_models("sdnd121", "--tol", "1e-9"),
-    "Force_Element": _of_models("dry_friction_element", "--tol", "1e-10"),
-    "cam, AUTO": _of_models("cam", "--tol", "1e-8"),
-    "stop, GALPHA": _of_models("four_bar_stop", "--integrator", "GALPHA", "--tol", "1e-7"),
-    "governor": _of_models("flyball_governor", "--print-interval", "0.001"),
-    "rigid stiction": _of_models("stiction_rigid", "--end-time", "2"),
-    "disc": _of_models("contensou_disc", "--integrator", "DOPRI5", "--tol", "1e-9"),
-    "walls": _of_models("poisson_walls", "--tol", "1e-10", "--end-time", "4"),
-    "mesh": _of_models("mesh_on_plane", "--end-time", "2"),
-    "stack, RADAU5": _of_models("stiff/box_stack", "--integrator", "RADAU5"),
-    "bushings, GALPHA": _of_models("stiff/bushing_chain", "--integrator", "GALPHA"),
-}
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Straight]:
+    """Return what runs a case straight, once for all tests."""
+
+    @functools.cache
+    def made(case: str) -> Straight:
+        return Straight(tmp_path_factory.mktemp("straight"), case)
+
+    return made
 
 
-def _law_with_states(folder: Path) -> tuple[str, list[str]]:
-    (folder / "law.py").write_text(STATES, encoding="utf-8")
-    law = {"cff_type": "USERCFF", "cff_fnc_name": "CFFSUB", "script_name": "law.py"}
-    text = GROUND + sphere(0.0995, v=(0.5, 0.1, 0)) + contact(**law) + GRAVITY
-    return str(write_deck(folder, text, 3.0, print_interval=0.001)), ["--interpret-plugins"]
+def share(total: int, case: str) -> int:
+    """Return how many of so many ends a case has."""
+    k = list(CASES).index(case)
+    return total * (k + 1) // len(CASES) - total * k // len(CASES)
 
 
-def _stages(folder: Path) -> tuple[str, list[str]]:
-    text = GROUND + sphere(0.4, v=(0.5, 0, 0)) + contact(**COULOMB) + GRAVITY
-    path = folder / "deck.xml"
-    path.write_text(f"<MotionSolve><Model>{text}</Model><Command>{STAGES}</Command></MotionSolve>")
-    return str(path), ["--tol", "1e-10"]
-
-
-MADE = {"interpreted law with states": _law_with_states, "two Simulates": _stages}
-
-
-def command(deck: str, options: list[str], out: Path, *more: str) -> list[str]:
-    """Return the command line of a run."""
-    base = [sys.executable, "-m", "mbsim", "run", deck, "-o", str(out), "--progress", "off"]
-    return [*base, *options, *more]
-
-
-def killed(line: list[str], after: float) -> bool:
-    """Run a command, kill it after so many seconds; return whether it was still running."""
-    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-        try:
-            _, said = process.communicate(timeout=after)
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGKILL)
-            process.communicate()
-            return True
-    assert process.returncode == 0, said.decode()
-    return False
-
-
-def seen(folder: Path) -> list[str]:
-    """Return the names of the files that a user sees."""
-    return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
-
-
-def same(one: Path, other: Path) -> None:
-    """Compare all signals and the CSV of two results."""
-    name = next(one.glob("*.h5")).name
-    with open_results(one / name) as a, open_results(other / name) as b:
-        assert a.status == b.status == "finished"
-        assert a.keys() == b.keys()
-        for key in a.keys():
-            np.testing.assert_array_equal(a[key], b[key], err_msg=key)
-    csvs = [sorted(folder.glob("*.csv")) for folder in (one, other)]
-    assert [path.name for path in csvs[0]] == [path.name for path in csvs[1]]
-    for left, right in zip(*csvs, strict=True):
-        assert left.read_bytes() == right.read_bytes()
+def of_cases(total: int) -> list[str]:
+    """Return the cases that have some."""
+    return [case for case in CASES if share(total, case)]
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGKILL")
-@pytest.mark.parametrize("case", [*CASES, *MADE])
-def test_a_killed_run_goes_on_bit_for_bit(tmp_path: Path, case: str) -> None:
-    deck, options = CASES[case] if case in CASES else MADE[case](tmp_path)
-    chance = random.Random(f"{SEED} {case}")
-    wanted = max(1, KILLS // (len(CASES) + len(MADE)))
-    straight = tmp_path / "straight"
-    assert not killed(command(deck, options, straight), 600.0)  # compiles, too
-    began = time.perf_counter()
-    assert not killed(command(deck, options, straight), 600.0)
-    whole = time.perf_counter() - began
-    kills = 0
-    for round_ in range(20 * wanted):
-        out, more = tmp_path / f"killed{round_}", []
-        while killed(command(deck, options, out, *more), chance.uniform(0.0, whole)):
-            kills += 1
-            published = list(out.glob("*.h5"))
-            statuses = []
-            for file in published:
-                with open_results(file) as results:
-                    statuses.append(results.status)
-                    assert len(results["state/y"]) == len(results["time"])
-            if statuses == ["finished"]:  # killed while it took leave
-                break
-            assert statuses in ([], ["running"])
-            more = ["--resume"] if published else []
-        same(straight, out)
-        assert seen(out) == seen(straight)
-        if kills >= wanted:
-            break
-    print(f"{case}: {kills} kills, {round_ + 1} runs of {whole:.1f} s")
-    assert kills >= wanted
+@pytest.mark.parametrize("case", of_cases(KILLS))
+def test_a_killed_run_goes_on_bit_for_bit(
+    tmp_path: Path, straight: Callable[[str], Straight], case: str
+) -> None:
+    """Killed at any instant, or at any change of its files; so is the run that goes on."""
+    whole, chance = straight(case), random.Random(f"{SEED} {case}")
+    kills = resumed = round_ = 0
+    while kills < share(KILLS, case):
+        out, more, status = tmp_path / f"killed{round_}", [], ""
+        round_ += 1
+        while status != "finished" and kills < share(KILLS, case):
+            how = chance.choice(["time", "names", "bytes", "result"]) if LINUX else "time"
+            after, at = chance.uniform(0.0, whole.whole), None
+            changes = None if how == "time" else Changes(out, with_bytes=how == "bytes")
+            if how == "result":
+                after *= 0.25  # as long as runs take after their first flush
+            elif how != "time":
+                at = chance.choice([1, 2, 3, 5, 8, 12] + [20, 40] * (how == "bytes"))
+            code, said = run_until(whole.line(out, *more), after, changes=changes, at=at)
+            if changes is not None:
+                changes.close()
+            assert code in (0, -signal.SIGKILL), said
+            kills += code != 0
+            resumed += bool(more)
+            status = looked_at(out) if out.exists() else ""
+            assert status in ("", "running", "finished")
+            more = ["--resume"] if status else []
+        if status == "finished":
+            whole.is_like(out)
+        else:
+            resumed += bool(more)
+            whole.resume(out)
+    print(f"{case}: {kills} kills, {resumed} resumed, {round_} runs of {whole.whole:.1f} s")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+@pytest.mark.parametrize("case", of_cases(KILLS // 4))
+def test_a_stopped_run_goes_on_bit_for_bit(
+    tmp_path: Path, straight: Callable[[str], Straight], case: str
+) -> None:
+    whole, chance = straight(case), random.Random(f"{SEED} stop {case}")
+    codes = []
+    for k in range(share(KILLS // 4, case)):
+        out = tmp_path / f"stopped{k}"
+        number = chance.choice([signal.SIGTERM] * 4 + [signal.SIGHUP, signal.SIGINT])
+        line = whole.line(out)
+        # most of the time passes before the run begins
+        code, said = run_until(line, chance.uniform(0.4, 1.05) * whole.whole, number)
+        codes.append(code)
+        # before the run begins nothing is there to be kept
+        assert code in (0, -number, 128 + number), said
+        assert "Traceback" not in said
+        status = looked_at(out) if out.exists() else ""
+        if code == 0 or status == "finished":
+            whole.is_like(out)
+            continue
+        assert status == ("interrupted" if "kept in" in said else "")
+        whole.resume(out)
+    print(f"{case}: stopped with codes {codes}, {whole.whole:.1f} s a run")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not LINUX or os.geteuid() != 0, reason="mounts small disks")
+@pytest.mark.parametrize("case", of_cases(KILLS // 10))
+def test_a_run_on_a_full_disk_goes_on_when_there_is_room(
+    tmp_path: Path, straight: Callable[[str], Straight], case: str
+) -> None:
+    whole, chance = straight(case), random.Random(f"{SEED} disk {case}")
+    size = sum(path.stat().st_size for path in whole.out.iterdir()) / 2**20
+    for k in range(share(KILLS // 10, case)):
+        # from where hardly a row fits to where two files almost do
+        room = 0.3 + chance.uniform(0.0, 2.0) * size
+        with small_disk(tmp_path / f"disk{k}", room) as disk:
+            out = disk / "out"
+            code, said = run_until(whole.line(out))
+            status = looked_at(out) if out.exists() else ""
+            rows = can_go_on(out) if status else None
+            print(f"{case}: {room:.2f} of {size:.2f} MB: {code}, {status or 'nothing'}, {rows}")
+            if code == 0:
+                whole.is_like(out)
+                continue
+            assert "Traceback" not in said
+            assert code in (2, 5), said
+            resized(disk, f"size={int(10 * size + 10)}m")
+            whole.resume(out)
