@@ -159,6 +159,7 @@ class Recorder:
         `rows` is a float: of a mistyped end time there may be more than integers count.
         """
         self._store.rows = int(min(rows, 1e9)) + 1
+        rows = max(0.0, rows - self._written[0])  # those of a run that goes on are there
         empty = self._signals(nothing(self.system))
         size = sum(table.itemsize * math.prod(table.shape[1:]) for _, table in empty)
         if self._target is None:

@@ -251,6 +251,21 @@ def test_a_run_goes_on_after_a_full_disk(tmp_path: Path, monkeypatch: pytest.Mon
         assert len(results["events"]) == 4
 
 
+def test_a_run_that_goes_on_needs_room_for_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = recording(tmp_path, 50)
+    size = sum(table[0].nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    recorder.flush(checkpoint(50))
+    recorder.abandon()
+    again = Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
+    monkeypatch.setattr(PartFile, "room", lambda part: (1 << 18) + int(1.125 * 12 * size))
+    again.check_room(60.0)
+    with pytest.raises(ModelError, match="15 output rows"):
+        again.check_room(65.0)
+    again.abandon()
+
+
 def test_a_disk_without_room_leaves_the_earlier_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
