@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import os
 import random
+import shutil
 import signal
 import sys
 import time
@@ -132,6 +133,25 @@ def test_a_killed_run_goes_on_bit_for_bit(
             resumed += bool(more)
             whole.resume(out)
     print(f"{case}: {kills} kills, {resumed} resumed, {round_} runs of {whole.whole:.1f} s")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGKILL")
+def test_a_run_killed_while_it_compiles(
+    tmp_path: Path, straight: Callable[[str], Straight], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it leaves in the cache does not harm the next one, nor a result that is there."""
+    whole, chance = straight("walls"), random.Random(f"{SEED} compile")
+    out = tmp_path / "out"
+    shutil.copytree(whole.out, out)
+    monkeypatch.setenv("MBSIM_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("MBSIM_SHIPPED_CODE", "")
+    for _ in range(max(2, KILLS // 40)):
+        code, _ = run_until(whole.line(out), chance.uniform(0.5, 4.0) * whole.whole)
+        if code == 0:
+            break
+        assert looked_at(out) in ("finished", "running")
+    whole.resume(out)
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from mbsim.results.part_file import PartFile
 from mbsim.results.reading import end_state, open_results
 from mbsim.results.recorder import Recorder
 from mbsim.results.resume import completed
+from mbsim.results.store import Store
 
 
 def recording(folder: Path, rows: int = 10, **options: Any) -> Recorder:
@@ -264,6 +265,31 @@ def test_a_run_that_goes_on_needs_room_for_the_rest(
     with pytest.raises(ModelError, match="15 output rows"):
         again.check_room(65.0)
     again.abandon()
+
+
+def test_one_that_goes_on_while_another_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which finishes after the other has read the checkpoint, before it has the lock."""
+    recorder = recording(tmp_path, 10)
+    recorder.flush(checkpoint(10))
+    recorder.abandon()
+
+    def goes_on() -> None:
+        system = fake_system(tmp_path / "deck")
+        found = Recorder(system, SETTINGS, tmp_path, resume=True)
+        add_rows(system, 10, 10)
+        found.take()
+        close(found)
+        assert numbers(tmp_path) == list(range(20))
+
+    def late(target: Path, resume: bool) -> Store:
+        monkeypatch.undo()
+        goes_on()
+        return Store(target, resume)
+
+    monkeypatch.setattr("mbsim.results.recorder.Store", late)
+    goes_on()
 
 
 def test_a_disk_without_room_leaves_the_earlier_run(
