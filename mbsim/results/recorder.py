@@ -222,7 +222,7 @@ class Recorder:
 
     def _save(self, checkpoint: Mapping[str, Table]) -> None:
         """Write a checkpoint in the place of the last one."""
-        tables = {**checkpoint, **self.watch.saved(), MADE_OF: self._identity.packed()}
+        tables = {**checkpoint, **self.watch.saved(), MADE_OF: self._identity.packed}
         self._store.update(
             values={f"checkpoint/{name}": table for name, table in tables.items()},
             attributes={"checkpoint": {"sha256": digest(tables)}},
