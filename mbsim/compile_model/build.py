@@ -31,6 +31,7 @@ from mbsim.compile_model.rigid_slots import rigid_slots
 from mbsim.compile_model.scratch import Sizes, empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
+from mbsim.core.collection import no_collection
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
@@ -348,6 +349,7 @@ def _scene(
     return scene, y0
 
 
+@no_collection()
 def build(
     model: Model,
     plugins: Sequence[Path] = (),

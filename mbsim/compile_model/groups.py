@@ -184,6 +184,8 @@ def find_groups(model: Model, placement: Placement) -> Groups:
         for id in met.markers:
             place = placement.markers[id]
             add([place.body_id] if place.body_id in bodies else met.bodies, (place.p, place.p))
+    # of two sets that touch within and a third one, a graphic stands on many sides
+    around: dict[int, tuple[Any, Any]] = {}
     contacts = []
     for id, contact in model.contacts.items():
         i, j = _touching(model, id)
@@ -195,8 +197,9 @@ def find_groups(model: Model, placement: Placement) -> Groups:
             for g in (contact.i_graphics_id, contact.j_graphics_id)[side]:
                 graphic = model.graphics[g]
                 place = placement.markers[graphic.marker_id]
-                box = graphic_box(graphic, place.p, place.R) or (place.p, place.p)
-                add([place.body_id] if place.body_id in bodies else moving[other], box)
+                if g not in around:
+                    around[g] = graphic_box(graphic, place.p, place.R) or (place.p, place.p)
+                add([place.body_id] if place.body_id in bodies else moving[other], around[g])
     row: dict[int, int] = {}
     of_body = [row.setdefault(sets.root(body), len(row)) for body in bodies]
     if not row:

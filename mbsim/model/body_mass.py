@@ -145,7 +145,9 @@ def _given_inertia(body: Body, mass: float, frames: Mapping[int, Frame], cg: Fra
 
 def _check_inertia(inertia: Array, body: Body) -> None:
     """Refuse what no rigid body has: moments <= 0, or one larger than the other two together."""
-    low, middle, high = np.linalg.eigvalsh((inertia + inertia.T) / 2.0)
+    low, middle, high = _principal_moments(inertia)
+    if low > 0.0 and high <= (low + middle) * (1.0 + _TRIANGLE):
+        return
     moments = f"principal moments about the cg {low:.9g}, {middle:.9g}, {high:.9g}"
     given = ""
     if body.inertia is not None:
@@ -155,5 +157,13 @@ def _check_inertia(inertia: Array, body: Body) -> None:
         given = given if given != ": " else "inertia_xx=0 inertia_yy=0 inertia_zz=0: "
     if not low > 0.0:
         raise BodyMassError(f"{given}{moments}; all must be > 0")
-    if high > (low + middle) * (1.0 + _TRIANGLE):
-        raise BodyMassError(f"{given}{moments}; none may be larger than the sum of the others")
+    raise BodyMassError(f"{given}{moments}; none may be larger than the sum of the others")
+
+
+def _principal_moments(inertia: Array) -> list[float]:
+    """Return the principal moments in ascending order."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.tolist()
+    if not (xy or xz or yz or yx or zx or zy):
+        return sorted((xx, yy, zz))
+    moments: list[float] = np.linalg.eigvalsh((inertia + inertia.T) / 2.0).tolist()
+    return moments

@@ -14,7 +14,11 @@ from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, keyword
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _INERTIAS = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_yz", "inertia_xz")
-_VELOCITIES = tuple(f"{kind}_ic_{axis}" for kind in "vw" for axis in "xyz")
+#: Of v and w, the names of the components and of their flags.
+_COMPONENTS = {
+    kind: tuple((f"{kind}_ic_{axis}", f"{kind}_ic_{axis}_flag") for axis in "xyz") for kind in "vw"
+}
+_VELOCITIES = tuple(name for kind in "vw" for name, _ in _COMPONENTS[kind])
 _COSINES = tuple(f"a{row}{column}" for row in range(3) for column in range(3))
 _ANGLES = ("psi", "theta", "phi")
 _POSITIONS = ("pos_x", "pos_y", "pos_z")
@@ -39,11 +43,10 @@ def _build_units(entry: Entry) -> None:
 def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
     """Return the initial velocity; a value whose flag is not TRUE counts as zero."""
     parts = []
-    for axis in "xyz":
-        name = f"{kind}_ic_{axis}"
+    for name, flag in _COMPONENTS[kind]:
         value = entry.get(name, 0.0)
-        if value != 0.0 and not entry.get(f"{name}_flag", False):
-            entry.warn(f"ignored, because {name}_flag is not TRUE", name)
+        if value != 0.0 and not entry.get(flag, False):
+            entry.warn(f"ignored, because {flag} is not TRUE", name)
             value = 0.0
         parts.append(value)
     if any(parts) and entry.get("isground", False):
@@ -53,16 +56,17 @@ def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
 
 def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
     """Return which components of the initial velocity the deck gives."""
-    x, y, z = (
-        entry.given(f"{kind}_ic_{axis}") and entry.get(f"{kind}_ic_{axis}_flag", False)
-        for axis in "xyz"
-    )
-    return bool(x), bool(y), bool(z)
+    x, y, z = _COMPONENTS[kind]
+    return _holds(entry, *x), _holds(entry, *y), _holds(entry, *z)
+
+
+def _holds(entry: Entry, name: str, flag: str) -> bool:
+    return entry.given(name) and bool(entry.get(flag, False))
 
 
 def _inertia(entry: Entry) -> tuple[float, float, float, float, float, float] | None:
     """Return the six inertias, or None where the deck gives none; products default to 0."""
-    if not any(entry.given(name) for name in _INERTIAS):
+    if not entry.those(_INERTIAS):
         return None
     for name in _INERTIAS[:3]:
         if not entry.given(name):
@@ -120,8 +124,7 @@ def _from_cosines(entry: Entry) -> el.Array:
 
 def _orientation(entry: Entry) -> el.Array:
     """Return the marker's axes as columns, from cosines or from 3-1-3 angles."""
-    cosines = [name for name in _COSINES if entry.given(name)]
-    angles = [name for name in _ANGLES if entry.given(name)]
+    cosines, angles = entry.those(_COSINES), entry.those(_ANGLES)
     if cosines and angles:
         both = f"{', '.join(cosines)} and {', '.join(angles)}"
         entry.fault(f"give direction cosines or angles, not both ({both})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,11 @@ class Shape:
     sizes: tuple[str, ...] = ()
     extras: tuple[str, ...] = ()
     offset: tuple[tuple[float, ...], ...] = ()
+
+    @cached_property
+    def attributes(self) -> frozenset[str]:
+        """Return the attributes that a graphic of this type may have."""
+        return frozenset((*_COMMON, *self.markers, *self.sizes, *self.extras))
 
 
 _LENGTHS = ("length_x", "length_y", "length_z")
@@ -149,9 +155,8 @@ def _build_graphic(entry: Entry) -> None:
 
 def _check_attributes(entry: Entry, shape: Shape) -> None:
     """Refuse attributes of other types and missing sizes; note what has no effect."""
-    own = {*_COMMON, *shape.markers, *shape.sizes, *shape.extras}
-    for name in entry.statement.attributes:
-        if entry.given(name) and name not in own:
+    for name in entry.those(entry.statement.attributes):
+        if name not in shape.attributes:
             allowed = ", ".join((*shape.markers, *shape.sizes, *shape.extras))
             entry.fault(f"type {shape.type} has no such attribute; it has {allowed}", name)
     for name in shape.sizes:
@@ -160,8 +165,8 @@ def _check_attributes(entry: Entry, shape: Shape) -> None:
             entry.fault(f"{name}: missing; must be {allowed} for type {shape.type}")
     if shape.shape == "FRUSTUM" and all(entry.get(name, 1.0) == 0.0 for name in _RADII):
         entry.fault("must be > 0 where bottom_radius is 0: a line has no volume", "top_radius")
-    for name in _BOUNDS:
-        if entry.given(name) and shape.shape == "PLANE":
+    for name in _BOUNDS if shape.shape == "PLANE" else ():
+        if entry.given(name):
             entry.note("contact uses the whole plane, the half-space z <= 0", name)
     if entry.get("ends_type", "CLOSED") != "CLOSED":
         entry.note("contact takes the solid as closed at both ends", "ends_type")
@@ -169,7 +174,7 @@ def _check_attributes(entry: Entry, shape: Shape) -> None:
 
 def _marker_id(entry: Entry, shape: Shape) -> int:
     """Return the marker that carries the shape, 0 where the deck gives none or two."""
-    given = [name for name in shape.markers if entry.given(name)]
+    given = entry.those(shape.markers)
     if len(given) == 1:
         return int(entry.get(given[0], 0))
     names = " or ".join(shape.markers)

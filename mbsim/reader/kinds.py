@@ -36,7 +36,7 @@ def parse_real(text: str) -> float:
     if not _REAL.fullmatch(text):
         raise BadValueError
     value = float(text)
-    if not math.isfinite(value) or abs(value) > LARGEST_REAL:
+    if abs(value) > LARGEST_REAL:
         raise BadValueError(f"is larger than {LARGEST_REAL:g}, the limit of a number")
     return value
 
@@ -57,7 +57,7 @@ def parse_integer(text: str) -> int:
 
 
 def real(
-    allowed: str = "a number",
+    allowed: str,
     *,
     above: float = -math.inf,
     least: float = -math.inf,
@@ -101,8 +101,7 @@ def _parse_either(text: str) -> float | Expression:
 
 def _parse_id(text: str) -> int:
     """Return a positive id that fits a 32-bit integer, as user subroutines take it."""
-    value = parse_integer(text)
-    if not 0 < value <= LARGEST_ID:
+    if not (_INTEGER.fullmatch(text) and 0 < (value := int(text)) <= LARGEST_ID):
         raise BadValueError
     return value
 
@@ -201,7 +200,7 @@ def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = No
     return Kind(choice, parse)
 
 
-REAL = real()
+REAL = Kind("a number", parse_real)
 POSITIVE = real("a number > 0", above=0.0)
 NOT_NEGATIVE = real("a number >= 0", least=0.0)
 POSITIVE_OR_INFINITE = Kind("a number > 0 or INFINITE", _parse_positive_or_infinite)

@@ -35,14 +35,15 @@ _ENCODINGS = {
 _DECLARATION = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)[\"']")
 _BEFORE_ROOT = re.compile(r"(?:\s+|<!--.*?-->|<\?.*?\?>)*", re.DOTALL)
 _TAG = re.compile(
-    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<([^\s/>!?][^\s/>]*)((?:[^>\"']|\"[^\"]*\"|'[^']*')*)>",
+    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"
+    r"|<([^\s/>!?][^\s/>]*)([^>\"']*(?:(?:\"[^\"]*\"|'[^']*')[^>\"']*)*)>",
     re.DOTALL,
 )
 _ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
 _SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}"
 
 
-@dataclass
+@dataclass(slots=True)
 class Attribute:
     """One attribute as written; `origin` names the --set option that gave the value."""
 
@@ -52,7 +53,7 @@ class Attribute:
     origin: str = ""
 
 
-@dataclass
+@dataclass(slots=True)
 class Node:
     """One element: `tag` as written, attributes in order, `text` without that of its children."""
 
@@ -71,7 +72,7 @@ class Node:
         """Return the attribute of that name, in any spelling, or None."""
         wanted = fold(name)
         for attribute in self.attributes:
-            if fold(attribute.name) == wanted:
+            if attribute.name == name or fold(attribute.name) == wanted:
                 return attribute
         return None
 
@@ -160,18 +161,19 @@ def _to_nodes(root: etree._Element, text: str, file: str) -> Node:
         if len(above) > MAX_DEPTH:
             raise _refused(file, line, f"elements nested more than {MAX_DEPTH} deep")
 
-        node = Node(str(element.tag).rpartition("}")[2], line)
-        for name, value in element.attrib.items():
-            local = str(name)
-            if local.startswith(_SCHEMA):
-                continue
-            if local.startswith("{"):
-                local = etree.QName(local).localname
-            node.attributes.append(Attribute(local, str(value), attribute_lines.get(local, line)))
+        attributes = []
+        for name, value in element.items():
+            if name[0] == "{":
+                if name.startswith(_SCHEMA):
+                    continue
+                name = etree.QName(name).localname
+            at = attribute_lines.get(name, line) if attribute_lines else line
+            attributes.append(Attribute(name, value, at))
         text_of = element.text or ""
         if len(element):
             text_of += "".join(child.tail or "" for child in element)
-        node.text = text_of.strip()
+        tag = element.tag.rpartition("}")[2]
+        node = Node(tag, line, attributes, text_of and text_of.strip())
         above[-1].children.append(node)
         above.append(node)
     return top.children[0]

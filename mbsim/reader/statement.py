@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -84,10 +84,21 @@ class Statement:
 
     @cached_property
     def spec_names(self) -> dict[str, str]:
-        """Return folded spelling -> attribute name, aliases included."""
+        """Return folded spelling -> attribute name, aliases and names as declared included."""
         names = {fold(name): name for name in self.attributes}
+        names |= {name: name for name in self.attributes}
         names |= {fold(s.alias): name for name, s in self.attributes.items() if s.alias}
         return names
+
+    @cached_property
+    def required(self) -> tuple[str, ...]:
+        """Return the attributes that every element must have."""
+        return tuple(name for name, spec in self.attributes.items() if spec.required)
+
+    @cached_property
+    def may_hold(self) -> frozenset[str]:
+        """Return the folded names of child elements."""
+        return frozenset(map(fold, self.children))
 
     def read(self, node: Node, draft: Draft) -> None:
         """Read one element into the draft; faults go there too."""
@@ -110,18 +121,22 @@ class Entry:
         self.source = Source(draft.file, node.line)
         self._attributes: dict[str, Attribute] = {}
         self._values: dict[str, Any] = {}
-        id = node.find("id")
-        self.label = statement.name + (f"[{_short(id.value)}]" if id else "")
 
         if statement.any_attribute(node):
             return
         self._collect()
-        self._check_content()
-        for name, attribute in self._attributes.items():
-            self._parse(name, attribute)
-        for name, spec in statement.attributes.items():
-            if spec.required and name not in self._attributes:
-                self.fault(f"{name}: missing; must be {spec.kind.allowed}")
+        if node.children or node.text:
+            self._check_content()
+        self._parse()
+        for name in statement.required:
+            if name not in self._attributes:
+                self.fault(f"{name}: missing; must be {statement.attributes[name].kind.allowed}")
+
+    @property
+    def label(self) -> str:
+        """Return what messages call the element."""
+        id = self.node.find("id")
+        return self.statement.name + (f"[{_short(id.value)}]" if id else "")
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return the value of an attribute, `default` where it is absent or faulty."""
@@ -130,6 +145,11 @@ class Entry:
     def given(self, name: str) -> bool:
         """Return whether the deck gives the attribute, faulty or not."""
         return name in self._attributes
+
+    def those(self, names: Iterable[str]) -> list[str]:
+        """Return those of the attributes that the deck gives."""
+        given = self._attributes
+        return [name for name in names if name in given]
 
     def fault(self, message: str, attribute: str = "") -> None:
         """Add a fault, at the attribute's line and quoting its value where one is named."""
@@ -171,45 +191,49 @@ class Entry:
 
     def _collect(self) -> None:
         """Match the attributes with the declared names; unknown and repeated ones are faults."""
-        names = self.statement.spec_names
+        names, found = self.statement.spec_names, self._attributes
         for attribute in self.node.attributes:
-            name = names.get(fold(attribute.name))
-            if name is None:
+            name = names.get(attribute.name) or names.get(fold(attribute.name))
+            if name is not None and name not in found:
+                found[name] = attribute
+            elif name is None:
                 close = nearest(attribute.name, self.statement.attributes)
                 known = ", ".join(self.statement.attributes) or "none"
                 help = close or f"; known: {known}"
                 message = f'{attribute.name}="{_short(attribute.value)}": unknown attribute{help}'
                 self.draft.fault(attribute.line, self.label, message)
-            elif name in self._attributes and self.statement.attributes[name].repeats:
-                first = self._attributes[name]
+            elif self.statement.attributes[name].repeats:
+                first = found[name]
                 joined = f"{first.value} | {attribute.value}"
-                self._attributes[name] = Attribute(first.name, joined, first.line, first.origin)
-            elif name in self._attributes:
-                self.fault(f"given twice, the second time as {attribute.name}", name)
+                found[name] = Attribute(first.name, joined, first.line, first.origin)
             else:
-                self._attributes[name] = attribute
+                self.fault(f"given twice, the second time as {attribute.name}", name)
 
-    def _parse(self, name: str, attribute: Attribute) -> None:
-        """Store the value of one attribute, or the fault, refusal or note it gives rise to."""
-        spec = self.statement.attributes[name]
-        text = attribute.value.strip()
-        harmless = bool(spec.harmless) and fold(text) == fold(spec.harmless)
-        try:
-            self._values[name] = spec.kind.parse(text)
-        except BadValueError as error:
-            what = str(error) or f"must be {spec.kind.allowed}"
-            self.fault(what + (about_degrees(text) if spec.unit == "rad" else ""), name)
-            return
-        if spec.refused and not harmless:
-            self.fault(spec.refused, name)
-        if spec.note and not harmless:
-            self.note(spec.note, name)
+    def _parse(self) -> None:
+        """Store the values, or the faults, refusals and notes that they give rise to."""
+        specs, values = self.statement.attributes, self._values
+        for name, attribute in self._attributes.items():
+            spec = specs[name]
+            text = attribute.value.strip()
+            try:
+                values[name] = spec.kind.parse(text)
+            except BadValueError as error:
+                what = str(error) or f"must be {spec.kind.allowed}"
+                self.fault(what + (about_degrees(text) if spec.unit == "rad" else ""), name)
+                continue
+            if not (spec.refused or spec.note):
+                continue
+            if spec.harmless and fold(text) == fold(spec.harmless):
+                continue
+            if spec.refused:
+                self.fault(spec.refused, name)
+            if spec.note:
+                self.note(spec.note, name)
 
     def _check_content(self) -> None:
         """Refuse text and child elements that the statement does not have."""
-        allowed = {fold(name) for name in self.statement.children} if self.node.children else ()
         for child in self.node.children:
-            if child.key not in allowed:
+            if child.key not in self.statement.may_hold:
                 close = nearest(child.tag, self.statement.children)
                 self.draft.fault(child.line, self.label, f"unknown element <{child.tag}>{close}")
         text = self.statement.text

@@ -127,28 +127,34 @@ def read_section(section: Node, draft: Draft) -> None:
 
 def _read_statement(section: Node, node: Node, draft: Draft) -> None:
     """Read one statement, or refuse it by name."""
-    id = node.find("id")
-    label = node.tag + (f"[{id.value.strip()[:40]}]" if id else "")
     statement = BY_KEY.get(node.key)
-    if statement is None:
-        if node.key in _NOT_BUILT:
-            message = f"{_NOT_BUILT[node.key]} is documented but not built yet"
-        elif node.key in _REFUSED:
-            message = _REFUSED[node.key]
-        else:
-            known = [*(statement.name for statement in STATEMENTS), *NOT_BUILT, *REFUSED]
-            message = f"unknown statement <{node.tag}>{nearest(node.tag, known)}"
-        draft.fault(node.line, label, message)
-    elif draft.stop_line and (statement in _NOT_AFTER_STOP or statement.name in CHANGEABLE):
-        draft.fault(node.line, label, f"is never reached after Stop on line {draft.stop_line}")
+    refusal = _refusal(statement, node, draft)
+    if statement is None or refusal:
+        id = node.find("id")
+        label = node.tag + (f"[{id.value.strip()[:40]}]" if id else "")
+        draft.fault(node.line, label, refusal)
     elif draft.in_command and statement.name in CHANGEABLE:
         change(statement, node, draft)
-    elif not (statement.in_command if draft.in_command else statement.in_model):
-        where = "<Model>" if draft.in_command else "<Command>"
-        also = f"; elements that can change between simulations: {', '.join(CHANGEABLE)}"
-        what = f"{statement.name} belongs in {where}" + (also if draft.in_command else "")
-        draft.fault(node.line, label, what)
     else:
         statement.read(node, draft)
-        if statement.name in CHANGEABLE and id:
+        if statement.name in CHANGEABLE and (id := node.find("id")):
             draft.nodes.setdefault((statement.name, id.value.strip()), node)
+
+
+def _refusal(statement: Statement | None, node: Node, draft: Draft) -> str:
+    """Return why a statement cannot stand where it does, or an empty string."""
+    if statement is None:
+        if node.key in _NOT_BUILT:
+            return f"{_NOT_BUILT[node.key]} is documented but not built yet"
+        if node.key in _REFUSED:
+            return _REFUSED[node.key]
+        known = [*(statement.name for statement in STATEMENTS), *NOT_BUILT, *REFUSED]
+        return f"unknown statement <{node.tag}>{nearest(node.tag, known)}"
+    if draft.stop_line and (statement in _NOT_AFTER_STOP or statement.name in CHANGEABLE):
+        return f"is never reached after Stop on line {draft.stop_line}"
+    if not draft.in_command:
+        return "" if statement.in_model else f"{statement.name} belongs in <Command>"
+    if statement.in_command or statement.name in CHANGEABLE:
+        return ""
+    also = f"elements that can change between simulations: {', '.join(CHANGEABLE)}"
+    return f"{statement.name} belongs in <Model>; {also}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+from mbsim.core.collection import no_collection
 from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
@@ -23,6 +24,7 @@ _COMPATIBILITY = "MOTIONSOLVE"
 _SECTIONS = ("model", "command")
 
 
+@no_collection()
 def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.Model:
     """Return the model that a deck describes, with everything about it checked.
 

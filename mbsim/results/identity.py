@@ -8,6 +8,7 @@ are declared. Facts are kept, so that a message can name what differs.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import re
@@ -72,6 +73,8 @@ CHECKPOINT = 2
 MOST_LISTED = 3
 #: What stands for a field that facts leave out, and for an element that is not there.
 _DEFAULT, _ABSENT = object(), object()
+#: Types of values that are facts as they are.
+_PLAIN = frozenset((type(None), bool, int, float, str))
 
 
 def plain(value: Any) -> Any:
@@ -80,7 +83,7 @@ def plain(value: Any) -> Any:
     Left out are file and line of an element and fields marked ASIDE. Arrays become digests,
     expressions their text: a tree may be deeper than JSON goes.
     """
-    if value is None or isinstance(value, bool | int | float | str):
+    if type(value) in _PLAIN or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, Expression):
         return value.text
@@ -92,23 +95,34 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, list | tuple):
-        named = bool(value) and all(isinstance(item, tuple) and len(item) == 2 for item in value)
+        if _PLAIN.issuperset(map(type, value)):
+            return list(value)
+        named = all(isinstance(item, tuple) and len(item) == 2 for item in value)
         if named and all(isinstance(item[0], str) for item in value):
             return {name: plain(item) for name, item in value}
         return [plain(item) for item in value]
     if not is_dataclass(value):
         raise TypeError(f"{type(value).__name__} is nothing that a run can be compared by")
     made = {"": type(value).__name__}
-    for field in fields(value):
-        item = getattr(value, field.name)
-        if isinstance(item, Source) or ASIDE in field.metadata:
-            continue
-        if item is field.default:
+    kind: Any = type(value)
+    for name, default, shown in _defaults(kind):
+        item = getattr(value, name)
+        if item is default or isinstance(item, Source):
             continue
         known = plain(item)
-        if field.default is MISSING or repr(known) != repr(plain(field.default)):
-            made[field.name] = known
+        if repr(known) != shown:
+            made[name] = known
     return made
+
+
+@functools.cache
+def _defaults(kind: Any) -> list[tuple[str, Any, str]]:
+    """Return the fields of a dataclass that count: name, default, its plain form as text."""
+    return [
+        (field.name, field.default, "" if field.default is MISSING else repr(plain(field.default)))
+        for field in fields(kind)
+        if ASIDE not in field.metadata and not isinstance(field.default, Source)
+    ]
 
 
 def of_elements(holder: Any, file: str) -> dict[str, Any]:
@@ -195,7 +209,7 @@ class Identity:
             "subroutines": of_users(system),
         }
 
-    @property
+    @functools.cached_property
     def digests(self) -> dict[str, str]:
         """Digests by the name of the result file's attribute."""
         return {
@@ -203,8 +217,9 @@ class Identity:
             for kind, facts in self.facts.items()
         }
 
+    @functools.cached_property
     def packed(self) -> np.ndarray[Any, Any]:
-        """Return all facts as bytes."""
+        """All facts as bytes."""
         return np.frombuffer(zlib.compress(_text(self.facts), 1), dtype=np.uint8)
 
     def changes(self, packed: np.ndarray[Any, Any], kind: str) -> str:

@@ -226,7 +226,7 @@ class Recorder:
 
     def _save(self, checkpoint: Mapping[str, Table]) -> None:
         """Write a checkpoint in the place of the last one."""
-        facts = {MADE_OF: self._identity.packed(), WRITTEN: np.array(self._written)}
+        facts = {MADE_OF: self._identity.packed, WRITTEN: np.array(self._written)}
         tables = {**checkpoint, **self.watch.saved(), **facts}
         self._store.update(
             values={f"checkpoint/{name}": table for name, table in tables.items()},

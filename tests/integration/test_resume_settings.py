@@ -207,5 +207,5 @@ def test_facts_do_not_depend_on_where_they_are_made(tmp_path):
         system = build(model, interpret=True)
         facts.append(Identity(system, settle(model)))
     assert facts[0].digests == facts[1].digests
-    packed = facts[0].packed()
+    packed = facts[0].packed
     assert not any(facts[1].changes(packed, kind) for kind in facts[1].facts)
