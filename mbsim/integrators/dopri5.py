@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
+from mbsim.core.problem import EACH, RATES, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
@@ -49,6 +47,8 @@ E1, E3, E4, E5, E6, E7 = (
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 
+#: Of k, for AUTO: the first row behind the stages, which hold differences between them.
+DIFFERENCES = 7
 #: From so many times the change of f over a step, between its last two stages, a rate is hidden,
 #: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
 HIDES, SHOWN, BOUNDS = 4.0, 1.5, 0.01
@@ -119,6 +119,32 @@ def rate_of(moved: float, faster: float, pulled: float) -> float:
 
 
 @jitable
+def fill_differences(m: Method, h: float) -> None:
+    """Write what `stiffness` is told by behind the stages.
+
+    Ways, changes of velocity and of f of two pairs of stages, and the change of f over the step.
+    """
+    k, d, n, bodies = m.k, m.k[DIFFERENCES:], len(m.y), m.bodies[0]
+    for j in range(RATES):
+        for i in range(n):
+            d[j, i] = 0.0
+    for b in range(max(1, bodies)):
+        at = BODY_SIZE * b
+        # f of a position is its velocity: that says nothing
+        rates, end = (at + 7, at + BODY_SIZE) if bodies > 0 else (0, n)
+        for i in range(at, end):
+            way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
+            way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
+            come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
+            come += (A64 - A54) * k[3, i] + A65 * k[4, i]
+            j = 1 if i >= rates else 0
+            d[j, i], d[3 + j, i] = h * way, h * come
+            if i >= rates:
+                d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
+                d[6, i] = k[6, i] - k[0, i]
+
+
+@jitable
 def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     """Return the step times the rate of f between its last stages, inf where that is hidden.
 
@@ -133,31 +159,14 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     says nothing of the rate at the motion. For f = -r y the two are as much apart at h r = 2,
     near the bound of stability at 3.3. An error that is far below what is allowed bounds no step.
     """
-    k, y = m.k, m.y
-    n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(y)
-    first = m.bodies[0] == 0
-    # in the norm of the error, which has no units: ways, changes of velocity and of f of two pairs,
-    # and the change of f over the step
-    d = np.zeros((7, len(y)))
-    for i in range(n):
-        way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
-        way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
-        come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
-        come += (A64 - A54) * k[3, i] + A65 * k[4, i]
-        # f of a position is its velocity: that says nothing
-        is_rate = first or i % BODY_SIZE >= 7
-        j = 1 if is_rate else 0
-        d[j, i], d[3 + j, i] = h * way, h * come
-        if is_rate:
-            d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
-            d[6, i] = k[6, i] - k[0, i]
-    size = np.empty(7)
-    for j in range(7):
-        size[j] = call_float(p.norm, (p.context, t, 0.0, d[j], y))
+    fill_differences(m, h)
+    # in the norm of the error, which has no units
+    size = m.k[DIFFERENCES:]
+    call_float(p.norm, (p.context, t, EACH, size[0], m.y))
     rate, own = 0.0, m.memory[OWN_TIME]
     for j in (0, 3):
-        rate = max(rate, rate_of(own * size[j], size[j + 1], size[j + 2]))
-    hidden = size[2] > HIDES * size[6] and m.memory[LAST_ERROR] > BOUNDS
+        rate = max(rate, rate_of(own * size[j, 0], size[j + 1, 0], size[j + 2, 0]))
+    hidden = size[2, 0] > HIDES * size[6, 0] and m.memory[LAST_ERROR] > BOUNDS
     return math.inf if hidden and h * rate < SHOWN else h * rate
 
 
@@ -190,4 +199,13 @@ def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return 0
 
 
-SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=6, dense=5, order=5.0, memory=0.4)
+SCHEME = Scheme(
+    _attempt,
+    _fit_dense,
+    stages=7,
+    last=6,
+    dense=5,
+    order=5.0,
+    memory=0.4,
+    watched=DIFFERENCES + RATES,
+)

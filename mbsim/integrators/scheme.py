@@ -114,6 +114,7 @@ class Scheme(NamedTuple):
     implicit: bool = False  # solves with the problem's linearisation
     carried: int = 0  # rows of `kept`
     pair: bool = False  # solves with complex coefficients as well
+    watched: int = 0  # rows of k where AUTO watches it
     samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
 
 
@@ -189,7 +190,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
 def both(one: Scheme, other: Scheme) -> Scheme:
     """Return a scheme whose arrays hold what either method needs."""
     return one._replace(
-        stages=max(one.stages, other.stages),
+        stages=max(one.stages, other.stages, one.watched, other.watched),
         dense=max(one.dense, other.dense),
         carried=max(one.carried, other.carried),
     )

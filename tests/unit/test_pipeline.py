@@ -12,11 +12,15 @@ import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS
 from mbsim.compile_model.build import build
+from mbsim.core.problem import EACH, RATES
 from mbsim.dynamics.pipeline.problem import mechanism
 
 POINTER = ctypes.c_void_p
 HOOK = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, POINTER, POINTER
+)
+MEASURE = ctypes.CFUNCTYPE(
+    ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, POINTER, POINTER
 )
 
 
@@ -67,6 +71,25 @@ def test_work_filled_with_nan_changes_nothing(name):
     second = rhs(y)
     assert first.tolist() == second.tolist()
     assert np.isfinite(first).all()
+
+
+def test_sizes_of_many_differences_at_once_are_those_of_each(tmp_path):
+    model = sphere(0.0, body=2, v=(0.3, 0.1, 0.5)) + sphere(0.19, body=3, mass=2.0)
+    path = write_deck(tmp_path, model + contact(300, 200, damping=5, dmax=1e-3, **COULOMB))
+    system = build(mbsim.read_model(path))
+    problem, table = mechanism(system.scene)
+    y, n = system.y0.copy(), len(system.y0)
+    rhs, norm = HOOK(problem.rhs), MEASURE(problem.norm)
+    f = np.zeros(n)
+    assert rhs(problem.context, 0.0, 0.0, y.ctypes.data, f.ctypes.data) == 0
+    differences = np.zeros((RATES, n))
+    # of bodies alone; the last row is none
+    differences[:-1, :26] = np.random.default_rng(5).standard_normal((RATES - 1, 26))
+    each = [norm(problem.context, 0.0, 0.0, d.ctypes.data, y.ctypes.data) for d in differences]
+    norm(problem.context, 0.0, EACH, differences.ctypes.data, y.ctypes.data)
+    assert differences[:, 0].tolist() == each
+    assert min(each[:-1]) > 0.0
+    del table
 
 
 def test_forces_of_a_pair_are_opposite_and_conserve_momentum(tmp_path):

@@ -364,14 +364,22 @@ def forget_apart(scene: Scene, y: F1) -> None:
     The last stages of a step that ends just before a touch may be in it, and what they gathered
     would be there when it begins.
     """
-    slots, touching = scene.slots, scene.work.touching
-    for s in range(len(slots.z)):
-        if touching[s] == 0 and slots.x[s] >= 0:
-            for k in range(3):
-                y[slots.x[s] + k] = 0.0
-        if touching[s] == 0 and slots.z[s] >= 0:
-            for k in range(scene.contacts.carried[contact_of(scene, s)]):
-                y[slots.z[s] + k] = 0.0
+    slots, pairs, touching = scene.slots, scene.pairs, scene.work.touching
+    for j in range(pairs.count[ACTIVE]):
+        first, last = pairs.slot[pairs.active[j]], pairs.last[pairs.active[j]]
+        # what one slot of a contact carries, all do
+        if slots.x[first] < 0 and slots.z[first] < 0:
+            continue
+        carried = scene.contacts.carried[contact_of(scene, first)]
+        for s in range(first, last):
+            if touching[s] == 1:
+                continue
+            if slots.x[s] >= 0:
+                for k in range(3):
+                    y[slots.x[s] + k] = 0.0
+            if slots.z[s] >= 0:
+                for k in range(carried):
+                    y[slots.z[s] + k] = 0.0
 
 
 @jitable

@@ -31,9 +31,11 @@ from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import (
     ALONG,
     BY_CHECK,
+    EACH,
     FRICTION_ALONE,
     FULL,
     IMPACTS_ALONE,
+    RATES,
     Taken,
 )
 from mbsim.dynamics.bodies.scales import take_speeds
@@ -43,6 +45,7 @@ from mbsim.dynamics.events.stability import stable_step
 from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.output import (
+    fill_sizes,
     gauged,
     no_room,
     scaled_error,
@@ -117,6 +120,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
         return gauged(scene, Gauges.IMPACT, t, t, a, b)
     if h == FRICTION_ALONE:
         return gauged(scene, Gauges.FRICTION, t, t, a, b)
+    if h == EACH:
+        fill_sizes(scene, vector_at(a, RATES * n), vector_at(b, n))
+        return 0.0
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error

@@ -413,6 +413,35 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
 
 
 @jitable
+def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
+    """Leave in the first number of each of the states' differences in d what it is in the norm.
+
+    As `scaled_error` has it with h = 0. Of bodies alone, where there are some.
+    """
+    scales, squares, n = scene.scales, scene.work.squares, len(y)
+    count = len(scene.bodies.mass)
+    fill_squares(scene, y)
+    for first in range(0, len(d), n):
+        e, largest = d[first : first + n], 0.0
+        if count == 0:
+            e[0] = scaled_error(scene, 0.0, e, y)
+            continue
+        for b in range(count):
+            at = BODY_SIZE * b
+            dx = e[at] ** 2 + e[at + 1] ** 2 + e[at + 2] ** 2
+            dq = e[at + 3] ** 2 + e[at + 4] ** 2 + e[at + 5] ** 2 + e[at + 6] ** 2
+            dv = e[at + 7] ** 2 + e[at + 8] ** 2 + e[at + 9] ** 2
+            dw = e[at + 10] ** 2 + e[at + 11] ** 2 + e[at + 12] ** 2
+            g = scales.group[b]
+            area, fast = scales.length[g] ** 2, squares[g]
+            square = max(max(dx / area, 4.0 * dq), max(dv / fast, dw * area / fast))
+            if not square <= largest:
+                largest = square
+        change = gauged(scene, Gauges.REVERSAL, 0.0, 0.0, e, y)
+        e[0] = math.sqrt(max(largest, change**2))
+
+
+@jitable
 def find_fault(scene: Scene) -> int:
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
     worst, hardest, contact = scene.work.trouble[0], 0.0, -1
