@@ -19,15 +19,13 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
     SHOWN,
-    THIRD,
     THIRD_AT,
-    THIRD_BEFORE,
-    THIRD_FIRST,
     TOL,
     Method,
     Scheme,
@@ -165,22 +163,33 @@ def combined_error(fifth: float, third: float) -> float:
 
 
 @jitable
-def least_error(m: Method, t: float, h: float, third: float) -> float:
-    """Return what the error of a step is at least, of whose error of order 3 it is `third`.
+def keep_bent(m: Method, t: float, h: float) -> bool:
+    """Leave in m.error, of errors of order 3, those that a force bends within the step.
 
-    That |e5|^2 / |e3| is small means much where both are smooth, and nothing where a force bends
-    within the step: e3 is large there, and e5 may vanish by chance.
+    Returns whether there are any. That |e5|^2 / |e3| is small means much where both are smooth, and
+    nothing there: e3 is large, and e5 may vanish by chance. Each body's velocity, its spin and each
+    state of first order are looked at by themselves: what turns fast elsewhere would hide them.
     """
-    memory = m.memory
-    if t != memory[THIRD_AT]:
-        # what was tried last was taken
-        memory[THIRD_AT] = t
-        memory[THIRD_FIRST], memory[THIRD_BEFORE] = memory[THIRD_BEFORE], memory[THIRD]
-    memory[THIRD] = third / h**4
-    smooth = min(memory[THIRD_FIRST], memory[THIRD_BEFORE])
-    if smooth > 0.0 and memory[THIRD] > BENDS_SHARPLY * smooth:
-        return COUNTS * third
-    return 0.0
+    e, kept, n, end = m.error, m.kept, len(m.y), BODY_SIZE * m.bodies[0]
+    taken = t != m.memory[THIRD_AT]
+    m.memory[THIRD_AT] = t
+    found, i = False, 0
+    while i < n:
+        # positions follow velocities
+        width = 1 if i >= end else (7 if i % BODY_SIZE == 0 else 3)
+        square = 0.0
+        for j in range(i, i + width):
+            square += e[j] * e[j]
+        if taken:
+            kept[2, i], kept[1, i] = kept[1, i], kept[0, i]
+        kept[0, i] = math.sqrt(square) / h**4
+        smooth = min(kept[1, i], kept[2, i])
+        bent = width < 7 and smooth > 0.0 and kept[0, i] > BENDS_SHARPLY * smooth
+        for j in range(i, i + width):
+            e[j] = e[j] if bent else 0.0
+        found = found or bent
+        i += width
+    return found
 
 
 @jitable
@@ -214,9 +223,11 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         m.trial[i] = m.y[i] + h * m.trial[i]
     project(p, m, t + h, h, m.trial)
     third = estimate(p, m, t, h, E3[0])
+    least = 0.0
+    if keep_bent(m, t, h):
+        least = COUNTS * call_float(p.norm, (p.context, t, h, m.error, m.trial))
     fifth = estimate(p, m, t, h, E5[0])
-    error = max(combined_error(fifth, third), least_error(m, t, h, third))
-    m.memory[LAST_ERROR] = error / m.memory[TOL]
+    m.memory[LAST_ERROR] = max(combined_error(fifth, third), least) / m.memory[TOL]
     if not m.memory[LAST_ERROR] <= 1.0:
         return 0
     m.counts[EVALUATIONS] += 1
@@ -296,5 +307,6 @@ def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return fit_dense(problem, method, t, h)
 
 
-# stages and a row for the defect
-SCHEME = Scheme(_attempt, _fit_dense, stages=17, last=12, dense=8, order=8.0, memory=0.2)
+# stages and a row for the defect; kept: sizes of errors of order 3 over h^4, of the step tried
+# last and of the two that were taken before
+SCHEME = Scheme(_attempt, _fit_dense, stages=17, last=12, dense=8, order=8.0, memory=0.2, carried=3)

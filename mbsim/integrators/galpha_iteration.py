@@ -11,16 +11,19 @@ from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import Problem
 from mbsim.integrators.newton import (
     GO_ON,
+    HOPELESS,
     OFF,
     QUARTER,
     SOLVED,
     as_failure,
     begin,
     is_rate,
+    is_rounding,
     judge,
     linearise,
     may_help,
     note,
+    stalls,
     target,
     unless_singular,
 )
@@ -32,7 +35,6 @@ from mbsim.integrators.scheme import (
     FRESH,
     HAVE_JACOBIAN,
     LAST_STEP,
-    LEFT,
     RATE,
     RETRY,
     TOL,
@@ -132,6 +134,8 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
         word, rate = judge(m, iteration, most, size, before, rate, LATE)
         before = size
     m.memory[RATE] = rate
+    if word == HOPELESS and anew and stalls(m, before):
+        word = SOLVED if is_rounding(p, m, t, h, before, m.k[D]) else word
     return 0 if word == SOLVED else -1
 
 
@@ -163,7 +167,7 @@ def search(p: Problem, m: Method, t: float, h: float, size: float) -> int:
 def iterate_damped(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for a with a linearisation and a line search for each correction; return a code."""
     m.memory[RETRY] = QUARTER
-    for _ in range(MOST_DAMPED):
+    for k in range(MOST_DAMPED):
         code = evaluate(p, m, t, h, True)
         if code != 0:
             return code
@@ -171,13 +175,14 @@ def iterate_damped(p: Problem, m: Method, t: float, h: float) -> int:
         if code != 0:
             return code
         note(m, size)
-        if size <= target(m):
+        rounded = k > 0 and stalls(m, size) and is_rounding(p, m, t, h, size, m.k[D])
+        if size <= target(m) or rounded:
             take(m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0
         code = search(p, m, t, h, size)
-        if code == -1 and size <= LEFT * m.memory[TOL]:
-            # nothing is better: what is left is rounding
+        if code == -1 and is_rounding(p, m, t, h, size, m.k[D]):
+            # nothing is better
             for i in range(len(m.y)):
                 m.k[A1, i] = m.k[A_BEFORE, i]
             m.memory[RATE] = 0.0

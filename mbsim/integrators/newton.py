@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
@@ -19,6 +19,7 @@ from mbsim.integrators.scheme import (
     EVALUATIONS,
     FACTORED_STEP,
     FRESH,
+    GROWTH,
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     JACOBIANS,
@@ -37,6 +38,8 @@ GO_ON, SOLVED, HOPELESS = range(3)
 OFF = 0.2
 #: No correction need be smaller than this.
 ROUNDING = 1e-14
+#: Friction may be left off by this part of what presses, where only rounding is left of the motion.
+FELT = 1e-6
 #: Hope for the first correction ends here: what was linear a step ago may press on something now.
 LEAST_REST = 0.05
 #: The step after one whose equations were not solved, where nothing is known of what would be.
@@ -169,17 +172,39 @@ def judge(
 
 
 @jitable
-def is_good_enough(m: Method, size: float, rate: float) -> bool:
-    """Return whether what a correction of `size` leaves is a small part of the step's error.
+def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -> bool:
+    """Return whether a correction e of `size`, no better than the one before, is rounding.
 
-    Where corrections end in rounding, above what is asked for, no better linearisation or shorter
-    step makes them smaller: one that is no smaller than half the one before is that.
+    It is if it is a small part of the step's error. Friction that turns over within 1e-3 of what
+    bodies are fast shows 1e4 times as much of the rounding of velocities, the more the tighter
+    joints hold them: of it counts what it can do, not what tol is.
     """
     most = LEFT * m.memory[TOL]
-    if not size < HALF * m.memory[CORRECTION_BEFORE]:
-        # what is left is looked at besides (`OFF`)
-        return size <= most
-    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= most
+    if size <= most:
+        return True
+    return size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most
+
+
+@jitable
+def stalls(m: Method, size: float) -> bool:
+    """Return whether a correction is no smaller than half the one before.
+
+    Of a linearisation of the step itself no better one or shorter step makes it smaller then.
+    """
+    return not size < HALF * m.memory[CORRECTION_BEFORE]
+
+
+@jitable
+def is_good_enough(p: Problem, m: Method, t: float, h: float, size: float, rate: float) -> bool:
+    """Return whether what a correction of `size`, in m.error, leaves is small enough for the step.
+
+    What is left is looked at besides (`OFF`). Rounding, which is above what is asked for, says
+    nothing of how far the step may grow.
+    """
+    if stalls(m, size) and is_rounding(p, m, t, h, size, m.error):
+        m.memory[GROWTH] = math.inf
+        return True
+    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * m.memory[TOL]
 
 
 @jitable

@@ -53,6 +53,7 @@ from mbsim.integrators.scheme import (
     JACOBIAN_TIME,
     LAST_ERROR,
     LAST_STEP,
+    LEFT,
     RATE,
     REST,
     RETRY,
@@ -280,13 +281,14 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
             slowest = rate
             if word == HOPELESS and size < SECOND * before:
                 word, rate = GO_ON, 0.0
-        elif iteration > 2:
+        elif iteration > 2 and (size < HALF * before or size > LEFT * m.memory[TOL]):
+            # else rounding, which is the same at any step
             slowest = max(size / before, slowest if iteration > 3 else 0.0)
         before = size
     m.memory[RATE] = rate
     m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
     if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == place(m, t, h)):
-        return 0 if is_good_enough(m, before, rate) else -1
+        return 0 if is_good_enough(p, m, t, h, before, rate) else -1
     return 0 if word == SOLVED else -1
 
 

@@ -88,10 +88,9 @@ SWITCH_CUT = 51
 LEFT_PART = 52
 # of AUTO: 1 once explicit steps are to stay within the bound of stability
 BOUNDED = 53
-# of DOP853: where its last step tried began, that step's error of order 3 over h^4, and those of
-# the two steps taken before
-THIRD_AT, THIRD, THIRD_BEFORE, THIRD_FIRST = range(54, 58)
-MEMORY = 58
+# of DOP853: where its last step tried began
+THIRD_AT = 54
+MEMORY = 55
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -138,14 +138,26 @@ def test_a_run_that_newton_ends_says_how_far_it_came_and_where(tmp_path):
         mbsim.simulate(mbsim.read_model(deck), integrator="RADAU5")
 
 
-def test_corrections_that_are_rounding_end_newtons_iteration():
+@pytest.mark.parametrize(
+    ("method", "tol", "end", "most"),
+    [
+        ("RADAU5", 1e-9, 720.0, 1e-6),
+        # friction turns over within 1e-3 of the usual speed, and shows 1e4 times as much of the
+        # rounding of velocities: steps fell to 1e-12 ms at 437 ms
+        ("RADAU5", 1e-10, 440.0, 1e-7),
+        pytest.param("GALPHA", 1e-9, 440.0, 2e-5, marks=pytest.mark.slow),
+    ],
+)
+def test_corrections_that_are_rounding_end_newtons_iteration(method, tol, end, most):
     # a loop of joints in other units, at 703 ms: corrections of 1e-11 came and went, each a little
     # smaller or larger than the last, and their mean rate promised much more to come: it gave up
     loop = mbsim.read_model(DATA / "loop_of_joints.xml")
-    by = {"end_time": 720.0, "print_interval": 60.0}
-    found = mbsim.simulate(loop, integrator="RADAU5", tol=1e-9, **by)
+    by = {"end_time": end, "print_interval": 0.1 * end}
+    found = mbsim.simulate(loop, integrator=method, tol=tol, **by)
     exact = mbsim.simulate(loop, integrator="DOP853", tol=1e-10, **by)
+    worst = 0.0
     for body in found.ids("bodies"):
         # centimetres, of a mechanism of a metre
         off = found[f"bodies/{body}/position"] - exact[f"bodies/{body}/position"]
-        assert np.abs(off).max() < 1e-6
+        worst = max(worst, np.abs(off).max())
+    assert worst < most

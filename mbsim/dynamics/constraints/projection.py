@@ -22,7 +22,7 @@ from mbsim.dynamics.constraints.equations import (
     fill_matrix,
     solve_matrix,
 )
-from mbsim.dynamics.constraints.folding import is_sticking, near_fold
+from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import prepare, respond
 from mbsim.dynamics.constraints.tree_projection import (
@@ -33,11 +33,10 @@ from mbsim.dynamics.constraints.tree_projection import (
     turn_body,
 )
 
-#: Newton ends when no residual is above this part of its unit, or after so many rounds.
-CLOSED = 2e-14
+#: Newton ends when no residual is above this part of its unit, or after so many rounds. What is
+#: left moves bodies by that over how near the equations are to singular: it is rounding alone.
+CLOSED = 1e-15
 MOST_ROUNDS = 8
-#: The same near a position in which a loop can fold: what is left leads astray there.
-ROUNDED = 1e-15
 #: A residual, over its unit, whose square is rounding.
 SMALL = 1e-8
 #: What of the way back onto the constraints counts as a step's error: its own estimate is to
@@ -168,7 +167,7 @@ def close_loops(scene: Scene, t: float, y: F1) -> None:
     factor_matrix(scene, t)
     for _ in range(MOST_ROUNDS):
         size = largest_residual(scene, 2, RESIDUAL, t)
-        if size <= (ROUNDED if near_fold(scene) else CLOSED):
+        if size <= CLOSED:
             return
         correct(scene, 2, RESIDUAL)
         displace(scene, y)
