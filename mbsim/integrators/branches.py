@@ -62,14 +62,16 @@ def first_switch(p: Problem, m: Method, t: float, h: float, whole: float, behind
     """
     farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
     low, high, near = NEAR_SWITCH, behind, NEAR_SWITCH * farther
-    if near >= behind:
-        return h
-    side_at(p, m, t, h, low, SETTLE)
+    if near < behind:
+        side_at(p, m, t, h, low, SETTLE)
     if behind < 1.0:
         interpolate(m, behind, m.error)
         differs = ask_switching(p, m, t + behind * h, ASK, m.error, m.error)
     else:
         differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
+    if differs < 2 and near >= behind:
+        ask_switching(p, m, t + h, ASK, m.trial, m.error)
+        return h
     if differs > 1:
         # it is told from what was committed, however near that is
         # a part of the whole step: where it lies at the very begin, as behind another, a step

@@ -43,6 +43,7 @@ from mbsim.dynamics.forces.applied import side_of
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED
 
 #: Each change of side adds 1 to chattering, each step takes a tenth of it.
 COOLING = 0.9
@@ -132,9 +133,9 @@ def side(scene: Scene, t: float, y: F1, k: int) -> float:
 def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
-    Of a step that was taken: 1 if it was cut for that. Such a step adds 1, whether a mode
-    changed then or not; one that was not leaves half of the chattering. So where cuts follow each
-    other a whole step is taken now and then.
+    Of a step that was taken: 1 if it ends so. Such a step adds 1, whether a mode changed then or
+    not; one that does not leaves half of the chattering. So where changes follow each other a whole
+    step is taken now and then; one that was cut a little before a change is none.
     """
     chattering, differs = scene.state.chattering, 0
     if what == PASS:
@@ -143,8 +144,8 @@ def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
         chattering[1] = 0.0
     elif chattering[0] <= CHATTERS:
         asked = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.ASK, t, y))
-        if answer_of(scene, asked) == 1:
-            chattering[1], differs = 1.0, 2
+        differs = 2 if answer_of(scene, asked) == 1 else 0
+        chattering[1] = 1.0 if differs > 0 else 0.0
     return differs
 
 
@@ -252,15 +253,31 @@ def bends(scene: Scene, y: F1, before: F1) -> bool:
 
 
 @jitable
+def may_turn(scene: Scene, s: int, h: float) -> bool:
+    """Return whether slip without give in slot s may have gone back within h, and on again.
+
+    So it is where friction alone could have stopped it.
+    """
+    kept, row = scene.state.memory[s], scene.work.slot[s]
+    if kept[KEPT_MODE] != SLIPS or scene.work.touching[s] == 0:
+        return False
+    most = scene.contacts.friction_par[contact_of(scene, s), 0] * row[NORMAL]
+    return slipping_mass(scene, s) * min(kept[KEPT_SPEED], row[SLIP]) <= h * most
+
+
+@jitable
 def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
     """Return whether a spring that sticks may have slipped since y `before` and stick again.
 
     So it is where load and normal force change by more within the step than is left to the limit.
+    Or whether what slips without give may have stuck within the step, and slip again.
     """
     state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
+        if state.touching[s] == 1 and scene.contacts.rigid[c] == 1 and may_turn(scene, s, h):
+            return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue
         most = scene.audit.cone[c] * row[NORMAL]
@@ -323,7 +340,9 @@ def serve_switching(
     if what == LOAD:
         b[0] = load(scene, context, t, vector_at(a, n))
         return 1 if b[0] >= 0.0 else 0
-    if what >= BENDS and (scene.state.frozen[0] == 0 or len(scene.work.kept) == 0):
+    if what >= BENDS and scene.state.frozen[0] == 0:
+        return 0
+    if what >= BENDS and what != HIDES and len(scene.work.kept) == 0:
         return 0
     if what == HIDES:
         return 1 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0
