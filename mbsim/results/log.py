@@ -385,9 +385,7 @@ def _audit_lines(audit: Audit) -> Iterator[str]:
             yield fact(name, f"{number(share.change)}, most at once {largest}")
     for id, share in audit.contacts.items():
         if share.friction:
-            yield fact(
-                f"  friction of Force_Contact[{id}]", f"did work of {number(share.friction)}"
-            )
+            yield fact(f"  friction of Force_Contact[{id}]", f"work {number(share.friction)}")
     for name, entry in audit.entries.items():
         at = f" at {entry.element}" if entry.element else ""
         when = f"{number(entry.value)} of {number(entry.allowed)} at time {number(entry.time)}"

@@ -119,7 +119,8 @@ class Folder:
             module = " -m mbsim" if name == "mbsim" else ""
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}"{module} "$@"\n')
             program.chmod(0o755)
-        for name in ("models", "userfuncs", "tests"):
+        # what pytest is set up by, too
+        for name in ("models", "userfuncs", "tests", "pyproject.toml"):
             (path / name).symlink_to(ROOT / name)
         self._environment = os.environ | {
             "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
