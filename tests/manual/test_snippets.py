@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from helpers.snippets import Folder, agrees, as_if_warm, blocks
+from helpers.snippets import Folder, agrees, as_if_warm, blocks, comments, nearly
 from mbsim.manual.book import pages
 
 _RUN = [name for name, page in pages().items() if any(b.runs for b in blocks(page))]
@@ -29,6 +29,24 @@ def test_a_cold_run_says_the_same_but_for_compiling():
         "finished\n11 steps, 2 rejected, 28.89 s (23.2 s of it compiling)\n\n"
     )
     assert as_if_warm(cold) == ["finished", "11 steps, 2 rejected, 28.89 s"]
+
+
+def test_what_comments_say_is_what_is_printed():
+    assert comments(["# a", "print(1)  # 1 m", "x = 2  # two", "# end"]) == ["1 m", "end"]
+    for shown, printed in (
+        ("1e-03: 1e-04 m, 1628 evaluations", "1e-03: 2e-04 m, 1640 evaluations"),
+        ("2e-17 m in 100 s", "0e+00 m in 100 s"),
+        ("4.582523e-04 m = (m g/k)^(2/3)", "4.582524e-04 m"),
+        ("DOPRI5    95710 steps", "DOPRI5   101000 steps"),
+    ):
+        assert nearly(shown, printed)
+    for shown, printed in (
+        ("1628 evaluations", "2100 evaluations"),
+        ("1e-04 m", "1e-05 m"),
+        ("1e-04 m", "1e-04 mm"),
+        ("4.58e-04 m", "9.16e-04 m"),
+    ):
+        assert not nearly(shown, printed)
 
 
 def test_dots_stand_for_anything():
