@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sys
+
 import pytest
 
-from helpers.snippets import Folder, agrees, as_if_warm, blocks, comments, nearly
+from helpers.snippets import (
+    ROOT,
+    Folder,
+    agrees,
+    as_if_warm,
+    blocks,
+    commands,
+    comments,
+    nearly,
+)
 from mbsim.manual.book import pages
 
 _RUN = [name for name, page in pages().items() if any(b.runs for b in blocks(page))]
@@ -54,3 +67,45 @@ def test_dots_stand_for_anything():
     assert agrees(["...", "end"], ["end"])
     assert not agrees(["a 1.5"], ["a 1.6"])
     assert not agrees(["a"], ["a", "b"])
+
+
+def _asked_of_pytest():
+    """Yield page and line, paths and words of -k of each command of pytest that no page runs."""
+    for name, page in pages().items():
+        for block in blocks(page):
+            if block.kind != "console" or block.runs:
+                continue
+            for command in commands(block):
+                words = shlex.split(command.text)
+                if words[:3] != ["python", "-m", "pytest"]:
+                    continue
+                paths = [word for word in words if word.startswith("tests")]
+                chosen = words[words.index("-k") + 1] if "-k" in words else ""
+                if paths:
+                    yield f"{name}.md:{block.line}", paths, chosen.split(" or ")
+
+
+@pytest.mark.slow
+def test_commands_that_no_page_runs_choose_tests():
+    asked = list(_asked_of_pytest())
+    assert len(asked) > 20
+    files = sorted({path for _, paths, _ in asked for path in paths})
+    collect = ["-o", "addopts=", "--collect-only", "-q", "-p", "no:cacheprovider", *files]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *collect],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    ids = [line for line in done.stdout.splitlines() if "::" in line]
+    for where, paths, chosen in asked:
+        for word in chosen:
+            found = [
+                each
+                for each in ids
+                if each.startswith(tuple(paths)) and word.lower() in each.lower()
+            ]
+            assert found, f"{where}: {paths} {word}"
