@@ -103,10 +103,17 @@ STORED_ENERGY, LOST_POWER = 6, 7
     CONE,  # friction over mu N, as a part of the contact's largest mu N
     NEWTON,  # what Newton's iteration left of an implicit step
     FOLD,  # velocities across a fold behind it, over the usual ones
-) = range(10)
-AUDITS = 10
+    DRIVES,  # energy that friction gave beyond what it took
+) = range(11)
+AUDITS = 11
+#: How many times what is explained friction may give, beyond which time and element are kept.
+DRIVES_LIMIT = 30.0
 # its columns, of the sample in which the value was largest over what was allowed
 FOUND_VALUE, FOUND_ALLOWED, FOUND_TIME, FOUND_ELEMENT = range(4)
+
+# columns of `Audit.friction`: work that friction of a contact did on the bodies so far, the least
+# that it was where friction had nothing in store, and whether the contact touches at the sample
+WORK_NOW, WORK_THEN, TOUCHED_NOW = range(3)
 
 # entries of `Audit.plan`: steps from one sample to the next, tol, a time at which one is taken
 AUDIT_EVERY, AUDIT_TOL, AUDIT_UNTIL = range(3)

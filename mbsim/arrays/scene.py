@@ -10,8 +10,9 @@ The ODE vector y holds, body after body, BODY_SIZE numbers: position of the cg (
 quaternion w first (4), velocity of the cg (3), angular velocity in cg axes (3); then, slot by
 slot, X (3) where the law uses it and the law's memory where that is integrated; then the user's own
 states, one number each; then the work of motions and what applied forces dissipated, where there
-are any (`World.accumulators`); last the energy that each contact has dissipated so far (one number
-where there is no contact, so that y is never empty).
+are any (`World.accumulators`); then the work of friction of each contact that has friction
+(`Audit.friction_at`), which counts in no error; last the energy that each contact has dissipated so
+far (one number where there is no contact, so that y is never empty).
 """
 
 from __future__ import annotations

@@ -110,4 +110,8 @@ class Audit(NamedTuple):
     contact: F2  # (nc + 1, 4) change of balance while this contact pressed hardest (last row: none
     # touched), the largest of one sample, and when; largest mu N
     energy: F1  # (4,) as of `Rows.energy`
+    friction_at: tags.Constant[I1]  # (nc,) where in y work of friction stands, -1 where is none
+    keeps: tags.Constant[I1]  # (nc,) 1 where friction can give back what it took: by memory or X
+    friction: F2  # (nc, 3) see codes
+    given: F1  # (nf,) energy that friction in a joint, or dry friction, gave
     found: F2  # (AUDITS, 4)

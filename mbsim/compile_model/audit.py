@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.arrays import codes
-from mbsim.arrays.model import Applied, Connections, Equations, Markers
+from mbsim.arrays.model import Applied, Connections, Contacts, Equations, Markers
 from mbsim.arrays.state import Audit
 from mbsim.laws.catalog import friction_law_of
 from mbsim.model.elements import Contact
@@ -56,6 +56,8 @@ def audit(
     group: Rows,
     mechanism: tuple[Connections, Equations, Applied, Markers],
     pulled: bool,
+    laws: Contacts,
+    friction_at: Rows,
 ) -> Audit:
     """Return what a run keeps to judge itself.
 
@@ -69,6 +71,9 @@ def audit(
     mechanism : tuple of arrays
     pulled : bool
         Whether gravity changes with time: then momentum is not looked at.
+    laws : Contacts
+    friction_at : ndarray, shape (nc,)
+        Where in y the work of friction of each contact stands.
     """
     connections, equations, applied, markers = mechanism
     ties = _ties(connections, equations, applied, markers.body)
@@ -93,5 +98,15 @@ def audit(
         np.array([int(np.argmax(group == g)) for g in range(groups)], dtype=np.int64),
         np.zeros((nc + 1, 4)),
         np.zeros(4),
+        friction_at,
+        # of built-in laws none but those with memory looks at X
+        ((laws.memory > 0) | (laws.reads_x == 1) & _in(contacts, with_user)).astype(np.int64),
+        np.zeros((nc, 3)),
+        np.zeros(len(applied.form)),
         found,
     )
+
+
+def _in(contacts: list[Contact], ids: set[int]) -> Rows:
+    """Return which contacts are among ids."""
+    return np.array([contact.id in ids for contact in contacts], dtype=bool)

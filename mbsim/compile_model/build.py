@@ -189,26 +189,29 @@ def _varies(pulls: Sequence[Pull]) -> bool:
 
 
 def _start(
-    model: Model, placement: Placement, carried: int, acts: Acting, judged: _Judged
-) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], Residuals]:
-    """Return y at the start, where in it work and damped energy stand, and the residuals.
+    model: Model, placement: Placement, contacts: ContactTables, acts: Acting, judged: _Judged
+) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], np.ndarray[Any, Any], Residuals]:
+    """Return y at the start, where in it accumulators and friction's work stand, the residuals.
 
-    Behind the bodies are the numbers `carried` by laws of contacts, the states, the accumulators.
+    Behind the bodies are the numbers carried by laws of contacts, the states, the accumulators.
     """
+    carried, rubs = contacts.carried, contacts.laws.friction_law != 0
     states, first_state = acts.states, BODY_SIZE * len(placement.bodies) + carried
     nz, damps = len(states.program), len(acts.applied_ids) > 0 or _varies(acts.pulls)
     accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
-    kept = int(np.count_nonzero(accumulators >= 0)) + max(1, len(model.contacts))
+    kept = int(np.count_nonzero(accumulators >= 0))
+    friction_at = np.where(rubs, first_state + nz + kept + np.cumsum(rubs) - 1, -1)
+    kept += int(rubs.sum()) + max(1, len(model.contacts))
     y0 = _initial_y(placement, carried + nz + kept)
     y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
     residuals = acts.residuals
     if residuals is None:
-        return y0, accumulators, no_residuals()
+        return y0, accumulators, friction_at, no_residuals()
     from mbsim.compile_model.force_elements import fill_scales
 
     fill_scales(residuals, states, judged.load, judged.length)
     y0[residuals.place[residuals.place >= 0]] = residuals.initial[residuals.place >= 0]
-    return y0, accumulators, residuals
+    return y0, accumulators, friction_at, residuals
 
 
 def _sizes(
@@ -299,7 +302,7 @@ def _scene(
     acts: Acting,
 ) -> tuple[Scene, np.ndarray[Any, Any]]:
     """Return all arrays of a model, and y at the start."""
-    y0, accumulators, residuals = _start(model, placement, contacts.carried, acts, judged)
+    y0, accumulators, friction_at, residuals = _start(model, placement, contacts, acts, judged)
     markers, angles = table.arrays()
     mechanism, contact_ids = acts.mechanism, list(contacts.contact_row)
     n = _sizes(
@@ -341,6 +344,8 @@ def _scene(
             np.array(judged.groups.of_body, dtype=np.int64),
             (mechanism.connections, mechanism.equations, acts.applied, markers),
             _varies(acts.pulls),
+            contacts.laws,
+            friction_at,
         ),
         work=scratch(n, contacts.graphics),
         sweep=sweep(mechanism),

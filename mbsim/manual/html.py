@@ -20,7 +20,7 @@ from mbsim import __version__
 from mbsim.errors import ResultsError
 from mbsim.manual.book import INDEX, PAGES, Page, pages
 from mbsim.manual.mathematics import to_mathml
-from mbsim.manual.search import EMPTY, SYNONYMS
+from mbsim.manual.search import EMPTY, NOTES, SYNONYMS
 
 _STATIC = Path(__file__).parent / "static"
 _LEXERS = {"console": "console", "xml": "xml", "python": "python", "c": "c", "toml": "toml"}
@@ -45,7 +45,11 @@ def document() -> str:
         .read_text(encoding="utf-8")
         .format(
             version=escape(__version__),
-            words=escape(json.dumps({"empty": sorted(EMPTY), "synonyms": SYNONYMS})),
+            words=escape(
+                json.dumps(
+                    {"empty": sorted(EMPTY), "synonyms": SYNONYMS, "notes": anchor_of(NOTES)}
+                )
+            ),
             style=(_STATIC / "manual.css").read_text(encoding="utf-8") + _colours(),
             contents="\n".join(_contents(every)),
             body=body,

@@ -13,6 +13,8 @@ _TITLE, _HEADING, _ROW, _TEXT = 40.0, 12.0, 6.0, 1.0
 _QUESTION = 30.0  # in a heading that is a question: its answer is a few lines
 _MOST = 8  # times that a word in the text counts
 _TOGETHER = 60.0  # for a heading that has all words, where there are several
+#: Pages that say why the program is as it is: they come behind those that say how to use it.
+NOTES, _OF_NOTES = "develop/design-notes", 0.2
 #: Words that say nothing of a topic.
 EMPTY = frozenset(
     "a an and are as at by do does for from how i in is it my of on the to what".split()
@@ -25,6 +27,13 @@ SYNONYMS = {
     "animate": "animation",
     "movie": "animation",
     "video": "animation",
+    "convergence": "converge",
+    "diverge": "converge",
+    "divergence": "converge",
+    "history": "memory",
+    "verify": "verification",
+    "validation": "verification",
+    "stick-slip": "stiction",
 }
 
 
@@ -109,5 +118,7 @@ def _hit(page: Page, words: list[re.Pattern[str]], missing: tuple[str, ...]) -> 
         if here > best and not text.startswith(("# ", "<!--", "```")):
             best, line, number = here, text, k
     score += sum(counted.values())
+    if page.name.startswith(NOTES):
+        score *= _OF_NOTES
     shown = plain(line).strip("#|-> ").replace("|", " ")
     return Hit(page, score, " ".join(shown.split()) or page.summary, number, missing)

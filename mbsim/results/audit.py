@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mbsim.arrays import codes
+from mbsim.forces.catalog import FORCES
 from mbsim.model.names import element_name
 from mbsim.results.units import ENERGY as ENERGY_UNIT
 from mbsim.results.units import UnitSystem
@@ -29,7 +30,7 @@ class Judged(NamedTuple):
     name: str  # in result files and in `Audit.entries`
     says: str  # what is off, for the warning
     limit: float  # how many times what is explained it may be
-    element: str  # what the row's element is: contact, body, equation, or nothing
+    element: str  # what the row's element is: contact, body, equation, friction, or nothing
 
 
 #: What a run is judged by. How the limits were found is in the manual, computation/audit.
@@ -86,6 +87,14 @@ ENTRIES = (
         10.0,
         "equation",
     ),
+    Judged(
+        codes.DRIVES,
+        "friction_work",
+        "friction drives instead of resisting (it gave {value:.3g} {energy} more than it took; is "
+        "its sign right?), first seen",
+        codes.DRIVES_LIMIT,
+        "friction",
+    ),
 )
 #: Those of energy.
 ENERGIES = ("energy", "energy_step")
@@ -115,6 +124,7 @@ class Share:
     change: float  # in all
     largest: float  # from one sample to the next
     time: float  # of that
+    friction: float = 0.0  # work of its friction on the bodies; below 0: it resists
 
 
 @dataclass(frozen=True)
@@ -171,9 +181,10 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
                 f"{says} at time {time:.9g}{at}: {entry.excess:.3g} times what tol explains"
             )
     ids = [*system.contact_ids, None]
+    works = [*kept.friction[:, codes.WORK_NOW], 0.0]
     shares = {
-        id: Share(*(float(number) for number in row[:3]))
-        for id, row in zip(ids, kept.contact, strict=True)
+        id: Share(float(row[0]), float(row[1]), float(row[2]), float(work))
+        for id, row, work in zip(ids, kept.contact, works, strict=True)
     }
     balance, time = abs(float(tally[codes.WORST_OPEN])), float(tally[codes.WORST_TIME])
     size = float(tally[codes.LARGEST_ENERGY])
@@ -193,7 +204,11 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
 
 def _named(system: System, judged: Judged, row: int) -> str:
     """Return the element of a row as its deck has it."""
-    if judged.element == "contact" and 0 <= row < len(system.contact_ids):
+    contacts = len(system.contact_ids)
+    if judged.element == "friction" and contacts <= row < contacts + len(system.applied):
+        kind, id = system.applied[row - contacts]
+        return element_name(system.model.file, FORCES[kind].statement, id)
+    if judged.element in ("contact", "friction") and 0 <= row < contacts:
         return element_name(system.model.file, "Force_Contact", system.contact_ids[row])
     if judged.element == "body" and 0 <= row < len(system.body_ids):
         return system.body_name(row)

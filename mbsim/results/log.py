@@ -383,6 +383,9 @@ def _audit_lines(audit: Audit) -> Iterator[str]:
             name = "  without contact" if id is None else f"  under Force_Contact[{id}]"
             largest = f"{number(share.largest)} at {number(share.time)}"
             yield fact(name, f"{number(share.change)}, most at once {largest}")
+    for id, share in audit.contacts.items():
+        if share.friction:
+            yield fact(f"  friction of Force_Contact[{id}]", f"work {number(share.friction)}")
     for name, entry in audit.entries.items():
         at = f" at {entry.element}" if entry.element else ""
         when = f"{number(entry.value)} of {number(entry.allowed)} at time {number(entry.time)}"

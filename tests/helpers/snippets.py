@@ -17,6 +17,12 @@ _MARK = "\x01"
 #: What a program says on a machine that has not compiled yet.
 _COMPILING = re.compile(r"^mbsim: compiling")
 _OF_IT = re.compile(r" \([\d.]+ s of it compiling\)")
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_SAID = re.compile(r"print\(.*\)\s+# (.*)")
+#: What another processor's rounding may change: counters and values, errors of one or two digits.
+_NEAR, _OF_ERRORS = 1.1, 3.0
+#: What is rounding altogether.
+_NOTHING = 1e-12
 
 
 @dataclass
@@ -99,6 +105,30 @@ def agrees(shown: list[str], printed: list[str]) -> bool:
     return bool(re.fullmatch(pattern, printed[0].rstrip())) and agrees(shown[1:], printed[1:])
 
 
+def comments(lines: list[str]) -> list[str]:
+    """Return what comments of a Python block say that it prints: behind prints, or at its end."""
+    said = [match.group(1) for line in lines if (match := _SAID.search(line))]
+    end = len(lines)
+    while end and lines[end - 1].startswith("# "):
+        end -= 1
+    return said + [line[2:] for line in lines[end:]]
+
+
+def nearly(shown: str, printed: str) -> bool:
+    """Return whether a line is printed as shown, where numbers may be as far off as rounding puts
+    them; what is shown may go on."""
+    words = [" ".join(_NUMBER.sub(" # ", text).split()) for text in (shown, printed)]
+    if not words[0].startswith(words[1]):
+        return False
+    for one, other in zip(_NUMBER.findall(shown), _NUMBER.findall(printed), strict=False):
+        a, b = abs(float(one)), abs(float(other))
+        digits = len(re.sub(r"e.*|\D", "", one).lstrip("0"))
+        factor = _OF_ERRORS if "e" in one and digits < 3 else _NEAR
+        if max(a, b) > _NOTHING and not b <= a * factor <= b * factor * factor:
+            return False
+    return True
+
+
 def as_if_warm(text: str) -> list[str]:
     """Return the lines of output as they are once everything is compiled, without blank ends."""
     lines = [_OF_IT.sub("", line) for line in text.splitlines() if not _COMPILING.match(line)]
@@ -119,7 +149,8 @@ class Folder:
             module = " -m mbsim" if name == "mbsim" else ""
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}"{module} "$@"\n')
             program.chmod(0o755)
-        for name in ("models", "userfuncs", "tests"):
+        # what pytest is set up by, too
+        for name in ("models", "userfuncs", "tests", "pyproject.toml"):
             (path / name).symlink_to(ROOT / name)
         self._environment = os.environ | {
             "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
@@ -158,6 +189,9 @@ class Folder:
     def _python(self, block: Block, where: str) -> None:
         code, printed = self._execute([sys.executable, "-"], "\n".join(block.lines))
         assert code == 0, f"{where}: {printed}"
+        shown, lines = comments(block.lines), as_if_warm(printed)
+        same = len(shown) <= len(lines) and all(map(nearly, shown, lines))
+        assert not shown or same, f"{where} prints\n{printed}\nand says\n" + "\n".join(shown)
 
     def _console(self, block: Block, where: str) -> None:
         asked = commands(block)

@@ -145,6 +145,11 @@ def test_whole_words_come_before_parts_of_others():
     assert len(search.search("integrat")) > 1  # no page has it alone
 
 
+@pytest.mark.parametrize("topic", ["reaction force", "redundant", "normal direction", "time step"])
+def test_notes_of_design_come_last(topic):
+    assert not search.search(topic)[0].page.name.startswith("develop/")
+
+
 def test_most_words_where_no_page_has_all():
     hits = search.search("dissipated friction qwertz")
     assert {hit.missing for hit in hits} == {("qwertz",)}

@@ -450,8 +450,11 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
         torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))
-        lost -= fx * slip[0] + fy * slip[1]
-        lost -= mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
+        along = fx * slip[0] + fy * slip[1]
+        about = mx * spin_rates[0] + my * spin_rates[1] + tz * spin_rates[2]
+        lost -= along
+        lost -= about
+        dy[scene.audit.friction_at[c]] += along + about
     add_wrench(scene, y, bi, p, force, torque)
     add_wrench(scene, y, bj, p, scale(-1.0, force), scale(-1.0, torque))
     noise = scene.kinds.noise[scene.pairs.kind[scene.slots.pair[s]]]

@@ -7,7 +7,10 @@ At an accepted step, every so many of them and where a contact begins or ends, a
 * momentum: of a group of bodies that nothing outside acts on but its weight, P grows by M g dt and
   the angular momentum about its cg not at all;
 * residuals of the constraints in use, and their rates; what slips although friction holds it;
-* friction over mu N.
+* friction over mu N;
+* the work of friction of each contact: it may give back no more than it took since it last had
+  nothing in store, which is never anything where it has neither memory nor X; and the power of
+  friction in joints and of dry friction, never above 0.
 
 What a local error of e explains is e times a usual size: the energy error of a step that is wrong
 by e V in velocities is e m v V. Steps give e, the tolerance is what they may be wrong by unseen
@@ -23,10 +26,13 @@ from mbsim.arrays.codes import (
     AUDIT_EVERY,
     AUDIT_TOL,
     AUDIT_UNTIL,
+    BALL_FRICTION,
     CLOSED_AT,
     CONE,
     CONTACT_THEN,
     DISSIPATED_FIRST,
+    DRIVES,
+    DRIVES_LIMIT,
     ENERGY,
     ENERGY_STEP,
     ERROR_NOW,
@@ -42,17 +48,22 @@ from mbsim.arrays.codes import (
     HELD_SLIP,
     HITS_THEN,
     LARGEST_ENERGY,
+    LOST_POWER,
     MOMENTUM,
     OPEN_BY,
     POSITION,
     POTENTIAL_FIRST,
+    SLIDE_FRICTION,
     SPIN,
     STEPS_ALL,
     STEPS_SINCE,
     TIME_THEN,
+    TOUCHED_NOW,
     USUAL_ENERGY,
     VELOCITY,
     WORK_FIRST,
+    WORK_NOW,
+    WORK_THEN,
     WORST_OPEN,
     WORST_TIME,
 )
@@ -79,6 +90,8 @@ CLOSED = 1e-10
 PASSED = 1e-8
 #: Rounding of a force whose friction is looked at, over its part along the normal.
 CONE_ROUNDING = 1e-12
+#: What friction may give at most, over the largest energy, however large the errors of all steps.
+GIVEN = 0.02 / DRIVES_LIMIT
 #: Bodies of the largest model that is sampled where contacts begin and end: of many, one always
 #: does.
 FEW = 16
@@ -94,6 +107,24 @@ def note(scene: Scene, row: int, value: float, allowed: float, t: float, element
     if not value * found[FOUND_ALLOWED] <= found[FOUND_VALUE] * allowed:
         found[FOUND_VALUE], found[FOUND_ALLOWED] = value, allowed
         found[FOUND_TIME], found[FOUND_ELEMENT] = t, element
+
+
+@jitable
+def note_given(scene: Scene, given: float, t: float, element: int) -> None:
+    """Keep what friction gave; beyond the limit time and element stay those of the first.
+
+    What errors of all steps explain is that of the energy balance, at most GIVEN.
+    """
+    audit, tally, found = scene.audit, scene.audit.tally, scene.audit.found[DRIVES]
+    size = max(tally[LARGEST_ENERGY], tally[USUAL_ENERGY])
+    errors = tally[ERRORS_ALL] + audit.plan[AUDIT_TOL] * math.sqrt(tally[STEPS_ALL])
+    allowed = size * min(errors, GIVEN)
+    if not found[FOUND_VALUE] > DRIVES_LIMIT * found[FOUND_ALLOWED]:
+        note(scene, DRIVES, given, allowed, t, element)
+        return
+    most = max(found[FOUND_VALUE], DRIVES_LIMIT * allowed)
+    if found[FOUND_ELEMENT] == element and given > most:
+        found[FOUND_VALUE], found[FOUND_ALLOWED] = given, allowed
 
 
 @jitable
@@ -285,6 +316,36 @@ def examine_friction(scene: Scene, t: float) -> None:
 
 
 @jitable
+def examine_work(scene: Scene, t: float, y: F1) -> None:
+    """Look whether friction of a contact gave more than it took."""
+    audit, hit = scene.audit, scene.work.hit
+    for c in range(len(audit.friction)):
+        audit.friction[c, TOUCHED_NOW] = 0.0
+    for k in range(hit[len(hit) - 1]):
+        audit.friction[contact_of(scene, hit[k]), TOUCHED_NOW] = 1.0
+    for c in range(len(audit.friction)):
+        row = audit.friction[c]
+        if audit.friction_at[c] < 0:
+            continue
+        row[WORK_NOW] = y[audit.friction_at[c]]
+        note_given(scene, max(0.0, row[WORK_NOW] - row[WORK_THEN]), t, c)
+        if audit.keeps[c] == 0 or row[TOUCHED_NOW] == 0.0:
+            row[WORK_THEN] = min(row[WORK_THEN], row[WORK_NOW])
+
+
+@jitable
+def examine_applied(scene: Scene, t: float) -> None:
+    """Look whether friction in a joint gives, or dry friction beyond what its spring stores."""
+    applied, given = scene.applied, scene.audit.given
+    for f in range(len(given)):
+        form = applied.form[f]
+        if applied.keeps[f] == 1 or SLIDE_FRICTION <= form <= BALL_FRICTION:
+            power = -scene.work.applied[f, LOST_POWER]
+            given[f] += max(0.0, power) * (t - scene.audit.tally[TIME_THEN])
+            note_given(scene, given[f], t, len(scene.contacts.id) + f)
+
+
+@jitable
 def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     """Take a sample at an accepted step that is due for one; of no length, h = 0, begin anew."""
     audit, tally = scene.audit, scene.audit.tally
@@ -310,6 +371,7 @@ def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     examine_momentum(scene, t, y, steps, local)
     if tally[ANEW] == 0.0:
         examine_equations(scene, t)
+        examine_applied(scene, t)
         if scene.world.hooks[Hook.CONTACTS] != 0:
             contacts = scene.world.hooks[Hook.CONTACTS]
             answer_of(scene, call_int(contacts, (scene, Contacts.CONE, t, h, y, y)))

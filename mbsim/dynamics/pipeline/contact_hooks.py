@@ -11,7 +11,12 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
 from mbsim.dynamics.events.step_limits import longest_step
-from mbsim.dynamics.pipeline.audit import examine_friction, hardest, mark_touched
+from mbsim.dynamics.pipeline.audit import (
+    examine_friction,
+    examine_work,
+    hardest,
+    mark_touched,
+)
 from mbsim.dynamics.pipeline.output import (
     add_stored,
     carried_square,
@@ -65,6 +70,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
         mark_touched(scene)
     else:
         examine_friction(scene, t)
+        examine_work(scene, t, y)
     return 0
 
 

@@ -99,7 +99,8 @@
         return words.every(function (word) { return head.search(word) >= 0; });
       });
       const has = words.filter(function (word) { return each.low.search(word) >= 0; });
-      return { each: each, has: has, score: score + (together ? 60 : 0) };
+      const part = each.page.id.startsWith(known.notes) ? 0.2 : 1;
+      return { each: each, has: has, score: part * (score + (together ? 60 : 0)) };
     });
     const most = Math.max.apply(null, hits.map(function (hit) { return hit.has.length; }));
     if (!most) { found.textContent = "No page has any of these words."; return; }
