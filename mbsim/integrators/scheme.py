@@ -38,7 +38,7 @@ from mbsim.core import tags
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import HOOK, Problem
+from mbsim.core.problem import HOOK, STATE, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
@@ -128,8 +128,7 @@ class Method(NamedTuple):
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
     memory: F1  # (MEMORY,) see the names above
     counts: I1  # (COUNTS,) see the names above
-    # (1,) how many bodies begin y, for methods that know positions from velocities
-    bodies: tags.Constant[I1]
+    kinds: tags.Constant[I1]  # (n,) POSITION, VELOCITY or STATE: see `core.problem`
     kept: F2  # (carried, n) what the method needs of the step before
     ahead: tags.Scratch[F2]  # (carried, n) the same of the step that was tried last
     timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
@@ -139,7 +138,7 @@ class Method(NamedTuple):
 class Workspace(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (20,) the fields of `Problem`
+    problem: I1  # (22,) the fields of `Problem`
     method: Method
 
 
@@ -156,8 +155,8 @@ class Steps(NamedTuple):
     probe: int  # `attempt` of the explicit method where AUTO may change back to it, else 0
 
 
-def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> Method:
-    """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies.
+def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -> Method:
+    """Return the method at rest at (t0, y0), whose numbers are of these kinds, STATEs if not given.
 
     Its timetable has room for so many rows, and bounds nothing.
     """
@@ -179,7 +178,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
         np.zeros((scheme.dense, n)),
         memory,
         counts,
-        np.array([bodies], dtype=np.int64),
+        np.full(n, STATE) if kinds is None else np.array(kinds, dtype=np.int64),
         np.zeros((scheme.carried, n)),
         np.zeros((scheme.carried, n)),
         np.full((rows, 2), math.inf),
@@ -220,8 +219,8 @@ def in_workspace(context: int) -> tuple[Problem, Method]:
     w = workspace.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
-    problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19])
-    return problem, workspace.method
+    third = (w[14], w[15], w[16], w[17], w[18], w[19], w[20], w[21])
+    return Problem(*(first + second + third)), workspace.method
 
 
 @jitable

@@ -36,6 +36,7 @@ from mbsim.core.problem import (
     IMPACTS_ALONE,
     Taken,
 )
+from mbsim.dynamics.bodies.configuration import differ, move_on
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import first_depth, reversal
@@ -233,6 +234,21 @@ def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     return longest
 
 
+def retract(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Positions moved on by velocities."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    move_on(vector_at(a, n), h, len(scene.bodies.mass), vector_at(b, n))
+    return 0
+
+
+def difference(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Changes of positions as velocities, and what turns add to them."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return differ(vector_at(a, n), t, len(scene.bodies.mass), h, vector_at(b, n))
+
+
 def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
@@ -240,7 +256,7 @@ def list_near(context: int, y: Pointer) -> int:
     return 0
 
 
-#: By their names in `Problem`; `stable` is only of a method without error estimate.
+#: By their names in `Problem`.
 HOOKS = {
     "rhs": rhs,
     "project": _project,
@@ -253,3 +269,5 @@ HOOKS = {
 }
 #: Of a scene with contacts.
 CONTACT_HOOKS = {"check": _check, "inner": _inner}
+#: Of a method without error estimate.
+FIXED_STEP_HOOKS = {"stable": stable, "retract": retract}
