@@ -91,7 +91,11 @@ BOUNDED = 53
 # of DOP853: where its last step tried began, that step's error of order 3 over h^4, and those of
 # the two steps taken before
 THIRD_AT, THIRD, THIRD_BEFORE, THIRD_FIRST = range(54, 58)
-MEMORY = 58
+# of the step that was tried last: what is to be looked for within it, and the load of what holds at
+# its begin (`branches`); a part of it at which a force is on another branch, 0 for none, and how
+# much of it the load of what holds is known for
+LOOKS, LOAD_THEN, SWITCHED, REACH = range(58, 62)
+MEMORY = 62
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -152,7 +156,12 @@ class Steps(NamedTuple):
     order: float
     memory: float
     implicit: bool
-    probe: int  # `attempt` of the explicit method where AUTO may change back to it, else 0
+    # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
+    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
+    branches: int
+    events: int
+    probe: int
+    calm: int
 
 
 def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -> Method:
@@ -199,6 +208,7 @@ def bind(
 ) -> tuple[Steps, Any]:
     """Return the method bound to a problem, and what must live as long as it is used."""
     from mbsim.core import jit
+    from mbsim.integrators import branches, changing, events
 
     if scheme.implicit and problem.linearise == 0:
         raise ValueError("this problem has no linearisation, which an implicit method needs")
@@ -207,8 +217,11 @@ def bind(
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
     numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
+    looks = jit.address(branches.serve, branches.ASKED) if problem.switching != 0 else 0
+    locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
     probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
-    steps = Steps(context, attempt, fit_dense, *numbers, probes)
+    calm = jit.address(changing.serve, changing.ASKED) if probe is not None else 0
+    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm)
     return steps, (table, workspace)
 
 
