@@ -15,6 +15,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.hooks import (
     Contacts,
     Dry,
+    Effects,
     Gauges,
     Hook,
     Joints,
@@ -41,7 +42,7 @@ from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import first_depth, reversal
 from mbsim.dynamics.events.stability import stable_step
-from mbsim.dynamics.pipeline.audit import examine, examine_fold
+from mbsim.dynamics.pipeline.audit import examine
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.output import (
     gauged,
@@ -115,9 +116,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return gauged(scene, Gauges.IMPACT, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, a, b)
     if h == FRICTION_ALONE:
-        return gauged(scene, Gauges.FRICTION, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error
@@ -149,8 +150,6 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     examine(scene, t, h, y)
     passes = scene.sweep.quality[FOLDS] == 1.0
     left = passed and not passes
-    if left:
-        examine_fold(scene, t)
     word = 0
     if changed > 0 or left:
         word += Taken.Y_CHANGED
