@@ -19,8 +19,7 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
+from mbsim.core.problem import POSITION, VELOCITY, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
@@ -170,13 +169,13 @@ def keep_bent(m: Method, t: float, h: float) -> bool:
     nothing there: e3 is large, and e5 may vanish by chance. Each body's velocity, its spin and each
     state of first order are looked at by themselves: what turns fast elsewhere would hide them.
     """
-    e, kept, n, end = m.error, m.kept, len(m.y), BODY_SIZE * m.bodies[0]
+    e, kept, n = m.error, m.kept, len(m.y)
     taken = t != m.memory[THIRD_AT]
     m.memory[THIRD_AT] = t
     found, i = False, 0
     while i < n:
-        # positions follow velocities
-        width = 1 if i >= end else (7 if i % BODY_SIZE == 0 else 3)
+        # velocities stand in vectors; positions follow them
+        width = 3 if m.kinds[i] == VELOCITY else 1
         square = 0.0
         for j in range(i, i + width):
             square += e[j] * e[j]
@@ -184,7 +183,7 @@ def keep_bent(m: Method, t: float, h: float) -> bool:
             kept[2, i], kept[1, i] = kept[1, i], kept[0, i]
         kept[0, i] = math.sqrt(square) / h**4
         smooth = min(kept[1, i], kept[2, i])
-        bent = width < 7 and smooth > 0.0 and kept[0, i] > BENDS_SHARPLY * smooth
+        bent = m.kinds[i] != POSITION and smooth > 0.0 and kept[0, i] > BENDS_SHARPLY * smooth
         for j in range(i, i + width):
             e[j] = e[j] if bent else 0.0
         found = found or bent

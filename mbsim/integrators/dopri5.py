@@ -13,8 +13,8 @@ import math
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import EACH, RATES, Problem
+from mbsim.core.problem import EACH, POSITION, RATES, STATE, Problem
+from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
@@ -124,24 +124,25 @@ def fill_differences(m: Method, h: float) -> None:
 
     Ways, changes of velocity and of f of two pairs of stages, and the change of f over the step.
     """
-    k, d, n, bodies = m.k, m.k[DIFFERENCES:], len(m.y), m.bodies[0]
+    k, d, n = m.k, m.k[DIFFERENCES:], len(m.y)
+    first = not has_positions(m)
     for j in range(RATES):
         for i in range(n):
             d[j, i] = 0.0
-    for b in range(max(1, bodies)):
-        at = BODY_SIZE * b
+    for i in range(n):
+        if m.kinds[i] == STATE and not first:
+            continue
+        way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
+        way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
+        come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
+        come += (A64 - A54) * k[3, i] + A65 * k[4, i]
         # f of a position is its velocity: that says nothing
-        rates, end = (at + 7, at + BODY_SIZE) if bodies > 0 else (0, n)
-        for i in range(at, end):
-            way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
-            way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
-            come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
-            come += (A64 - A54) * k[3, i] + A65 * k[4, i]
-            j = 1 if i >= rates else 0
-            d[j, i], d[3 + j, i] = h * way, h * come
-            if i >= rates:
-                d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
-                d[6, i] = k[6, i] - k[0, i]
+        is_rate = m.kinds[i] != POSITION
+        j = 1 if is_rate else 0
+        d[j, i], d[3 + j, i] = h * way, h * come
+        if is_rate:
+            d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
+            d[6, i] = k[6, i] - k[0, i]
 
 
 @jitable

@@ -74,9 +74,46 @@ def _contacts(scene: Scene) -> Callable[..., Any]:
 
 
 def _gauges(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts
+    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts, gauge_steps
 
-    return gauge_contacts
+    carries = (scene.slots.x >= 0).any() or (scene.slots.z >= 0).any()
+    return gauge_contacts if carries else gauge_steps
+
+
+def _has_faces(scene: Scene, method: Method) -> bool:
+    return bool((scene.kinds.whole > 0.0).any())
+
+
+def _tilting(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import damp_contact
+
+    return damp_contact
+
+
+def _recalls(scene: Scene, method: Method) -> bool:
+    return bool((scene.contacts.memory > 0).any())
+
+
+def _recall(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import recall_friction
+
+    return recall_friction
+
+
+def _has_contact_slopes(scene: Scene, method: Method) -> bool:
+    return method.tangent is not None and _has_contacts(scene, method)
+
+
+def _contact_slopes(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.implicit_hooks import slopes_of_contacts
+
+    return slopes_of_contacts
+
+
+def _effects(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import measure_effects
+
+    return measure_effects
 
 
 def _has_programs(scene: Scene, method: Method) -> bool:
@@ -294,6 +331,21 @@ TABLE = (
         "writes the points of pairs without a closed form; a scene with such a pair has it",
     ),
     Row(
+        Hook.TILTING,
+        _INT(_INT, _INT, _T, _T, _PTR),  # context, slot, t, normal force, y
+        _has_faces,
+        _tilting,
+        "finds the couple against tilting of a flat face that is one incident",
+    ),
+    Row(
+        Hook.RECALL,
+        _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
+        _recalls,
+        _recall,
+        "does what friction of contacts with memory is asked for: `Recall`",
+        "an answer, or less a code",
+    ),
+    Row(
         Hook.VALUE,
         _T(_INT, _T, _PTR, _INT),  # context, t, y, program
         _has_programs,
@@ -367,6 +419,13 @@ TABLE = (
         "adds how forces of equations turn with the bodies",
     ),
     Row(
+        Hook.CONTACT_SLOPES,
+        _INT(_INT, _INT, _T, _T, _PTR),  # context, request, t, h, y
+        _has_contact_slopes,
+        _contact_slopes,
+        "does what derivatives of contacts are asked for: `ContactSlopes`",
+    ),
+    Row(
         Hook.MEMORY,
         _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
         _has_memory,
@@ -394,6 +453,14 @@ TABLE = (
         _has_contacts,
         _gauges,
         "measures contacts: `Gauges`",
+        "the measure; a failure is noted",
+    ),
+    Row(
+        Hook.EFFECTS,
+        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        _has_contact_slopes,
+        _effects,
+        "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
         "the measure; a failure is noted",
     ),
     Row(

@@ -15,6 +15,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.hooks import (
     Contacts,
     Dry,
+    Effects,
     Gauges,
     Hook,
     Joints,
@@ -38,11 +39,12 @@ from mbsim.core.problem import (
     RATES,
     Taken,
 )
+from mbsim.dynamics.bodies.configuration import differ, move_on
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import first_depth, reversal
 from mbsim.dynamics.events.stability import stable_step
-from mbsim.dynamics.pipeline.audit import examine, examine_fold
+from mbsim.dynamics.pipeline.audit import examine
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.output import (
     fill_sizes,
@@ -117,9 +119,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return gauged(scene, Gauges.IMPACT, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, a, b)
     if h == FRICTION_ALONE:
-        return gauged(scene, Gauges.FRICTION, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
     if h == EACH:
         fill_sizes(scene, vector_at(a, RATES * n), vector_at(b, n))
         return 0.0
@@ -154,8 +156,6 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     examine(scene, t, h, y)
     passes = scene.sweep.quality[FOLDS] == 1.0
     left = passed and not passes
-    if left:
-        examine_fold(scene, t)
     word = 0
     if changed > 0 or left:
         word += Taken.Y_CHANGED
@@ -239,6 +239,21 @@ def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     return longest
 
 
+def retract(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Positions moved on by velocities."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    move_on(vector_at(a, n), h, len(scene.bodies.mass), vector_at(b, n))
+    return 0
+
+
+def difference(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Changes of positions as velocities, and what turns add to them."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return differ(vector_at(a, n), t, len(scene.bodies.mass), h, vector_at(b, n))
+
+
 def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
@@ -246,7 +261,7 @@ def list_near(context: int, y: Pointer) -> int:
     return 0
 
 
-#: By their names in `Problem`; `stable` is only of a method without error estimate.
+#: By their names in `Problem`.
 HOOKS = {
     "rhs": rhs,
     "project": _project,
@@ -259,3 +274,5 @@ HOOKS = {
 }
 #: Of a scene with contacts.
 CONTACT_HOOKS = {"check": _check, "inner": _inner}
+#: Of a method without error estimate.
+FIXED_STEP_HOOKS = {"stable": stable, "retract": retract}
