@@ -56,7 +56,8 @@ def _compiled(case: Case, data: Any) -> Any:
     """The law as a C function on the addresses of qpos, qvel and qfrc_passive."""
     import numba
 
-    law = numba.njit(case.law)
+    compiler: Any = numba  # its types know no call of what they compile
+    law = compiler.njit(case.law)
     pointer = _pointer()
     q, v, f = (int(a.ctypes.data) for a in (data.qpos, data.qvel, data.qfrc_passive))
     radius, balls = case.radius, len(case.velocity)
@@ -78,7 +79,7 @@ def _compiled(case: Case, data: Any) -> Any:
 
     body = on_plane if case.gap == "plane" else on_balls
     signature = numba.types.void(numba.types.voidptr, numba.types.voidptr)
-    return _keep(numba.cfunc(signature)(body))
+    return _keep(compiler.cfunc(signature)(body))
 
 
 #: Machine code must not be freed while MuJoCo may call it.
@@ -114,7 +115,7 @@ def impact(depth: float, rate: float) -> float:
     """The law of S2a."""
     s = min(depth / p.S2A_LAW.dmax, 1.0)
     damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
-    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
+    return max(0.0, float(p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate))
 
 
 def linear(depth: float, rate: float) -> float:
@@ -138,4 +139,4 @@ _HERTZ_K, _HERTZ_E = p.S5.k, p.S5.e
 
 def hertz(depth: float, rate: float) -> float:
     """The law of S5, without damping."""
-    return _HERTZ_K * depth**_HERTZ_E
+    return float(_HERTZ_K * depth**_HERTZ_E)

@@ -75,7 +75,8 @@ def _run(case: Case, repeats: int) -> Outcome:
             bodies = case.build(bullet)
             bullet.setTimeStep(case.dt)
             march = _march if case.law is None else _march_with_law
-            return march(bullet, bodies, steps, case)
+            wall, rows = march(bullet, bodies, steps, case)
+            return wall, rows
         finally:
             bullet.disconnect(client)
 
@@ -216,7 +217,7 @@ def _free(top: p.FreeBody, dts: tuple[float, ...]) -> Cases:
 def _impact(depth: float, rate: float) -> float:
     s = min(depth / p.S2A_LAW.dmax, 1.0)
     damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
-    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
+    return max(0.0, float(p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate))
 
 
 def _linear(depth: float, rate: float) -> float:
