@@ -38,7 +38,8 @@ AREA_IN, RADIUS_IN, LOCI_IN, LOCJ_IN = 11, 12, 13, 16
 #: Those that only derivatives and laws with memory look at.
 DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19, 25)
 NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
-#: Fields of a law's output before its memory: force, torques, and those named here.
+#: Fields of a law's output before its memory.
+FORCE_X_OUT, FORCE_Y_OUT, TORQUE_X_OUT, TORQUE_Y_OUT, TORQUE_Z_OUT = range(5)
 STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
 
 _PTR = types.CPointer(types.float64)
