@@ -45,12 +45,37 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
 BOUNDS = 8
 
+# the column of `Applied.par` of a RESIDUAL: its row of `Residuals`
+OF_ELEMENT = 0
+
+# columns of `State.residual`: from the second on x, f and f'
+AT_TIME = 0
+
 # columns of `Applied.par` of what slides (`Applied.keeps`): stiffness, 0 where it is rigid; the
 # force of slip, and the one that begins it
 SLIDER_STIFFNESS, SLIDER_LIMIT, SLIDER_STATIC = range(3)
 
-# second column of `Applied.by_reactions`: components 0 to 5 of a vector force, then
+# columns of `Applied.by_reactions`
+ROW_OF, COMPONENT, PROGRAM = range(3)
+
+# its second column: components 0 to 5 of a vector force, then
 SCALAR, JOINT_FRICTION = 6, 7
+
+# columns of `Tree.axis`: the child's and the parent's marker
+CHILD_AXIS, PARENT_AXIS = range(2)
+
+# columns of `Equations.axis`, and of `Equations.start`
+AXIS_I, AXIS_J = range(2)
+START_SUM, START_RATE = range(2)
+
+# columns of `Pattern.pair`: bodies of a block's row and of its column
+BLOCK_ROW, BLOCK_COLUMN = range(2)
+
+# columns of `Keeps.press`
+PRESS_BY_DEPTH, PRESS_BY_RATE = range(2)
+
+# columns of `Real.c`: coefficients of `linearization.newton_matrix`
+C1, C2, C3, FORM = range(4)
 
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
@@ -87,6 +112,25 @@ OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST = range(7)
     FOLD_AT,
     FOLD_POWER,
 ) = range(18)
+
+# columns of `Work.noise`
+NOISE_FORCE, NOISE_TORQUE = range(2)
+
+# columns of `Work.speed`
+FASTEST_POINT, CENTRE_ACCELERATION = range(2)
+
+# columns of `Work.kept`
+WHOLE_X, WHOLE_Y, COUNTS_AS, COMMITTED = range(4)
+
+# columns of `Broadphase.first`, of `moved`, and the first ones of `spare` for pairs
+FIRST_I, LAST_I, FIRST_J, LAST_J = range(4)
+MOVED_TO, MOVED_KIND, MOVED_I, MOVED_J, MOVED_TOUCHES = range(5)
+SPARE_GAP, SPARE_LEFT = range(2)
+
+# columns of `Programs.stack`, the first ones of `Programs.code`, the first of `Programs.piece`
+JET_VALUE, JET_SLOPE, JET_CURVATURE = range(3)
+CODE_OPERATION, CODE_OPERAND = range(2)
+PIECE_BEGIN = 0
 
 # columns of `Work.applied`: force 3, torque 3, then
 STORED_ENERGY, LOST_POWER = 6, 7
@@ -211,4 +255,6 @@ SLOT_COLUMNS = 28
 #: What `contact_set.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
 #: `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS
-CONTACT_COLUMNS = 10  # force 3, torque 3, depth, slip, incidents, area
+# columns of `Rows.contact`, of each contact; force and torque take three
+CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7
+CONTACT_INCIDENTS, CONTACT_AREA, CONTACT_COLUMNS = 8, 9, 10

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import echo
+from mbsim.cli.options import json_option
 
 if TYPE_CHECKING:
     from mbsim.bench.runner import Options, Report
@@ -55,7 +56,7 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     "those above 2 s not at all.",
 )
 @click.option("--no-peers", is_flag=True, help="Run only mbsim, whatever is installed.")
-@click.option("--json", "as_json", is_flag=True, help="Print all numbers as one JSON object.")
+@json_option("all numbers as one JSON object")
 def command(
     scenes: tuple[str, ...],
     output: Path,

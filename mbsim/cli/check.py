@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import counted, echo
+from mbsim.cli.options import set_option
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -29,13 +30,7 @@ def _without_file(deck: Model) -> Iterator[str]:
 
 @click.command("check")
 @click.argument("model", type=click.Path())
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="SELECTOR=VALUE",
-    help="Change an attribute first, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
-)
+@set_option("Change an attribute first")
 def command(model: str, overrides: tuple[str, ...]) -> None:
     """Check MODEL: every fault is listed with file and line.
 

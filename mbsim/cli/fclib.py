@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbsim.cli.messages import echo, print_json
+from mbsim.cli.options import json_option
 
 if TYPE_CHECKING:
     from mbsim.errors import MbsimError
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _FILES = click.argument(
     "files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE.hdf5..."
 )
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
+_JSON = json_option("a JSON list")
 
 
 def _positive(ctx: click.Context, parameter: click.Parameter, value: float | None) -> float | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbsim.cli.messages import echo
+from mbsim.cli.options import json_option, plugin_option
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -18,15 +19,8 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 @click.command("info")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--plugin",
-    "plugins",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="File with user subroutines of a model; may be repeated.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@plugin_option("File with user subroutines of a model")
+@json_option("one JSON object")
 def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
     """Show what is in FILE, a model or a result file: elements, forces, end state, statistics.
 

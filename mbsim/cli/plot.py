@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import echo
+from mbsim.cli.options import json_option
 
 if TYPE_CHECKING:
     from mbsim.results.curves import Choice, Picture
@@ -43,7 +44,7 @@ _LONGEST = 100
     metavar="RESULT.h5",
     help="Draw differences from this run.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was drawn as one JSON object.")
+@json_option("what was drawn as one JSON object")
 def command(
     arguments: tuple[str, ...],
     output: Path | None,

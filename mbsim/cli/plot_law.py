@@ -10,21 +10,10 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import echo
+from mbsim.cli.options import json_option, plugin_option
 
 if TYPE_CHECKING:
     from mbsim.laws.slip_test import Conditions, Sample
-
-#: What parameters are unless --set says otherwise: a curve that shows what the law does.
-USUAL = {
-    "mu_static": 0.5,
-    "mu_dynamic": 0.3,
-    "stiction_trans_vel": 2e-3,
-    "friction_trans_vel": 1e-2,
-    "stribeck_vel": 5e-3,
-    "bristle_stiffness": 1e4,
-    "rolling_arm": 0.01,
-    "patch_radius": 0.1,
-}
 
 
 @click.command("plot-law")
@@ -36,14 +25,7 @@ USUAL = {
     metavar="FILE",
     help="PNG or SVG, by its suffix.  [default: friction-<laws>.png]",
 )
-@click.option(
-    "--plugin",
-    "plugins",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Python file with a friction function, which LAW may then name; may be repeated.",
-)
+@plugin_option("Python file with a friction function, which LAW may then name")
 @click.option(
     "--set",
     "given",
@@ -52,7 +34,7 @@ USUAL = {
     help="A parameter of the laws, or nforce, stiffness, mass, amplitude, speed, spin, radius; "
     "par=1,2,... is what a user's function gets. May be repeated.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was drawn as one JSON object.")
+@json_option("what was drawn as one JSON object")
 def command(
     laws: tuple[str, ...],
     output: Path | None,
@@ -141,14 +123,12 @@ def _sample(
     """Return a law by its name; what it takes of `values`, or has by itself, goes to `used`."""
     from mbsim.errors import ModelError
     from mbsim.laws.catalog import FRICTION_LAWS
-    from mbsim.laws.slip_test import sample_of
+    from mbsim.laws.slip_test import sample_of, usual_parameters
 
     if name.upper() in FRICTION_LAWS:
         law = FRICTION_LAWS[name.upper()]
         own = {each.name: each for each in law.own}
-        for each in law.parameters:
-            default = own[each].default if each in own else None
-            usual = default if default is not None and default != 0.0 else USUAL.get(each, default)
+        for each, usual in usual_parameters(law).items():
             number = values.get(each, usual)
             if number is None:
                 raise ModelError(f"{name}: give its {each} with --set {each}=VALUE")

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from mbsim.cli.messages import counted, echo
+from mbsim.cli.options import json_option
 
 
 @click.command("request")
@@ -25,7 +26,7 @@ from mbsim.cli.messages import counted, echo
 @click.option(
     "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of CSV.")
+@json_option("one JSON object instead of CSV")
 def command(
     result: Path, names: tuple[str, ...], output: Path | None, scripts: bool, as_json: bool
 ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbsim.cli.messages import counted, echo
+from mbsim.cli.options import json_option, plugin_option, set_option
 from mbsim.integrators.catalog import METHODS
 
 if TYPE_CHECKING:
@@ -28,21 +29,8 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     metavar="DIR",
     help="Folder for results.  [default: <model name>/]",
 )
-@click.option(
-    "--plugin",
-    "plugins",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="File with user subroutines; may be repeated.",
-)
-@click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="SELECTOR=VALUE",
-    help="Change an attribute of the deck, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
-)
+@plugin_option("File with user subroutines")
+@set_option("Change an attribute of the deck")
 @click.option(
     "--integrator",
     metavar="NAME",
@@ -64,7 +52,7 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     show_default=True,
     help="auto: shown where standard error is a terminal.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the end state as one JSON object.")
+@json_option("the end state as one JSON object")
 @click.option(
     "--detector",
     type=click.Choice(["auto", "fcl"]),

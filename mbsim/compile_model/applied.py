@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.arrays import codes
+from mbsim.arrays.codes import OF_ELEMENT
 from mbsim.arrays.model import Applied
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
@@ -189,7 +190,7 @@ def _fill_residual(to: _Rows, k: int, form: OfResidual, element: Any) -> None:
     from mbsim.compile_model.force_elements import force_program
 
     to.made.form[k] = codes.RESIDUAL
-    to.made.par[k, 0] = list(to.model.force_elements).index(element.id)
+    to.made.par[k, OF_ELEMENT] = list(to.model.force_elements).index(element.id)
     for at, direction in enumerate(element.directions):
         c = 3 * "TR".index(direction[0]) + "XYZ".index(direction[1])
         to.made.components[k, c] = force_program(to.programs, element.id, at)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION, JET_VALUE
 from mbsim.arrays.model import Programs
 from mbsim.compile_model.instructions import (
     ACCELERATION,
@@ -191,8 +192,8 @@ def _table(
                 given = (numbers.setdefault(value, len(numbers)),)
             elif element is not None:
                 given = (*rows[element], *given)
-            code[at, 0] = op
-            code[at, 1 : 1 + len(given)] = given
+            code[at, CODE_OPERATION] = op
+            code[at, CODE_OPERAND : CODE_OPERAND + len(given)] = given
             at += 1
     lengths = [len(program) for program in programs]
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64), code
@@ -405,13 +406,13 @@ def _combine(node: Call, made: list[Instruction], starts: list[int]) -> None:
 def _folded(node: Call, values: list[float]) -> Instruction:
     """Return the number that a function makes of numbers."""
     stack = np.zeros((len(values), 3))
-    stack[:, 0] = values
+    stack[:, JET_VALUE] = values
     try:
         with np.errstate(divide="raise", over="raise", invalid="raise"):
             elementary.apply(CODES[node.name], len(values), stack, len(values))
     except (ArithmeticError, ValueError):
-        stack[0, 0] = np.nan
-    if not np.isfinite(stack[0, 0]):
+        stack[0, JET_VALUE] = np.nan
+    if not np.isfinite(stack[0, JET_VALUE]):
         shown = ", ".join(f"{value:g}" for value in values)
         raise ExpressionError(f"{node.name} of {shown} is not a finite number", node.column)
-    return Instruction(NUMBER, value=float(stack[0, 0]))
+    return Instruction(NUMBER, value=float(stack[0, JET_VALUE]))

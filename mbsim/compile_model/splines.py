@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from mbsim.arrays.codes import PIECE_BEGIN
 from mbsim.model.elements import Spline
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +58,7 @@ def pieces(method: str, x: Array, y: Array, linear: bool) -> Array:
     """
     linear = linear or method == "LINSPL"
     made = np.zeros((len(x) + 1, 5))
-    made[1:, 0], made[0, 0] = x, x[0]
+    made[1:, PIECE_BEGIN], made[0, PIECE_BEGIN] = x, x[0]
     made[1:-1, 1:] = _between(method, x, y)
     made[0, 1], made[-1, 1] = y[0], y[-1]
     made[0, 2:4] = _outside(x, y, linear)

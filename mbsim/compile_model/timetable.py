@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mbsim.arrays.codes import CODE_OPERATION
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.instructions import SPLINE
@@ -329,7 +330,7 @@ def _least(t: Any, end: float) -> Any:
 
 def follows_time(scene: Scene) -> bool:
     """Return whether an expression names TIME."""
-    return bool(np.any(scene.programs.code[:, 0] == TIME))
+    return bool(np.any(scene.programs.code[:, CODE_OPERATION] == TIME))
 
 
 def _asks_time(system: System) -> bool:

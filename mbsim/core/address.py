@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import typing
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -21,13 +21,19 @@ from numba.core.datamodel import models
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import intrinsic, lower_builtin, register_model, type_callable
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core.array_items import DATA, describe
 from mbsim.core.memory import floats_at
 
+_Made = TypeVar("_Made")
 _WORD = ir.IntType(64)
 #: An intrinsic is called without the typing context that it is declared with.
 _intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = intrinsic
+#: The first numbers of an array as a tuple: of the array and how many, which is constant.
+as_tuple: Callable[..., tuple[float, ...]] = to_fixed_tuple
+_lowers_fields: Callable[..., Callable[[_Made], _Made]] = lower_getattr_generic
+_lowers: Callable[..., Callable[[_Made], _Made]] = lower_builtin
 
 
 class GroupType(types.Type):
@@ -35,12 +41,13 @@ class GroupType(types.Type):
 
     def __init__(self, group: type) -> None:
         self.group = group
-        super().__init__(name=f"Group({group.__module__}.{group.__qualname__})")
+        name = f"Group({group.__module__}.{group.__qualname__})"
+        super().__init__(name=name)
 
     @functools.cached_property
-    def fields(self) -> dict[str, tuple[types.Type, int]]:
+    def fields(self) -> dict[str, tuple[Any, int]]:
         """Numba type and first word in the table of every field, from the annotations."""
-        found: dict[str, tuple[types.Type, int]] = {}
+        found: dict[str, tuple[Any, int]] = {}
         word = 0
         for name, hint in typing.get_type_hints(self.group, include_extras=True).items():
             if hasattr(hint, "__metadata__"):
@@ -63,14 +70,14 @@ class GroupType(types.Type):
 @register_model(GroupType)
 class _GroupModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, _WORD)
+        super().__init__(dmm, fe_type, _WORD)  # type: ignore[no-untyped-call]
 
 
 @infer_getattr
 class _GroupAttribute(AttributeTemplate):
     key = GroupType
 
-    def generic_resolve(self, group: GroupType, name: str) -> Any:
+    def generic_resolve(self, group: GroupType, name: str) -> Any:  # type: ignore[override]
         return group.fields[name][0] if name in group.fields else None
 
 
@@ -81,7 +88,7 @@ def _constant_word(builder: Any, table: Any, word: int) -> Any:
     return read
 
 
-@lower_getattr_generic(GroupType)
+@_lowers_fields(GroupType)
 def _lower_field(context: Any, builder: Any, group: Any, value: Any, name: str) -> Any:
     """Return a field of a packed group: the table of an inner group, or the array."""
     target, word = group.fields[name]
@@ -94,7 +101,7 @@ def _lower_field(context: Any, builder: Any, group: Any, value: Any, name: str) 
     return impl_ret_borrowed(context, builder, target, array)
 
 
-def _leaves(group: NamedTuple) -> list[np.ndarray[Any, Any]]:
+def _leaves(group: tuple[Any, ...]) -> list[np.ndarray[Any, Any]]:
     """Return the arrays of a group of groups in order of their fields."""
     found: list[np.ndarray[Any, Any]] = []
     for value in group:
@@ -190,7 +197,7 @@ def _type_of_floats(context: Any) -> Any:
     return lambda address, count: _FLOATS
 
 
-@lower_builtin(floats_at, types.Number, types.Number)
+@_lowers(floats_at, types.Number, types.Number)
 def _floats_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     """Return the doubles at an address that is a number."""
     kinds = zip(args, signature.args, strict=True)

@@ -193,7 +193,7 @@ class _ContentLocator(_CacheLocator):
 
 
 class _ByContent(CompileResultCacheImpl):
-    _locator_classes = (_ContentLocator,)
+    _locator_classes: Any = (_ContentLocator,)
 
 
 class CodeCache(FunctionCache):
@@ -202,11 +202,12 @@ class CodeCache(FunctionCache):
     _impl_class = _ByContent
 
     def __init__(self, py_func: Callable[..., Any], on_miss: Callable[[str], None]) -> None:
-        super().__init__(py_func)
+        super().__init__(py_func)  # type: ignore[no-untyped-call]
         self._on_miss = on_miss
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
-        data = self._find(self._index_key(sig, target_context.codegen()))
+        key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
+        data = self._find(key)
         if data is None:
             self._on_miss(self._py_func.__qualname__)
             return None
@@ -214,7 +215,7 @@ class CodeCache(FunctionCache):
 
     def _save_overload(self, sig: Any, data: Any) -> None:
         try:
-            super()._save_overload(sig, data)
+            super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
         except OSError as error:  # a folder that cannot be written, or is full
             _note_unkept(cache_root(), error)
 

@@ -46,7 +46,7 @@ class RootLibrary(codegen.JITCodeLibrary):
     def add_ir_module(self, ir_module: Any) -> None:
         """Take what was lowered, without what nobody uses of it."""
         plain_code.leave_out_unused(ir_module)
-        super().add_ir_module(ir_module)
+        super().add_ir_module(ir_module)  # type: ignore[no-untyped-call]
 
     def lowered(self) -> Any:
         """Return the code as it was lowered, its symbols such that many roots may hold them."""
@@ -62,7 +62,7 @@ class RootLibrary(codegen.JITCodeLibrary):
         """Return the address of `name`; 0, and nothing is emitted, where it is not defined."""
         if not self._finalized and not _defines(self._final_module, name):
             return 0
-        return int(super().get_pointer_to_function(name))
+        return int(super().get_pointer_to_function(name))  # type: ignore[no-untyped-call]
 
     def finalize(self) -> None:
         """Link all that is reached, optimise and emit it."""
@@ -75,14 +75,15 @@ class RootLibrary(codegen.JITCodeLibrary):
             module = library.lowered() if raw else library._get_module_for_linking()
             self._final_module.link_in(module, preserve=True)
         self._resolve_recursion()
-        self._optimize_final_module()
+        self._optimize_final_module()  # type: ignore[no-untyped-call]
         self._final_module.verify()
-        self._finalize_final_module()
+        self._finalize_final_module()  # type: ignore[no-untyped-call]
+        codegen: Any = self._codegen
         for variable in self._final_module.global_variables:
             if variable.name.startswith(_ENVIRONMENT):
                 found = environment.lookup_environment(variable.name)
                 if found is not None:
-                    self._codegen.set_env(variable.name, found)
+                    codegen.set_env(variable.name, found)
 
     def _resolve_recursion(self) -> None:
         """Let calls of functions that call each other go straight, now that all are here."""
@@ -100,7 +101,7 @@ class RootLibrary(codegen.JITCodeLibrary):
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
         """Return the library that the cache holds: optimised, nothing to link."""
-        library = super()._unserialize(codegen, state)
+        library = super()._unserialize(codegen, state)  # type: ignore[no-untyped-call]
         library._from_cache = True
         return library
 

@@ -7,8 +7,9 @@ Each function here gives what Numba's own gives, in less time. They are put in p
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from llvmlite import ir as llvm
 from numba import stencil
@@ -30,8 +31,9 @@ from numba.core import (
     types,
 )
 from numba.core.base import BaseContext
+from numba.core.ir_utils import enforce_no_dels
 from numba.core.registry import cpu_target
-from numba.core.rewrites import rewrite_registry
+from numba.core.rewrites.registry import rewrite_registry
 from numba.core.runtime.context import NRTContext
 from numba.core.types.functions import BaseFunction
 from numba.core.typing import npydecl
@@ -40,7 +42,9 @@ from numba.stencils.stencil import StencilFunc
 
 from mbsim.core import array_items
 
-_equal_options = targetconfig.TargetConfig.__eq__
+_Made = TypeVar("_Made")
+_once: Callable[[_Made], _Made] = cast(Any, functools.cache)  # classes are hashable
+_equal_options: Any = targetconfig.TargetConfig.__eq__
 
 
 def _same_options(self: Any, other: Any) -> Any:
@@ -53,9 +57,9 @@ def _same_options(self: Any, other: Any) -> Any:
     )
 
 
-@functools.cache
-def _hash_of_class(kind: type) -> int:
-    return hash(tuple(sorted(kind.options)))  # type: ignore[attr-defined]
+@_once
+def _hash_of_class(kind: Any) -> int:
+    return hash(tuple(sorted(kind.options)))
 
 
 def _hash_of_options(self: Any) -> int:
@@ -72,8 +76,8 @@ _ROLES = (
 )
 
 
-@functools.cache
-def _role(kind: type) -> int:
+@_once
+def _role(kind: Any) -> int:
     """Return what a part of an instruction is, by its type."""
     return next((role for base, role in _ROLES if issubclass(kind, base)), _NONE)
 
@@ -129,7 +133,7 @@ def _uses_and_definitions(blocks: Any) -> Any:
     return analysis._use_defs_result(usemap=used, defmap=defined)
 
 
-_delete_exit = interpreter.peep_hole_delete_with_exit
+_delete_exit: Any = interpreter.peep_hole_delete_with_exit
 
 
 def _delete_exit_of_with(func_ir: Any) -> Any:
@@ -141,7 +145,7 @@ def _delete_exit_of_with(func_ir: Any) -> Any:
     return func_ir
 
 
-_has_location = base._has_loc
+_has_location: Any = base._has_loc
 
 
 def _takes_location(function: Any) -> bool:
@@ -152,7 +156,7 @@ def _takes_location(function: Any) -> bool:
     return "loc" in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
 
 
-_array_operator = npydecl.NumpyRulesArrayOperator.generic
+_array_operator: Any = npydecl.NumpyRulesArrayOperator.generic
 
 
 def _operator_on_arrays(self: Any, args: Any, kws: Any) -> Any:
@@ -200,7 +204,7 @@ def _lists(registry: Any) -> list[Any]:
     return [entries for entries in vars(registry).values() if isinstance(entries, list)]
 
 
-_post_process = postproc.PostProcessor.run
+_post_process: Any = postproc.PostProcessor.run
 
 
 def _with_lifetimes_on_demand(
@@ -219,7 +223,7 @@ def _with_lifetimes_on_demand(
     ir_of_function.generator_info = None
 
 
-_count_references = NRTContext._call_incref_decref
+_count_references: Any = NRTContext._call_incref_decref
 
 
 def _counted(context: Any, kind: Any) -> Any:
@@ -259,7 +263,7 @@ def _references(self: Any, builder: Any, ty: Any, val: Any) -> list[Any]:
     return found
 
 
-_call_type = BaseFunction.get_call_type
+_call_type: Any = BaseFunction.get_call_type
 
 
 def _call_type_once(self: Any, context: Any, args: Any, kws: Any) -> Any:
@@ -280,6 +284,9 @@ def _call_type_once(self: Any, context: Any, args: Any, kws: Any) -> Any:
     return found
 
 
+_errors: Any = errors  # its private names too
+
+
 class _ErrorContext:
     """What an error within is said to have happened in: a plain object for a generator."""
 
@@ -290,12 +297,12 @@ class _ErrorContext:
 
     def __enter__(self) -> None:
         loc = self._named.get("loc")
-        if loc is not None and not loc.filename.startswith(errors._numba_path):
-            errors.loc_info.update(self._named)
+        if loc is not None and not loc.filename.startswith(_errors._numba_path):
+            _errors.loc_info.update(self._named)
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         if isinstance(error, errors.NumbaError):
-            error.add_context(errors._format_msg(self._format, self._args, self._named))
+            error.add_context(_errors._format_msg(self._format, self._args, self._named))
 
 
 _size_of, _alignment_of = BaseContext.get_abi_sizeof, BaseContext.get_abi_alignment
@@ -313,7 +320,7 @@ def _measured(self: Any, measure: Any, ty: Any) -> int:
     return _sizes[key]
 
 
-_close_over = inline_closurecall.InlineClosureCallPass.run
+_close_over: Any = inline_closurecall.InlineClosureCallPass.run
 _INLINED_CALLS = (functools.reduce, stencil)
 
 
@@ -335,7 +342,7 @@ def _inline_where_there_is_something(self: Any) -> None:
                 return
 
 
-_rewrite = typed_passes.NopythonRewrites.run_pass
+_rewrite: Any = typed_passes.NopythonRewrites.run_pass
 
 
 def _rewrite_with_deletions_where_asked(self: Any, state: Any) -> bool:
@@ -357,10 +364,10 @@ def _is_of_arrays(value: Any, types_of: Any) -> bool:
     """Return whether an expression may be one that Numba runs in a loop over whole arrays."""
     if value.op != "call":
         return value.op in ("unary", "binop", "inplace_binop")
-    return array_exprs._is_ufunc(getattr(types_of.get(value.func.name), "typing_key", None))
+    return bool(array_exprs._is_ufunc(getattr(types_of.get(value.func.name), "typing_key", None)))
 
 
-_run_pass = compiler_machinery.PassManager._runPass
+_run_pass: Any = compiler_machinery.PassManager._runPass
 
 
 def _run_pass_unmeasured(self: Any, index: int, pss: Any, state: Any) -> None:
@@ -379,31 +386,40 @@ def _run_pass_unmeasured(self: Any, index: int, pss: Any, state: Any) -> None:
     finally:
         event.end_event(kind)
     if isinstance(pss, compiler_machinery.FunctionPass):
-        compiler_machinery.enforce_no_dels(state.func_ir)
+        enforce_no_dels(state.func_ir)
     none = compiler_machinery.pass_timings(0.0, 0.0, 0.0)
     self.exec_times[f"{index}_{pss.name()}"] = none
 
 
+#: What is put in place of what: a class or module of Numba's, a name in it, and ours.
+_REPLACED: tuple[tuple[Any, str, Any], ...] = (
+    (targetconfig.TargetConfig, "__eq__", _same_options),
+    (targetconfig.TargetConfig, "__hash__", _hash_of_options),
+    (ir.Inst, "_rec_list_vars", _variables),
+    (analysis, "compute_use_defs", _uses_and_definitions),
+    (inline_closurecall, "compute_use_defs", _uses_and_definitions),
+    (transforms, "compute_use_defs", _uses_and_definitions),
+    (interpreter, "peep_hole_delete_with_exit", _delete_exit_of_with),
+    (base, "_has_loc", _takes_location),
+    (npydecl.NumpyRulesArrayOperator, "generic", _operator_on_arrays),
+    (postproc.PostProcessor, "run", _with_lifetimes_on_demand),
+    (NRTContext, "_call_incref_decref", _count_where_counted),
+    (NRTContext, "get_meminfos", _references),
+    (typed_passes.NopythonRewrites, "run_pass", _rewrite_with_deletions_where_asked),
+    (BaseFunction, "get_call_type", _call_type_once),
+    (errors, "new_error_context", _ErrorContext),
+    (lowering, "new_error_context", _ErrorContext),
+    (typeinfer, "new_error_context", _ErrorContext),
+    (BaseContext, "get_abi_sizeof", functools.partialmethod(_measured, _size_of)),
+    (BaseContext, "get_abi_alignment", functools.partialmethod(_measured, _alignment_of)),
+    (inline_closurecall.InlineClosureCallPass, "run", _inline_where_there_is_something),
+    (compiler_machinery.PassManager, "_runPass", _run_pass_unmeasured),
+)
+
+
 def install() -> None:
     """Put these in place of Numba's for the rest of the process."""
-    targetconfig.TargetConfig.__eq__ = _same_options  # type: ignore[method-assign,assignment]
-    targetconfig.TargetConfig.__hash__ = _hash_of_options  # type: ignore[method-assign]
-    ir.Inst._rec_list_vars = _variables
-    for module in (analysis, inline_closurecall, transforms):
-        module.compute_use_defs = _uses_and_definitions
-    interpreter.peep_hole_delete_with_exit = _delete_exit_of_with
-    base._has_loc = _takes_location
-    npydecl.NumpyRulesArrayOperator.generic = _operator_on_arrays
-    postproc.PostProcessor.run = _with_lifetimes_on_demand
-    NRTContext._call_incref_decref = _count_where_counted
-    NRTContext.get_meminfos = _references
-    typed_passes.NopythonRewrites.run_pass = _rewrite_with_deletions_where_asked
-    BaseFunction.get_call_type = _call_type_once
-    for module in (errors, lowering, typeinfer):
-        module.new_error_context = _ErrorContext
-    BaseContext.get_abi_sizeof = functools.partialmethod(_measured, _size_of)
-    BaseContext.get_abi_alignment = functools.partialmethod(_measured, _alignment_of)
-    inline_closurecall.InlineClosureCallPass.run = _inline_where_there_is_something
-    compiler_machinery.PassManager._runPass = _run_pass_unmeasured
+    for owner, name, ours in _REPLACED:
+        setattr(owner, name, ours)
     array_items.install()
     _import_declarations_once()

@@ -133,7 +133,8 @@ def _is_deleted_twice(graph: Any, places: list[Any]) -> bool:
     return len(wanted) < len(places)
 
 
-_store_variable, _delete_variable = lowering.Lower.storevar, lowering.Lower.delvar
+_store_variable: Any = lowering.Lower.storevar
+_delete_variable: Any = lowering.Lower.delvar
 
 
 def _store(self: Any, value: Any, name: str, argidx: Any = None) -> None:
@@ -153,7 +154,7 @@ def _delete(self: Any, name: str) -> None:
         _delete_variable(self, name)
 
 
-_set_up_function = lowering.BaseLower.setup_function
+_set_up_function: Any = lowering.BaseLower.setup_function
 
 
 def _set_up(self: Any, fndesc: Any) -> None:
@@ -162,8 +163,8 @@ def _set_up(self: Any, fndesc: Any) -> None:
     self.builder.builds_plainly = getattr(self, "builds_plainly", False)
 
 
-_call_function = callconv.CPUCallConv.call_function
-_propagate = callconv.CPUCallConv.return_status_propagate
+_call_function: Any = callconv.CPUCallConv.call_function
+_propagate: Any = callconv.CPUCallConv.return_status_propagate
 
 
 class _Status:
@@ -276,12 +277,19 @@ def _is_used(instruction: Any, uses: dict[int, int]) -> bool:
     return uses[id(instruction)] > 0 or instruction.opname not in _WITHOUT_EFFECT
 
 
+#: What is put in place of what: a class of Numba's, a name in it, and ours.
+_REPLACED: tuple[tuple[Any, str, Any], ...] = (
+    (llvm.IRBuilder, "extract_value", _member),
+    (lowering.Lower, "_find_singly_assigned_variable", _find_assigned_once),
+    (lowering.Lower, "storevar", _store),
+    (lowering.Lower, "delvar", _delete),
+    (lowering.BaseLower, "setup_function", _set_up),
+    (callconv.CPUCallConv, "call_function", _call),
+    (callconv.CPUCallConv, "return_status_propagate", _hand_on),
+)
+
+
 def install() -> None:
     """Put these in place of Numba's for the rest of the process."""
-    llvm.IRBuilder.extract_value = _member
-    lowering.Lower._find_singly_assigned_variable = _find_assigned_once
-    lowering.Lower.storevar = _store
-    lowering.Lower.delvar = _delete
-    lowering.BaseLower.setup_function = _set_up
-    callconv.CPUCallConv.call_function = _call
-    callconv.CPUCallConv.return_status_propagate = _hand_on
+    for owner, name, ours in _REPLACED:
+        setattr(owner, name, ours)

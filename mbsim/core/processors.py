@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
-from numba.core import config
+from numba.core import config as _declared
 from numba.core.codegen import get_host_cpu_features
 
 from mbsim.errors import ModelError
+
+_config: Any = _declared  # Numba fills it when it is imported
 
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")
@@ -35,7 +38,7 @@ def runnable() -> tuple[str, ...]:
 
     None where NUMBA_CPU_NAME or NUMBA_CPU_FEATURES asks for code of a certain processor.
     """
-    if config.CPU_NAME is not None or config.CPU_FEATURES is not None:
+    if _config.CPU_NAME is not None or _config.CPU_FEATURES is not None:
         return ()
     here = set(get_host_cpu_features().split(","))
     return tuple(
@@ -45,7 +48,7 @@ def runnable() -> tuple[str, ...]:
 
 def folder_of(family: str) -> str:
     """Return the folder's name for a family's code, which may call Intel's SVML where that is."""
-    return f"{family}-svml" if config.USING_SVML else family
+    return f"{family}-svml" if _config.USING_SVML else family
 
 
 def settings(family: str) -> dict[str, str]:

@@ -287,27 +287,36 @@ def own_units(val: Vector, diagonal: Indices) -> Vector:
 
 
 @jitable
-def transposed_pattern(size: int, ptr: Indices, col: Indices) -> tuple[Indices, Indices]:
+def diagonal_and_units(ptr: Indices, col: Indices, val: Vector) -> tuple[Indices, Vector]:
+    """Return where each row's diagonal block is, and `own_units`."""
+    diagonal = diagonal_places(ptr, col)
+    return diagonal, own_units(val, diagonal)
+
+
+@jitable
+def transposed_pattern(
+    rows: int, columns: int, ptr: Indices, col: Indices
+) -> tuple[Indices, Indices]:
     """Return the transpose of a pattern, its columns rising."""
-    tptr = np.zeros(size + 1, np.int32)
-    for k in range(ptr[size]):
+    tptr = np.zeros(columns + 1, np.int32)
+    for k in range(ptr[rows]):
         tptr[col[k] + 1] += 1
-    for a in range(size):
-        tptr[a + 1] += tptr[a]
-    place = tptr[:size].copy()
-    tcol = np.empty(ptr[size], np.int32)
-    for a in range(size):
+    for b in range(columns):
+        tptr[b + 1] += tptr[b]
+    free = tptr[:columns].copy()  # where the next entry of a row of the transpose goes
+    tcol = np.empty(ptr[rows], np.int32)
+    for a in range(rows):
         for k in range(ptr[a], ptr[a + 1]):
             b = col[k]
-            tcol[place[b]] = a
-            place[b] += 1
+            tcol[free[b]] = a
+            free[b] += 1
     return tptr, tcol
 
 
 @jitable
 def symmetric_pattern(size: int, ptr: Indices, col: Indices) -> tuple[Indices, Indices]:
     """Return the union of a pattern and its transpose, columns rising."""
-    tptr, tcol = transposed_pattern(size, ptr, col)
+    tptr, tcol = transposed_pattern(size, size, ptr, col)
     seen = np.full(size, -1, np.int32)
     total = 0
     same = True
@@ -345,7 +354,7 @@ def symmetric_pattern(size: int, ptr: Indices, col: Indices) -> tuple[Indices, I
                 at += 1
         sptr[a + 1] = at
     # a symmetric pattern is its own transpose, and that comes out sorted
-    return transposed_pattern(size, sptr, scol)
+    return transposed_pattern(size, size, sptr, scol)
 
 
 @jitable

@@ -83,7 +83,7 @@ def late(until: Vector) -> bool:
     """Return whether the time is over; a question takes 0.2 us."""
     if until[2] == np.inf:
         return False
-    now: float = call_float(np.int64(until[0]), ())  # type: ignore[call-arg]  # an intrinsic
+    now: float = call_float(np.int64(until[0]), ())
     over: bool = now - floats_at(until[1], 1)[0] > until[2]
     return over
 

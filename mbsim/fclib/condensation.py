@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.blocks import Rows, block_rows, symmetric_pattern
+from mbsim.fclib.blocks import Rows, block_rows, symmetric_pattern, transposed_pattern
 from mbsim.fclib.clock import unlimited
 from mbsim.fclib.factor import (
     Factors,
@@ -211,7 +211,7 @@ def _touched_nodes(
 def _coupling(nodes: int, node_ptr: Indices, touched: Indices) -> tuple[Indices, Indices]:
     """Return the pattern in which nodes that one component touches are neighbours."""
     count = len(node_ptr) - 1
-    of_ptr, of_node = _components_of_nodes(nodes, count, node_ptr, touched)
+    of_ptr, of_node = transposed_pattern(count, nodes, node_ptr, touched)
     seen = np.full(nodes, -1, np.int32)
     ptr = np.zeros(nodes + 1, np.int32)
     total = 0
@@ -241,26 +241,6 @@ def _coupling(nodes: int, node_ptr: Indices, touched: Indices) -> tuple[Indices,
                     col[total] = b
                     total += 1
     return symmetric_pattern(nodes, ptr, col)
-
-
-@jitable
-def _components_of_nodes(
-    nodes: int, count: int, node_ptr: Indices, touched: Indices
-) -> tuple[Indices, Indices]:
-    """Return the components that touch each node, by compressed rows."""
-    of_ptr = np.zeros(nodes + 1, np.int32)
-    for k in range(node_ptr[count]):
-        of_ptr[touched[k] + 1] += 1
-    for a in range(nodes):
-        of_ptr[a + 1] += of_ptr[a]
-    place = of_ptr[:nodes].copy()
-    of_node = np.empty(node_ptr[count], np.int32)
-    for c in range(count):
-        for k in range(node_ptr[c], node_ptr[c + 1]):
-            a = touched[k]
-            of_node[place[a]] = c
-            place[a] += 1
-    return of_ptr, of_node
 
 
 @jitable

@@ -29,20 +29,27 @@ K = {|r_T| <= mu r_N}; it is zero exactly at a solution.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.fclib.blocks import product_of_stored, transposed_product_of_stored
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.cone import EVERY_SHARE, FREE, own_errors, residual
-from mbsim.fclib.problem import Global, Local, Solution
-from mbsim.fclib.reduction import directions, multipliers, reduce, velocities
+from mbsim.fclib.problem import Global, Local, Solution, length
+from mbsim.fclib.reduction import (
+    directions,
+    multipliers,
+    reduce,
+    times,
+    transposed_times,
+    velocities,
+)
 
 if TYPE_CHECKING:
-    from mbsim.fclib.problem import Matrix, Vector
+    from mbsim.fclib.problem import Vector
     from mbsim.fclib.reduction import Blocks
 
 #: A contact at the edge of its cone that is slower than this share of |q| or |u| sticks.
@@ -104,14 +111,14 @@ class Figures:
 def completed(problem: Local | Global, r: Vector, blocks: Blocks | None = None) -> Solution:
     """Return u, v and l that go with impulses r."""
     if isinstance(problem, Local) and problem.V is None:
-        return Solution(_times(problem.W, r) + problem.q, r)
+        return Solution(times(problem.W, r) + problem.q, r)
     blocks = reduce(problem) if blocks is None else blocks
     l = multipliers(blocks, r)  # noqa: E741  FCLIB's name
     if isinstance(problem, Local):
-        u = _times(problem.W, r) + problem.q
-        return Solution(u if l is None or problem.V is None else u + _times(problem.V, l), r, l=l)
+        u = times(problem.W, r) + problem.q
+        return Solution(u if l is None or problem.V is None else u + times(problem.V, l), r, l=l)
     v = velocities(problem, blocks, r, l)
-    return Solution(_transposed_times(problem.H, v) + problem.w, r, v, l)
+    return Solution(transposed_times(problem.H, v) + problem.w, r, v, l)
 
 
 def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = None) -> Figures:
@@ -123,7 +130,7 @@ def judge(problem: Local | Global, solution: Solution, blocks: Blocks | None = N
     q = blocks.q if isinstance(problem, Global) else problem.q
     found = _whole(problem, solution, blocks)
     error, missing, u, dynamics, equalities, absolute = _error(problem, found)
-    bound = _norm(q)
+    bound = length(q)
     return Figures(
         error,
         _over(missing, bound),
@@ -164,7 +171,7 @@ class Errors(NamedTuple):
 def errors(problem: Local | Global, solution: Solution, blocks: Blocks) -> Errors:
     """Return the figures that decide alone, which is quicker."""
     error, missing, u, *_ = _error(problem, solution)
-    bound = _norm(problem.q if isinstance(problem, Local) else blocks.q)
+    bound = length(problem.q if isinstance(problem, Local) else blocks.q)
     return Errors(error, _over(missing, bound), *_own(blocks, u, solution.r))
 
 
@@ -206,25 +213,6 @@ def _error(
     return error, missing, u, dynamics, equalities, absolute
 
 
-def _times(a: Matrix, vector: Vector) -> Vector:
-    """Return A times a vector, from the entries as they are stored."""
-    found = np.zeros(a.m)
-    compiled(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
-    return found
-
-
-def _transposed_times(a: Matrix, vector: Vector) -> Vector:
-    """Return the transpose of A times a vector."""
-    found = np.zeros(a.n)
-    compiled(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
-    return found
-
-
-def _norm(vector: Vector) -> float:
-    """Return the Euclidean norm."""
-    return float(np.linalg.norm(vector))
-
-
 def _over(value: float, scale: float) -> float:
     """Return a quotient; a scale of 0 does not divide."""
     return value / scale if scale > 0.0 else value
@@ -241,29 +229,30 @@ def _velocities(
     r, l = solution.r, solution.l  # noqa: E741  FCLIB's name
     equalities, absolute = 0.0, 0.0
     if isinstance(problem, Local):
-        u = _times(problem.W, r) + problem.q
+        u = times(problem.W, r) + problem.q
         if problem.V is not None and problem.R is not None and problem.s is not None:
             assert l is not None
-            u = u + _times(problem.V, l)
-            parts = (_transposed_times(problem.V, r), _times(problem.R, l), problem.s)
-            left = _norm(parts[0] + parts[1] + parts[2])
-            equalities = _over(left, max(_norm(part) for part in parts))
-            absolute = left / (1.0 + _norm(problem.s))
-        return u, (_norm(problem.q), _norm(r), _norm(u)), 0.0, equalities, absolute
+            u = u + times(problem.V, l)
+            parts = (transposed_times(problem.V, r), times(problem.R, l), problem.s)
+            left = length(parts[0] + parts[1] + parts[2])
+            equalities = _over(left, max(length(part) for part in parts))
+            absolute = left / (1.0 + length(problem.s))
+        return u, (length(problem.q), length(r), length(u)), 0.0, equalities, absolute
     v = solution.v
     assert v is not None
-    u = _transposed_times(problem.H, v) + problem.w
-    forces = [_times(problem.M, v), -_times(problem.H, r), -problem.f]
+    u = transposed_times(problem.H, v) + problem.w
+    forces = [times(problem.M, v), -times(problem.H, r), -problem.f]
     if problem.G is not None and problem.b is not None:
         assert l is not None
-        forces.append(-_times(problem.G, l))
-        left = _norm(_transposed_times(problem.G, v) + problem.b)
+        forces.append(-times(problem.G, l))
+        left = length(transposed_times(problem.G, v) + problem.b)
         # G' v may cancel to nothing: its terms are the scale
-        terms = _transposed_times(replace(problem.G, x=np.abs(problem.G.x)), np.abs(v))
-        equalities = _over(left, max(_norm(terms), _norm(problem.b)))
-        absolute = left / (1.0 + _norm(problem.b))
-    dynamics = _over(_norm(np.sum(forces, axis=0)), max(_norm(force) for force in forces))
-    return u, (_norm(u), _norm(r)), dynamics, equalities, absolute
+        terms = transposed_times(replace(problem.G, x=np.abs(problem.G.x)), np.abs(v))
+        equalities = _over(left, max(length(terms), length(problem.b)))
+        absolute = left / (1.0 + length(problem.b))
+    total = functools.reduce(np.add, forces)
+    dynamics = _over(length(total), max(length(force) for force in forces))
+    return u, (length(u), length(r)), dynamics, equalities, absolute
 
 
 def _figures(problem: Local | Global, u: Vector, r: Vector, q: Vector) -> tuple[Any, ...]:
@@ -296,7 +285,7 @@ def _figures(problem: Local | Global, u: Vector, r: Vector, q: Vector) -> tuple[
         _over(penetration, float(_lengths(qs).max())),
         _over(float(power.max()), largest_r * largest_u),
         largest_r,
-        _norm(r),
+        length(r),
         states,
     )
 

@@ -20,8 +20,9 @@ from mbsim.fclib.blocks import (
     block_rows,
     compressed_rows,
     dense,
-    diagonal_places,
-    own_units,
+    diagonal_and_units,
+    product_of_stored,
+    transposed_product_of_stored,
 )
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.condensation import condense, mass_solve
@@ -87,10 +88,9 @@ def _blocks(
 ) -> Blocks:
     """Return blocks with what every problem has."""
     tangent, rolling = directions(problem)
-    diagonal = compiled(diagonal_places)(rows[0], rows[1])
     mu_r = np.zeros(problem.contacts) if problem.mu_r is None else problem.mu_r
     ptr, col, val = rows
-    rho = compiled(own_units)(val, diagonal)
+    diagonal, rho = compiled(diagonal_and_units)(ptr, col, val)
     return Blocks(tangent, rolling, ptr, col, val, diagonal, q, problem.mu, mu_r, rho, equality)
 
 
@@ -145,6 +145,20 @@ def _condensed(problem: Global) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
     return done[1:], mass, extra
 
 
+def times(a: Matrix, vector: Vector) -> Vector:
+    """Return A times a vector, from the entries as they are stored."""
+    found = np.zeros(a.m)
+    compiled(product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
+def transposed_times(a: Matrix, vector: Vector) -> Vector:
+    """Return the transpose of A times a vector."""
+    found = np.zeros(a.n)
+    compiled(transposed_product_of_stored)(a.m, a.nz, a.p, a.i, a.x, vector, found)
+    return found
+
+
 def multipliers(blocks: Blocks, r: Vector) -> Vector | None:
     """Return l (p,) that goes with r, or None without equality constraints."""
     if blocks.equality is None:
@@ -157,9 +171,9 @@ def multipliers(blocks: Blocks, r: Vector) -> Vector | None:
 
 def velocities(problem: Global, blocks: Blocks, r: Vector, l: Vector | None) -> Vector:  # noqa: E741  FCLIB
     """Return v (n,) that goes with r and l: M v = H r + G l + f."""
-    forces = problem.f + problem.H.apply(r)
+    forces = problem.f + times(problem.H, r)
     if problem.G is not None and l is not None:
-        forces = forces + problem.G.apply(l)
+        forces = forces + times(problem.G, l)
     assert blocks.mass is not None
     v = np.empty(len(forces))
     compiled(mass_solve)(blocks.mass, forces, v)

@@ -146,20 +146,24 @@ def _solve_plain(
     sweeps, every = first_sweeps(nc)
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
-    check = np.empty(6)
+    check, u = np.empty(6), np.empty(len(r))
     end = _end(began, max_seconds, nc, len(w.x) / problem.spacedim**2)
-    ptr, col, val, diagonal, rho, u, done, error, error_q, rows = compiled(local_sweeps)(
+    done, error, error_q, rows, made = compiled(local_sweeps)(
         tangent, (w.m, w.nz, w.p, w.i, w.x), problem.q, mu, r, (tol, tol, until(end)), sweeps,
-        every, history, check,
+        every, history, check, u,
     )  # fmt: skip
-    if error <= tol and error_q <= tol:
+    if made is None:
         found = Errors(*check.tolist())
         if found.status(tol) == "solved":
             return Result(
                 problem, "AUTO", tol, strict, r, u, found.error, found.error_q, clock() - began,
                 0.0, done, [("NSGS", history[:rows])],
             )  # fmt: skip
-    blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc), rho)
+    if made is None:
+        blocks = reduce(problem)
+    else:
+        ptr, col, val, diagonal, rho = made
+        blocks = Blocks(tangent, (), ptr, col, val, diagonal, problem.q, mu, np.zeros(nc), rho)
     task = Task(blocks, r, tol, tol, strict, end)
     task.work, task.iterations = done * sweep_work(blocks), done
     task.offer(r, error, error_q)

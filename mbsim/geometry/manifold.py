@@ -17,6 +17,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub
 from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, put_point
 
+#: Centre, u, v, radius, depth at the centre, rise of the depth along u.
+Disc = tuple[V3, V3, V3, float, float, float]
+
 TURN = 2.0 * math.pi
 #: Shares below this are no incident.
 SMALL = 1e-6
@@ -87,7 +90,7 @@ def put_arcs(
     first: int,
     arcs: F2,
     count: int,
-    disc: tuple[V3, V3, V3, float, float, float],
+    disc: Disc,
     n: V3,
     side: float,
     reference: float,
@@ -131,7 +134,7 @@ def put_rim(
     first: int,
     arcs: F2,
     count: int,
-    disc: tuple[V3, V3, V3, float, float, float],
+    disc: Disc,
     n: V3,
     side: float,
     total: float,

@@ -20,17 +20,13 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.core.address import vector_at
+from mbsim.core.address import as_tuple, vector_at
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import vector
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
-
-#: An intrinsic is called without the typing context that it is declared with.
-_as_tuple: Callable[..., tuple[float, ...]] = to_fixed_tuple
 
 #: Results of a normal law.
 LOAD, ELASTIC, ENERGY = range(3)
@@ -42,7 +38,8 @@ AREA_IN, RADIUS_IN, LOCI_IN, LOCJ_IN = 11, 12, 13, 16
 #: Those that only derivatives and laws with memory look at.
 DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19, 25)
 NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
-#: Fields of a law's output before its memory: force, torques, and those named here.
+#: Fields of a law's output before its memory.
+FORCE_X_OUT, FORCE_Y_OUT, TORQUE_X_OUT, TORQUE_Y_OUT, TORQUE_Z_OUT = range(5)
 STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
 
 _PTR = types.CPointer(types.float64)
@@ -79,7 +76,7 @@ def _adapt_normal(law: Callable[..., Any], count: int) -> Any:
     """Return a normal law of `count` constants as a C function."""
 
     def entry(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
-        values = _as_tuple(vector_at(par, count), count)
+        values = as_tuple(vector_at(par, count), count)
         result = vector_at(out, 3)
         force, elastic, stored = law(depth, rate, *values)
         result[0] = force
@@ -94,7 +91,7 @@ def _adapt_friction(force: Callable[..., Any], count: int) -> Any:
     """Return `force` of `count` parameters as a C function."""
 
     def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
-        values = _as_tuple(vector_at(par, count), count)
+        values = as_tuple(vector_at(par, count), count)
         result = vector_at(out, 5)
         given = friction_input(vector_at(inputs, FRICTION_INPUTS))
         fx, fy, mx, my, tz = force(given, *values)
@@ -113,9 +110,9 @@ def _adapt_with_memory(force: Callable[..., Any], count: int, memory: int, carri
     given = memory + carried
 
     def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
-        values = _as_tuple(vector_at(par, count), count)
+        values = as_tuple(vector_at(par, count), count)
         a = vector_at(inputs, FRICTION_INPUTS + memory)
-        kept = _as_tuple(a[FRICTION_INPUTS:], memory)
+        kept = as_tuple(a[FRICTION_INPUTS:], memory)
         result = vector_at(out, MEMORY_OUT + given)
         found, new = force(friction_input(a), kept, *values)
         for k in range(MEMORY_OUT):

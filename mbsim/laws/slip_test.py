@@ -18,6 +18,18 @@ LONG = 15.0
 #: Parts of that way, and of a quarter of a cycle, that are gone at once.
 FINE, QUARTER = 0.02, 500
 
+#: Parameters that show what a law does, where nobody gives others and it has none of its own.
+USUAL = {
+    "mu_static": 0.5,
+    "mu_dynamic": 0.3,
+    "stiction_trans_vel": 2e-3,
+    "friction_trans_vel": 1e-2,
+    "stribeck_vel": 5e-3,
+    "bristle_stiffness": 1e4,
+    "rolling_arm": 0.01,
+    "patch_radius": 0.1,
+}
+
 
 class Conditions(NamedTuple):
     """Under which a law is rubbed, in one consistent set of units."""
@@ -40,6 +52,12 @@ class Sample(NamedTuple):
     memory: int = 0
     carried: int = 0  # how many numbers of memory are integrated
     way: float = 0.0  # over which friction builds up
+
+
+def usual_parameters(law: FrictionLaw) -> dict[str, float | None]:
+    """Return a law's parameters: its defaults but for 0, else those of USUAL, else None."""
+    own = {each.name: each.default for each in law.own}
+    return {name: own.get(name) or USUAL.get(name, own.get(name)) for name in law.parameters}
 
 
 def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sample:

@@ -16,8 +16,29 @@ from mbsim.plugins.helpers import host
 from mbsim.plugins.returned import force_and_state, only_one, three_numbers
 
 
+class _Called:
+    """What users' functions of contacts have in common."""
+
+    language: str
+    compiled: bool
+    hidden: tuple[float, ...]
+    par: npt.NDArray[np.float64]
+
+    @property
+    def how(self) -> str:
+        """How it runs, in a word for the user."""
+        if self.language != "Python":
+            return self.language
+        return "compiled" if self.compiled else "interpreted"
+
+    @property
+    def row(self) -> npt.NDArray[np.float64]:
+        """The parameters as the C function behind `address` reads them."""
+        return np.concatenate([self.hidden, self.par])
+
+
 @dataclass(frozen=True, eq=False)
-class UserFriction:
+class UserFriction(_Called):
     """A user's friction function, ready to be called.
 
     Keep it alive as long as `address` is in use: an interpreted one owns its callback, one of
@@ -74,18 +95,6 @@ class UserFriction:
     reads_x: bool = True
     states: int = 0
 
-    @property
-    def how(self) -> str:
-        """How it runs, in a word for the user."""
-        if self.language != "Python":
-            return self.language
-        return "compiled" if self.compiled else "interpreted"
-
-    @property
-    def row(self) -> npt.NDArray[np.float64]:
-        """The parameters as the C function behind `address` reads them."""
-        return np.concatenate([self.hidden, self.par])
-
     def call(
         self,
         time: float,
@@ -117,7 +126,7 @@ class UserFriction:
 
 
 @dataclass(frozen=True, eq=False)
-class UserNormal:
+class UserNormal(_Called):
     """A user's normal law, ready to be called; keep it alive as long as `address` is in use.
 
     Attributes
@@ -148,18 +157,6 @@ class UserNormal:
     keep: object = field(default=None, repr=False)
     looks: bool = False
     asked: tuple[str, ...] = ()
-
-    @property
-    def how(self) -> str:
-        """How it runs, in a word for the user."""
-        if self.language != "Python":
-            return self.language
-        return "compiled" if self.compiled else "interpreted"
-
-    @property
-    def row(self) -> npt.NDArray[np.float64]:
-        """The parameters as the C function behind `address` reads them."""
-        return np.concatenate([self.hidden, self.par])
 
     def call(self, depth: float, rate: float) -> float:
         """Return the force of the interpreted function at its place; exceptions come through."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.codes import EVENT_ELEMENT, EVENT_KIND, EVENT_TIME
+
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
@@ -58,7 +60,7 @@ def first_rows(block: Block, rows: int) -> Block:
     until = block.time[rows - 1] if rows else -np.inf
     counts = {
         "incidents": int(block.incident_count[:rows].sum()),
-        "events": int(np.searchsorted(block.events[:, 0], until, side="right")),
+        "events": int(np.searchsorted(block.events[:, EVENT_TIME], until, side="right")),
     }
     return Block(*(getattr(block, f.name)[: counts.get(f.name, rows)] for f in fields(Block)))
 
@@ -79,8 +81,8 @@ def nothing(system: System) -> Block:
 def events_table(rows: Table) -> Table:
     """Return the table of events in order of time; within a step they come slot by slot."""
     table = np.zeros(len(rows), dtype=EVENT)
-    ordered = rows[np.argsort(rows[:, 0], kind="stable")]
-    table["time"] = ordered[:, 0]
-    table["kind"] = EVENT_KINDS[ordered[:, 1].astype(np.int64)]
-    table["element"] = ordered[:, 2].astype(np.int64)
+    ordered = rows[np.argsort(rows[:, EVENT_TIME], kind="stable")]
+    table["time"] = ordered[:, EVENT_TIME]
+    table["kind"] = EVENT_KINDS[ordered[:, EVENT_KIND].astype(np.int64)]
+    table["element"] = ordered[:, EVENT_ELEMENT].astype(np.int64)
     return table

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import CONTACT_COLUMNS
+from mbsim.arrays.codes import (
+    CONTACT_AREA,
+    CONTACT_COLUMNS,
+    CONTACT_DEPTH,
+    CONTACT_FORCE,
+    CONTACT_INCIDENTS,
+    CONTACT_SLIP,
+    CONTACT_TORQUE,
+)
 from mbsim.results.blocks import Block, Table, events_table, nothing
 from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.forces import Forces
@@ -156,12 +164,12 @@ def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tup
         "contacts",
         ids,
         {
-            "force": lambda: rows[..., 0:3],
-            "torque": lambda: rows[..., 3:6],
-            "penetration": lambda: rows[..., 6],
-            "slip_speed": lambda: rows[..., 7],
-            "incidents": lambda: rows[..., 8].astype(np.int64),
-            "area": lambda: rows[..., 9],
+            "force": lambda: rows[..., CONTACT_FORCE : CONTACT_FORCE + 3],
+            "torque": lambda: rows[..., CONTACT_TORQUE : CONTACT_TORQUE + 3],
+            "penetration": lambda: rows[..., CONTACT_DEPTH],
+            "slip_speed": lambda: rows[..., CONTACT_SLIP],
+            "incidents": lambda: rows[..., CONTACT_INCIDENTS].astype(np.int64),
+            "area": lambda: rows[..., CONTACT_AREA],
         },
     )
 

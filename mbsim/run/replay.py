@@ -212,14 +212,14 @@ class Replay:
         """Return the signals of an incident of contact row c."""
         from mbsim.arrays import codes
         from mbsim.dynamics.contact import forces as at
-        from mbsim.laws.abi import FRICTION_INPUTS
+        from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT, FRICTION_INPUTS, TORQUE_Z_OUT
         from mbsim.laws.catalog import FRICTION_LAWS
 
         contacts, id = self.system.scene.contacts, self.system.contact_ids[c]
         kind = self.system.model.contacts[id].cff_type
         rubs = contacts.friction_law[c] != 0
         nforce = float(slot[at.NORMAL])
-        friction = out[[0, 1, 4]] if rubs else np.zeros(3)
+        friction = out[[FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT]] if rubs else np.zeros(3)
         sticks = kind in FRICTION_LAWS and FRICTION_LAWS[kind].modes
         signals: dict[str, Any] = {
             "mu": math.hypot(friction[0], friction[1]) / nforce if nforce != 0.0 else math.nan,

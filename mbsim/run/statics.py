@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.core import tags
 from mbsim.core.layout import BODY_SIZE
@@ -35,12 +36,12 @@ def standing_still(system: System, t: float) -> Iterator[None]:
     programs, equations = system.scene.programs, system.scene.equations
     given = equations.program.copy()
     rates = (given >= 0) & (equations.level < 2) & (equations.general == 0)
-    times = programs.code[:, 0] == TIME
+    times = programs.code[:, CODE_OPERATION] == TIME
     kept = programs.code.copy()
     if times.any():
         programs.number[-1] = t
-        programs.code[times, 0] = NUMBER
-        programs.code[times, 1] = len(programs.number) - 1
+        programs.code[times, CODE_OPERATION] = NUMBER
+        programs.code[times, CODE_OPERAND] = len(programs.number) - 1
     equations.program[rates] = -1
     try:
         yield

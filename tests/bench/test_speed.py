@@ -104,23 +104,12 @@ def test_calls_of_normal_laws():
         assert total > 0.0
 
 
-FRICTION = {
-    "mu_static": 0.5,
-    "mu_dynamic": 0.3,
-    "stiction_trans_vel": 2e-3,
-    "friction_trans_vel": 1e-2,
-    "stribeck_vel": 5e-3,
-    "bristle_stiffness": 1e4,
-    "rolling_arm": 0.01,
-    "patch_radius": 0.1,
-}
-
-
 def test_calls_of_friction_laws():
     from mbsim.core import jit
     from mbsim.core.address import call_int
     from mbsim.laws import abi
     from mbsim.laws.catalog import FRICTION_LAWS
+    from mbsim.laws.slip_test import USUAL
 
     def loop(address, speeds, given, par, out):
         total = 0.0
@@ -137,7 +126,7 @@ def test_calls_of_friction_laws():
     print()
     for name in FRICTION_LAWS:
         law = FRICTION_LAWS[name]
-        own = {each.name: each.default for each in law.own} | FRICTION
+        own = {each.name: each.default for each in law.own} | USUAL
         par = np.array([own[each] for each in law.parameters])
         address, times = abi.friction_address(law), []
         for _ in range(6):

@@ -19,6 +19,7 @@ from mbsim.fclib.problem import (
     Solution,
     matrix,
 )
+from mbsim.fclib.reduction import times, transposed_times
 
 
 def same(a, b) -> bool:
@@ -137,8 +138,8 @@ def test_matrices_of_every_storage_are_the_same_matrix():
     for storage in ("csr", "csc", "triplet"):
         stored = matrix(dense, storage)
         assert np.array_equal(stored.csr().toarray(), dense)
-        assert np.allclose(stored.apply(vector), dense @ vector)
-        assert np.allclose(stored.apply_transposed(vector), dense.T @ vector)
+        assert np.allclose(times(stored, vector), dense @ vector)
+        assert np.allclose(transposed_times(stored, vector), dense.T @ vector)
 
 
 def test_triplet_entries_at_one_place_add_up_and_nzmax_may_exceed_nz():
@@ -146,7 +147,7 @@ def test_triplet_entries_at_one_place_add_up_and_nzmax_may_exceed_nz():
     p, i, x = (np.append(a, a[0]) for a in (stored.p, stored.i, stored.x))
     doubled = replace(stored, nz=4, p=p, i=i, x=x)
     assert doubled.csr().toarray().tolist() == [[2.0, 2.0], [0.0, 4.0]]
-    assert doubled.apply(np.array([1.0, 1.0])).tolist() == [4.0, 4.0]
+    assert times(doubled, np.array([1.0, 1.0])).tolist() == [4.0, 4.0]
 
 
 def test_solutions_and_guesses_are_appended_and_not_overwritten(tmp_path):

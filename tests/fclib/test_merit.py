@@ -14,7 +14,7 @@ from mbsim.fclib import hdf5
 from mbsim.fclib.cone import cone_height
 from mbsim.fclib.merit import OPEN, SLIP, STICK, completed, judge
 from mbsim.fclib.problem import Global, Local, Solution, matrix
-from mbsim.fclib.reduction import globalised, local, reduce
+from mbsim.fclib.reduction import globalised, local, reduce, times
 
 MU = 0.5
 
@@ -76,7 +76,7 @@ def test_error_and_merit_follow_their_definitions():
     w = matrix(rng.normal(size=(9, 9)))
     problem = Local(3, w, rng.normal(size=9), np.array([0.3, 0.5, 0.0]))
     r = rng.normal(size=9)
-    u = w.apply(r) + problem.q
+    u = times(w, r) + problem.q
     missing = np.linalg.norm(natural_map(u.copy(), r.copy(), problem.mu))
     figures = judge(problem, Solution(u, r))
     size = np.linalg.norm(problem.q)

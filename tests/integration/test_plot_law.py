@@ -10,10 +10,9 @@ from click.testing import CliRunner
 
 from helpers.folders import USERFUNCS
 from mbsim.cli.main import main
-from mbsim.cli.plot_law import USUAL
 from mbsim.errors import PluginError
 from mbsim.laws.catalog import FRICTION_LAWS
-from mbsim.laws.slip_test import Conditions, cycle, sample_of, steady
+from mbsim.laws.slip_test import USUAL, Conditions, cycle, sample_of, steady
 
 pytest.importorskip("matplotlib")
 WITH_STATE = USERFUNCS / "stiction_with_state.py"

@@ -124,7 +124,8 @@ def hermite(time: np.ndarray, x: np.ndarray, v: np.ndarray, at: np.ndarray) -> n
     s = (at - time[i]) / h
     left = (1 + 2 * s) * (1 - s) ** 2 * x[i] + s * (1 - s) ** 2 * h * v[i]
     right = s**2 * (3 - 2 * s) * x[i + 1] + s**2 * (s - 1) * h * v[i + 1]
-    return left + right
+    values: np.ndarray = left + right
+    return values
 
 
 def through_four(

@@ -107,7 +107,7 @@ def jointed_rows(time: np.ndarray, x: np.ndarray, v: np.ndarray) -> common.Rows:
     """Rows of the rods from displacements and angles (n, 3 rods)."""
     shape = (len(x), -1, 3)
     moved, rates = x.reshape(shape), v.reshape(shape)
-    flat = np.zeros((1, moved.shape[1]))
+    flat = np.zeros((1, len(moved[0])))
     place = linkages.chain(flat, flat).position[..., ::2] + moved[..., :2]
     poses = linkages.planar(place, moved[..., 2], rates[..., :2], rates[..., 2])
     return common.Rows(time, *poses)

@@ -19,15 +19,10 @@ from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 from mbsim.bench.peers import mujoco_linkages as jointed
+from mbsim.bench.peers.laws import Law, hertz, hunt_crossley, impact, linear, stiff
 from mbsim.bench.peers.mujoco_laws import (
     Case,
-    Law,
     callback,
-    hertz,
-    hunt_crossley,
-    impact,
-    linear,
-    stiff,
 )
 
 NAME = "mujoco"

@@ -11,8 +11,8 @@ import numpy as np
 
 from mbsim.bench import parameters as p
 from mbsim.bench.peers import common
+from mbsim.bench.peers.laws import Law
 
-Law = Callable[[float, float], float]
 RowsOf = Callable[[np.ndarray, np.ndarray, np.ndarray], common.Rows]
 
 
@@ -56,7 +56,8 @@ def _compiled(case: Case, data: Any) -> Any:
     """The law as a C function on the addresses of qpos, qvel and qfrc_passive."""
     import numba
 
-    law = numba.njit(case.law)
+    compiler: Any = numba  # its types know no call of what they compile
+    law = compiler.njit(case.law)
     pointer = _pointer()
     q, v, f = (int(a.ctypes.data) for a in (data.qpos, data.qvel, data.qfrc_passive))
     radius, balls = case.radius, len(case.velocity)
@@ -78,7 +79,7 @@ def _compiled(case: Case, data: Any) -> Any:
 
     body = on_plane if case.gap == "plane" else on_balls
     signature = numba.types.void(numba.types.voidptr, numba.types.voidptr)
-    return _keep(numba.cfunc(signature)(body))
+    return _keep(compiler.cfunc(signature)(body))
 
 
 #: Machine code must not be freed while MuJoCo may call it.
@@ -108,34 +109,3 @@ def _pointer() -> Any:
         return result(types.int64), make
 
     return pointer
-
-
-def impact(depth: float, rate: float) -> float:
-    """The law of S2a."""
-    s = min(depth / p.S2A_LAW.dmax, 1.0)
-    damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
-    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
-
-
-def linear(depth: float, rate: float) -> float:
-    """The law of S2b."""
-    return max(0.0, p.S2B_LAW.k * depth + p.S2B_LAW.c * rate)
-
-
-def hunt_crossley(depth: float, rate: float) -> float:
-    """The law of S2c."""
-    return p.S2C_LAW.k * depth * max(0.0, 1.0 + p.S2C_LAW.dissipation * rate)
-
-
-def stiff(depth: float, rate: float) -> float:
-    """The law of S10a."""
-    return max(0.0, p.S10A_LAW.k * depth + p.S10A_LAW.c * rate)
-
-
-#: Plain numbers: compiled code reads no field of a dataclass.
-_HERTZ_K, _HERTZ_E = p.S5.k, p.S5.e
-
-
-def hertz(depth: float, rate: float) -> float:
-    """The law of S5, without damping."""
-    return _HERTZ_K * depth**_HERTZ_E

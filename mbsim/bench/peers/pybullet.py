@@ -16,11 +16,10 @@ import numpy as np
 
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.peers import common
+from mbsim.bench.peers import common, laws
+from mbsim.bench.peers.laws import Law
 
 NAME = "pybullet"
-
-Law = Callable[[float, float], float]
 
 
 class Case(NamedTuple):
@@ -75,7 +74,8 @@ def _run(case: Case, repeats: int) -> Outcome:
             bodies = case.build(bullet)
             bullet.setTimeStep(case.dt)
             march = _march if case.law is None else _march_with_law
-            return march(bullet, bodies, steps, case)
+            wall, rows = march(bullet, bodies, steps, case)
+            return wall, rows
         finally:
             bullet.disconnect(client)
 
@@ -182,9 +182,9 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         return dict(_grains(int(scene[3:])))
     scenes: dict[str, Callable[[], Cases]] = {
         "S1": lambda: _free(p.S1, (1e-2, 1e-3, 1e-4)),
-        "S2a": lambda: _law_drop(_impact, "impact"),
-        "S2b": lambda: _law_drop(_linear, "linear"),
-        "S2c": lambda: _law_drop(_hunt_crossley, "hc"),
+        "S2a": lambda: _law_drop(laws.impact, "impact"),
+        "S2b": lambda: _law_drop(laws.linear, "linear"),
+        "S2c": lambda: _law_drop(laws.hunt_crossley, "hc"),
         "S3": _rolling,
         "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (TICK, 2e-3, 1e-3, 2.5e-4)),
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (TICK, 2e-3, 1e-3, 2.5e-4, 1e-4)),
@@ -211,20 +211,6 @@ def _free(top: p.FreeBody, dts: tuple[float, ...]) -> Cases:
             name = f"maximal={int(maximal)} dt={dt:g}"
             made = functools.partial(build, maximal)
             yield name, functools.partial(Case, made, dt, top.end_time, note)
-
-
-def _impact(depth: float, rate: float) -> float:
-    s = min(depth / p.S2A_LAW.dmax, 1.0)
-    damping = p.S2A_LAW.c * s * s * (3.0 - 2.0 * s)
-    return max(0.0, p.S2A_LAW.k * depth**p.S2A_LAW.e + damping * rate)
-
-
-def _linear(depth: float, rate: float) -> float:
-    return max(0.0, p.S2B_LAW.k * depth + p.S2B_LAW.c * rate)
-
-
-def _hunt_crossley(depth: float, rate: float) -> float:
-    return p.S2C_LAW.k * depth * max(0.0, 1.0 + p.S2C_LAW.dissipation * rate)
 
 
 def _law_drop(law: Law, variant: str) -> Cases:

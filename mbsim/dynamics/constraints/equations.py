@@ -19,6 +19,8 @@ import numpy as np
 from mbsim.arrays.codes import (
     ANGLE,
     ASKED,
+    AXIS_I,
+    AXIS_J,
     FOLD_POWER,
     GENERAL,
     KEPT,
@@ -69,13 +71,13 @@ def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
             general_term(scene, t, y, i, eq.program[e], G)
             continue
         if kind == TOUCHING:
-            flow, second = touching_term(scene, y, i, j, eq.axis[k, 0], eq.axis[k, 1], G)
+            flow, second = touching_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
             continue
         g, dg, ddg = 0.0, 0.0, 0.0
         if kind == OFFSET:
-            g, dg, ddg = offset_term(scene, y, i, j, eq.axis[k, 1], G)
+            g, dg, ddg = offset_term(scene, y, i, j, eq.axis[k, AXIS_J], G)
         elif kind == PERP:
-            g, dg, ddg = perp_term(scene, y, i, j, eq.axis[k, 0], eq.axis[k, 1], G)
+            g, dg, ddg = perp_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
         elif kind == ANGLE:
             g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
         elif kind == TWIST:

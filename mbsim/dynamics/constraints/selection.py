@@ -42,6 +42,7 @@ from mbsim.dynamics.constraints.equations import (
 from mbsim.dynamics.constraints.folding import leave_fold, near_fold, watch_fold
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
 from mbsim.laws.catalog import STICK
+from mbsim.laws.friction.stiction import KEPT_MODE
 
 #: What `keep_selection` returns where a fold was left behind.
 LEFT = -1
@@ -112,8 +113,8 @@ def sticks(scene: Scene, e: int) -> bool:
     s = scene.equations.slot[e]
     if s >= 0:
         if scene.world.past[0] == WITHIN:
-            return scene.state.before[s, 0] == STICK and scene.state.touching[s] == 1
-        return scene.state.memory[s, 0] == STICK
+            return scene.state.before[s, KEPT_MODE] == STICK and scene.state.touching[s] == 1
+        return scene.state.memory[s, KEPT_MODE] == STICK
     f = scene.equations.dry[e]
     if f < 0:
         return False

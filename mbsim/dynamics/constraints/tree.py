@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.codes import CHILD_AXIS, PARENT_AXIS, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2, V3, V6
 from mbsim.core.jitable import jitable
@@ -130,8 +130,8 @@ def fill_directions(scene: Scene, y: F1, k: int) -> None:
         free = 1
     elif turn == TURN_CROSS:
         # a moves with the child, b with the parent; they are at right angles
-        a = child_axis(scene, k, tree.axis[k, 0])
-        b = parent_axis(scene, k, tree.axis[k, 1])
+        a = child_axis(scene, k, tree.axis[k, CHILD_AXIS])
+        b = parent_axis(scene, k, tree.axis[k, PARENT_AXIS])
         put(S[0], a, cross(P, a))
         put(S[1], b, cross(P, b))
         about_a, about_b = scale(dot(relative, a), a), scale(dot(relative, b), b)

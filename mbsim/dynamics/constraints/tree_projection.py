@@ -8,7 +8,15 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_LOCKED, TURN_ROOT
+from mbsim.arrays.codes import (
+    CHILD_AXIS,
+    PARENT_AXIS,
+    TURN_AXIS,
+    TURN_CROSS,
+    TURN_FREE,
+    TURN_LOCKED,
+    TURN_ROOT,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -71,8 +79,8 @@ def wanted_turn(scene: Scene, k: int) -> V3:
         a, b = child_axis(scene, k, 2), parent_axis(scene, k, 2)
         s, c = cross(a, b), dot(a, b)
     elif turn == TURN_CROSS:
-        a = child_axis(scene, k, scene.tree.axis[k, 0])
-        b = parent_axis(scene, k, scene.tree.axis[k, 1])
+        a = child_axis(scene, k, scene.tree.axis[k, CHILD_AXIS])
+        b = parent_axis(scene, k, scene.tree.axis[k, PARENT_AXIS])
         s, c = cross(a, b), dot(a, b)
         size = norm(s)
         return scale(-math.atan2(c, size) / size, s) if size > 0.0 else (0.0, 0.0, 0.0)
@@ -134,8 +142,8 @@ def carry(scene: Scene, y: F1, k: int) -> None:
         e = parent_axis(scene, k, 2)
         w = add(w, scale(dot(relative, e), e))
     elif turn == TURN_CROSS:
-        a = child_axis(scene, k, tree.axis[k, 0])
-        b = parent_axis(scene, k, tree.axis[k, 1])
+        a = child_axis(scene, k, tree.axis[k, CHILD_AXIS])
+        b = parent_axis(scene, k, tree.axis[k, PARENT_AXIS])
         w = add(w, add(scale(dot(relative, a), a), scale(dot(relative, b), b)))
     slip = (0.0, 0.0, 0.0)
     for axis in range(3):

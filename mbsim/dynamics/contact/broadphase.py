@@ -12,7 +12,24 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, FIXED, FREE, LISTINGS, WANTED
+from mbsim.arrays.codes import (
+    ACTIVE,
+    FIRST_I,
+    FIRST_J,
+    FIXED,
+    FREE,
+    LAST_I,
+    LAST_J,
+    LISTINGS,
+    MOVED_I,
+    MOVED_J,
+    MOVED_KIND,
+    MOVED_TO,
+    MOVED_TOUCHES,
+    SPARE_GAP,
+    SPARE_LEFT,
+    WANTED,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -204,7 +221,7 @@ def fill_cells(
     start[c + 1] is then where cell c begins; the next cell's begin is its end.
     """
     broadphase = scene.broadphase
-    first_j, last_j = broadphase.first[contact_set, 2], broadphase.first[contact_set, 3]
+    first_j, last_j = broadphase.first[contact_set, FIRST_J], broadphase.first[contact_set, LAST_J]
     low, width, nx, ny, nz = grid
     start, order, cells = broadphase.start, broadphase.order, nx * ny * nz
     for cell in range(cells + 1):
@@ -237,7 +254,7 @@ def fill_cells(
 def search(scene: Scene, contact_set: int, skin: float) -> None:
     """List all near pairs of a large contact."""
     broadphase = scene.broadphase
-    first_i, last_i = broadphase.first[contact_set, 0], broadphase.first[contact_set, 1]
+    first_i, last_i = broadphase.first[contact_set, FIRST_I], broadphase.first[contact_set, LAST_I]
     grid = cell_range(scene, contact_set)
     usual = fill_cells(scene, contact_set, grid, skin)
     low, width, nx, ny, nz = grid
@@ -351,15 +368,17 @@ def close_ranks(scene: Scene) -> None:
         return
     for k in range(fixed, active):
         pair, row = pairs.active[k], broadphase.moved[k]
-        broadphase.moved[pair, 0] = k
-        row[1], row[2], row[3] = pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair]
-        row[4] = pairs.touches[pair]
-        broadphase.spare[k, 0], broadphase.spare[k, 1] = pairs.gap[pair], pairs.left[pair]
+        broadphase.moved[pair, MOVED_TO] = k
+        row[MOVED_KIND], row[MOVED_TOUCHES] = pairs.kind[pair], pairs.touches[pair]
+        row[MOVED_I], row[MOVED_J] = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        broadphase.spare[k, SPARE_GAP] = pairs.gap[pair]
+        broadphase.spare[k, SPARE_LEFT] = pairs.left[pair]
     for k in range(fixed, active):
         row = broadphase.moved[k]
-        pairs.kind[k], pairs.graphic_i[k], pairs.graphic_j[k] = row[1], row[2], row[3]
-        pairs.touches[k] = row[4]
-        pairs.gap[k], pairs.left[k] = broadphase.spare[k, 0], broadphase.spare[k, 1]
+        pairs.kind[k], pairs.touches[k] = row[MOVED_KIND], row[MOVED_TOUCHES]
+        pairs.graphic_i[k], pairs.graphic_j[k] = row[MOVED_I], row[MOVED_J]
+        pairs.gap[k] = broadphase.spare[k, SPARE_GAP]
+        pairs.left[k] = broadphase.spare[k, SPARE_LEFT]
         pairs.active[k] = k
     places = len(pairs.active)
     pairs.count[FREE] = places - active
@@ -374,7 +393,7 @@ def close_ranks(scene: Scene) -> None:
         s = state.hit[h]
         pair = scene.slots.pair[s]
         if pair >= fixed:
-            s += pairs.slot[broadphase.moved[pair, 0]] - pairs.slot[pair]
+            s += pairs.slot[broadphase.moved[pair, MOVED_TO]] - pairs.slot[pair]
         put_aside(scene, 1, s, broadphase.spare[h])
         state.touching[s] = work.touching[s] = 1
         state.hit[h] = work.hit[h] = s

@@ -11,7 +11,13 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import FRICTION_CALLS, NORMAL_CALLS, PYTHON_CALLS
+from mbsim.arrays.codes import (
+    FRICTION_CALLS,
+    NOISE_FORCE,
+    NOISE_TORQUE,
+    NORMAL_CALLS,
+    PYTHON_CALLS,
+)
 from mbsim.arrays.hooks import Hook, Recall
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -357,8 +363,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     noise = scene.kinds.noise[scene.pairs.kind[scene.slots.pair[s]]]
     if noise > 0.0:
         for b in (bi, bj):
-            work.noise[b, 0] += noise * normal
-            work.noise[b, 1] += noise * normal * norm(sub(p, position(scene, y, b)))
+            work.noise[b, NOISE_FORCE] += noise * normal
+            work.noise[b, NOISE_TORQUE] += noise * normal * norm(sub(p, position(scene, y, b)))
 
     # X of the incident follows the slip
     at = scene.slots.x[s]

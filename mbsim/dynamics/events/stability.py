@@ -30,6 +30,8 @@ from mbsim.arrays.codes import (
     BOUND_STIFFNESS,
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
+    CENTRE_ACCELERATION,
+    FASTEST_POINT,
     REST,
     SCALE_LENGTH,
     SCALE_SPEED,
@@ -168,7 +170,8 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     rate = state.rate[s] if state.touching[s] == 1 else 0.0
     inverse = translation(scene, bi) + translation(scene, bj)
     kinetic = 0.5 * rate * rate / (weight * inverse)
-    force = (work.speed[gi, 1] + work.speed[gj, 1]) / (weight * inverse)
+    push = work.speed[gi, CENTRE_ACCELERATION] + work.speed[gj, CENTRE_ACCELERATION]
+    force = push / (weight * inverse)
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
     if kinetic + force * depth > AT_REST * out[ENERGY]:
         energy = max(0.0, out[ENERGY] + kinetic - force * depth)
@@ -270,8 +273,8 @@ def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
     """
     pairs, graphics = scene.pairs, scene.graphics
     i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
-    speed = scene.work.speed[i, 0] + scene.work.speed[j, 0]
-    push = scene.work.speed[i, 1] + scene.work.speed[j, 1]
+    speed = scene.work.speed[i, FASTEST_POINT] + scene.work.speed[j, FASTEST_POINT]
+    push = scene.work.speed[i, CENTRE_ACCELERATION] + scene.work.speed[j, CENTRE_ACCELERATION]
     inverse = translation(scene, graphics.body[i]) + translation(scene, graphics.body[j])
     if inverse == 0.0 or speed + push == 0.0:
         return False

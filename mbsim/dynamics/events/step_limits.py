@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, SCALE_LENGTH
+from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, CENTRE_ACCELERATION, FASTEST_POINT, SCALE_LENGTH
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
@@ -289,7 +289,7 @@ def longest_stay(scene: Scene, y: F1, f: F1) -> float:
             # a plane, which has no reach, is never passed through
             speed += turning * radius if radius < math.inf else 0.0
             push = norm((f[at + AT_V], f[at + AT_V + 1], f[at + AT_V + 2]))
-            work.speed[g, 0], work.speed[g, 1] = speed, push
+            work.speed[g, FASTEST_POINT], work.speed[g, CENTRE_ACCELERATION] = speed, push
             room = scene.broadphase.room[g]
             if room < math.inf:
                 longest = min(longest, time_for(0.9 * room, speed, push))
@@ -311,8 +311,8 @@ def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
         if pairs.touches[pair] > 0:
             continue
         left = max(pairs.left[pair], 0.0)
-        speed = work.speed[i, 0] + work.speed[j, 0]
-        push = work.speed[i, 1] + work.speed[j, 1]
+        speed = work.speed[i, FASTEST_POINT] + work.speed[j, FASTEST_POINT]
+        push = work.speed[i, CENTRE_ACCELERATION] + work.speed[j, CENTRE_ACCELERATION]
         # half of the thinner shape: a step may bury it no deeper before it is seen; what a
         # half-space has swallowed it still pushes out, so nothing passes through a plane
         thin = 0.5 * min(graphics.thin[i], graphics.thin[j])

@@ -9,7 +9,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDER_STATIC, SLIDES
+from mbsim.arrays.codes import (
+    AUDIT_TOL,
+    CHATTERING,
+    CHATTERS,
+    COMMITTED,
+    COUNTS_AS,
+    SIDE,
+    SLIDER_STATIC,
+    SLIDES,
+    WHOLE_X,
+    WHOLE_Y,
+)
 from mbsim.arrays.hooks import Hook, Sticking, answer_of, failure_or, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -301,17 +312,18 @@ def follow_half(scene: Scene, context: int, t: float, y: F1) -> None:
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
-        kept[0], kept[1], kept[2] = row[ALONG_X], row[ALONG_Y], counts_as(scene, s)
+        kept[WHOLE_X], kept[WHOLE_Y] = row[ALONG_X], row[ALONG_Y]
+        kept[COUNTS_AS] = counts_as(scene, s)
     look_at(scene, context, t, y, work.idle)
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         for j in range(state.memory.shape[1]):
-            work.kept[s, 3 + j] = state.memory[s, j]
+            work.kept[s, COMMITTED + j] = state.memory[s, j]
         if follows(scene, s) and work.touching[s] == 1 and work.slot[s, MODE] == SLIPS:
             for j in range(state.memory.shape[1]):
                 state.memory[s, j] = work.memory[s, j]
         else:
-            work.kept[s, 2] = 0.0
+            work.kept[s, COUNTS_AS] = 0.0
 
 
 @jitable
@@ -323,11 +335,11 @@ def follow_halves(scene: Scene, context: int, t: float, y: F1) -> float:
         s = hit[k]
         row, kept = work.slot[s], work.kept[s]
         for j in range(state.memory.shape[1]):
-            state.memory[s, j] = kept[3 + j]
-        size = math.hypot(kept[0], kept[1])
-        if kept[2] > 0.0 and size > 0.0 and work.touching[s] == 1:
-            off = math.hypot(row[ALONG_X] - kept[0], row[ALONG_Y] - kept[1])
-            worst = max(worst, kept[2] * off / size)
+            state.memory[s, j] = kept[COMMITTED + j]
+        size = math.hypot(kept[WHOLE_X], kept[WHOLE_Y])
+        if kept[COUNTS_AS] > 0.0 and size > 0.0 and work.touching[s] == 1:
+            off = math.hypot(row[ALONG_X] - kept[WHOLE_X], row[ALONG_Y] - kept[WHOLE_Y])
+            worst = max(worst, kept[COUNTS_AS] * off / size)
     return worst
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from numba.extending import overload
 
+from mbsim.arrays.codes import JET_CURVATURE, JET_SLOPE, JET_VALUE
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
@@ -61,7 +62,7 @@ def jet(scene: Scene, t: float, y: F1, program: int) -> V3:
     """
     run(scene, t, y, program, AS_THEY_ARE, 0)
     stack = scene.programs.stack
-    return stack[0, 0], stack[0, 1], stack[0, 2]
+    return stack[0, JET_VALUE], stack[0, JET_SLOPE], stack[0, JET_CURVATURE]
 
 
 @jitable
@@ -72,7 +73,7 @@ def gradient(scene: Scene, t: float, y: F1, program: int, body: int, out: F1) ->
     """
     for direction in range(6):
         run(scene, t, y, program, body, direction)
-        out[direction] = scene.programs.stack[0, 1]
+        out[direction] = scene.programs.stack[0, JET_SLOPE]
 
 
 @jitable

@@ -6,6 +6,7 @@ the last of them, its value is linear in z.
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import PIECE_BEGIN
 from mbsim.arrays.model import Programs
 from mbsim.core.arrays import V3
 from mbsim.core.jitable import jitable
@@ -17,12 +18,12 @@ from mbsim.expressions.elementary import chain, constant, times
 def piece_at(programs: Programs, curve: int, x: float) -> int:
     """Return the piece of a curve that x is in; the last knot belongs to the piece before it."""
     piece, low, high = programs.piece, programs.curve[curve], programs.curve[curve + 1] - 1
-    if x <= piece[high, 0]:
+    if x <= piece[high, PIECE_BEGIN]:
         high -= 1
     while low < high:
         middle = (low + high + 1) // 2
         # the first piece reaches back from the first knot, where the second one begins
-        if piece[middle, 0] <= x:
+        if piece[middle, PIECE_BEGIN] <= x:
             low = middle
         else:
             high = middle - 1

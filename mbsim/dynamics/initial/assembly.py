@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.codes import ANGLE, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import ANGLE, SCALE_LENGTH, SCALE_SPEED, START_SUM
 from mbsim.arrays.hooks import Joints
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import System
@@ -122,7 +122,7 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
         is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
         if not is_motion or equations.kind[k] != ANGLE:
             continue
-        given = 0.0 if equations.level[e] == 2 else float(equations.start[e, 0])
+        given = 0.0 if equations.level[e] == 2 else float(equations.start[e, START_SUM])
         turns = (float(scene.sweep.rate[e, _RESIDUAL]) - given) / (2.0 * np.pi)
         if np.isfinite(turns):
             scene.state.angle[equations.angle[k]] -= 2.0 * np.pi * np.round(turns)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.codes import SCALE_LENGTH, START_RATE
 from mbsim.arrays.scene import Scene
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.constraints.equations import lasting
@@ -102,7 +102,7 @@ def start_velocities(scene: Scene, y: Array, given: dict[int, Array]) -> None:
         for b in tree.body:
             y[BODY_SIZE * b + 7 : BODY_SIZE * b + 13] = 0.0
         return
-    starts = np.where(scene.equations.level < 1, scene.equations.start[:, 1], np.nan)
+    starts = np.where(scene.equations.level < 1, scene.equations.start[:, START_RATE], np.nan)
     held = (scene.equations.level >= 1) | np.isfinite(starts)
     # what slides at the start may do so
     held &= lasting(scene)

@@ -28,6 +28,7 @@ from mbsim.dynamics.forces.applied import by_formula, displacement
 from mbsim.dynamics.linearization.blocks import couple
 from mbsim.dynamics.linearization.expression_slopes import add_program_slopes
 from mbsim.dynamics.linearization.stiffness import (
+    ACROSS_ROW,
     PART,
     PART_OF_SPEED,
     PUSH,
@@ -78,7 +79,7 @@ def add_turning_rate(
     bi, bj = sides_of(scene, f)
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
     across = scale(1.0 / d, sub(v, scale(dot(v, n), n)))
-    rows = T.linear.basis[:, 1]
+    rows = T.linear.basis[:, ACROSS_ROW]
     none = (0.0, 0.0, 0.0)
     lever(scene, T.linear, y, bi, marker_point(scene, y, i), across, none, rows[0])
     lever(scene, T.linear, y, bj, marker_point(scene, y, j), across, none, rows[1])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import BLOCK_COLUMN, BLOCK_ROW
 from mbsim.core.arrays import F2, I1, N1, N2
 from mbsim.core.jitable import jitable
 
@@ -35,7 +36,7 @@ def forget_pattern(P: Pattern) -> None:
         for b in range(nb):
             P.place[a, b] = -1
         P.place[a, a] = a
-        P.pair[a, 0] = P.pair[a, 1] = a
+        P.pair[a, BLOCK_ROW] = P.pair[a, BLOCK_COLUMN] = a
     P.count[COUPLINGS] = nb
     P.count[STALE] = 1
 
@@ -53,8 +54,8 @@ def couple(P: Pattern, a: int, b: int) -> bool:
     if k + 2 > len(P.pair):
         return False
     P.place[a, b], P.place[b, a] = k, k + 1
-    P.pair[k, 0], P.pair[k, 1] = a, b
-    P.pair[k + 1, 0], P.pair[k + 1, 1] = b, a
+    P.pair[k, BLOCK_ROW], P.pair[k, BLOCK_COLUMN] = a, b
+    P.pair[k + 1, BLOCK_ROW], P.pair[k + 1, BLOCK_COLUMN] = b, a
     P.count[COUPLINGS] = k + 2
     return True
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -51,8 +51,11 @@ if TYPE_CHECKING:
     from mbsim.compile_model.tangent import Pattern, Tangent
 
 
-#: Row of `basis` with how the force of one incident for many points changes.
-PRESS = 6
+# rows of `basis`: levers of units along n, x, y, and about x, y, n; how the force of one incident
+# for many points changes; of one of these points, and how far that moves the force
+ALONG_N, ALONG_X, ALONG_Y, ABOUT_X, ABOUT_Y, ABOUT_N, PRESS, POINT, MOVED = range(9)
+# columns of `law`, and what it is asked at
+SLIP_X, SLIP_Y, SPIN_X, SPIN_Y, SPIN_N, PRESSED = range(6)
 #: Slip, over the model's speed, below which directions of rigid friction converge only as far as
 #: slip does that is so fast: its part across may be as large as there.
 SLOW = 1e-3
@@ -88,7 +91,7 @@ def ask_friction(
     loci, locj = around
     slip, spin = (given[0], given[1]), (given[2], given[3], given[4])
     scene.work.law_in[DFLAG] = 1.0
-    code = friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[5])
+    code = friction(scene, t, h, y, s, c, loci, locj, spin, slip, given[PRESSED])
     scene.work.law_in[DFLAG] = 0.0
     return code
 
@@ -150,9 +153,9 @@ def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     numbers = scene.work.points[s + 1]
     p, (ax, ay) = vector(point[AT_POINT:]), plane_axes(vector(point[AT_NORMAL:]))
     for side in range(2):
-        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, 2])
-        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, 3])
-    u, v = L.basis[:, 2], L.basis[:, 3]
+        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, ABOUT_X])
+        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, ABOUT_Y])
+    u, v = L.basis[:, ABOUT_X], L.basis[:, ABOUT_Y]
     add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
     add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], u, v)
     add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], v, u)
@@ -174,7 +177,7 @@ def add_region_stiffness(
     P, L, rows, nb = T.pattern, T.linear, scene.work.points, len(scene.bodies.mass)
     i, j = contact_bodies(scene, s)
     depth, whole, none = rows[s, AT_DEPTH], face_weight_of(scene, s), (0.0, 0.0, 0.0)
-    one, every, press = L.basis[:, 0], L.basis[:, 1], L.basis[:, PRESS]
+    one, every, press = L.basis[:, POINT], L.basis[:, MOVED], L.basis[:, PRESS]
     every[:] = press[:] = 0.0
     weight, moment = 0.0, 0.0
     first = s + REGION_ROWS
@@ -212,7 +215,7 @@ def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) 
     p, n, tx = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), vector(work.t[s])
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
     rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
-    one, moved, first = L.basis[:, 7], L.basis[:, 8], s + REGION_ROWS
+    one, moved, first = L.basis[:, POINT], L.basis[:, MOVED], s + REGION_ROWS
     last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
         weight += max(0.0, work.points[k, AT_DEPTH]) * work.points[k, AT_WEIGHT]
@@ -229,9 +232,10 @@ def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) 
             lever(scene, L, y, b, vector(row[AT_POINT:]), vector(row[AT_NORMAL:]), none, one[side])
             lever(scene, L, y, b, p, scale(by_rate * rate, n), torque, moved[side])
             for r in range(5):
-                rise = L.law[r, 0] * slip_x + L.law[r, 1] * slip_y + L.law[r, 5] * by_rate * rate
+                rise = L.law[r, SLIP_X] * slip_x + L.law[r, SLIP_Y] * slip_y
+                rise += L.law[r, PRESSED] * by_rate * rate
                 for c in range(6):
-                    moved[side, c] += rise * L.basis[side, 1 + r, c]
+                    moved[side, c] += rise * L.basis[side, ALONG_X + r, c]
         add_two_sided(P, L.K, nb, i, j, -row[AT_WEIGHT] / weight, moved, one)
 
 
@@ -288,8 +292,8 @@ def add_contact_slopes(  # noqa: C901
         slope = by_depth / weight
         by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)
     for side in range(2):
-        lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, 0])
-    u, v = normal[:, 0], normal[:, 0]
+        lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
+    u, v = normal[:, ALONG_N], normal[:, ALONG_N]
     if not region:
         add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
     add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
@@ -301,9 +305,10 @@ def add_contact_slopes(  # noqa: C901
     v_rel = sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p))
     w_rel = sub(vector(work.w[i]), vector(work.w[j]))
     given = L.rise[0:6]
-    given[0], given[1] = dot(v_rel, tx), dot(v_rel, ty)
-    given[2], given[3], given[4] = dot(w_rel, tx), dot(w_rel, ty), dot(w_rel, n)
-    given[5] = max(work.slot[s, 2], 0.0)
+    given[SLIP_X], given[SLIP_Y] = dot(v_rel, tx), dot(v_rel, ty)
+    given[SPIN_X], given[SPIN_Y] = dot(w_rel, tx), dot(w_rel, ty)
+    given[SPIN_N] = dot(w_rel, n)
+    given[PRESSED] = max(work.slot[s, NORMAL], 0.0)
     around = (none, none)
     if contacts.framed[c] == 1:
         half = scale(0.5 * depth, n)
@@ -315,40 +320,41 @@ def add_contact_slopes(  # noqa: C901
     # of its direction, whichever way, take from what rubs along the slip: what nearly rests creeps
     counts = 1.0
     if contacts.rigid[c] == 1:
-        slow = min(math.hypot(given[0], given[1]), rigid_slip(scene, s, c))
+        slow = min(math.hypot(given[SLIP_X], given[SLIP_Y]), rigid_slip(scene, s, c))
         counts = min(1.0, slow / (SLOW * scene.world.scale[SCALE_SPEED]))
     # bristles that are damped rub by more than what presses as that falls to 0: velocities that
     # differ by rounding then change friction by much of it
     force = vector(work.slot[s, FORCE : FORCE + 3])
-    pressed = max(given[5], math.hypot(dot(force, tx), dot(force, ty)))
+    pressed = max(given[PRESSED], math.hypot(dot(force, tx), dot(force, ty)))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[5] > 0.0 else 0.0
+        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[PRESSED] > 0.0 else 0.0
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]
-        lever(scene, L, y, b, p, tx, none, rows[1])
-        lever(scene, L, y, b, p, ty, none, rows[2])
-        lever(scene, L, y, b, p, none, tx, rows[3])
-        lever(scene, L, y, b, p, none, ty, rows[4])
-        lever(scene, L, y, b, p, none, n, rows[5])
+        lever(scene, L, y, b, p, tx, none, rows[ALONG_X])
+        lever(scene, L, y, b, p, ty, none, rows[ALONG_Y])
+        lever(scene, L, y, b, p, none, tx, rows[ABOUT_X])
+        lever(scene, L, y, b, p, none, ty, rows[ABOUT_Y])
+        lever(scene, L, y, b, p, none, n, rows[ABOUT_N])
     for r in range(5):
-        u = L.basis[:, 1 + r]
+        u = L.basis[:, ALONG_X + r]
         for column in range(5):
             if L.law[r, column] != 0.0:
-                add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, 1 + column])
-        by_normal = L.law[r, 5]
+                add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, ALONG_X + column])
+        by_normal = L.law[r, PRESSED]
         if by_normal != 0.0:
             if region:
                 add_two_sided(P, L.K, nb, i, j, -by_normal, u, L.basis[:, PRESS])
             else:
-                add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, 0])
-            add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, 0])
+                add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
+            add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
         add_moves_of_place(scene, T, y, s, by_rate)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]
-        K.held[count], K.press[count, 0], K.press[count, 1] = s, by_depth, by_rate
+        K.held[count] = s
+        K.press[count, PRESS_BY_DEPTH], K.press[count, PRESS_BY_RATE] = by_depth, by_rate
         return call_int(scene.world.hooks[Hook.MEMORY], (scene, Memory.FILL, y, y))
     return 0
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import RESIDUAL, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import AT_TIME, OF_ELEMENT, RESIDUAL, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.model import Residuals
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -63,7 +63,7 @@ def step_for_slopes(scene: Scene, t: float, e: int) -> float:
     kept = scene.state.residual[e]
     h = step_of(scene, t, kept[NOW])
     if not h > SHORT * own_time(scene):
-        h = kept[NOW, 0] - kept[BEFORE, 0]
+        h = kept[NOW, AT_TIME] - kept[BEFORE, AT_TIME]
     return h if h > SHORT * own_time(scene) else 1e-6 * own_time(scene)
 
 
@@ -129,7 +129,7 @@ def add_residual_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> No
     Many branches because axes and states of one element share its levers.
     """
     R, P, L = scene.residuals, T.pattern, T.linear
-    e, nb = int(scene.applied.par[f, 0]), len(scene.bodies.mass)
+    e, nb = int(scene.applied.par[f, OF_ELEMENT]), len(scene.bodies.mass)
     h = solve_slopes(scene, t, y, e)
     add_geometry(scene, T, y, f, scene.applied.axes[f], 0)
     if h < 0.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import JET_SLOPE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import USER
 from mbsim.core.arrays import F1, F2
@@ -99,7 +99,7 @@ def program_rise(
             place_body(scene, y, body)
         else:
             run(scene, t, y, program, body, direction)
-            rise = scene.programs.stack[0, 1]
+            rise = scene.programs.stack[0, JET_SLOPE]
         # (linear, angular) to (angular, linear)
         row[(direction // POSES) * POSES + (direction % POSES + 3) % POSES] = rise
     r = vector(T.linear.r[body])
@@ -144,7 +144,7 @@ def state_rise(scene: Scene, T: Tangent, t: float, y: F1, program: int, z: int) 
     place = scene.states.place[z]
     if T.depends.user[program] == 0:
         run(scene, t, y, program, A_STATE, place)
-        return scene.programs.stack[0, 1]
+        return scene.programs.stack[0, JET_SLOPE]
     before, kept = value_anew(scene, t, y, program), y[place]
     size = PUSH * max(abs(kept), scene.states.scale[z])
     y[place] = kept + size

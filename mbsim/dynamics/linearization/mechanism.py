@@ -17,7 +17,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import SCALE_LENGTH, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT
+from mbsim.arrays.codes import (
+    CHILD_AXIS,
+    PARENT_AXIS,
+    SCALE_LENGTH,
+    TURN_AXIS,
+    TURN_CROSS,
+    TURN_FREE,
+    TURN_ROOT,
+)
 from mbsim.arrays.hooks import ContactSlopes, Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -135,8 +143,8 @@ def fill_joint(scene: Scene, L: Linear, y: F1, k: int) -> None:
         write_turn(U, 0, parent_axis(scene, k, 2), P, f, 0)
         q = 1
     elif turn == TURN_CROSS:
-        write_turn(U, 0, child_axis(scene, k, tree.axis[k, 0]), P, f, 1)
-        write_turn(U, 1, parent_axis(scene, k, tree.axis[k, 1]), P, f, 0)
+        write_turn(U, 0, child_axis(scene, k, tree.axis[k, CHILD_AXIS]), P, f, 1)
+        write_turn(U, 1, parent_axis(scene, k, tree.axis[k, PARENT_AXIS]), P, f, 0)
         q = 2
     elif turn == TURN_FREE:
         for axis in range(3):

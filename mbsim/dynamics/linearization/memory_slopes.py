@@ -15,7 +15,7 @@ Behind hooks of the scene, so that only scenes with such friction compile it.
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import C1, C3, PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Keeps, Linear, Pair, Real, Tangent
@@ -213,7 +213,7 @@ def add_to_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:  # noqa: C9
         for i in range(n):
             for j in range(n):
                 A[i, j] = -K.table[k, 5 + i, _GIVEN + j]
-            A[i, i] += M.c[0, 2]
+            A[i, i] += M.c[0, C3]
         invert(A, Z, n)
         pair = K.body[k]
         for by in range(2):
@@ -230,7 +230,10 @@ def add_to_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:  # noqa: C9
                     for i in range(6):
                         rate += lever[i] * E[i, q]
                     if direction == 5:
-                        rate = -K.press[k, 0] * lever[q] - K.press[k, 1] * rate
+                        rate = (
+                            -K.press[k, PRESS_BY_DEPTH] * lever[q]
+                            - K.press[k, PRESS_BY_RATE] * rate
+                        )
                     turned[direction, q] = rate
             # E is free from here on
             part, by_move = E[0], E[1]
@@ -273,13 +276,13 @@ def drive(scene: Scene, T: Tangent, M: Real | Pair, r: F1, k: int, e: N1, with_m
                     rates[i] += E[i, q] * M.g[b, q]
         for direction in range(6):
             lever = K.lever[k, by, (direction + 1) % 6]
-            move, rate = 0.0 * M.c[0, 0], 0.0 * M.c[0, 0]
+            move, rate = 0.0 * M.c[0, C1], 0.0 * M.c[0, C1]
             for i in range(6):
                 rate += lever[i] * rates[i]
                 if with_moves:
                     move += lever[i] * M.g[b, i]
             if direction == 5:
-                rate = -K.press[k, 0] * move - K.press[k, 1] * rate
+                rate = -K.press[k, PRESS_BY_DEPTH] * move - K.press[k, PRESS_BY_RATE] * rate
             for i in range(n):
                 e[i] += sign * K.table[k, 5 + i, direction] * rate
 
@@ -293,7 +296,7 @@ def add_to_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: F1) -> None:
         n, pair = count_of(K, k), K.body[k]
         drive(scene, T, M, r, k, e, False)
         for row in range(5):
-            force = 0.0 * M.c[0, 0]
+            force = 0.0 * M.c[0, C1]
             for i in range(n):
                 for j in range(n):
                     force += K.table[k, row, _GIVEN + i] * Z[i, j] * e[j]
@@ -312,7 +315,7 @@ def recover(scene: Scene, T: Tangent, M: Real | Pair, r: F1, d: F1) -> None:
         Z, e, n = M.keep[k], M.keep[len(M.keep) - 1, 0], count_of(K, k)
         drive(scene, T, M, r, k, e, True)
         for i in range(n):
-            total = 0.0 * M.c[0, 0]
+            total = 0.0 * M.c[0, C1]
             for j in range(n):
                 total += Z[i, j] * e[j]
             d[K.carries[k, i]] = total

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import BLOCK_COLUMN, BLOCK_ROW, C1, C2, C3, FORM
 from mbsim.arrays.hooks import Memory, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 @jitable
 def fill_turns(T: Tangent, M: Real | Pair, h: float) -> None:
     """Fill B of every body."""
-    L, c1, form = T.linear, M.c[0, 0], M.c[0, 3].real
+    L, c1, form = T.linear, M.c[0, C1], M.c[0, FORM].real
     for b in range(len(L.w)):
         w, B = L.w[b], M.B[b]
         for i in range(3):
@@ -72,7 +73,7 @@ def times_rate(L: Linear, M: Real | Pair, b: int, out: N2) -> None:
 
     spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
     """
-    R, B, c1, w, r = L.R[b], M.B[b], M.c[0, 0], L.spin[b], L.r[b]
+    R, B, c1, w, r = L.R[b], M.B[b], M.c[0, C1], L.spin[b], L.r[b]
     for j in range(B.shape[0]):
         column = (R[j, 0], R[j, 1], R[j, 2])
         # R B R' e_j
@@ -106,7 +107,7 @@ def gyration(scene: Scene, L: Linear, b: int, u: tuple[complex, complex, complex
 @jitable
 def add_inertia(scene: Scene, L: Linear, M: Real | Pair, b: int, A: N2) -> None:
     """Add inertia and the wrench that joints and equations exert on body b, by xi, to A."""
-    m, c1, c2 = scene.bodies.mass[b], M.c[0, 0], M.c[0, 1]
+    m, c1, c2 = scene.bodies.mass[b], M.c[0, C1], M.c[0, C2]
     R, B, J = L.R[b], M.B[b], scene.bodies.inertia[b]
     r, f, N = vector(L.r[b]), vector(L.force[b]), vector(L.torque[b])
     for j in range(B.shape[0]):
@@ -149,7 +150,7 @@ def fill_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:
                 M.A[k, i, j] = 0.0
     E, last = M.work[2], -1
     for k in range(P.count[COUPLINGS]):
-        b, K, D, A = P.pair[k, 1], L.K[k], L.D[k], M.A[k]
+        b, K, D, A = P.pair[k, BLOCK_COLUMN], L.K[k], L.D[k], M.A[k]
         if b != last:
             times_rate(L, M, b, E)
             last = b
@@ -233,8 +234,8 @@ def wrench_at_cg(L: Linear, row: int, b: int) -> tuple[V3, V3]:
 @jitable
 def acceleration_row(L: Linear, M: Real | Pair, row: int, x: N2) -> complex:
     """Return what displacements make of an equation's accelerations: C (c2 dx, c2/c1 B theta)."""
-    total, c2 = 0.0 * x[0, 0], M.c[0, 1]
-    ratio = c2 / M.c[0, 0]
+    total, c2 = 0.0 * x[0, 0], M.c[0, C2]
+    ratio = c2 / M.c[0, C1]
     for b in range(len(L.w)):
         force, torque = wrench_at_cg(L, row, b)
         theta = (x[b, 0], x[b, 1], x[b, 2])
@@ -258,8 +259,8 @@ def held_row(scene: Scene, L: Linear, M: Real | Pair, row: int, x: N2) -> comple
         return along_row(L, M, row, 0, x)
     total = along_row(L, M, row, 1, x)
     if level == 1:
-        return total / M.c[0, 0]
-    return (total + acceleration_row(L, M, row, x)) / M.c[0, 1]
+        return total / M.c[0, C1]
+    return (total + acceleration_row(L, M, row, x)) / M.c[0, C2]
 
 
 @jitable
@@ -273,12 +274,12 @@ def held_residual(scene: Scene, L: Linear, M: Real | Pair, row: int, r: N1) -> c
             # M.rate is -e
             total -= L.row_rate[row, b, i] * M.rate[b, i]
     if level == 1:
-        return total / M.c[0, 0]
+        return total / M.c[0, C1]
     for b in range(len(L.w)):
         force, torque = wrench_at_cg(L, row, b)
         shift, turn = asked_of(L, M, b, r)
         total += dot(force, shift) + dot(torque, turn)
-    return total / M.c[0, 1]
+    return total / M.c[0, C2]
 
 
 @jitable
@@ -305,7 +306,7 @@ def factor_rest(scene: Scene, T: Tangent, M: Real | Pair) -> int:
             if other >= held:
                 M.border[k, other] -= L.slopes[k - held, other - held]
             if other == k:
-                M.border[k, other] += M.c[0, 2]
+                M.border[k, other] += M.c[0, C3]
     factor_border(M.border, M.border_swap, size)
     return 0
 
@@ -327,8 +328,8 @@ def asked_of(
     L: Linear, M: Real | Pair, b: int, r: N1
 ) -> tuple[tuple[complex, complex, complex], tuple[complex, complex, complex]]:
     """Return r_a and r_alpha of body b."""
-    at, form = BODY_SIZE * b, M.c[0, 3].real
-    first = M.c[0, 0] if form == 0.0 else 0.0 * M.c[0, 0]
+    at, form = BODY_SIZE * b, M.c[0, FORM].real
+    first = M.c[0, C1] if form == 0.0 else 0.0 * M.c[0, C1]
     rho = turn_residual(L, b, r)
     shift = (
         first * r[at] + r[at + 7],
@@ -368,7 +369,7 @@ def fill_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
     for b in range(len(P.order)):
         ask_body(scene, L, M, b, r)
     for k in range(P.count[COUPLINGS]):
-        a, b, D = P.pair[k, 0], P.pair[k, 1], L.D[k]
+        a, b, D = P.pair[k, BLOCK_ROW], P.pair[k, BLOCK_COLUMN], L.D[k]
         for i in range(D.shape[0]):
             for j in range(D.shape[1]):
                 M.g[a, i] += D[i, j] * M.rate[b, j]
@@ -402,7 +403,7 @@ def solve_border_part(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
 @jitable
 def write_answer(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> None:
     """Write the displacements of bodies in the layout of y."""
-    L, c1 = T.linear, M.c[0, 0]
+    L, c1 = T.linear, M.c[0, C1]
     for b in range(len(L.w)):
         at, B, q = BODY_SIZE * b, M.B[b], L.q[b]
         theta = (M.g[b, 0], M.g[b, 1], M.g[b, 2])
@@ -428,7 +429,7 @@ def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
     solve_border_part(scene, T, M, r)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
         # work and losses are sums of what bodies do
-        d[k] = r[k] / M.c[0, 2]
+        d[k] = r[k] / M.c[0, C3]
     ask_memory(scene, M, Memory.RECOVER, r, d)
     write_answer(scene, T, M, r, d)
     held = active_count(scene)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 PART, PART_OF_SPEED = 1e-6, 1e-8
 #: Differences of the state, as parts of length or speed, and radians.
 PUSH = 1e-7
+# rows of `basis` for a force between markers: a unit of it, and its turn with the line
+UNIT_ROW, ACROSS_ROW = range(2)
 
 
 @jitable
@@ -83,7 +85,7 @@ def fill_unit(scene: Scene, T: Tangent, y: F1, f: int, force: V3, torque: V3, at
     """Fill the wrenches of a unit force and torque: on I at its origin, on J at its own or I's."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
-    u = T.linear.basis[:, 0]
+    u = T.linear.basis[:, UNIT_ROW]
     lever(scene, T.linear, y, bi, marker_point(scene, y, i), force, torque, u[0])
     p = marker_point(scene, y, j if at_j == 1 else i)
     lever(scene, T.linear, y, bj, p, force, torque, u[1])

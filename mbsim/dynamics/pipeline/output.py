@@ -437,7 +437,7 @@ def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
             square = max(max(dx / area, 4.0 * dq), max(dv / fast, dw * area / fast))
             if not square <= largest:
                 largest = square
-        change = gauged(scene, Gauges.REVERSAL, 0.0, 0.0, e, y)
+        change = gauged(scene, Hook.EFFECTS, Effects.REVERSAL, 0.0, 0.0, e, y)
         e[0] = math.sqrt(max(largest, change**2))
 
 

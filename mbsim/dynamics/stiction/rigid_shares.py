@@ -15,6 +15,7 @@ from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
 from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
 from mbsim.geometry.catalog import AT_NORMAL
+from mbsim.laws.friction.stiction import MU_STATIC
 
 #: What presses less than this part of what presses most counts as that: no limit is 0.
 LEAST_PART = 1e-9
@@ -70,7 +71,7 @@ def fill_load(scene: Scene, first: int, m: F1) -> None:
 @jitable
 def capacity(scene: Scene, s: int) -> float:
     """Return what slot s holds at most."""
-    held = scene.contacts.friction_par[contact_of(scene, s), 0]
+    held = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC]
     return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
 
 

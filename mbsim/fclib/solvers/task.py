@@ -10,6 +10,7 @@ import numpy as np
 from mbsim.core.jitable import jitable
 from mbsim.fclib.clock import clock, compiled, until
 from mbsim.fclib.cone import DECIDING, errors_at, improves
+from mbsim.fclib.problem import length
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
@@ -146,7 +147,7 @@ class Task:
         """
         better = error < self.error
         if error <= self.tol and self.error <= self.tol:
-            size, before = float(np.linalg.norm(r)), float(np.linalg.norm(self.r))
+            size, before = length(r), length(self.r)
             better = bool(improves(float(error_q), size, self.error_q, before))
         if better:
             self.r, self.error, self.error_q = r, float(error), float(error_q)
@@ -165,4 +166,4 @@ class Task:
         """Add rows to the history."""
         if len(rows):
             self.history.append((name, rows.copy()))
-        self.sizes.append((self.error_q, float(np.linalg.norm(self.r))))
+        self.sizes.append((self.error_q, length(self.r)))

@@ -23,6 +23,7 @@ from mbsim.geometry.convex import (
 from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
+    Disc,
     crossing_of,
     disc_lies,
     line_lies,
@@ -139,9 +140,7 @@ def clip_edge(row: F1, ax: float, ay: float, bx: float, by: float, r: float) -> 
 
 
 @jitable
-def put_corners(
-    work: F2, disc: tuple[V3, V3, V3, float, float, float], n: V3, weight: float
-) -> None:
+def put_corners(work: F2, disc: Disc, n: V3, weight: float) -> None:
     """Turn the cut edges in the rows of `work` into points where they enter and leave the disc."""
     centre, u, v, r, depth0, rise = disc
     turns = (work[1, 6], work[3, 6], work[5, 6], work[7, 6])

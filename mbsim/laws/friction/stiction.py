@@ -120,6 +120,9 @@ def _dynamic_limit(inputs: FrictionInput, mu_dynamic: float) -> float:
 #: let go: what sticks moves as its neighbours let it, that is by how they turn over its depth.
 KEPT_MODE, KEPT_X, KEPT_Y, HELD_X, HELD_Y = range(5)
 KEPT_SPEED, KEPT_PLAY = HELD_X, HELD_Y
+#: Its parameters.
+_RIGID_PARAMETERS = ("mu_static", "mu_dynamic")
+MU_STATIC = _RIGID_PARAMETERS.index("mu_static")
 #: Slip across d that is less than this part of the committed speed is rounding. It is to stay so
 #: where v goes through 0: there it is compared with a part of that speed at least.
 STRAIGHT, PART = 1e-6, 0.7
@@ -202,7 +205,7 @@ def rigid(
     takes_function=True,
     modes=True,
     rigid=FrictionLaw(
-        "STICTION", rigid, ("mu_static", "mu_dynamic"), memory=5, takes_function=True, modes=True
+        "STICTION", rigid, _RIGID_PARAMETERS, memory=5, takes_function=True, modes=True
     ),
 )
 def stiction(  # noqa: C901

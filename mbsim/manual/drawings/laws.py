@@ -7,23 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
-from mbsim.laws.slip_test import Conditions, cycle, sample_of, samples, steady
+from mbsim.laws.slip_test import Conditions, cycle, sample_of, samples, steady, usual_parameters
 from mbsim.manual.pictures import picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Parameters without a usual value: numbers that show what a law does.
-_FRICTION = {
-    "mu_static": 0.5,
-    "mu_dynamic": 0.3,
-    "stiction_trans_vel": 2e-3,
-    "friction_trans_vel": 1e-2,
-    "stribeck_vel": 5e-3,
-    "bristle_stiffness": 1e4,
-    "rolling_arm": 0.01,
-    "patch_radius": 0.1,
-}
 #: Impacts: attributes of the law, of a mass of 1 kg.
 _NORMAL: dict[str, dict[str, Any]] = {
     "IMPACT": {"stiffness": 1e6, "exponent": 1.5, "damping": 100.0, "dmax": 1e-3},
@@ -52,22 +41,13 @@ _NORMAL: dict[str, dict[str, Any]] = {
 _SPEEDS = (0.5, 1.0)
 
 
-def _parameters(name: str) -> dict[str, float]:
-    """Return a friction law's parameters: its own usual ones, else those above."""
-    law = FRICTION_LAWS[name]
-    own = {each.name: each.default for each in law.own}
-    return {
-        each: _FRICTION[each] if not own.get(each) and each in _FRICTION else own[each] or 0.0
-        for each in law.parameters
-    }
-
-
 def _friction(figure: Figure, names: Sequence[str]) -> None:
     """Draw friction over slip speed, and through a slip to and fro."""
     at = Conditions()
     left, right = figure.subplots(1, 2)
     for name in names:
-        law = sample_of(FRICTION_LAWS[name], _parameters(name), at)
+        usual = {k: v or 0.0 for k, v in usual_parameters(FRICTION_LAWS[name]).items()}
+        law = sample_of(FRICTION_LAWS[name], usual, at)
         speeds = [v for v in samples(law, at, 120) if v <= 0.03]
         left.plot([1e3 * v for v in speeds], steady(law, at, speeds), label=name)
         x, force = cycle(law, at)

@@ -3,8 +3,6 @@
 Apart from `compiled`, so that the cache key of a user's function covers this and no more.
 """
 
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
-# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
 import math
@@ -12,38 +10,50 @@ from collections.abc import Callable
 from typing import Any
 
 from numba.extending import register_jitable
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.core.address import vector_at
+from mbsim.core.address import as_tuple, vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
-from mbsim.laws.abi import DFLAG, FRICTION_INPUTS, FRICTION_SIGNATURE, MEMORY_OUT
+from mbsim.core.rotation import vector
+from mbsim.laws.abi import (
+    AREA_IN,
+    DFLAG,
+    FRICTION_INPUTS,
+    FRICTION_SIGNATURE,
+    LOCI_IN,
+    LOCJ_IN,
+    MEMORY_OUT,
+    NFORCE_IN,
+    TIME_IN,
+    X_IN,
+    XDOT_IN,
+)
 
 
 def _adapt(function: Callable[..., Any], count: int) -> Any:
     """Return CFFSUB with `count` parameters as a C function that signals what it raises."""
 
-    def entry(element, inputs, par, out):
-        a: Any = vector_at(inputs, FRICTION_INPUTS)  # type: ignore[call-arg]
-        # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        a: F1 = vector_at(inputs, FRICTION_INPUTS)
+        values = as_tuple(vector_at(par, count), count)
         result = vector_at(out, 5)
         code = 0
         try:
             force = function(
                 element,
-                a[0],
+                a[TIME_IN],
                 values,
                 count,
-                (a[13], a[14], a[15]),
-                (a[16], a[17], a[18]),
-                (a[2], a[3], a[4]),
-                (a[5], a[6], a[7]),
-                a[10],
+                vector(a[LOCI_IN:]),
+                vector(a[LOCJ_IN:]),
+                vector(a[X_IN:]),
+                vector(a[XDOT_IN:]),
+                a[NFORCE_IN],
                 int(a[DFLAG]),
                 0,
-                a[0],
-                a[11],
+                a[TIME_IN],
+                a[AREA_IN],
             )
             if len(force) != 3:
                 raise ValueError("not three")
@@ -62,28 +72,28 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
 def _adapt_with_state(function: Callable[..., Any], count: int, states: int) -> Any:
     """Return CFFSUB that keeps so many numbers of its own as a C function."""
 
-    def entry(element, inputs, par, out):
-        a: Any = vector_at(inputs, FRICTION_INPUTS + states)  # type: ignore[call-arg]
-        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
-        kept: Any = to_fixed_tuple(a[FRICTION_INPUTS:], states)  # type: ignore[call-arg]
+    def entry(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
+        a: F1 = vector_at(inputs, FRICTION_INPUTS + states)
+        values = as_tuple(vector_at(par, count), count)
+        kept = as_tuple(a[FRICTION_INPUTS:], states)
         result = vector_at(out, MEMORY_OUT + states)
         code = 0
         try:
             force, new = function(
                 element,
-                a[0],
+                a[TIME_IN],
                 values,
                 count,
-                (a[13], a[14], a[15]),
-                (a[16], a[17], a[18]),
-                (a[2], a[3], a[4]),
-                (a[5], a[6], a[7]),
-                a[10],
+                vector(a[LOCI_IN:]),
+                vector(a[LOCJ_IN:]),
+                vector(a[X_IN:]),
+                vector(a[XDOT_IN:]),
+                a[NFORCE_IN],
                 int(a[DFLAG]),
                 0,
                 kept,
-                a[0],
-                a[11],
+                a[TIME_IN],
+                a[AREA_IN],
             )
             if len(force) != 3 or len(new) != states:
                 raise ValueError("not as many")

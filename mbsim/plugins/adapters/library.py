@@ -5,19 +5,27 @@ comes as data. The parameters of such a law begin with the address of a packed `
 Apart from `shared_library`, so that the cache key of this covers no more than it needs.
 """
 
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
-# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mbsim.core.address import call_int, vector_at, view
-from mbsim.core.arrays import F1, I1
+from mbsim.core.arrays import F1, I1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
+from mbsim.laws.abi import (
+    AREA_IN,
+    DFLAG,
+    FRICTION_INPUTS,
+    LOCI_IN,
+    LOCJ_IN,
+    NFORCE_IN,
+    TIME_IN,
+    X_IN,
+    XDOT_IN,
+)
 
 
 class LibraryCall(NamedTuple):
@@ -30,7 +38,7 @@ class LibraryCall(NamedTuple):
 
 
 @jitable
-def begin_call(call, element, values, dflag):
+def begin_call(call: LibraryCall, element: int, values: F1, dflag: int) -> None:
     """Write down what a call is given; results that it leaves unset are found, as nan."""
     for k in range(len(call.par)):
         call.par[k] = values[k]
@@ -40,34 +48,33 @@ def begin_call(call, element, values, dflag):
         call.result[k] = np.nan
 
 
-def call_c(element, inputs, par, out):
+def call_c(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
     """CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, result)."""
-    # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-    call: Any = view(np.int64(vector_at(par, 1)[0]), LibraryCall)  # type: ignore[call-arg]
+    call: LibraryCall = view(np.int64(vector_at(par, 1)[0]), LibraryCall)
     a, n = vector_at(inputs, FRICTION_INPUTS), len(call.par)
     whole, result = call.whole, call.result
     begin_call(call, element, vector_at(par, 1 + n)[1:], int(a[DFLAG]))
     # the function returns nothing, and nobody looks at what `call_int` takes for its result
     call_int(
         call.address[0],
-        (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:],
-         whole[2:], whole[3:], result),
+        (whole[0:], a[TIME_IN:], call.par, whole[1:], a[LOCI_IN:], a[LOCJ_IN:], a[X_IN:],
+         a[XDOT_IN:], a[NFORCE_IN:], whole[2:], whole[3:], result),
     )  # fmt: skip
     force = vector_at(out, 5)
     force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]
     return 0
 
 
-def call_fortran(element, inputs, par, out):
+def call_fortran(element: int, inputs: Pointer, par: Pointer, out: Pointer) -> int:
     """CFFSUB(ID, TIME, PAR, NPAR, LOCI, LOCJ, X, XDOT, NFORCE, AREA, DFLAG, IFLAG, RESULTS)."""
-    call: Any = view(np.int64(vector_at(par, 1)[0]), LibraryCall)  # type: ignore[call-arg]
+    call: LibraryCall = view(np.int64(vector_at(par, 1)[0]), LibraryCall)
     a, n = vector_at(inputs, FRICTION_INPUTS), len(call.par)
     whole, result = call.whole, call.result
     begin_call(call, element, vector_at(par, 1 + n)[1:], int(a[DFLAG]))
     call_int(
         call.address[0],
-        (whole[0:], a[0:], call.par, whole[1:], a[13:], a[16:], a[2:], a[5:], a[10:], a[11:],
-         whole[2:], whole[3:], result),
+        (whole[0:], a[TIME_IN:], call.par, whole[1:], a[LOCI_IN:], a[LOCJ_IN:], a[X_IN:],
+         a[XDOT_IN:], a[NFORCE_IN:], a[AREA_IN:], whole[2:], whole[3:], result),
     )  # fmt: skip
     force = vector_at(out, 5)
     force[0], force[1], force[2], force[3], force[4] = result[0], result[1], 0.0, 0.0, result[2]

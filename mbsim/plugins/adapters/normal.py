@@ -4,8 +4,6 @@ A file of its own, as `friction` and `library` are, for the cache's sake. The pa
 of such a law begin with an address: of its place (`laws.user_normal`), or of a `NormalCall`.
 """
 
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
-# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -13,13 +11,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import types  # type: ignore[attr-defined]
+from numba import types
 from numba.extending import overload, register_jitable
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.core.address import call_int, vector_at, view
-from mbsim.core.arrays import F1, I1
+from mbsim.core.address import as_tuple, call_int, vector_at, view
+from mbsim.core.arrays import F1, I1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -54,7 +51,7 @@ class NormalCall(NamedTuple):
 
 
 @jitable
-def prepare(call, values, depth, rate):
+def prepare(call: NormalCall, values: F1, depth: float, rate: float) -> None:
     """Write down what one question to a library is."""
     for k in range(len(call.par)):
         call.par[k] = values[k]
@@ -65,14 +62,13 @@ def prepare(call, values, depth, rate):
     call.result[0] = np.nan
 
 
-def call_c(depth, rate, par, out):
+def call_c(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
     """CNFSUB in C.
 
     Its arguments are id, time, par, npar, loci, ni, locj, nj, gap, gapdot, gapdotdot, dflag,
     iflag, result.
     """
-    # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-    call: Any = view(np.int64(vector_at(par, 1)[0]), NormalCall)  # type: ignore[call-arg]
+    call: NormalCall = view(np.int64(vector_at(par, 1)[0]), NormalCall)
     result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
     values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
@@ -89,9 +85,9 @@ def call_c(depth, rate, par, out):
     return 0
 
 
-def call_fortran(depth, rate, par, out):
+def call_fortran(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
     """As `call_c`, with AREA before DFLAG."""
-    call: Any = view(np.int64(vector_at(par, 1)[0]), NormalCall)  # type: ignore[call-arg]
+    call: NormalCall = view(np.int64(vector_at(par, 1)[0]), NormalCall)
     result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
     values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
@@ -107,17 +103,17 @@ def call_fortran(depth, rate, par, out):
     return 0
 
 
-def only_one(result):
+def only_one(result: Any) -> float:
     """Return the force that a function gave as a number, or as a list of one."""
     raise NotImplementedError  # `_only_one` is its compiled form
 
 
 @overload(only_one)
-def _only_one(result):
+def _only_one(result: Any) -> Callable[[Any], float]:
     if isinstance(result, (types.Number, types.Boolean)):
         return lambda result: float(result)
 
-    def from_list(result):
+    def from_list(result: Any) -> float:
         if len(result) != 1:
             raise ValueError("not one")
         return float(result[0])
@@ -129,8 +125,8 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
     """Return CNFSUB with `count` parameters as a C function that signals what it raises."""
     wide = count + 1  # with the address ahead of them
 
-    def entry(depth, rate, par, out):
-        row: Any = to_fixed_tuple(vector_at(par, wide), wide)  # type: ignore[call-arg]
+    def entry(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
+        row = as_tuple(vector_at(par, wide), wide)
         at, values = floats_at(row[0], PLACE), row[1:]
         result = vector_at(out, 3)
         begin(result, depth)

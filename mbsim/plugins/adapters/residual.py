@@ -3,18 +3,16 @@
 A file of its own, as `friction` is, for the cache's sake.
 """
 
-# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
-# what Numba compiles carries no annotations, as in laws/ and core/blend.py
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
 from numba.extending import register_jitable
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from mbsim.core import jit
-from mbsim.core.address import vector_at
+from mbsim.core.address import as_tuple, vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.laws.abi import FRICTION_SIGNATURE
 
@@ -24,14 +22,13 @@ def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -
     first = 1 + 2 * axes
     size = first + 2 * unknowns
 
-    def entry(element, given, par, out):
-        a: Any = vector_at(given, size)  # type: ignore[call-arg]
-        # mypy sees the typing context that Numba passes to an intrinsic as a first argument
-        values: Any = to_fixed_tuple(vector_at(par, count), count)  # type: ignore[call-arg]
-        x: Any = to_fixed_tuple(a[1:], axes)  # type: ignore[call-arg]
-        xdot: Any = to_fixed_tuple(a[1 + axes :], axes)  # type: ignore[call-arg]
-        f: Any = to_fixed_tuple(a[first:], unknowns)  # type: ignore[call-arg]
-        fdot: Any = to_fixed_tuple(a[first + unknowns :], unknowns)  # type: ignore[call-arg]
+    def entry(element: int, given: Pointer, par: Pointer, out: Pointer) -> int:
+        a: F1 = vector_at(given, size)
+        values = as_tuple(vector_at(par, count), count)
+        x = as_tuple(a[1:], axes)
+        xdot = as_tuple(a[1 + axes :], axes)
+        f = as_tuple(a[first:], unknowns)
+        fdot = as_tuple(a[first + unknowns :], unknowns)
         result = vector_at(out, unknowns)
         code = 0
         try:

@@ -1,0 +1,39 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def plugin_option(what: str) -> Decorator:
+    """Return --plugin, which a command takes as `plugins`; `what` such a file is."""
+    return click.option(
+        "--plugin",
+        "plugins",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help=f"{what}; may be repeated.",
+    )
+
+
+def set_option(what: str) -> Decorator:
+    """Return --set for attributes of a deck, which a command takes as `overrides`."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="SELECTOR=VALUE",
+        help=f"{what}, e.g. Force_Contact[1].mu_static=0.3; may be repeated.",
+    )
+
+
+def json_option(what: str) -> Decorator:
+    """Return --json, which a command takes as `as_json`; `what` it prints."""
+    return click.option("--json", "as_json", is_flag=True, help=f"Print {what}.")
