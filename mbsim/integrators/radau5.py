@@ -414,10 +414,7 @@ def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
 
 @jitable
 def arrive(p: Problem, m: Method, t: float, h: float) -> int:
-    """Fill trial point, error and, where that is good enough, f at the trial point.
-
-    Returns a code.
-    """
+    """Fill trial point, error and, where that is small, f at the trial point; return a code."""
     for i in range(len(m.y)):
         m.trial[i] = m.y[i] + m.k[Z + 2, i]
     estimate_error(p, m, t, h)
