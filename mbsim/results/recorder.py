@@ -13,7 +13,7 @@ from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
-from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
+from mbsim.results.blocks import Block, Gathered, Table, first_rows, nothing
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
@@ -92,8 +92,7 @@ class Recorder:
         self.checkpoint: dict[str, Table] = {}
         #: What the log says of all rows, those before a resume included.
         self.watch = Watch(acting(system))
-        self._blocks: list[Block] = []
-        self._bytes = 0
+        self._gathered = Gathered(system)
         self._rows_since_flush = 0
         self._incidents = 0  # rows of state/incidents so far
         self._started = False  # whether state/incident_offsets has its first 0
@@ -177,15 +176,12 @@ class Recorder:
         n, incidents, events = (int(count) for count in rows.used)
         if n == incidents == events == 0:
             return
-        block = cut(self.system, n, incidents, events)
+        block = self._gathered.take(n, incidents, events)
         rows.used[:] = 0
-        self.watch.add(block.time, block.energy, block.wrenches)
-        self._blocks.append(block)
-        self._bytes += block.bytes
         self._rows_since_flush += n + events
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
-        if self._bytes > BUFFER_BYTES:
+        if self._gathered.bytes > BUFFER_BYTES:
             self._write()
 
     def end(self) -> None:
@@ -242,7 +238,7 @@ class Recorder:
     @property
     def empty(self) -> bool:
         """Whether not one row was recorded, by this run or by the one that it resumes."""
-        return not (self._started or self._blocks)
+        return not (self._started or self._gathered.bytes)
 
     def abandon(self) -> None:
         """Leave what an earlier run published as it is, and drop this one."""
@@ -322,12 +318,10 @@ class Recorder:
 
     def _write(self, last: bool = False) -> None:
         """Hand the buffered rows to the store."""
-        if not self._blocks:
-            if self._started:
-                return
-            self._blocks = [nothing(self.system)]
-        block = joined(self._blocks)
-        self._blocks, self._bytes = [], 0
+        if self._started and not self._gathered.bytes:
+            return
+        block = self._gathered.block
+        self._gathered.clear()
         rows = dict(self._signals(block))
         room, size = self._store.room(), sum(table.nbytes for table in rows.values())
         short = room is not None and size > room
@@ -336,6 +330,7 @@ class Recorder:
             rows = dict(self._signals(block))
         # with the first rows, so that a run that dies has them too
         columns = {} if self._started else request_columns(self.system)
+        self.watch.add(block.time, block.energy, block.wrenches)
         if not short:
             self._store.update(rows=rows, attributes=columns, last=last)
         elif len(block.time):
