@@ -191,7 +191,6 @@ class Store:
             rows.dtype,
             maxshape=(None, *rows.shape[1:]) if growing else None,
             chunks=(count if growing else max(1, min(count, len(rows))), *elements),
-            fletcher32=True,
             **_compression(rows),
         )
         if _holds(rows):
