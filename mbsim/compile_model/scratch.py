@@ -14,7 +14,8 @@ from mbsim.arrays.state import Log, State
 from mbsim.geometry.catalog import POINT
 from mbsim.laws import abi
 
-ROWS = 256
+#: Output rows before Python takes them: so many at least, and more where they are short.
+ROWS, MOST_ROWS, ROWS_BYTES = 256, 2048, 1 << 19
 EVENTS = 1024
 INCIDENTS = 100_000
 
@@ -160,19 +161,23 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
 def empty_rows(n: Sizes) -> Rows:
     """Return the tables in which compiled code leaves its output rows."""
     ns = n.slots
+    columns = {
+        "y": n.y,
+        "accel": 6 * n.bodies,
+        "contact": codes.CONTACT_COLUMNS * n.contacts,
+        "energy": 4,
+        "joint": 6 * n.connections,
+        "applied": 6 * n.forces,
+        "value": n.values,
+    }
+    rows = min(max(ROWS, ROWS_BYTES // (8 * sum(columns.values()))), MOST_ROWS)
     events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.sliders
     return Rows(
-        time=np.zeros(ROWS),
-        y=np.zeros((ROWS, n.y)),
-        accel=np.zeros((ROWS, 6 * n.bodies)),
-        contact=np.zeros((ROWS, codes.CONTACT_COLUMNS * n.contacts)),
-        energy=np.zeros((ROWS, 4)),
-        joint=np.zeros((ROWS, 6 * n.connections)),
-        applied=np.zeros((ROWS, 6 * n.forces)),
-        value=np.zeros((ROWS, n.values)),
-        incident_count=np.zeros(ROWS, dtype=np.int64),
+        time=np.zeros(rows),
+        **{name: np.zeros((rows, count)) for name, count in columns.items()},
+        incident_count=np.zeros(rows, dtype=np.int64),
         incidents=np.zeros(
-            (min(ROWS * ns, 2 * ns + INCIDENTS), codes.INC_MEMORY + n.memory + n.region)
+            (min(rows * ns, 2 * ns + INCIDENTS), codes.INC_MEMORY + n.memory + n.region)
         ),
         events=np.zeros((events, 4)),
         used=np.zeros(3, dtype=np.int64),

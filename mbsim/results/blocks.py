@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -36,23 +37,56 @@ class Block:
     events: Table
 
     @property
-    def bytes(self) -> int:
-        """Memory that the block takes."""
-        return sum(int(array.nbytes) for array in vars(self).values())
-
-    @property
     def wrenches(self) -> Table:
         """Force and torque of all elements between markers, in the order of `acting`."""
         return np.hstack([self.joint, self.applied])
 
 
-def cut(system: System, rows: int, incidents: int, events: int) -> Block:
-    """Return a copy of the first rows that the pipeline has left."""
-    counts = {"incidents": incidents, "events": events}
-    found = system.scene.rows
-    return Block(
-        *(getattr(found, f.name)[: counts.get(f.name, rows)].copy() for f in fields(Block))
-    )
+class Gathered:
+    """Rows taken so far, in tables that are filled anew once what they hold is written.
+
+    What is asked of it shares their memory, and is there until the next `clear`.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        found = system.scene.rows
+        self._tables = {f.name: getattr(found, f.name)[:0].copy() for f in fields(Block)}
+        self._widths = {
+            name: table.itemsize * math.prod(table.shape[1:])
+            for name, table in self._tables.items()
+        }
+        self._ends = dict.fromkeys(self._tables, 0)
+
+    def take(self, rows: int, incidents: int, events: int) -> Block:
+        """Add the first rows that the pipeline has left, and return what was added."""
+        counts = {"incidents": incidents, "events": events}
+        added = []
+        for name, first in self._ends.items():
+            end = first + counts.get(name, rows)
+            table = self._tables[name]
+            if end > len(table):
+                table = np.empty((max(end, 2 * len(table)), *table.shape[1:]), table.dtype)
+                table[:first] = self._tables[name][:first]
+                self._tables[name] = table
+            table[first:end] = getattr(self._system.scene.rows, name)[: end - first]
+            self._ends[name] = end
+            added.append(table[first:end])
+        return Block(*added)
+
+    @property
+    def block(self) -> Block:
+        """All rows that are there."""
+        return Block(*(self._tables[name][:end] for name, end in self._ends.items()))
+
+    @property
+    def bytes(self) -> int:
+        """Memory that the rows take."""
+        return sum(end * self._widths[name] for name, end in self._ends.items())
+
+    def clear(self) -> None:
+        """Let go of all rows."""
+        self._ends = dict.fromkeys(self._ends, 0)
 
 
 def first_rows(block: Block, rows: int) -> Block:
@@ -65,17 +99,9 @@ def first_rows(block: Block, rows: int) -> Block:
     return Block(*(getattr(block, f.name)[: counts.get(f.name, rows)] for f in fields(Block)))
 
 
-def joined(blocks: list[Block]) -> Block:
-    """Return several blocks as one."""
-    if len(blocks) == 1:
-        return blocks[0]
-    columns = zip(*(vars(block).values() for block in blocks), strict=True)
-    return Block(*(np.concatenate(column) for column in columns))
-
-
 def nothing(system: System) -> Block:
     """Return a block without rows: a run that failed at once has a complete file too."""
-    return cut(system, 0, 0, 0)
+    return Gathered(system).block
 
 
 def events_table(rows: Table) -> Table:

@@ -5,6 +5,8 @@ that others see. Two files take turns: the part file grows, `publish` renames it
 published one, whose last state, kept by a second name, is brought up to date with the bytes
 written since and becomes the next part file. A kill at any instant leaves the published file
 as it was or as it is now. Nothing is copied whole, unless somebody is reading the older file.
+
+A published file ends with checksums, see `checksums`; a growing one does not.
 """
 
 from __future__ import annotations
@@ -12,9 +14,11 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+from array import array
 from pathlib import Path
 from typing import Any
 
+from mbsim.results.checksums import DamagedError, end_of, renewed, sums_at_end
 from mbsim.results.files import create, locked, unlocked
 
 #: Bytes copied at a time.
@@ -43,11 +47,18 @@ class PartFile:
         self._at = 0
         #: Where bytes were written since both files held the same: [first, end].
         self._new: list[list[int]] = []
+        #: Checksums of the blocks of what was published last, and its size without them.
+        self._sums, self._summed = array("I"), 0
         self._published: tuple[int, int] | None = None  # device and inode of the other file
         self._fd = create(self.path)
         locked(self._fd)
         if resume:
-            self._copy_from(target)
+            try:
+                self._copy_from(target)
+            except OSError:
+                self.failure = OSError("the file is closed")
+                self.close()
+                raise
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Set where the next bytes are read or written, from the start or the end."""
@@ -126,6 +137,8 @@ class PartFile:
             Where the disk fails; what was published stays.
         """
         self.check()
+        older = self._summed
+        self._sum()
         os.fsync(self._fd)
         self.discard(self._older)
         kept = not last and self._keep()
@@ -137,9 +150,18 @@ class PartFile:
             found = os.fstat(done)
             self._published = found.st_dev, found.st_ino
             if not last:
-                self._follow(done, kept)
+                self._follow(done, kept, older)
         finally:
             os.close(done)
+
+    def _sum(self) -> None:
+        """Write the checksums behind all that is there."""
+        size = self._size()
+        # what lies behind an end that has moved is new too, written or not
+        moved = [[min(size, self._summed), size]] if size != self._summed else []
+        self._sums = renewed(self._fd, self._sums, _merged(self._new + moved), size)
+        self._summed = size
+        _write(self._fd, end_of(self._sums, size), size)
 
     def _keep(self) -> bool:
         """Give the published file a second name; return whether it is there and ours."""
@@ -152,15 +174,19 @@ class PartFile:
             return False
         return (found.st_dev, found.st_ino) == self._published
 
-    def _follow(self, done: int, kept: bool) -> None:
-        """Make the next part file: the older one with what is new in `done`, else a whole copy."""
+    def _follow(self, done: int, kept: bool, older: int) -> None:
+        """Make the next part file: the older one with what is new in `done`, else a whole copy.
+
+        `older` is the size of the older one without its checksums.
+        """
         if kept:
             self._fd = os.open(self._older, os.O_RDWR)
             # somebody who reads it has it locked; where no lock can be had nobody knows
             if locked(self._fd):
+                os.ftruncate(self._fd, older)
                 for first, end in _merged(self._new):
                     _copy(done, self._fd, first, end)
-                os.ftruncate(self._fd, os.fstat(done).st_size)
+                os.ftruncate(self._fd, self._summed)
                 os.replace(self._older, self.path)
                 self._new = []
                 return
@@ -172,10 +198,16 @@ class PartFile:
         self._copy_from(self.target)
 
     def _copy_from(self, path: Path) -> None:
-        """Fill the part file with another's bytes."""
+        """Fill the part file with another's bytes; raise `DamagedError` where they are not right."""
         with path.open("rb") as source:
-            _copy(source.fileno(), self._fd, 0, os.fstat(source.fileno()).st_size)
-        self._new = []
+            handle = source.fileno()
+            found = sums_at_end(handle)
+            sums, size = found or (array("I"), os.fstat(handle).st_size)
+            _copy(handle, self._fd, 0, size)
+        whole = renewed(self._fd, array("I"), [[0, size]], size)
+        if found is not None and sums != whole:
+            raise DamagedError("its bytes are not those that were written")
+        self._sums, self._summed, self._new = whole, size, []
 
     @staticmethod
     def discard(path: Path) -> None:
@@ -211,8 +243,14 @@ def _copy(source: int, target: int, first: int, end: int) -> None:
         piece = os.pread(source, min(_PIECE, end - first), first)
         if not piece:
             return
-        view = memoryview(piece)
-        while len(view):
-            done = os.pwrite(target, view, first)
-            view = view[done:]
-            first += done
+        _write(target, piece, first)
+        first += len(piece)
+
+
+def _write(target: int, data: bytes, first: int) -> None:
+    """Write all bytes to a place of an open file."""
+    view = memoryview(data)
+    while len(view):
+        done = os.pwrite(target, view, first)
+        view = view[done:]
+        first += done

@@ -15,6 +15,7 @@ import numpy as np
 
 from mbsim.errors import ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
+from mbsim.results.checksums import CheckedFile
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 
 if TYPE_CHECKING:
@@ -474,12 +475,16 @@ def _opened(path: Path) -> h5py.File:
     """
     import h5py
 
-    for _ in range(_TRIES):
+    for left in reversed(range(_TRIES)):
         try:
-            return h5py.File(path, "r", locking="best-effort")
+            found = CheckedFile(path, lock=left > 0)
+            if found.checked:
+                return h5py.File(found, "r")
+            found.close()
+            return h5py.File(path, "r", locking="best-effort" if left else False)
         except BlockingIOError:
             time.sleep(_PAUSE)
-    return h5py.File(path, "r", locking=False)
+    raise AssertionError("without a lock nobody is waited for")
 
 
 def end_state(results: Results) -> dict[str, dict[str, list[float]]]:

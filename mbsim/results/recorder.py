@@ -16,7 +16,7 @@ from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
-from mbsim.results.blocks import Block, Table, cut, first_rows, joined, nothing
+from mbsim.results.blocks import Block, Gathered, Table, first_rows, nothing
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
@@ -96,8 +96,7 @@ class Recorder:
         self.checkpoint: dict[str, Table] = {}
         #: What the log says of all rows, those before a resume included.
         self.watch = Watch(acting(system))
-        self._blocks: list[Block] = []
-        self._bytes = 0
+        self._gathered = Gathered(system)
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
@@ -183,14 +182,11 @@ class Recorder:
         n, incidents, events = (int(count) for count in rows.used)
         if n == incidents == events == 0:
             return
-        block = cut(self.system, n, incidents, events)
+        block = self._gathered.take(n, incidents, events)
         rows.used[:] = 0
-        self.watch.add(block.time, block.energy, block.wrenches)
-        self._blocks.append(block)
-        self._bytes += block.bytes
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
-        if self._bytes > BUFFER_BYTES:
+        if self._gathered.bytes > BUFFER_BYTES:
             self._write()
 
     def end(self) -> None:
@@ -247,7 +243,7 @@ class Recorder:
     @property
     def empty(self) -> bool:
         """Whether not one row was recorded, by this run or by the one that it resumes."""
-        return not (self._started or self._blocks)
+        return not (self._started or self._gathered.bytes)
 
     def abandon(self) -> None:
         """Leave what an earlier run published as it is, and drop this one."""
@@ -332,16 +328,15 @@ class Recorder:
 
     def _write(self, last: bool = False) -> None:
         """Hand the buffered rows to the store."""
-        if not self._blocks:
-            if self._started:
-                return
-            self._blocks = [nothing(self.system)]
-        block = joined(self._blocks)
-        self._blocks, self._bytes = [], 0
+        if self._started and not self._gathered.bytes:
+            return
+        block = self._gathered.block
+        self._gathered.clear()
         rows = dict(self._signals(block))
         room, size = self._store.room(), sum(table.nbytes for table in rows.values())
         # with the first rows, so that a run that dies has them too
         columns = {} if self._started else request_columns(self.system)
+        self.watch.add(block.time, block.energy, block.wrenches)
         if room is not None and size > room:
             self._fill(first_rows(block, max(0, len(block.time) * room // size)), columns)
         self._store.update(rows=rows, attributes=columns, last=last)

@@ -190,4 +190,7 @@ def _elements(system: System, block: Block, asked: SignalFilter) -> Iterator[tup
 
 def _columns_of(wrenches: Table, places: list[int], part: slice) -> Table:
     """Return forces or torques of some elements, (rows, elements, 3)."""
+    first, end = places[0], places[-1] + 1
+    if places == list(range(first, end)):
+        return wrenches[:, first:end, part]  # as they lie, without a copy
     return wrenches[:, places, part]

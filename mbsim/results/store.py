@@ -29,8 +29,8 @@ Value = str | float | int
 _CHUNK = 1 << 16
 #: Rows of a chunk where nobody knows how many there will be: events, points of contact.
 _FEW = 256
-#: Groups whose datasets do not have a row an output time.
-_UNKNOWN = ("events", "state")
+#: Datasets that do not have a row an output time.
+_UNKNOWN = ("events", "state/incidents")
 #: Most elements in a chunk, so that one of thousands is read without all the others.
 _ELEMENTS = 64
 #: A signal is compressed where its first rows, up to so many bytes of them, shrink to this share:
@@ -187,7 +187,8 @@ class Store:
                 dataset = file[name]
                 count = dataset.shape[0]
                 dataset.resize(count + len(rows), axis=0)
-                dataset[count:] = rows
+                if _holds(rows):
+                    dataset[count:] = rows
             return
         if not growing and (self.target is None or not rows.size):
             file.create_dataset(name, data=rows)
@@ -196,16 +197,18 @@ class Store:
         if len(elements) > 1:
             elements = (min(elements[0], _ELEMENTS), *elements[1:])
         width = rows.itemsize * int(np.prod(elements))
-        likely = self.rows if name.partition("/")[0] not in _UNKNOWN else max(_FEW, len(rows))
+        likely = self.rows if name not in _UNKNOWN else max(_FEW, len(rows))
         count = max(1, min(likely, _CHUNK // max(1, width)))
-        file.create_dataset(
+        dataset = file.create_dataset(
             name,
-            data=rows,
+            rows.shape,
+            rows.dtype,
             maxshape=(None, *rows.shape[1:]) if growing else None,
             chunks=(count if growing else max(1, min(count, len(rows))), *elements),
-            fletcher32=True,
             **_compression(rows),
         )
+        if _holds(rows):
+            dataset[...] = rows
 
     def _put(self, file: h5py.File, name: str, array: Table) -> None:
         """Write one dataset whole."""
@@ -247,11 +250,20 @@ def _text(value: Any) -> Any:
     return value
 
 
+def _holds(rows: Table) -> bool:
+    """Return whether anything is not the zero that HDF5 reads where nothing was written."""
+    if not rows.size or rows.dtype.kind not in "fiu":
+        return bool(rows.size)
+    # by its bits: a negative zero is one that must be written
+    bits = rows.view(f"u{rows.itemsize}")
+    return bool(bits.flat[-1]) or bool(bits.any())
+
+
 def _compression(rows: Table) -> dict[str, Any]:
     """Return how a signal that begins with these rows is compressed, if at all."""
     wanted = max(1, _SAMPLE // max(1, rows[:1].nbytes))
     sample = np.ascontiguousarray(rows[:: max(1, len(rows) // wanted)][:wanted])
-    if sample.nbytes < 4096:
+    if sample.nbytes < 4096 or not _holds(sample):
         return {}
     # as HDF5's filter does: first bytes of all numbers, then second ones
     shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T.tobytes()

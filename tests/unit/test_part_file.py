@@ -43,8 +43,11 @@ def add(file: h5py.File, rows: int) -> None:
 
 def rows_of(target: Path) -> int:
     """Return how many rows a published file has, all of which are right."""
+    with open_results(target) as results:
+        x = results["x"]
+    # as readers do that know nothing of the checksums
     with h5py.File(target, "r") as file:
-        x = file["x"][()]
+        np.testing.assert_array_equal(x, file["x"][()])
     np.testing.assert_array_equal(x, np.arange(len(x))[:, None] + [0.0, 0.25, 0.5])
     return len(x)
 

@@ -110,7 +110,7 @@ def test_many_writes_give_the_file_of_one(tmp_path: Path, monkeypatch: Any) -> N
         for first in range(0, 60, 10):
             add_rows(system, first, 10, events=first == 0)
             recorder.take()
-            assert recorder._bytes <= 2000
+            assert recorder._gathered.bytes <= 2000
             recorder.flush(checkpoint(first + 10))
         with recorder.close("finished", STATS, system.scene.log.contacts) as parts:
             for name in whole.keys():
@@ -125,9 +125,10 @@ def test_take_empties_the_rows(tmp_path: Path) -> None:
     add_rows(system, 0, 5)
     recorder.take()
     assert list(system.scene.rows.used) == [0, 0, 0]
+    assert not recorder.due()
+    recorder.close("finished", STATS, system.scene.log.contacts).close()
     np.testing.assert_array_equal(recorder.watch.first, [0, 0, 0, 0])
     np.testing.assert_array_equal(recorder.watch.last, [4, 8, 12, 16])
-    assert not recorder.due()
 
 
 def test_run_without_rows_is_complete(tmp_path: Path) -> None:

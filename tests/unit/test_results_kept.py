@@ -144,7 +144,7 @@ def test_what_fits_on_a_full_disk_is_kept(
         recorder.flush(checkpoint(flushed))
     add_rows(system, flushed, 60 - flushed)
     recorder.take()
-    size = sum(table.nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    size = sum(table.nbytes for _, table in recorder._signals(recorder._gathered.block))
     monkeypatch.setattr(PartFile, "room", lambda part: (1 << 18) + int(0.7 * size))
     with pytest.raises(ResultsError, match=r"no space left on device; rows up to time \d"):
         close(recorder)

@@ -159,7 +159,7 @@ def test_a_checkpoint_that_does_not_say_its_arrays_is_refused(tmp_path, monkeypa
             "digests",
             property(lambda self: {kind.attribute: "" for kind in kinds.values()}),
         )
-        patch.setattr(identity.Identity, "packed", earlier)
+        patch.setattr(identity.Identity, "packed", property(earlier))
         interrupted(tmp_path)
     with pytest.raises(ModelError, match=r"with other arrays; a run goes on as it began"):
         Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
