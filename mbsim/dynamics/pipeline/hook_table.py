@@ -67,10 +67,16 @@ def _has_contacts(scene: Scene, method: Method) -> bool:
     return len(scene.contacts.id) > 0
 
 
-def _contacts(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import serve_contacts
+def _of_contacts(name: str) -> Callable[[Scene], Callable[..., Any]]:
+    """Return what finds a hook of contacts that is the same in all scenes that have it."""
 
-    return serve_contacts
+    def entry(scene: Scene) -> Callable[..., Any]:
+        from mbsim.dynamics.pipeline import contact_hooks
+
+        found: Callable[..., Any] = getattr(contact_hooks, name)
+        return found
+
+    return entry
 
 
 def _gauges(scene: Scene) -> Callable[..., Any]:
@@ -84,20 +90,8 @@ def _has_faces(scene: Scene, method: Method) -> bool:
     return bool((scene.kinds.whole > 0.0).any())
 
 
-def _tilting(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import damp_contact
-
-    return damp_contact
-
-
 def _recalls(scene: Scene, method: Method) -> bool:
     return bool((scene.contacts.memory > 0).any())
-
-
-def _recall(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import recall_friction
-
-    return recall_friction
 
 
 def _has_contact_slopes(scene: Scene, method: Method) -> bool:
@@ -108,12 +102,6 @@ def _contact_slopes(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline.implicit_hooks import slopes_of_contacts
 
     return slopes_of_contacts
-
-
-def _effects(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import measure_effects
-
-    return measure_effects
 
 
 def _has_programs(scene: Scene, method: Method) -> bool:
@@ -319,7 +307,7 @@ TABLE = (
         Hook.CONTACTS,
         _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
         _has_contacts,
-        _contacts,
+        _of_contacts("serve_contacts"),
         "does what contacts are asked for: `Contacts`",
         "an answer, or less a code",
     ),
@@ -334,14 +322,14 @@ TABLE = (
         Hook.TILTING,
         _INT(_INT, _INT, _T, _T, _PTR),  # context, slot, t, normal force, y
         _has_faces,
-        _tilting,
+        _of_contacts("damp_contact"),
         "finds the couple against tilting of a flat face that is one incident",
     ),
     Row(
         Hook.RECALL,
         _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
         _recalls,
-        _recall,
+        _of_contacts("recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
         "an answer, or less a code",
     ),
@@ -459,7 +447,7 @@ TABLE = (
         Hook.EFFECTS,
         _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
         _has_contact_slopes,
-        _effects,
+        _of_contacts("measure_effects"),
         "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
         "the measure; a failure is noted",
     ),

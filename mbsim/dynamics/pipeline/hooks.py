@@ -261,12 +261,11 @@ HOOKS = {
     "project": _project,
     "norm": _norm,
     "commit": _commit,
-    "look": _look,
     "limit": _limit,
     "output": _output,
     "reject": _reject,
 }
 #: Of a scene with contacts.
-CONTACT_HOOKS = {"check": _check, "inner": _inner}
+CONTACT_HOOKS = {"check": _check, "inner": _inner, "look": _look}
 #: Of a method without error estimate.
 FIXED_STEP_HOOKS = {"stable": stable, "retract": retract}
