@@ -63,7 +63,7 @@ def test_a_damaged_file_is_not_gone_on_with(tmp_path: Path, at: int) -> None:
     data = bytearray(path.read_bytes())
     data[at] ^= 0x10
     path.write_bytes(data)
-    with pytest.raises((ModelError, ResultsError), match="damaged|cannot be read"):
+    with pytest.raises((ModelError, ResultsError), match=r"damaged|cannot be read"):
         Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
     assert path.read_bytes() == data
 

@@ -49,7 +49,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.events.switching import switching_hook
 
         hooks["switching"] = switching_hook
-    found = {"check": 0, "inner": 0} | addresses(hooks)
+    found = {"check": 0, "inner": 0, "look": 0} | addresses(hooks)
     problem = Problem(int(table.ctypes.data), **found)
     fill(scene)
     if "switching" in hooks:
