@@ -23,25 +23,29 @@ class Hook(IntEnum):
 
     CONTACTS = 0  # what contacts are asked for: `Contacts`
     FCL = 1  # distances of pairs without a closed form
-    VALUE = 2  # value of an expression
-    JET = 3  # its value and rates
-    APPLIED = 4  # forces between markers, states of the user's own
-    WRENCH = 5  # a bushing or a vector force
-    ELEMENT = 6  # a Force_Element by its residual
-    JOINTS = 7  # what joints are asked for: `Joints`
-    STICKING = 8  # contacts whose friction holds without give: `Sticking`
-    REACTION_FORCES = 9  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 10  # the whole rhs
-    TANGENT = 11  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 12  # how forces of equations turn with the bodies
-    MEMORY = 13  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 14  # derivatives of forces between markers
-    MEMORY_PAIR = 15  # as MEMORY in complex systems
-    GAUGES = 16  # what is measured of contacts: `Gauges`
-    DRY = 17  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 18  # turns of followed angles
-    NEAR = 19  # the lists of near pairs
-    REQUESTS = 20  # expressions of requests
+    TILTING = 2  # damping of what tilts on a flat face that is one incident
+    RECALL = 3  # friction of contacts that keeps something: `Recall`
+    VALUE = 4  # value of an expression
+    JET = 5  # its value and rates
+    APPLIED = 6  # forces between markers, states of the user's own
+    WRENCH = 7  # a bushing or a vector force
+    ELEMENT = 8  # a Force_Element by its residual
+    JOINTS = 9  # what joints are asked for: `Joints`
+    STICKING = 10  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 11  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 12  # the whole rhs
+    TANGENT = 13  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 14  # how forces of equations turn with the bodies
+    CONTACT_SLOPES = 15  # derivatives of contacts: `ContactSlopes`
+    MEMORY = 16  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 17  # derivatives of forces between markers
+    MEMORY_PAIR = 18  # as MEMORY in complex systems
+    GAUGES = 19  # what is measured of contacts: `Gauges`
+    EFFECTS = 20  # what an error does to contacts, as implicit methods ask: `Effects`
+    DRY = 21  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 22  # turns of followed angles
+    NEAR = 23  # the lists of near pairs
+    REQUESTS = 24  # expressions of requests
 
 
 class Contacts(IntEnum):
@@ -64,14 +68,34 @@ class Gauges(IntEnum):
     """What is measured of contacts."""
 
     ERROR = 0  # square of the scaled error of what incidents carry
-    FRICTION = 1  # change of friction that an error causes, over the normal force
-    REVERSAL = 2  # the same, with a slip that it turns round
-    IMPACT = 3  # change of a closing speed that an error causes, over that in a step
-    STEP = 4  # how much of a step may be tried
+    STEP = 1  # how much of a step may be tried
+
+
+class Effects(IntEnum):
+    """What an error does to contacts."""
+
+    FRICTION = 0  # change of friction that it causes, over the normal force
+    REVERSAL = 1  # the same, with a slip that it turns round
+    IMPACT = 2  # change of a closing speed that it causes, over that in a step
+
+
+class Recall(IntEnum):
+    """What friction of contacts is asked for that keeps something: see contact.memory."""
+
+    GIVE = 0  # give the law what it kept
+    TAKE = 1  # keep what the law made of it
+    COMMIT = 2  # keep it of a step: 0, 1 if f changed, HELD_OTHERWISE
+
+
+class ContactSlopes(IntEnum):
+    """What derivatives of contacts are asked for."""
+
+    COUPLE = 0  # couple the bodies that touch
+    FILL = 1  # add the derivatives
 
 
 class Joints(IntEnum):
-    """What joints are asked for; the last four are for assembly, in Python."""
+    """What joints are asked for; CHOOSE to SPEED_UP are for assembly, in Python."""
 
     PROJECT_TREE = 0  # bring a trial point onto the equations, near a fold
     ACCELERATE = 1  # replace accelerations by those that constraints leave
@@ -83,6 +107,7 @@ class Joints(IntEnum):
     MATRIX = 7  # residuals and matrix of all equations at y
     DISPLACE = 8  # displace bodies by the multipliers as they stand
     SPEED_UP = 9  # change velocities by them
+    AUDIT = 10  # look at the residuals of equations
 
 
 class Dry(IntEnum):

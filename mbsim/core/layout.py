@@ -1,4 +1,4 @@
-"""How the ODE vector of a mechanism begins, for methods that tell positions from velocities."""
+"""How the ODE vector of a mechanism begins; methods are told by hooks (`core.problem`)."""
 
 from __future__ import annotations
 

@@ -42,6 +42,28 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 | look    | y at an inner point, - | code; called where `inner` before asked for it             |
 | output  | y at an output time, - | 0, or FULL: take the rows away before going on             |
 
+Numbers of y are POSITIONs, the VELOCITYs that positions follow from, or STATEs of first order
+(`scheme.make`). Bodies turn, so positions are no sums of velocities: a method that takes them for
+more than numbers asks these hooks, of a problem that has any.
+
+| hook       | a, b                                    | returns                               |
+|------------|-----------------------------------------|---------------------------------------|
+| retract    | y, b (velocities in, positions out)     | code; y's positions moved on for a    |
+|            |                                         | time h by the velocities in b         |
+| difference | y, b (h: what is asked)                 | code; AS_VELOCITIES: b's velocities   |
+|            |                                         | grow by those that change y's         |
+|            |                                         | positions, in a time of one, by b's;  |
+|            |                                         | AS_POSITIONS: b's positions are the   |
+|            |                                         | change of y's by b's velocities;      |
+|            |                                         | BRACKET: b's velocities become their  |
+|            |                                         | Lie bracket with y's, 0 where nothing |
+|            |                                         | turns; BOW (t: a step): b's           |
+|            |                                         | velocities are by how much the cubic  |
+|            |                                         | of a uniform turn of y's is off in    |
+|            |                                         | that step; TURNED: 1 if b's positions |
+|            |                                         | are turned against y's across y's     |
+|            |                                         | velocities, else 0                    |
+
 Implicit methods need the linearisation of f as well, in y's layout and with the bodies' part in
 second-order form. With d = (dx, dq, dv, dw, dz) for bodies at x with quaternion q, velocity v
 and angular velocity w, and states z of first order, and real or complex c1, c2, c3, it solves
@@ -105,6 +127,8 @@ class Problem(NamedTuple):
     solve: int = 0
     factor_pair: int = 0
     solve_pair: int = 0
+    retract: int = 0  # this and the next only for methods that know positions from velocities
+    difference: int = 0
 
 
 def addresses(hooks: Mapping[str, Callable[..., Any]]) -> dict[str, int]:
@@ -137,6 +161,12 @@ FRICTION_ALONE, IMPACTS_ALONE = -1.0, -2.0
 
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0
+
+#: What a number of y is.
+POSITION, VELOCITY, STATE = range(3)
+
+#: What `difference` is given for h.
+AS_VELOCITIES, AS_POSITIONS, BRACKET, BOW, TURNED = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 # what `advance` returns

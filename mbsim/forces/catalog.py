@@ -43,7 +43,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
@@ -70,10 +70,57 @@ class Parameter(NamedTuple):
     count: int = 1  # type: ignore[assignment]  # hides a method of tuples
     alias: str = ""
     words: tuple[str, ...] = ()
+    others: Mapping[str, str] = {}  # other spellings of a word, separated by blanks
+    kind: str = ""  # what it is if neither number nor word: a name that the reader knows
     optional: bool = False  # it is None where the deck does not give it
     about: str = ""  # its meaning, for the manual
     unit: str = ""
     shown: str = ""  # what the manual gives for the default, unless it is a number
+
+
+class Given(Protocol):
+    """What a deck gives of an element, for a kind that reads its own statement."""
+
+    def given(self, name: str) -> bool:
+        """Return whether the deck gives an attribute, faulty or not."""
+
+    def fault(self, message: str, attribute: str = "") -> None:
+        """Say what is wrong, of an attribute if one is named."""
+
+    def by_user(self, expressions: tuple[str, ...] = ("expr",)) -> bool:
+        """Return whether a user's function stands in place of expressions."""
+
+    def subroutine(self, default: str) -> Any:
+        """Return the user's function, called `default` where the deck does not name it."""
+
+    def result(self, user: Any, component: int = 0) -> Any:
+        """Return what a user's function gives as an expression."""
+
+    def check_law(self, attribute: str) -> None:
+        """Check what a law of friction or of normal forces needs, which an attribute names."""
+
+
+class Reading(NamedTuple):
+    """How a kind with elements of its own class reads its statement.
+
+    ``read(given, values)`` returns the fields of the element beside id, label and source, or None
+    where too much is missing; `values` are those that the deck gives without fault, and 0 for ids
+    that must be there and are not.
+    """
+
+    attributes: tuple[Parameter, ...]
+    read: Callable[[Given, dict[str, Any]], Mapping[str, Any] | None]
+
+
+def marker(name: str, about: str = "") -> Parameter:
+    """Return the attribute that names a marker, ``i_marker_id``."""
+    return Parameter(name, None, kind="id", about=about or f"marker {name[0].upper()}")
+
+
+#: The attributes of a user's function.
+USERS = Parameter("usrsub", kind="users function")
+#: Attributes of vector forces that are expressions.
+COMPONENTS = tuple(f"{name}_expression" for name in ("fx", "fy", "fz", "tx", "ty", "tz"))
 
 
 class Adams(NamedTuple):
@@ -209,6 +256,7 @@ class ForceKind(NamedTuple):
     functions: str
     adams: Adams | None
     table: str
+    reading: Reading | None
     spellings: str
     changes: tuple[str, ...]
     refused: Mapping[str, str]
@@ -246,6 +294,7 @@ def force(
     functions: str = "",
     adams: Adams | None = None,
     table: str = "",
+    reading: Reading | None = None,
     spellings: str = "",
     changes: str = "",
     refused: Mapping[str, str] | None = None,
@@ -274,8 +323,10 @@ def force(
     adams : Adams, optional
         The statement of an Adams deck.
     table : str, optional
-        The field of `Model` that has its elements, where the reader makes elements of their own
-        class; otherwise they are `MarkerForce`.
+        The field of `Model` that has its elements, where they are of a class of their own;
+        otherwise they are `MarkerForce`.
+    reading : Reading, optional
+        How the statement of such elements is read.
     spellings : str, optional
         What requests may call it beside its name and its statement.
     changes : str, optional
@@ -299,6 +350,7 @@ def force(
         functions,
         adams,
         table,
+        reading,
         spellings,
         tuple(changes.split()),
         refused or {},

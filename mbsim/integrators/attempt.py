@@ -5,26 +5,21 @@ from __future__ import annotations
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HIDES, Problem
-from mbsim.integrators.branches import (
-    NEAR_CHANGE,
-    ask_switching,
-    first_switch,
-    hidden_side,
-    horizon_of,
-    load_of,
-    way_error,
-)
+from mbsim.core.problem import Problem
+from mbsim.integrators.branches import FIRST, FITTED, NEAR_CHANGE, TRIED
 from mbsim.integrators.control import smallest_step
-from mbsim.integrators.events import first_event, happens_at
+from mbsim.integrators.events import AT_END
+from mbsim.integrators.events import FIRST as FIRST_EVENT
 from mbsim.integrators.scheme import (
     CUT_FROM,
     LAST_ERROR,
     NEXT_OUTPUT,
     OWN_TIME,
+    REACH,
     SHOWN,
     STIFFNESS,
     SWITCH_CUT,
+    SWITCHED,
     Method,
     Steps,
     failure_or,
@@ -52,49 +47,37 @@ def output_within(m: Method, times: F1, t: float) -> bool:
 @jitable
 def attempt(
     p: Problem, m: Method, steps: Steps, t: float, h: float, times: F1
-) -> tuple[int, float, float, float, float]:
+) -> tuple[int, float, float]:
     """Try a step of length h; return a hook's code, the check's part, the inner point asked for.
-
-    And a part of it at which a force is on another branch, 0 for none, and what `horizon_of`
-    allows.
 
     A step that fails is not checked. The dense output of one that will be taken is fitted
     before the problem is committed, while its hooks still know the step's begin. Single impacts
     are not guarded, nor their peaks looked for, by a method whose step is the problem's bound.
     """
+    m.memory[SWITCHED], m.memory[REACH] = 0.0, 1.0
     code = failure_or(m, call_int(steps.attempt, (steps.context, t, h, m.y, m.trial)))
     if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
-        return code, 1.0, -1.0, 0.0, 1.0
-    asked, switched, bends, hides, begin, reach = -1.0, 0.0, False, False, -1.0, 1.0
+        return code, 1.0, -1.0
+    asked, looks = -1.0, False
     # one that ends before a switch at the end is taken for the end
     until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
         if p.check != 0:
             part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
             if part < 1.0:
-                return 0, part, -1.0, 0.0, 1.0
+                return 0, part, -1.0
         if p.inner != 0:
             asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
-    if p.switching != 0:
-        differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
-        switched = 1.0 if differs > 0 else 0.0
-        if switched == 0.0:
-            hides = ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0
-            bends = ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0
-            begin = load_of(p, m, t, m.y)
-    looks = switched > 0.0 or hides or bends or begin >= 0.0
+    if steps.branches != 0:
+        looks = call_float(steps.branches, (steps.context, TRIED, t, h, 0.0)) == 1.0
     # a peak is looked for in every step of what trembles at its bound of stability: not shown
     shown = output_within(m, times, until)
     m.memory[SHOWN] = 1.0 if shown else 0.0
-    if asked >= 0.0 or shown or looks or p.happens != 0:
+    if asked >= 0.0 or shown or looks or steps.events != 0:
         code = call_int(steps.fit_dense, (steps.context, t, h, m.y, m.trial))
-    if begin >= 0.0 and code == 0:
-        reach = horizon_of(p, m, t, h, begin)
-    if hides and code == 0:
-        switched = hidden_side(p, m, t, h)
-    if bends and code == 0 and switched == 0.0:
-        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
-    return code, 1.0, asked, switched, reach
+    if looks and code == 0:
+        call_float(steps.branches, (steps.context, FITTED, t, h, 0.0))
+    return code, 1.0, asked
 
 
 @jitable
@@ -117,27 +100,28 @@ def attempt_to_event(
     uncut, stiffness = -1.0, 0.0
     # `attempt` is named once: each place where it is called is compiled anew
     while True:
-        code, part, asked, switched, reach = attempt(p, m, steps, t, h, times)
+        code, part, asked = attempt(p, m, steps, t, h, times)
         failed = code != 0 or not m.memory[LAST_ERROR] <= 1.0 or part < 1.0
         if uncut < 0.0:
             uncut, stiffness = m.memory[LAST_ERROR], m.memory[STIFFNESS]
         # whether stability bounds a step is asked of what it would be without the event
         m.memory[STIFFNESS] = stiffness
-        if switched > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
+        if m.memory[SWITCHED] > 0.0 and not failed and cuts < MOST_CUTS and not shortened:
             cuts += 1
-            cut = first_switch(p, m, t, h, whole, switched)
+            cut = call_float(steps.branches, (steps.context, FIRST, t, h, whole))
             if floor < cut < h:
                 h = cut
                 continue
-        if reach < 1.0 and not failed and short < MOST_SHORT and not shortened:
+        if m.memory[REACH] < 1.0 and not failed and short < MOST_SHORT and not shortened:
             short += 1
-            if reach * h > floor:
-                h *= reach
+            if m.memory[REACH] * h > floor:
+                h *= m.memory[REACH]
                 continue
         m.memory[SWITCH_CUT] = 1.0 if cuts > 0 else 0.0
-        if p.happens == 0 or failed:
+        if steps.events == 0 or failed:
             return failure_or(m, code), part, asked, h, uncut
-        cut = first_event(p, m, t, h, times)
+        looked = (steps.context, FIRST_EVENT, t, h, times, len(times))
+        cut = call_float(steps.events, looked)
         before = cut > h
         good = (not shortened or nudge > near) if before else (h - cut <= near or h <= floor)
         if good or retakes == MOST_RETAKES:
@@ -150,5 +134,5 @@ def attempt_to_event(
             h = max(cut, floor)
             shortened = True
     # the problem's hooks expect its last evaluation at the trial point
-    happens_at(p, m, t, h, 1.0)
+    call_float(steps.events, (steps.context, AT_END, t, h, times, len(times)))
     return failure_or(m, code), part, asked, h, uncut

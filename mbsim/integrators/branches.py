@@ -1,17 +1,40 @@
 """Where within a step a force changes its branch, and how far the load of what holds is known.
 
-The problem's hook `switching` tells branches apart (`core.problem`).
+The problem's hook `switching` tells branches apart (`core.problem`). What the driver asks of them
+stands behind an address, `serve`: problems without such forces compile nothing of it.
 """
 
 from __future__ import annotations
 
 import math
 
+from numba import types
+
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, HALF, HALVES, LOAD, SETTLE, Problem
-from mbsim.integrators.scheme import TOL, VAIN, Method, answer_of, interpolate
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS, SETTLE, Problem
+from mbsim.integrators.scheme import (
+    LAST_ERROR,
+    LOAD_THEN,
+    LOOKS,
+    REACH,
+    SWITCH_CUT,
+    SWITCHED,
+    TOL,
+    VAIN,
+    Method,
+    answer_of,
+    in_workspace,
+    interpolate,
+)
+
+#: Of `serve`: context, what is asked, time and step, and of FIRST how long that was meant to be.
+ASKED = types.float64(types.int64, types.int64, types.float64, types.float64, types.float64)
+#: A step begins where nothing is known; one was tried, is fitted, may be cut; one was taken.
+BEGIN, TRIED, FITTED, FIRST, TAKEN = range(5)
+#: What is looked for within a step (`LOOKS`): sides that change twice, ways that bend.
+SIDES, WAYS = 1.0, 2.0
 
 #: At so many parts of a step for a side that is left and come back to: near the end of a touch what
 #: holds slips for a moment, a small part of a step of a high order.
@@ -143,3 +166,48 @@ def hidden_side(p: Problem, m: Method, t: float, h: float) -> float:
             part = k / LOOKS_FOR_HIDDEN
     ask_switching(p, m, t + h, ASK, m.trial, m.error)
     return part
+
+
+@jitable
+def look_at(p: Problem, m: Method, t: float, h: float) -> bool:
+    """Ask for the branches at the trial point; return whether the step is to be looked into."""
+    m.memory[LOOKS], m.memory[LOAD_THEN] = 0.0, -1.0
+    if ask_switching(p, m, t + h, ASK, m.trial, m.error) > 0:
+        m.memory[SWITCHED] = 1.0
+        return True
+    if ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0:
+        m.memory[LOOKS] += SIDES
+    if ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0:
+        m.memory[LOOKS] += WAYS
+    m.memory[LOAD_THEN] = load_of(p, m, t, m.y)
+    return m.memory[LOOKS] > 0.0 or m.memory[LOAD_THEN] >= 0.0
+
+
+@jitable
+def look_into(p: Problem, m: Method, t: float, h: float) -> None:
+    """Look for what `look_at` asked for in the step, which is fitted."""
+    looks = m.memory[LOOKS]
+    if m.memory[LOAD_THEN] >= 0.0:
+        m.memory[REACH] = horizon_of(p, m, t, h, m.memory[LOAD_THEN])
+    if looks == SIDES or looks == SIDES + WAYS:
+        m.memory[SWITCHED] = hidden_side(p, m, t, h)
+    if looks >= WAYS and m.memory[SWITCHED] == 0.0:
+        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
+
+
+def serve(context: int, what: int, t: float, h: float, whole: float) -> float:
+    """What the driver asks of branches; return an answer of TRIED and FIRST, else 0."""
+    p, m = in_workspace(context)
+    if what == TRIED:
+        return 1.0 if look_at(p, m, t, h) else 0.0
+    if what == FITTED:
+        look_into(p, m, t, h)
+    elif what == FIRST:
+        return first_switch(p, m, t, h, whole, m.memory[SWITCHED])
+    elif what == BEGIN:
+        ask_switching(p, m, t, SETTLE, m.y, m.error)
+    else:
+        changed = ask_switching(p, m, t + h, PASS, m.trial, m.error) > 0
+        in_vain = m.memory[SWITCH_CUT] == 1.0 and not changed
+        m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
+    return 0.0

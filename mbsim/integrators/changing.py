@@ -26,9 +26,10 @@ from __future__ import annotations
 
 import math
 
+from numba import types
+
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     BEGUN,
     BEGUN_WORK,
@@ -54,8 +55,11 @@ from mbsim.integrators.scheme import (
     Method,
     Steps,
     failure_or,
+    in_workspace,
 )
 
+#: Of `serve`: context, `attempt` of the explicit method, end of the run.
+ASKED = types.int64(types.int64, types.int64, types.float64)
 #: From here on a step is at the stability bound; as long as this it stays within.
 BOUND, WITHIN = 1.6, 1.8
 #: A step below this error, over the allowed one, moves nothing that the rate could be of.
@@ -142,7 +146,7 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
 
 
 @jitable
-def is_calm(p: Problem, m: Method, steps: Steps, t_end: float) -> bool:
+def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
     if m.memory[IMPLICIT_STEPS] % TRY_EVERY != 0.0:
@@ -151,7 +155,7 @@ def is_calm(p: Problem, m: Method, steps: Steps, t_end: float) -> bool:
     h = min(m.memory[STEP], t_end - t)
     if not h > 0.0:
         return False
-    code = failure_or(m, call_int(steps.probe, (steps.context, t, h, m.y, m.trial)))
+    code = failure_or(m, call_int(probe, (context, t, h, m.y, m.trial)))
     error = m.memory[LAST_ERROR]
     m.memory[LAST_ERROR] = kept
     part = 0.0
@@ -177,9 +181,15 @@ def is_calm(p: Problem, m: Method, steps: Steps, t_end: float) -> bool:
     return True
 
 
+def serve(context: int, probe: int, t_end: float) -> int:
+    """Whether the implicit method is to be left: behind an address, for most runs never take it."""
+    _, m = in_workspace(context)
+    return 1 if is_calm(m, context, probe, t_end) else 0
+
+
 @jitable
-def changes_over(p: Problem, m: Method, steps: Steps, h: float, t_end: float) -> bool:
+def changes_over(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
-        return is_calm(p, m, steps, t_end)
+        return call_int(steps.calm, (steps.context, steps.probe, t_end)) == 1
     return is_stiff(m, h, t_end)

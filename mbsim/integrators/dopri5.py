@@ -15,8 +15,8 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
+from mbsim.core.problem import POSITION, STATE, Problem
+from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_ERROR,
@@ -134,18 +134,19 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     near the bound of stability at 3.3. An error that is far below what is allowed bounds no step.
     """
     k, y = m.k, m.y
-    n = BODY_SIZE * m.bodies[0] if m.bodies[0] > 0 else len(y)
-    first = m.bodies[0] == 0
+    first = not has_positions(m)
     # in the norm of the error, which has no units: ways, changes of velocity and of f of two pairs,
     # and the change of f over the step
     d = np.zeros((7, len(y)))
-    for i in range(n):
+    for i in range(len(y)):
+        if m.kinds[i] == STATE and not first:
+            continue
         way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
         way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
         come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
         come += (A64 - A54) * k[3, i] + A65 * k[4, i]
         # f of a position is its velocity: that says nothing
-        is_rate = first or i % BODY_SIZE >= 7
+        is_rate = m.kinds[i] != POSITION
         j = 1 if is_rate else 0
         d[j, i], d[3 + j, i] = h * way, h * come
         if is_rate:

@@ -21,10 +21,8 @@ from mbsim.core.problem import (
     DONE,
     FAILED,
     HAPPENED,
-    PASS,
     PAUSED,
     ROWS_FULL,
-    SETTLE,
     STABLE_EVERY,
     STEP_TOO_SMALL,
     TABLE_OVER,
@@ -34,7 +32,7 @@ from mbsim.core.problem import (
     Taken,
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
-from mbsim.integrators.branches import ask_switching
+from mbsim.integrators.branches import BEGIN, TAKEN
 from mbsim.integrators.changing import changes_over, stay_within
 from mbsim.integrators.control import (
     HOLD,
@@ -82,10 +80,8 @@ from mbsim.integrators.scheme import (
     STALE,
     STEP,
     STEPS,
-    SWITCH_CUT,
     TIME,
     TOL,
-    VAIN,
     WAS_CUT,
     WATCH,
     Method,
@@ -149,8 +145,8 @@ def begin(p: Problem, m: Method, steps: Steps, t: float, t_end: float, h_max: fl
         if code != 0:
             return code
         m.memory[HAVE_F] = 1.0
-        if p.switching != 0:
-            ask_switching(p, m, t, SETTLE, m.y, m.error)
+        if steps.branches != 0:
+            call_float(steps.branches, (steps.context, BEGIN, t, 0.0, 0.0))
         m.memory[FRESH] = 1.0
         m.memory[HAVE_JACOBIAN] = 0.0
     if m.memory[STEP] == 0.0:
@@ -285,10 +281,8 @@ def look_inside(p: Problem, m: Method, asked: float) -> int:
 def accept(p: Problem, m: Method, steps: Steps, t: float, h: float, asked: float) -> int:
     """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
     word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
-    if p.switching != 0:
-        changed = ask_switching(p, m, t + h, PASS, m.trial, m.error) > 0
-        in_vain = m.memory[SWITCH_CUT] == 1.0 and not changed
-        m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
+    if steps.branches != 0:
+        call_float(steps.branches, (steps.context, TAKEN, t, h, 0.0))
     for i in range(len(m.y)):
         m.y[i] = m.trial[i]
         m.k[0, i] = m.k[steps.last, i]
@@ -468,7 +462,7 @@ def advance(  # noqa: C901
             if code != 0:
                 m.counts[CODE] = code
                 return FAILED
-        if m.memory[WATCH] == 1.0 and changes_over(p, m, steps, most, t_end):
+        if m.memory[WATCH] == 1.0 and changes_over(m, steps, most, t_end):
             m.memory[CHANGE_DUE] = 1.0
         if full > 0 or word & Taken.ROWS_FULL:
             return ROWS_FULL

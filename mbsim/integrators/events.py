@@ -1,16 +1,33 @@
-"""Where within a step an event happens: the problem's hook `happens` says by when it has."""
+"""Where within a step an event happens: the problem's hook `happens` says by when it has.
+
+What the driver asks of events stands behind an address, `serve`: problems that locate none compile
+nothing of it.
+"""
 
 from __future__ import annotations
 
-from mbsim.core.address import call_int
-from mbsim.core.arrays import F1
+from numba import types
+
+from mbsim.core.address import call_int, vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
-from mbsim.integrators.scheme import NEXT_OUTPUT, Method, answer_of, interpolate
+from mbsim.integrators.scheme import NEXT_OUTPUT, Method, answer_of, in_workspace, interpolate
 
 #: A step is looked into for events at so many points, and at one more for each row within it,
 #: up to so many.
 LOOKS, MOST_LOOKS = 4, 64
+#: Of `serve`: context, what is asked, time and step, the output times and their number.
+ASKED = types.float64(
+    types.int64,
+    types.int64,
+    types.float64,
+    types.float64,
+    types.CPointer(types.float64),
+    types.int64,
+)
+#: The length up to the first event; to be evaluated at the trial point again.
+FIRST, AT_END = range(2)
 
 
 @jitable
@@ -57,3 +74,12 @@ def first_event(p: Problem, m: Method, t: float, h: float, times: F1) -> float:
         else:
             low = middle
     return high * h
+
+
+def serve(context: int, what: int, t: float, h: float, times: Pointer, count: int) -> float:
+    """What the driver asks of events; return the length that FIRST asks for."""
+    p, m = in_workspace(context)
+    if what == FIRST:
+        return first_event(p, m, t, h, vector_at(times, count))
+    happens_at(p, m, t, h, 1.0)
+    return 0.0

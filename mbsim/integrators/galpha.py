@@ -33,9 +33,7 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE, Problem
-from mbsim.core.rotation import norm
+from mbsim.core.problem import FRICTION_ALONE, IMPACTS_ALONE, POSITION, VELOCITY, Problem
 from mbsim.integrators.galpha_iteration import (
     A0,
     A1,
@@ -54,15 +52,8 @@ from mbsim.integrators.galpha_iteration import (
     step_before,
     true_rate,
 )
-from mbsim.integrators.newton import (
-    QUARTER,
-    as_failure,
-    is_rate,
-    linearise,
-    put_along,
-    unless_singular,
-)
-from mbsim.integrators.rotation import turn
+from mbsim.integrators.newton import QUARTER, as_failure, linearise, unless_singular
+from mbsim.integrators.positions import as_positions, bow, is_rate, put_along, retract
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     FACTORED_STEP,
@@ -97,15 +88,12 @@ PROBE = 0.05
 
 
 @jitable
-def carry_on(m: Method, s: float) -> None:
+def carry_on(p: Problem, m: Method, s: float) -> None:
     """Move m.trial on for a time s with its velocities as they are; A_BEFORE keeps where it was."""
     w, before = m.trial, m.k[A_BEFORE]
     for i in range(len(w)):
         before[i] = w[i]
-    for at in range(0, BODY_SIZE * m.bodies[0], BODY_SIZE):
-        for i in range(at, at + 3):
-            w[i] += s * before[i + 7]
-        turn(before, at, s, before[at + 10], before[at + 11], before[at + 12], w)
+    retract(p, s, before, w)
 
 
 @jitable
@@ -116,7 +104,7 @@ def probe_on(p: Problem, m: Method, t: float, h: float, s: float, ahead: float, 
     followed, of which corrections along joints know nothing. `gain` is what y gains.
     """
     n = len(m.y)
-    carry_on(m, s)
+    carry_on(p, m, s)
     project(p, m, t + ahead, ahead, m.trial)
     m.counts[EVALUATIONS] += 1
     code = call_int(p.rhs, (p.context, t + ahead, ahead, m.trial, m.k[F]))
@@ -124,8 +112,7 @@ def probe_on(p: Problem, m: Method, t: float, h: float, s: float, ahead: float, 
         return code
     for i in range(n):
         m.k[R, i] = m.k[F, i] - (m.trial[i] - m.k[A_BEFORE, i]) / s
-    if m.bodies[0] > 0:
-        put_along(p, m, t + ahead, m.trial, m.k[R], m.error)
+    put_along(p, m, t + ahead, m.trial, m.k[R], m.error)
     code = call_int(p.solve, (p.context, t, h, m.k[R], gain))
     if code != 0:
         return code
@@ -190,10 +177,11 @@ def velocity_error(m: Method, h: float, i: int, dot: float, bend: float) -> floa
 @jitable
 def estimate_error(p: Problem, m: Method, t: float, h: float) -> float:
     """Write the step's error, and what the next needs to know; return its norm over tol."""
-    e, w = m.error, m.trial
-    end, before = BODY_SIZE * m.bodies[0], step_before(m)
+    e, w, shift, before = m.error, m.trial, m.k[D], step_before(m)
+    # a uniform turn is exact at the end, but not between
+    bow(p, h, w, shift)
     for i in range(len(m.y)):
-        if is_rate(i, end):
+        if is_rate(m, i):
             dot = true_rate(m, i)
             slope = (dot - m.kept[DOT, i]) / h
             bend = h * max(1.0, 2.0 * h / (h + before)) * (slope - m.kept[SLOPE, i])
@@ -201,23 +189,13 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> float:
             m.ahead[DOT, i] = dot
             m.ahead[SLOPE, i] = slope
             e[i] = velocity_error(m, h, i, dot, bend)
-    for at in range(0, end, BODY_SIZE):
-        for i in range(at, at + 3):
-            e[i] = position_error(m, h, i + 7)
-        a = 0.5 * position_error(m, h, at + 10)
-        b = 0.5 * position_error(m, h, at + 11)
-        c = 0.5 * position_error(m, h, at + 12)
-        # a uniform turn is exact at the end, but not between: its polynomial is off by this
-        spin = norm((w[at + 10], w[at + 11], w[at + 12]))
-        bow = PART * (0.5 * h) ** 4 * spin**3 / 384.0
-        a += math.copysign(bow * w[at + 10], a)
-        b += math.copysign(bow * w[at + 11], b)
-        c += math.copysign(bow * w[at + 12], c)
-        qw, qx, qy, qz = w[at + 3], w[at + 4], w[at + 5], w[at + 6]
-        e[at + 3] = -qx * a - qy * b - qz * c
-        e[at + 4] = qw * a + qy * c - qz * b
-        e[at + 5] = qw * b + qz * a - qx * c
-        e[at + 6] = qw * c + qx * b - qy * a
+        if m.kinds[i] == VELOCITY:
+            off = position_error(m, h, i)
+            shift[i] = off + math.copysign(PART * shift[i], off)
+    as_positions(p, w, shift)
+    for i in range(len(m.y)):
+        if m.kinds[i] == POSITION:
+            e[i] = shift[i]
     error = call_float(p.norm, (p.context, t, h, e, w)) / (PART * m.memory[TOL])
     rough = call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH
     lost = call_float(p.norm, (p.context, h, IMPACTS_ALONE, e, w)) / (OF_IMPACT * m.memory[TOL])
@@ -242,9 +220,9 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
 @jitable
 def fit_dense(m: Method, h: float) -> None:
     """Fill the cubic Hermite polynomial of the step from y to trial."""
-    d, end = m.dense, BODY_SIZE * m.bodies[0]
+    d = m.dense
     for i in range(len(m.y)):
-        rate = is_rate(i, end)
+        rate = is_rate(m, i)
         first = m.kept[DOT, i] if rate else m.k[0, i]
         last = m.ahead[DOT, i] if rate else m.k[LAST, i]
         rise = m.trial[i] - m.y[i]

@@ -7,8 +7,7 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
+from mbsim.core.problem import STATE, VELOCITY, Problem
 from mbsim.integrators.newton import (
     GO_ON,
     OFF,
@@ -16,7 +15,6 @@ from mbsim.integrators.newton import (
     SOLVED,
     as_failure,
     begin,
-    is_rate,
     judge,
     linearise,
     may_help,
@@ -24,7 +22,7 @@ from mbsim.integrators.newton import (
     target,
     unless_singular,
 )
-from mbsim.integrators.rotation import turn
+from mbsim.integrators.positions import bracket, is_rate, is_turned, retract
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     FACTORED_STEP,
@@ -58,8 +56,6 @@ LATE = 3.0
 LEAST_PART = 1.0 / 128.0
 #: A linearisation is kept for another step where the iteration converged so fast with it.
 KEEP = 0.2
-#: A turn across an angular velocity, over that, which is none but for rounding.
-SWUNG = 1e-14
 
 # rows of k: f at the iterate, residual, correction, the one that a line search extrapolates, a at
 # begin and end, a before a line search, f at the trial point
@@ -85,9 +81,8 @@ def correction(p: Problem, m: Method, t: float, h: float, d: F1) -> tuple[int, f
         code = factor(p, m, t, h)
         if code != 0:
             return unless_singular(code), 0.0
-    end = BODY_SIZE * m.bodies[0]
     for i in range(len(m.y)):
-        m.k[R, i] = m.k[F, i] - true_rate(m, i) if is_rate(i, end) else 0.0
+        m.k[R, i] = m.k[F, i] - true_rate(m, i) if is_rate(m, i) else 0.0
     code = call_int(p.solve, (p.context, t, h, m.k[R], d))
     if code != 0:
         return code, 0.0
@@ -95,23 +90,22 @@ def correction(p: Problem, m: Method, t: float, h: float, d: F1) -> tuple[int, f
 
 
 @jitable
-def take(m: Method, h: float, part: float, d: F1) -> None:
+def take(p: Problem, m: Method, h: float, part: float, d: F1) -> None:
     """Add a part of the correction d of y to a.
 
     The unknown is a, in turns as in shifts: with c1 dtheta - dtheta x w / 2 = dw of the linear
     system, a changes by dtheta / (beta h^2), not by dw / (gamma h).
     """
-    end = BODY_SIZE * m.bodies[0]
     step = part / (GAMMA * h)
     for i in range(len(m.y)):
-        if is_rate(i, end):
+        if is_rate(m, i):
             m.k[A1, i] += step * d[i]
-    half = 0.5 * BETA * h / GAMMA * step
-    for at in range(10, end, BODY_SIZE):
-        wx, wy, wz = m.trial[at], m.trial[at + 1], m.trial[at + 2]
-        m.k[A1, at] += half * (d[at + 1] * wz - d[at + 2] * wy)
-        m.k[A1, at + 1] += half * (d[at + 2] * wx - d[at] * wz)
-        m.k[A1, at + 2] += half * (d[at] * wy - d[at + 1] * wx)
+    if p.difference != 0:
+        half = 0.5 * BETA * h / GAMMA * step
+        bracket(p, m.trial, d, m.error)
+        for i in range(len(m.y)):
+            if m.kinds[i] == VELOCITY:
+                m.k[A1, i] += half * m.error[i]
 
 
 @jitable
@@ -128,7 +122,7 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
         code, size = correction(p, m, t, h, m.k[D])
         if code != 0:
             return code
-        take(m, h, 1.0, m.k[D])
+        take(p, m, h, 1.0, m.k[D])
         word, rate = judge(m, iteration, most, size, before, rate, LATE)
         before = size
     m.memory[RATE] = rate
@@ -147,7 +141,7 @@ def search(p: Problem, m: Method, t: float, h: float, size: float) -> int:
     while part >= LEAST_PART:
         for i in range(len(m.y)):
             m.k[A1, i] = m.k[A_BEFORE, i]
-        take(m, h, part, m.k[D])
+        take(p, m, h, part, m.k[D])
         code = evaluate(p, m, t, h, False)
         if not may_help(code):
             return code
@@ -172,7 +166,7 @@ def iterate_damped(p: Problem, m: Method, t: float, h: float) -> int:
             return code
         note(m, size)
         if size <= target(m):
-            take(m, h, 1.0, m.k[D])
+            take(p, m, h, 1.0, m.k[D])
             m.memory[RATE] = 0.0
             return 0
         code = search(p, m, t, h, size)
@@ -203,19 +197,18 @@ def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
     Corrections of a linearisation in touch are small where nothing is touched any more, however
     large a residual they leave. Of that, what is across joints is none.
     """
-    e, w, end = m.error, m.k[D], BODY_SIZE * m.bodies[0]
+    e, w = m.error, m.k[D]
     for i in range(len(m.y)):
-        e[i] = h * (m.k[LAST, i] - true_rate(m, i)) if is_rate(i, end) else 0.0
+        e[i] = h * (m.k[LAST, i] - true_rate(m, i)) if is_rate(m, i) else 0.0
     most = OFF * m.memory[TOL]
     if call_float(p.norm, (p.context, t, h, e, m.trial)) <= most:
         return False
-    for i in range(end):
-        w[i] = m.trial[i] + e[i]
-    for i in range(end, len(m.y)):
-        w[i] = m.trial[i]
+    for i in range(len(m.y)):
+        w[i] = m.trial[i] if m.kinds[i] == STATE else m.trial[i] + e[i]
     project(p, m, t + h, h, w)
-    for i in range(end):
-        e[i] = w[i] - m.trial[i]
+    for i in range(len(m.y)):
+        if m.kinds[i] != STATE:
+            e[i] = w[i] - m.trial[i]
     return not call_float(p.norm, (p.context, t, h, e, m.trial)) <= most
 
 
@@ -279,35 +272,15 @@ def mean_velocity(m: Method, h: float, i: int) -> float:
 
 
 @jitable
-def place(m: Method, h: float) -> None:
+def place(p: Problem, m: Method, h: float) -> None:
     """Write the point that a leads to into m.trial."""
-    y, w, end = m.y, m.trial, BODY_SIZE * m.bodies[0]
+    y, w = m.y, m.trial
     for i in range(len(y)):
-        if is_rate(i, end):
+        w[i] = mean_velocity(m, h, i)
+    retract(p, h, y, w)
+    for i in range(len(y)):
+        if is_rate(m, i):
             w[i] = y[i] + h * ((1.0 - GAMMA) * m.k[A0, i] + GAMMA * m.k[A1, i])
-    for at in range(0, end, BODY_SIZE):
-        for i in range(at, at + 3):
-            w[i] = y[i] + h * mean_velocity(m, h, i + 7)
-        wx, wy = mean_velocity(m, h, at + 10), mean_velocity(m, h, at + 11)
-        turn(y, at, h, wx, wy, mean_velocity(m, h, at + 12), w)
-
-
-@jitable
-def swung(m: Method) -> bool:
-    """Return whether a body was turned between m.error and m.trial across its angular velocity.
-
-    The turn is twice the vector part of conj(q) q' in body axes.
-    """
-    p, q = m.error, m.trial
-    for at in range(3, BODY_SIZE * m.bodies[0], BODY_SIZE):
-        x = p[at] * q[at + 1] - p[at + 1] * q[at] - p[at + 2] * q[at + 3] + p[at + 3] * q[at + 2]
-        y = p[at] * q[at + 2] + p[at + 1] * q[at + 3] - p[at + 2] * q[at] - p[at + 3] * q[at + 1]
-        z = p[at] * q[at + 3] - p[at + 1] * q[at + 2] + p[at + 2] * q[at + 1] - p[at + 3] * q[at]
-        u, v, w = p[at + 7], p[at + 8], p[at + 9]
-        across = max(abs(y * w - z * v), max(abs(z * u - x * w), abs(x * v - y * u)))
-        if across > SWUNG * max(abs(u), max(abs(v), abs(w))):
-            return True
-    return False
 
 
 @jitable
@@ -318,20 +291,19 @@ def settle(p: Problem, m: Method, t: float, h: float) -> bool:
     So a has across joints what velocities on them ask for, as in a formulation of index 2, and
     what is stiff does not come in. Of free bodies `project` leaves velocities as they are.
     """
-    place(m, h)
-    end = BODY_SIZE * m.bodies[0]
-    for i in range(end):
+    place(p, m, h)
+    for i in range(len(m.y)):
         m.error[i] = m.trial[i]
     project(p, m, t + h, h, m.trial)
-    twice = swung(m)
+    twice = is_turned(p, m.error, m.trial)
     if twice:
         # that turned velocities along joints as well, in body axes: only what is across counts
-        for at in range(7, end, BODY_SIZE):
-            for i in range(at, at + 6):
+        for i in range(len(m.y)):
+            if m.kinds[i] == VELOCITY:
                 m.trial[i] = m.error[i]
         project(p, m, t + h, h, m.trial)
-    for at in range(7, end, BODY_SIZE):
-        for i in range(at, at + 6):
+    for i in range(len(m.y)):
+        if m.kinds[i] == VELOCITY:
             m.k[A1, i] += (m.trial[i] - m.error[i]) / (GAMMA * h)
     return twice
 
@@ -342,7 +314,7 @@ def show_drift(p: Problem, m: Method, t: float, h: float) -> None:
     n = len(m.y)
     for i in range(n):
         m.k[D, i] = m.trial[i]
-    place(m, h)
+    place(p, m, h)
     project(p, m, t + h, h, m.trial)
     for i in range(n):
         m.trial[i] = m.k[D, i]

@@ -11,8 +11,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import ALONG, Problem
+from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
@@ -28,7 +27,6 @@ from mbsim.integrators.scheme import (
     RETRY,
     TOL,
     Method,
-    project,
 )
 
 # what `judge` says
@@ -62,46 +60,6 @@ def linearise(p: Problem, m: Method, t: float, h: float, y: F1, f: F1) -> int:
     m.memory[HAVE_JACOBIAN] = 1.0 if code == 0 else 0.0
     m.memory[JACOBIAN_TIME] = t
     return code
-
-
-@jitable
-def put_along(p: Problem, m: Method, t: float, y: F1, r: F1, w: F1) -> None:
-    """Leave of what r asks of the bodies' positions what their joints allow at (t, y).
-
-    w is scratch. Motions of velocities and accelerations hold no positions. The rest is the
-    multipliers'. Were it left in, `project` would share it out between velocities, along other
-    lines than those of the forces, and their order would fall to 2.
-    """
-    end = BODY_SIZE * m.bodies[0]
-    for i in range(len(y)):
-        w[i] = y[i]
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        ra, rb, rc, rd = r[at + 3], r[at + 4], r[at + 5], r[at + 6]
-        for i in range(3):
-            w[at + 7 + i] += r[at + i]
-        # an angular velocity, 2 conj(q) r
-        w[at + 10] += 2.0 * (a * rb - b * ra - c * rd + d * rc)
-        w[at + 11] += 2.0 * (a * rc - c * ra - d * rb + b * rd)
-        w[at + 12] += 2.0 * (a * rd - d * ra - b * rc + c * rb)
-    project(p, m, t, ALONG, w)
-    for at in range(0, end, BODY_SIZE):
-        a, b, c, d = y[at + 3], y[at + 4], y[at + 5], y[at + 6]
-        for i in range(3):
-            r[at + i] = w[at + 7 + i] - y[at + 7 + i]
-        wx = 0.5 * (w[at + 10] - y[at + 10])
-        wy = 0.5 * (w[at + 11] - y[at + 11])
-        wz = 0.5 * (w[at + 12] - y[at + 12])
-        r[at + 3] = -b * wx - c * wy - d * wz
-        r[at + 4] = a * wx + c * wz - d * wy
-        r[at + 5] = a * wy + d * wx - b * wz
-        r[at + 6] = a * wz + b * wy - c * wx
-
-
-@jitable
-def is_rate(i: int, end: int) -> bool:
-    """Return whether y[i] is a velocity of a body or a state of first order, bodies' end given."""
-    return i >= end or i % BODY_SIZE >= 7
 
 
 @jitable

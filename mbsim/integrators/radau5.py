@@ -25,8 +25,7 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
+from mbsim.core.problem import VELOCITY, Problem
 from mbsim.integrators.newton import (
     GO_ON,
     HALF,
@@ -36,13 +35,12 @@ from mbsim.integrators.newton import (
     as_failure,
     begin,
     is_good_enough,
-    is_rate,
     judge,
     linearise,
     may_help,
-    put_along,
     unless_singular,
 )
+from mbsim.integrators.positions import is_rate, put_along
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     FACTORED_STEP,
@@ -221,9 +219,8 @@ def correct(p: Problem, m: Method, t: float, h: float) -> tuple[int, float]:
         pair[0, i] = TI[1, 0] * f0 + TI[1, 1] * f1 + TI[1, 2] * f2 - (re * w1 - im * w2)
         pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
         k[UNSOLVED, i] = unsolved(m, h, F + 2, i)
-    if m.bodies[0] > 0:
-        for r in (real, pair[0], pair[1]):
-            put_along(p, m, t, m.y, r, m.trial)
+    for r in (real, pair[0], pair[1]):
+        put_along(p, m, t, m.y, r, m.trial)
     code = call_int(p.solve, (p.context, t, h, real, d))
     if code != 0:
         return code, 0.0
@@ -359,11 +356,10 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> None:
     lead to, as a jump of a motion's velocity. The norm sees what is put right last: the velocities
     that f at the stages leads to.
     """
-    k, r, w, end = m.k, m.k[REAL], m.k[PAIR], BODY_SIZE * m.bodies[0]
+    k, r, w = m.k, m.k[REAL], m.k[PAIR]
     for i in range(len(m.y)):
         r[i] = k[0, i] + (E[0] * k[Z, i] + E[1] * k[Z + 1, i] + E[2] * k[Z + 2, i]) / h
-    if m.bodies[0] > 0:
-        put_along(p, m, t, m.y, r, m.error)
+    put_along(p, m, t, m.y, r, m.error)
     error = math.inf
     code = call_int(p.solve, (p.context, t, h, r, m.error))
     if code != 0:
@@ -371,7 +367,7 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> None:
     else:
         for i in range(len(m.y)):
             w[i] = m.trial[i]
-            if i < end and is_rate(i, end):
+            if m.kinds[i] == VELOCITY:
                 w[i] = m.y[i] + h * led(m, i, F + 2)
         # the last stage, which the trial point is, has been projected
         project(p, m, t + h, h, w)
@@ -403,14 +399,14 @@ def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
     smaller: only what it did not counts. And so does what joints have across them, of which the
     method's sum over f of all stages has next to nothing: it matters where that sum is off, too.
     """
-    end, most = BODY_SIZE * m.bodies[0], OFF * m.memory[TOL]
+    most = OFF * m.memory[TOL]
     for i in range(len(m.y)):
-        left = unsolved(m, h, LAST, i) if is_rate(i, end) else 0.0
+        left = unsolved(m, h, LAST, i) if is_rate(m, i) else 0.0
         m.error[i] = left if abs(left) > CONTRACTED * abs(m.k[UNSOLVED, i]) else 0.0
     if call_float(p.norm, (p.context, t, h, m.error, m.trial)) <= most:
         return False
     for i in range(len(m.y)):
-        m.error[i] = h * led(m, i, LAST) - m.k[Z + 2, i] if is_rate(i, end) else 0.0
+        m.error[i] = h * led(m, i, LAST) - m.k[Z + 2, i] if is_rate(m, i) else 0.0
     return not call_float(p.norm, (p.context, t, h, m.error, m.trial)) <= most
 
 

@@ -38,7 +38,7 @@ from mbsim.core import tags
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import HOOK, Problem
+from mbsim.core.problem import HOOK, STATE, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
@@ -91,7 +91,11 @@ BOUNDED = 53
 # of DOP853: where its last step tried began, that step's error of order 3 over h^4, and those of
 # the two steps taken before
 THIRD_AT, THIRD, THIRD_BEFORE, THIRD_FIRST = range(54, 58)
-MEMORY = 58
+# of the step that was tried last: what is to be looked for within it, and the load of what holds at
+# its begin (`branches`); a part of it at which a force is on another branch, 0 for none, and how
+# much of it the load of what holds is known for
+LOOKS, LOAD_THEN, SWITCHED, REACH = range(58, 62)
+MEMORY = 62
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -128,8 +132,7 @@ class Method(NamedTuple):
     dense: F2  # (coefficients, n) polynomial of the last step that something lay in
     memory: F1  # (MEMORY,) see the names above
     counts: I1  # (COUNTS,) see the names above
-    # (1,) how many bodies begin y, for methods that know positions from velocities
-    bodies: tags.Constant[I1]
+    kinds: tags.Constant[I1]  # (n,) POSITION, VELOCITY or STATE: see `core.problem`
     kept: F2  # (carried, n) what the method needs of the step before
     ahead: tags.Scratch[F2]  # (carried, n) the same of the step that was tried last
     timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
@@ -139,7 +142,7 @@ class Method(NamedTuple):
 class Workspace(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (20,) the fields of `Problem`
+    problem: I1  # (22,) the fields of `Problem`
     method: Method
 
 
@@ -153,11 +156,16 @@ class Steps(NamedTuple):
     order: float
     memory: float
     implicit: bool
-    probe: int  # `attempt` of the explicit method where AUTO may change back to it, else 0
+    # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
+    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
+    branches: int
+    events: int
+    probe: int
+    calm: int
 
 
-def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> Method:
-    """Return the method at rest at (t0, y0), whose first numbers are those of `bodies` bodies.
+def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -> Method:
+    """Return the method at rest at (t0, y0), whose numbers are of these kinds, STATEs if not given.
 
     Its timetable has room for so many rows, and bounds nothing.
     """
@@ -179,7 +187,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
         np.zeros((scheme.dense, n)),
         memory,
         counts,
-        np.array([bodies], dtype=np.int64),
+        np.full(n, STATE) if kinds is None else np.array(kinds, dtype=np.int64),
         np.zeros((scheme.carried, n)),
         np.zeros((scheme.carried, n)),
         np.full((rows, 2), math.inf),
@@ -200,6 +208,7 @@ def bind(
 ) -> tuple[Steps, Any]:
     """Return the method bound to a problem, and what must live as long as it is used."""
     from mbsim.core import jit
+    from mbsim.integrators import branches, changing, events
 
     if scheme.implicit and problem.linearise == 0:
         raise ValueError("this problem has no linearisation, which an implicit method needs")
@@ -208,8 +217,11 @@ def bind(
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
     numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
+    looks = jit.address(branches.serve, branches.ASKED) if problem.switching != 0 else 0
+    locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
     probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
-    steps = Steps(context, attempt, fit_dense, *numbers, probes)
+    calm = jit.address(changing.serve, changing.ASKED) if probe is not None else 0
+    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm)
     return steps, (table, workspace)
 
 
@@ -220,8 +232,8 @@ def in_workspace(context: int) -> tuple[Problem, Method]:
     w = workspace.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
-    problem = Problem(*(first + second), w[14], w[15], w[16], w[17], w[18], w[19])
-    return problem, workspace.method
+    third = (w[14], w[15], w[16], w[17], w[18], w[19], w[20], w[21])
+    return Problem(*(first + second + third)), workspace.method
 
 
 @jitable

@@ -15,36 +15,27 @@ from __future__ import annotations
 from mbsim.core.address import call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import Problem
-from mbsim.integrators.rotation import turn
+from mbsim.core.problem import POSITION, Problem
+from mbsim.integrators.positions import retract
 from mbsim.integrators.scheme import EVALUATIONS, LAST_ERROR, Method, Scheme, in_workspace, project
 
 
 @jitable
 def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill f at the new positions and the trial point; return a code."""
-    y, f, w, new = m.y, m.k[0], m.trial, m.k[1]
-    n, end = len(y), BODY_SIZE * m.bodies[0]
+    y, f, w, new, kinds = m.y, m.k[0], m.trial, m.k[1], m.kinds
     m.counts[EVALUATIONS] += 1
-    for i in range(end, n):
-        w[i] = y[i] + h * f[i]
-    for at in range(0, end, BODY_SIZE):
-        for k in range(3):
-            w[at + k] = y[at + k] + h * (y[at + 7 + k] + 0.5 * h * f[at + 7 + k])
-            w[at + 7 + k] = y[at + 7 + k] + h * f[at + 7 + k]
-            w[at + 10 + k] = y[at + 10 + k] + h * f[at + 10 + k]
-        # the angular velocity of the middle
-        wx = y[at + 10] + 0.5 * h * f[at + 10]
-        wy = y[at + 11] + 0.5 * h * f[at + 11]
-        wz = y[at + 12] + 0.5 * h * f[at + 12]
-        turn(y, at, h, wx, wy, wz, w)
+    for i in range(len(y)):
+        # the velocity of the middle
+        w[i] = y[i] + 0.5 * h * f[i]
+    retract(p, h, y, w)
+    for i in range(len(y)):
+        if kinds[i] != POSITION:
+            w[i] = y[i] + h * f[i]
     code = call_int(p.rhs, (p.context, t + h, h, w, new))
-    for i in range(end, n):
-        w[i] = y[i] + 0.5 * h * (f[i] + new[i])
-    for at in range(0, end, BODY_SIZE):
-        for k in range(at + 7, at + 13):
-            w[k] = y[k] + 0.5 * h * (f[k] + new[k])
+    for i in range(len(y)):
+        if kinds[i] != POSITION:
+            w[i] = y[i] + 0.5 * h * (f[i] + new[i])
     project(p, m, t + h, h, w)
     m.memory[LAST_ERROR] = 0.0
     return code

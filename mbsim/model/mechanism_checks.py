@@ -9,7 +9,7 @@ from mbsim.errors import Fault
 from mbsim.expressions import Expression
 from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.tree import Call, Number
-from mbsim.forces.catalog import FORCES, Components, of_form
+from mbsim.forces.catalog import COMPONENTS, FORCES, Components, of_form
 from mbsim.joints.catalog import JOINTS
 from mbsim.model.elements import Model, Source
 
@@ -27,8 +27,6 @@ STATEMENTS = {
     "ARRAY": "Reference_Array",
     "SENSOR": "Sensor_Event",
 }
-#: Attributes of vector forces that are expressions.
-COMPONENTS = tuple(f"{name}_expression" for name in ("fx", "fy", "fz", "tx", "ty", "tz"))
 _DIRECTIONS = {"R": "turn about", "T": "slide along"}
 #: Joints that may have friction, with the attribute that is the lever of what turns.
 _LEVERS = {

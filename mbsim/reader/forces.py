@@ -1,167 +1,194 @@
-"""Force_Scalar_TwoBody, _Vector_..., and Reference_Variable."""
+"""Statements of applied forces, in both languages, as `forces.catalog` has them."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, get_args, get_type_hints
 
+from mbsim.expressions import Expression
+from mbsim.forces.catalog import FORCES, USERS, ForceKind, Parameter, Reading
 from mbsim.model import elements as el
-from mbsim.model.mechanism_checks import COMPONENTS
-from mbsim.reader.keywords import SCALAR_TYPES, VECTOR_TYPES
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, keyword
+from mbsim.reader.contact import CFF_ALL, CFF_USES, FORCE_CONTACT, check_coulomb
+from mbsim.reader.keywords import CFF_OF_JOINTS, CNF_OF_LIMITS, spellings
+from mbsim.reader.kinds import (
+    EXPRESSION,
+    FLAG,
+    ID,
+    NOT_NEGATIVE,
+    POSITIVE,
+    REAL,
+    REALS,
+    BadValueError,
+    Kind,
+    keyword,
+)
+from mbsim.reader.normal_force import check_normal, note_unused
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
-from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
+from mbsim.reader.subroutine import USERSUB, by_user, result, subroutine
+
+#: Attributes that are neither numbers nor words of their own.
+_KINDS = {
+    "id": ID,
+    "flag": FLAG,
+    "expression": EXPRESSION,
+    "friction of joints": keyword(CFF_OF_JOINTS),
+    "law of limits": keyword(CNF_OF_LIMITS),
+}
 
 
-def _build_scalar(entry: Entry) -> None:
-    """Add a scalar force by an expression or a user subroutine."""
-    user = subroutine(entry, "usrsub", "SFOSUB") if by_user(entry) else None
-    expr = entry.get("expr") if user is None else result(entry, "SFORCE", user)
-    if entry.get("type") is None or expr is None:
-        return
-    force = el.ScalarForce(
+def kind_of(parameter: Parameter) -> Kind:
+    """Return what an attribute may be, or one number of it."""
+    if parameter.kind == "words":
+        return _words(parameter.words)
+    if parameter.kind:
+        return _KINDS[parameter.kind]
+    if parameter.words:
+        words = dict.fromkeys(parameter.words, "") | dict(parameter.others)
+        return keyword(spellings(**words))
+    if parameter.signed:
+        return REAL
+    return POSITIVE if parameter.positive else NOT_NEGATIVE
+
+
+def _words(known: tuple[str, ...]) -> Kind:
+    """Return the kind of words of some known, each once, separated by blanks or commas."""
+
+    def parse(text: str) -> tuple[str, ...]:
+        words = tuple(text.replace(",", " ").upper().split())
+        if not words or any(word not in known for word in words) or len(set(words)) < len(words):
+            raise BadValueError
+        return words
+
+    return Kind(f"one or more of {', '.join(known)}, each once", parse)
+
+
+def _several(count: int) -> Kind:
+    """Return the kind of so many numbers, separated by blanks or commas."""
+
+    def parse(text: str) -> tuple[float, ...]:
+        values: tuple[float, ...] = REALS.parse(text)
+        if len(values) != count:
+            raise BadValueError
+        return values
+
+    return Kind(f"{count} numbers", parse)
+
+
+def add_force(
+    entry: Entry,
+    kind: ForceKind,
+    values: Mapping[str, Any],
+    i: int,
+    j: int,
+    words: Mapping[str, str],
+) -> None:
+    """Check the values of an element and add it; `words` are its attributes as the deck has them.
+
+    Attributes that must be given and are not have the value None, and their fault already.
+    """
+    needed = [each.name for each in kind.parameters if not each.optional]
+    if all(values[name] is not None for name in needed):
+        for finding in kind.check(values):
+            say = entry.warn if finding.warns else entry.fault
+            say(finding.message, words.get(finding.attribute, finding.attribute))
+    force = el.MarkerForce(
         id=entry.get("id", 0),
-        type=entry.get("type"),
-        expr=expr,
+        kind=kind.name,
         label=entry.get("label", ""),
-        i_marker_id=entry.get("i_marker_id", 0),
-        j_marker_id=entry.get("j_marker_id", 0),
-        action_only=entry.get("action_only", False),
-        user=user,
+        i_marker_id=i,
+        j_marker_id=j,
+        parameters=tuple(values.items()),
         source=entry.source,
     )
-    entry.register(entry.draft.scalar_forces, force)
+    entry.register(entry.draft.marker_forces.setdefault(kind.name, {}), force)
 
 
-#: Which of COMPONENTS a type does not have.
-_NOT_OF_TYPE = {
-    "FORCEONLY": COMPONENTS[3:],
-    "TORQUEONLY": COMPONENTS[:3],
-    "FORCEANDTORQUE": (),
-}
+class _Given:
+    """What a deck gives of an element: `forces.catalog.Given`."""
+
+    def __init__(self, entry: Entry, kind: ForceKind) -> None:
+        self.entry, self.name = entry, kind.name
+        self.given, self.fault = entry.given, entry.fault
+
+    def by_user(self, expressions: tuple[str, ...] = ("expr",)) -> bool:
+        return by_user(self.entry, expressions)
+
+    def subroutine(self, default: str) -> el.Subroutine:
+        return subroutine(self.entry, "usrsub", default)
+
+    def result(self, user: el.Subroutine, component: int = 0) -> Expression:
+        return result(self.entry, self.name, user, component)
+
+    def check_law(self, attribute: str) -> None:
+        law = self.entry.get(attribute)
+        if attribute == "cnf_type":
+            check_normal(self.entry, law)
+            return
+        note_unused(self.entry, f"cff_type {law}", CFF_ALL - CFF_USES[law])
+        if law != "COULOMB_OFF":
+            check_coulomb(self.entry, law)
 
 
-#: What the subroutine of a type is called where the deck does not say.
-_VECTOR_SUBROUTINES = {
-    "FORCEONLY": "VFOSUB",
-    "TORQUEONLY": "VTOSUB",
-    "FORCEANDTORQUE": "GFOSUB",
-}
-
-
-def _vector_parts(entry: Entry, statement: str) -> dict[str, Any]:
-    """Return what vector forces on one and on two bodies have in common."""
-    type = entry.get("type", "FORCEANDTORQUE")
-    for name in _NOT_OF_TYPE[type]:
-        if entry.given(name):
-            has = ", ".join(each for each in COMPONENTS if each not in _NOT_OF_TYPE[type])
-            entry.fault(f"does not belong to type {type}, which has {has}", name)
-    user: el.Subroutine | None = None
-    exprs = tuple(entry.get(name) for name in COMPONENTS)
-    if by_user(entry, COMPONENTS):
-        user = subroutine(entry, "usrsub", _VECTOR_SUBROUTINES[type])
-        built = [name not in _NOT_OF_TYPE[type] for name in COMPONENTS]
-        exprs = tuple(
-            result(entry, statement, user, sum(built[:k])) if built[k] else None for k in range(6)
-        )
-    elif not any(entry.given(name) for name in COMPONENTS):
-        entry.fault(f"{COMPONENTS[0]} ... {COMPONENTS[-1]}: missing; at least one must be given")
-    return {
-        "id": entry.get("id", 0),
-        "type": type,
-        "exprs": exprs,
-        "user": user,
-        "label": entry.get("label", ""),
-        "i_marker_id": entry.get("i_marker_id", 0),
-        "ref_marker_id": entry.get("ref_marker_id"),
-        "source": entry.source,
-    }
-
-
-def _build_vector(entry: Entry) -> None:
-    """Add a vector force between two bodies."""
-    j = entry.get("j_floating_marker_id", 0)
-    force = el.VectorForce(**_vector_parts(entry, "VECTORFORCE"), j_floating_marker_id=j)
-    entry.register(entry.draft.vector_forces, force)
-
-
-def _build_body_force(entry: Entry) -> None:
-    """Add a vector force on one body."""
-    entry.register(entry.draft.body_forces, el.BodyForce(**_vector_parts(entry, "BODYFORCE")))
-
-
-def _build_variable(entry: Entry) -> None:
-    """Add a variable."""
-    user = None
-    if by_user(entry, type=entry.get("type", "")):
-        user = subroutine(entry, "usrsub", "VARSUB")
-    expr = entry.get("expr") if user is None else result(entry, "VARIABLE", user)
-    if expr is None:
-        return
-    variable = el.Variable(
-        id=entry.get("id", 0),
-        expr=expr,
-        label=entry.get("label", ""),
-        user=user,
-        source=entry.source,
+def _spec(parameter: Parameter) -> dict[str, Spec]:
+    """Return the attribute that a parameter stands for, or those."""
+    if parameter is USERS:
+        return USERSUB
+    if parameter.kind == "of contacts":
+        return {parameter.name: FORCE_CONTACT.attributes[parameter.name]}
+    number = isinstance(parameter.default, float) and not (parameter.kind or parameter.optional)
+    found = Spec(
+        kind_of(parameter) if parameter.count == 1 else _several(parameter.count),
+        parameter.about,
+        parameter.unit,
+        f"{parameter.default:g}" if number else parameter.shown,
+        required=parameter.default is None and not parameter.optional,
+        alias=parameter.alias,
     )
-    entry.register(entry.draft.variables, variable)
+    return {parameter.name: found}
 
 
-FORCE_SCALAR_TWOBODY = Statement(
-    "Force_Scalar_TwoBody",
-    {
-        **NAMED,
-        "type": Spec(keyword(SCALAR_TYPES), "force along I-J, torque about J's z", required=True),
-        **MARKERS,
-        "expr": Spec(EXPRESSION, "the force, > 0 pushes apart; or the torque on I", "F or F L"),
-        **USERSUB,
-        "action_only": Spec(FLAG, "nothing acts on J", "", "FALSE"),  # ours; Adams' ACTIONONLY
-    },
-    _build_scalar,
-    about="a force along a line or a torque, by an expression",
-)
+def _build_marker_force(kind: ForceKind) -> Callable[[Entry], None]:
+    """Return what makes elements of a kind that has no class of its own."""
+
+    def build(entry: Entry) -> None:
+        values = {each.name: entry.get(each.name, each.default) for each in kind.parameters}
+        i, j = entry.get("i_marker_id", 0), entry.get("j_marker_id", 0)
+        add_force(entry, kind, values, i, j, {})
+
+    return build
 
 
-def _about_component(name: str) -> str:
-    return f"{'force' if name[0] == 'f' else 'torque'} on I along {name[1]}"
+def _build_own(kind: ForceKind, reading: Reading) -> Callable[[Entry], None]:
+    """Return what makes elements of a kind's own class."""
+    made: Any = get_args(get_type_hints(el.Model)[kind.table])[1]
+
+    def build(entry: Entry) -> None:
+        values = {each.name: entry.get(each.name) for each in reading.attributes}
+        for each in reading.attributes:
+            if each.kind == "id" and not each.optional:
+                values[each.name] = values[each.name] or 0
+        known = {name: value for name, value in values.items() if value is not None}
+        found = reading.read(_Given(entry, kind), known)
+        if found is not None:
+            id, label = entry.get("id", 0), entry.get("label", "")
+            element = made(id=id, label=label, source=entry.source, **found)
+            entry.register(getattr(entry.draft, kind.table), element)
+
+    return build
 
 
-_VECTOR: dict[str, Spec] = {
-    "type": Spec(keyword(VECTOR_TYPES), "which components there are", required=True),
-    "ref_marker_id": Spec(ID, "marker along whose axes they are", "", "global frame"),
-    **{
-        name: Spec(EXPRESSION, _about_component(name), "F" if name[0] == "f" else "F L", "0")
-        for name in COMPONENTS
-    },
-    **USERSUB,
-}
-FORCE_VECTOR_TWOBODY = Statement(
-    "Force_Vector_TwoBody",
-    {
-        **NAMED,
-        "i_marker_id": MARKERS["i_marker_id"],
-        "j_floating_marker_id": Spec(
-            ID, "marker of the body that takes the opposite at I's origin", required=True
-        ),
-        **_VECTOR,
-    },
-    _build_vector,
-    about="force and torque between two bodies by components",
-)
-FORCE_VECTOR_ONEBODY = Statement(
-    "Force_Vector_OneBody",
-    {**NAMED, "i_marker_id": MARKERS["i_marker_id"], **_VECTOR},
-    _build_body_force,
-    about="force and torque on one body by components",
-)
-REFERENCE_VARIABLE = Statement(
-    "Reference_Variable",
-    {
-        **NAMED,
-        "type": Spec(BY_EITHER, "how it is given", "", "by what is given"),
-        "expr": Spec(EXPRESSION, "its value"),
-        **USERSUB,
-    },
-    _build_variable,
-    about="an expression with a name, used as VARVAL(id)",
-)
+def _statement(kind: ForceKind) -> Statement:
+    """Return the XML statement of a kind."""
+    attributes, reading = dict(NAMED), kind.reading
+    if reading is None:
+        attributes |= MARKERS
+    for each in reading.attributes if reading else kind.parameters:
+        attributes |= _spec(each)
+    attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
+    build = _build_own(kind, reading) if reading else _build_marker_force(kind)
+    return Statement(kind.statement, attributes, build, about=kind.about)
+
+
+def force_statements() -> list[Statement]:
+    """Return the XML statements of all kinds."""
+    return [_statement(FORCES[name]) for name in FORCES]

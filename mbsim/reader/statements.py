@@ -16,21 +16,14 @@ from mbsim.reader.constraints import (
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
-from mbsim.reader.force_element import FORCE_ELEMENT
-from mbsim.reader.forces import (
-    FORCE_SCALAR_TWOBODY,
-    FORCE_VECTOR_ONEBODY,
-    FORCE_VECTOR_TWOBODY,
-    REFERENCE_VARIABLE,
-)
+from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
-from mbsim.reader.joint_forces import FORCE_JOINTFRICTION, FORCE_JOINTLIMIT
 from mbsim.reader.keywords import fold, nearest
-from mbsim.reader.marker_forces import marker_forces
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
 from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
+from mbsim.reader.variable import REFERENCE_VARIABLE
 
 
 def _everything(node: Node) -> bool:
@@ -57,13 +50,7 @@ STATEMENTS = (
     CONSTRAINT_GENERAL,
     MOTION_JOINT,
     MOTION_MARKER,
-    FORCE_SCALAR_TWOBODY,
-    *marker_forces(),
-    FORCE_VECTOR_TWOBODY,
-    FORCE_VECTOR_ONEBODY,
-    FORCE_JOINTFRICTION,
-    FORCE_JOINTLIMIT,
-    FORCE_ELEMENT,
+    *force_statements(),
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
     REFERENCE_SPLINE,

@@ -12,6 +12,7 @@ from mbsim.arrays.codes import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
 from mbsim.core import jit
+from mbsim.dynamics.bodies import configuration
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.changing import (
@@ -54,7 +55,8 @@ class Methods:
         self.other = catalog.load(catalog.IMPLICIT) if changing else None
         bodies = len(system.body_ids)
         held = scheme.both(self.explicit, self.other) if self.other else self.explicit
-        self.arrays = scheme.make(held, system.y0, start, bodies, ROWS if timed else 1)
+        kinds = configuration.kinds(bodies, len(system.y0))
+        self.arrays = scheme.make(held, system.y0, start, kinds, ROWS if timed else 1)
         # where a contact may close or stick, Newton's iteration that fails with what held at the
         # step's begin is what finds it
         touches = len(system.scene.contacts.id) > 0

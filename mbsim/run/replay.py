@@ -151,8 +151,8 @@ class Replay:
         from mbsim.dynamics.pipeline.replay import replay_hook
 
         scene = self.system.scene
-        # a user's law may ask for expressions
-        fill(scene, only=(Hook.VALUE, Hook.ELEMENT))
+        # laws may ask for expressions, and for what they kept
+        fill(scene, only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL))
         if self.system.reader is not None:
             self.system.reader.open(scene)
         self._table = pack(scene)

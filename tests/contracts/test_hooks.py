@@ -15,7 +15,18 @@ from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
 from mbsim.arrays.codes import NEAR_FOLD
-from mbsim.arrays.hooks import Contacts, Dry, Gauges, Hook, Joints, Memory, Sticking
+from mbsim.arrays.hooks import (
+    Contacts,
+    ContactSlopes,
+    Dry,
+    Effects,
+    Gauges,
+    Hook,
+    Joints,
+    Memory,
+    Recall,
+    Sticking,
+)
 from mbsim.core import jit
 from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
@@ -26,12 +37,14 @@ SIGNATURES = {row.hook: row.signature for row in hook_table.TABLE}
 ANSWERS = {row.hook for row in hook_table.TABLE if "answer" in row.result}
 
 #: What one method alone measures.
-METHOD_OF = {Gauges.FRICTION: "GALPHA", Gauges.IMPACT: "GALPHA"}
+METHOD_OF = {Effects.FRICTION: "GALPHA", Effects.IMPACT: "GALPHA"}
 
 # hook, request (None for any), deck, method
 CASES = [
     *((Hook.CONTACTS, what, "bowling_ball", "DOPRI5") for what in Contacts),
     (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
+    (Hook.TILTING, None, "stiff/standing_cylinder", "DOPRI5"),
+    *((Hook.RECALL, what, "lugre_stick_slip", "DOPRI5") for what in Recall),
     (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),
     (Hook.JET, None, "cam", "DOPRI5"),
     (Hook.APPLIED, None, "cam", "DOPRI5"),
@@ -42,10 +55,12 @@ CASES = [
     (Hook.REACTION_FORCES, None, "pin", "DOPRI5"),
     (Hook.EVALUATE, None, "dry_friction_element", "DOPRI5"),
     (Hook.BEND, None, "four_bar", "RADAU5"),
+    *((Hook.CONTACT_SLOPES, what, "bowling_ball", "RADAU5") for what in ContactSlopes),
     *((Hook.MEMORY, what, "lugre_stick_slip", "RADAU5") for what in Memory),
     (Hook.SLOPES, None, "stiff/bushing_chain", "RADAU5"),
     (Hook.MEMORY_PAIR, None, "lugre_stick_slip", "RADAU5"),
-    *((Hook.GAUGES, what, "bowling_ball", METHOD_OF.get(what, "RADAU5")) for what in Gauges),
+    *((Hook.GAUGES, what, "bowling_ball", "DOPRI5") for what in Gauges),
+    *((Hook.EFFECTS, what, "bowling_ball", METHOD_OF.get(what, "RADAU5")) for what in Effects),
     *((Hook.DRY, what, "dry_friction_element", "DOPRI5") for what in Dry),
     (Hook.ANGLES, None, "cam", "DOPRI5"),
     (Hook.NEAR, None, "crowd", "DOPRI5"),
@@ -108,7 +123,7 @@ class Failure:
             if self.request is not None and given[1] != self.request:
                 return own(*given)
             self.asked += 1
-            if self.hook in (Hook.VALUE, Hook.GAUGES):
+            if self.hook in (Hook.VALUE, Hook.GAUGES, Hook.EFFECTS):
                 # it returns a number: its code is noted
                 scene.users.failed[0] = FAILS
                 return math.nan
@@ -142,6 +157,9 @@ def test_every_hook_and_request_is_tried():
     requests = {
         Hook.CONTACTS: Contacts,
         Hook.GAUGES: Gauges,
+        Hook.EFFECTS: Effects,
+        Hook.RECALL: Recall,
+        Hook.CONTACT_SLOPES: ContactSlopes,
         Hook.JOINTS: Joints,
         Hook.STICKING: Sticking,
         Hook.DRY: Dry,

@@ -27,6 +27,7 @@ from mbsim.core.problem import (
     Problem,
     addresses,
 )
+from mbsim.dynamics.bodies import configuration
 from mbsim.integrators import (
     catalog,
     control,
@@ -302,6 +303,17 @@ def _unit(context, t, h, a, b):
     return 0
 
 
+def _retract(context, t, h, a, b):
+    n = len(view(context, Box).scale)
+    configuration.move_on(carray(a, (n,)), h, 1, carray(b, (n,)))
+    return 0
+
+
+def _difference(context, t, h, a, b):
+    n = len(view(context, Box).scale)
+    return configuration.differ(carray(a, (n,)), t, 1, h, carray(b, (n,)))
+
+
 def _keep(context, t, h, a, b):
     box = view(context, Box)
     n = len(box.scale)
@@ -361,9 +373,11 @@ class Run:
         linear = (_linearise, _factor, _solve, _factor_pair, _solve_pair)
         hooks = HOOKS | dict(zip(LINEAR, linear, strict=True))
         hooks["project"] = _unit if bodies else zero
+        if bodies:
+            hooks |= {"retract": _retract, "difference": _difference}
         self.problem = Problem(int(self._table.ctypes.data), **addresses(hooks))
         method = catalog.load(name)
-        self.state = scheme.make(method, np.array(y0), 0.0, bodies)
+        self.state = scheme.make(method, np.array(y0), 0.0, configuration.kinds(bodies, n))
         self.state.memory[scheme.STEP] = step
         self.steps, self._kept = scheme.bind(method, self.problem, self.state)
 

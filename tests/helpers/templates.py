@@ -37,8 +37,8 @@ TEMPLATES = {
         (
             (
                 "reader/statements.py",
-                "from mbsim.reader.marker_forces import",
-                "from mbsim.reader.lift import FORCE_LIFT\nfrom mbsim.reader.marker_forces import",
+                "from mbsim.reader.forces import",
+                "from mbsim.reader.lift import FORCE_LIFT\nfrom mbsim.reader.forces import",
                 "STATEMENTS = (\n",
                 "STATEMENTS = (\n    FORCE_LIFT,\n",
             ),

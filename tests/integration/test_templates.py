@@ -147,7 +147,6 @@ from mbsim.integrators import catalog
 from mbsim.joints.catalog import JOINTS
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.reader import keywords
-from mbsim.reader.joint_forces import FORCE_JOINTFRICTION
 from mbsim.reader.statements import BY_KEY
 assert "VISCOUS" in FRICTION_LAWS and "VISCOUS" in keywords.CFF_TYPES.values()
 assert "slip_coef" in BY_KEY["forcecontact"].attributes
@@ -158,7 +157,7 @@ assert "CUBICSPRING" in FORCES and "forcecubicspring" in BY_KEY
 assert "ELLIPSOID-MESH" in PAIRS
 assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
 assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
-assert "preload_rate" in FORCE_JOINTFRICTION.attributes
+assert "preload_rate" in BY_KEY["forcejointfriction"].attributes
 assert "forcelift" in BY_KEY
 from mbsim.manual.tables import made
 from mbsim.manual.book import Page

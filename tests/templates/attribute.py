@@ -17,16 +17,11 @@ LINES = {
         "return radius, self.preload, self.bending_reaction_arm, self.preload_rate",
     ),
     # what decks say, with meaning, unit and default for the manual's table
-    "mbsim/reader/joint_forces.py": (
-        """        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
+    "mbsim/forces/kinds/joint_friction.py": (
+        """    Parameter("preload", about="presses beside the reaction", unit="F"),
 """,
-        """        "preload": Spec(NOT_NEGATIVE, "presses beside the reaction", "F", "0"),
-        "preload_rate": Spec(NOT_NEGATIVE, "how fast it grows", "F/T", "0"),
-""",
-        """        preload=entry.get("preload", 0.0),
-""",
-        """        preload=entry.get("preload", 0.0),
-        preload_rate=entry.get("preload_rate", 0.0),
+        """    Parameter("preload", about="presses beside the reaction", unit="F"),
+    Parameter("preload_rate", about="how fast it grows", unit="F/T"),
 """,
     ),
     # the formula

@@ -16,9 +16,9 @@ from mbsim.arrays.codes import (
     NOISE_FORCE,
     NOISE_TORQUE,
     NORMAL_CALLS,
-    NOW,
     PYTHON_CALLS,
 )
+from mbsim.arrays.hooks import Hook, Recall
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V2, V3
@@ -44,36 +44,20 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
-    MOMENT_XX,
-    MOMENT_XY,
-    MOMENT_YY,
-    plane_axes,
 )
 from mbsim.laws.abi import (
     AREA_IN,
-    BRANCH_OUT,
     ELASTIC,
     ENERGY,
-    FRICTION_INPUTS,
-    FROZEN,
-    GROWTH,
-    LIMIT_RATE,
     LOAD,
     LOCI_IN,
     LOCJ_IN,
-    MEMORY_OUT,
-    MODE_OUT,
     NFORCE_IN,
-    NORMAL_RATE,
-    NORMAL_STIFFNESS,
     RADIUS_IN,
     ROLLING_IN,
     SLIDING_LIMIT,
-    SLIPPING_MASS,
     STEP_IN,
-    STORED_OUT,
     TIME_IN,
-    UNIT_OUT,
     X_IN,
     XDOT_IN,
 )
@@ -175,51 +159,6 @@ def add_wrench(scene: Scene, y: F1, b: int, p: V3, force: V3, torque: V3) -> Non
 
 
 @jitable
-def slipping_mass(scene: Scene, s: int) -> float:
-    """Return the mass of both bodies of slot s as one slips on the other, a part for each point."""
-    inverse = 0.0
-    for g in sides(scene, s):
-        b = scene.graphics.body[g]
-        if b < len(scene.bodies.mass):
-            inverse += 1.0 / scene.bodies.mass[b]
-    points = max(1, scene.pairs.touches[scene.slots.pair[s]])
-    return 1.0 / (points * inverse) if inverse > 0.0 else 0.0
-
-
-@jitable
-def remember(scene: Scene, y: F1, s: int, c: int, given: F1) -> None:
-    """Give a friction law what it kept, and what only laws with memory look at."""
-    state, at, z, row = scene.state, FRICTION_INPUTS, scene.slots.z[s], scene.work.slot[s]
-    carried = scene.contacts.carried[c]
-    given[FROZEN] = 1.0 if state.frozen[0] == 1 and state.touching[s] == 1 else 0.0
-    given[NORMAL_STIFFNESS], given[GROWTH] = row[STIFFNESS], row[STIFFENS]
-    given[SLIPPING_MASS] = slipping_mass(scene, s)
-    given[SLIDING_LIMIT] = math.nan
-    known = row[FOUND_AT] == given[TIME_IN]
-    given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
-    given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
-    for k in range(scene.contacts.memory[c]):
-        if k < carried:
-            given[at + k] = y[z + k]
-        elif scene.world.past[0] != NOW:
-            given[at + k] = state.before[s, k]
-        else:
-            given[at + k] = state.memory[s, k]
-
-
-@jitable
-def keep(scene: Scene, dy: F1, s: int, c: int, out: F1) -> None:
-    """Keep what a friction law with memory made of it."""
-    row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
-    row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
-    row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[0], out[1]
-    for k in range(n):
-        scene.work.memory[s, k] = out[MEMORY_OUT + k]
-    for k in range(scene.contacts.carried[c]):
-        dy[z + k] = out[MEMORY_OUT + n + k]
-
-
-@jitable
 def show_state(scene: Scene, y: F1) -> None:
     """Let interpreted laws that ask for it see the trial point."""
     for k in range(len(scene.users.seen)):
@@ -260,7 +199,9 @@ def friction(
     given[AREA_IN] = area
     given[RADIUS_IN] = math.sqrt(area / math.pi) if area > 0.0 else 0.0
     if contacts.memory[c] > 0:
-        remember(scene, y, s, c, given)
+        answer = call_int(scene.world.hooks[Hook.RECALL], (scene, Recall.GIVE, s, t, y, 0))
+        if answer < 0:
+            return -answer
     scene.log.counters[FRICTION_CALLS] += 1
     scene.log.counters[PYTHON_CALLS] += contacts.interpreted[c]
     if contacts.interpreted[c] == 1:
@@ -343,53 +284,6 @@ def hold_back(
 
 
 @jitable
-def tilting(
-    scene: Scene,
-    t: float,
-    y: F1,
-    c: int,
-    s: int,
-    at: tuple[int, int, V3, V3, float],
-    depth: float,
-    normal: float,
-    w: V3,
-) -> tuple[int, V3, float]:
-    """Return code, couple on I and power lost of the points of slot s that are damped one by one.
-
-    With w the relative angular velocity, the law's c = dN/d(rate) and the moments J of the points'
-    parts about the incident, in `plane_axes` x, y,
-
-        couple = -c [(Jyy wx - Jxy wy) x + (Jxx wy - Jxy wx) y]
-
-    asked of the law at the mean rate at which points come and go. It is no more than the normal
-    force has at their mean distance, for none of them pulls.
-    """
-    work, out, none = scene.work, scene.work.law_out, (0.0, 0.0, 0.0)
-    numbers, row, whole = work.points[s + 1], work.slot[s], face_weight_of(scene, s)
-    xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
-    row[TILTING] = 0.0
-    x, y_axis = plane_axes(at[3])
-    wx, wy = dot(w, x), dot(w, y_axis)
-    square = (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy) / whole
-    if square <= 0.0 or normal <= 0.0:
-        return 0, none, 0.0
-    rate = math.sqrt(square)
-    code = ask_normal(scene, t, y, c, at, depth, rate, out)
-    closing = out[LOAD]
-    if code == 0:
-        code = ask_normal(scene, t, y, c, at, depth, -rate, out)
-    if code != 0:
-        return code, none, 0.0
-    damping = (closing - out[LOAD]) / (2.0 * rate)
-    about_x, about_y = damping * (yy * wx - xy * wy), damping * (xx * wy - xy * wx)
-    size, most = math.hypot(about_x, about_y), normal * math.sqrt((xx + yy) / whole)
-    part = most / size if size > most else 1.0
-    row[TILTING] = part * damping
-    couple = add(scale(-part * about_x, x), scale(-part * about_y, y_axis))
-    return 0, couple, part * damping * whole * square
-
-
-@jitable
 def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:  # noqa: C901
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
 
@@ -439,10 +333,10 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     if whole > 0.0:
         # see geometry.region
         stored = whole * out[ENERGY]
-        code, torque, damped = tilting(scene, t, y, c, s, touching_point, depth, normal, w)
+        code = call_int(scene.world.hooks[Hook.TILTING], (scene, s, t, normal, y))
         if code != 0:
             return code
-        lost += damped
+        torque, lost = vector(row[TORQUE : TORQUE + 3]), lost + row[LOST]
     torque = add(torque, couple)
 
     force = scale(normal, n)
@@ -463,7 +357,9 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         if scene.world.fixed_step[0] == 1 and h > 0.0:
             hold_back(scene, y, bi, bj, p, n, h, slip, out)
         if contacts.memory[c] > 0:
-            keep(scene, dy, s, c, out)
+            answer = call_int(scene.world.hooks[Hook.RECALL], (scene, Recall.TAKE, s, t, dy, 0))
+            if answer < 0:
+                return -answer
         fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
         torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))

@@ -17,7 +17,6 @@ from mbsim.arrays.codes import (
     EVENT_SLOT,
     EVENT_TIME,
     FIRST_TOUCH,
-    HELD_OTHERWISE,
     LEAVE,
     PEAK_DEPTH,
     PEAK_FORCE,
@@ -25,12 +24,11 @@ from mbsim.arrays.codes import (
     PEAK_SLIP,
     REBOUND,
     SCALE_LENGTH,
-    STICK,
     TOUCH,
     TOUCHES,
     USED_EVENTS,
 )
-from mbsim.arrays.codes import SLIP as SLIP_EVENT
+from mbsim.arrays.hooks import Hook, Recall, answer_of
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -39,7 +37,6 @@ from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import (
-    BRANCH,
     DEPTH,
     FORCE,
     NORMAL,
@@ -51,7 +48,6 @@ from mbsim.dynamics.contact.forces import (
     velocity_at,
 )
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
-from mbsim.laws import catalog
 from mbsim.laws.abi import ELASTIC, ENERGY
 
 
@@ -290,30 +286,6 @@ def another_point(scene: Scene, y: F1, h: float, s: int) -> bool:
 
 
 @jitable
-def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
-    """Keep what friction in slot s makes of the step, anew if `fresh`.
-
-    Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
-    """
-    state, work, z = scene.state, scene.work, scene.slots.z[s]
-    for k in range(state.memory.shape[1]):
-        state.before[s, k] = state.memory[s, k]
-        state.memory[s, k] = 0.0 if fresh else work.memory[s, k]
-    branch = 0.0 if fresh else work.slot[s, BRANCH]
-    if branch == catalog.UNDECIDED or branch == state.mode[s]:
-        return 0
-    mode, before = branch % catalog.BRANCHES, state.mode[s] % catalog.BRANCHES
-    if mode != before and mode > 0.0 and before > 0.0:
-        record_event(scene, t, STICK if mode == catalog.STICK else SLIP_EVENT, s)
-    if mode != before:
-        # which decides what the carried numbers are
-        for k in range(scene.contacts.carried[contact_of(scene, s)]):
-            y[z + k] = state.memory[s, k]
-    state.mode[s] = branch
-    return HELD_OTHERWISE if mode != before else 1
-
-
-@jitable
 def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
     """Write the incident of slot s for the accepted point; return what `commit` does."""
     state, work = scene.state, scene.work
@@ -343,7 +315,9 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
     else:
         changed = 0
     if scene.contacts.memory[contact_of(scene, s)] > 0:
-        changed = max(changed, commit_memory(scene, t, y, s, fresh and not begins))
+        anew = 1 if fresh and not begins else 0
+        given = (scene, Recall.COMMIT, s, t, y, anew)
+        changed = max(changed, answer_of(scene, call_int(scene.world.hooks[Hook.RECALL], given)))
     state.touching[s] = now
     if now == 1:
         state.depth[s] = work.slot[s, DEPTH]

@@ -47,8 +47,8 @@ from mbsim.dynamics.contact.forces import (
     STIFFNESS,
     UNIT,
     contact_of,
-    slipping_mass,
 )
+from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import side_of
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid

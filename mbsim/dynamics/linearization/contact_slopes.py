@@ -363,7 +363,6 @@ def add_contact_slopes(  # noqa: C901
 def add_contacts_slopes(scene: Scene, T: Tangent, t: float, h: float, y: F1) -> int:
     """Add what all incidents do; return a code."""
     hit = scene.work.hit
-    T.keeps.held[len(T.keeps.held) - 1] = 0
     for k in range(hit[len(hit) - 1]):
         code = add_contact_slopes(scene, T, t, h, y, hit[k])
         if code != 0:

@@ -26,7 +26,7 @@ from mbsim.arrays.codes import (
     TURN_FREE,
     TURN_ROOT,
 )
-from mbsim.arrays.hooks import Hook
+from mbsim.arrays.hooks import ContactSlopes, Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2, V3
@@ -48,7 +48,6 @@ from mbsim.dynamics.linearization.blocks import (
     find_order,
     forget_pattern,
 )
-from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
 from mbsim.dynamics.linearization.expression_slopes import pushed
 
 if TYPE_CHECKING:
@@ -195,20 +194,28 @@ def terms_behind(scene: Scene, e: int, term: int) -> tuple[int, int]:
 
 
 @jitable
-def find_couplings(scene: Scene, T: Tangent) -> bool:
-    """Couple what acts on each other and order the bodies; return whether there is room."""
+def slopes_of_contacts(scene: Scene, what: int, t: float, h: float, y: F1) -> int:
+    """Do what derivatives of contacts are asked for, where there are contacts; return a code."""
+    hook = scene.world.hooks[Hook.CONTACT_SLOPES]
+    return call_int(hook, (scene, what, t, h, y)) if hook != 0 else 0
+
+
+@jitable
+def find_couplings(scene: Scene, T: Tangent, t: float, y: F1) -> int:
+    """Couple what acts on each other and order the bodies; return a code."""
     P = T.pattern
     for attempt in range(2):
         if P.count[COUPLINGS] == 0 or attempt == 1:
             forget_pattern(P)
-        room = (
-            couple_contacts(scene, P) and couple_applied(scene, P, T) and couple_equations(scene, P)
-        )
+        code = slopes_of_contacts(scene, ContactSlopes.COUPLE, t, 0.0, y)
+        if code != 0 and code != Code.NO_ROOM:
+            return code
+        room = code == 0 and couple_applied(scene, P, T) and couple_equations(scene, P)
         if room and (P.count[STALE] == 0 or find_order(P)):
-            return True
+            return 0
         # couplings of the past take the room of these
         drop_fill(P)
-    return False
+    return Code.NO_ROOM
 
 
 @jitable
@@ -337,8 +344,9 @@ def add_bends(scene: Scene, T: Tangent, t: float, y: F1) -> None:
 @jitable
 def linearise(scene: Scene, T: Tangent, t: float, h: float, y: F1, dy: F1) -> int:
     """Keep the mechanism linearised at (t, y), where dy = f(t, y); return a code."""
-    if not find_couplings(scene, T):
-        return Code.NO_ROOM
+    code = find_couplings(scene, T, t, y)
+    if code != 0:
+        return code
     clear(scene, T)
     keep_bodies(scene, T.linear, y, dy)
     fill_joint_forces(scene, T.linear)
@@ -349,7 +357,8 @@ def linearise(scene: Scene, T: Tangent, t: float, h: float, y: F1, dy: F1) -> in
         code = call_int(scene.world.hooks[Hook.BEND], (scene, t, y))
         if code != 0:
             return code
-    code = add_contacts_slopes(scene, T, t, h, y)
+    T.keeps.held[len(T.keeps.held) - 1] = 0
+    code = slopes_of_contacts(scene, ContactSlopes.FILL, t, h, y)
     if code == 0 and scene.world.hooks[Hook.SLOPES] != 0:
         code = call_int(scene.world.hooks[Hook.SLOPES], (scene, t, y))
     return code

@@ -56,7 +56,7 @@ from mbsim.arrays.codes import (
     WORST_OPEN,
     WORST_TIME,
 )
-from mbsim.arrays.hooks import Contacts, Hook, answer_of
+from mbsim.arrays.hooks import Contacts, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -309,7 +309,9 @@ def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     examine_energy(scene, t, y, steps, local)
     examine_momentum(scene, t, y, steps, local)
     if tally[ANEW] == 0.0:
-        examine_equations(scene, t)
+        if scene.world.hooks[Hook.JOINTS] != 0:
+            joints = scene.world.hooks[Hook.JOINTS]
+            note_failure(scene, call_int(joints, (scene, Joints.AUDIT, t, y, y)))
         if scene.world.hooks[Hook.CONTACTS] != 0:
             contacts = scene.world.hooks[Hook.CONTACTS]
             answer_of(scene, call_int(contacts, (scene, Contacts.CONE, t, h, y, y)))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import Contacts, Gauges, failure_or
+from mbsim.arrays.hooks import Contacts, Effects, Gauges, Recall, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import add_contact, contact_of
+from mbsim.dynamics.contact.memory import commit_memory, keep, remember
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
+from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine_friction, hardest, mark_touched
 from mbsim.dynamics.pipeline.output import (
@@ -68,17 +70,52 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     return 0
 
 
+def damp_contact(context: int, s: int, t: float, normal: float, a: Pointer) -> int:
+    """What dampers of slot s do against tilting."""
+    scene = view(context, Scene)
+    return damp_tilting(scene, t, vector_at(a, scene.rows.y.shape[1]), s, normal)
+
+
+def recall_friction(context: int, what: int, s: int, t: float, a: Pointer, anew: int) -> int:
+    """What friction with memory in slot s is asked for; `a` is y, of TAKE y'."""
+    scene = view(context, Scene)
+    y = vector_at(a, scene.rows.y.shape[1])
+    if what == Recall.COMMIT:
+        return commit_memory(scene, t, y, s, anew == 1)
+    if what == Recall.GIVE:
+        remember(scene, y, s)
+    else:
+        keep(scene, y, s)
+    return 0
+
+
+def gauge_steps(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
+    """What is measured of contacts that carry nothing; `a` and `b` are y and y'."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    if what != Gauges.STEP:
+        return 0.0
+    longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    failure_or(scene, 0)  # laws are explored, not asked
+    return longest
+
+
 def gauge_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """What is measured of contacts; `a` is an error and `b` is y, of STEP they are y and y'."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
-    e, y = vector_at(a, n), vector_at(b, n)
     if what == Gauges.ERROR:
-        return carried_square(scene, e)
-    if what == Gauges.IMPACT:
+        return carried_square(scene, vector_at(a, n))
+    longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
+    failure_or(scene, 0)  # laws are explored, not asked
+    return longest
+
+
+def measure_effects(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
+    """What the error `a` does to contacts at y, `b`."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    e, y = vector_at(a, n), vector_at(b, n)
+    if what == Effects.IMPACT:
         return impact_left(scene, t, e, y)
-    if what == Gauges.STEP:
-        longest = longest_step(scene, e, y, h)
-        failure_or(scene, 0)  # laws are explored, not asked
-        return longest
-    return friction_left(scene, e, y, what == Gauges.REVERSAL)
+    return friction_left(scene, e, y, what == Effects.REVERSAL)

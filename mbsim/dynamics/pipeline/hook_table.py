@@ -67,16 +67,41 @@ def _has_contacts(scene: Scene, method: Method) -> bool:
     return len(scene.contacts.id) > 0
 
 
-def _contacts(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import serve_contacts
+def _of_contacts(name: str) -> Callable[[Scene], Callable[..., Any]]:
+    """Return what finds a hook of contacts that is the same in all scenes that have it."""
 
-    return serve_contacts
+    def entry(scene: Scene) -> Callable[..., Any]:
+        from mbsim.dynamics.pipeline import contact_hooks
+
+        found: Callable[..., Any] = getattr(contact_hooks, name)
+        return found
+
+    return entry
 
 
 def _gauges(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts
+    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts, gauge_steps
 
-    return gauge_contacts
+    carries = (scene.slots.x >= 0).any() or (scene.slots.z >= 0).any()
+    return gauge_contacts if carries else gauge_steps
+
+
+def _has_faces(scene: Scene, method: Method) -> bool:
+    return bool((scene.kinds.whole > 0.0).any())
+
+
+def _recalls(scene: Scene, method: Method) -> bool:
+    return bool((scene.contacts.memory > 0).any())
+
+
+def _has_contact_slopes(scene: Scene, method: Method) -> bool:
+    return method.tangent is not None and _has_contacts(scene, method)
+
+
+def _contact_slopes(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.implicit_hooks import slopes_of_contacts
+
+    return slopes_of_contacts
 
 
 def _has_programs(scene: Scene, method: Method) -> bool:
@@ -282,7 +307,7 @@ TABLE = (
         Hook.CONTACTS,
         _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
         _has_contacts,
-        _contacts,
+        _of_contacts("serve_contacts"),
         "does what contacts are asked for: `Contacts`",
         "an answer, or less a code",
     ),
@@ -292,6 +317,21 @@ TABLE = (
         _never,
         _no_entry,
         "writes the points of pairs without a closed form; a scene with such a pair has it",
+    ),
+    Row(
+        Hook.TILTING,
+        _INT(_INT, _INT, _T, _T, _PTR),  # context, slot, t, normal force, y
+        _has_faces,
+        _of_contacts("damp_contact"),
+        "finds the couple against tilting of a flat face that is one incident",
+    ),
+    Row(
+        Hook.RECALL,
+        _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
+        _recalls,
+        _of_contacts("recall_friction"),
+        "does what friction of contacts with memory is asked for: `Recall`",
+        "an answer, or less a code",
     ),
     Row(
         Hook.VALUE,
@@ -367,6 +407,13 @@ TABLE = (
         "adds how forces of equations turn with the bodies",
     ),
     Row(
+        Hook.CONTACT_SLOPES,
+        _INT(_INT, _INT, _T, _T, _PTR),  # context, request, t, h, y
+        _has_contact_slopes,
+        _contact_slopes,
+        "does what derivatives of contacts are asked for: `ContactSlopes`",
+    ),
+    Row(
         Hook.MEMORY,
         _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
         _has_memory,
@@ -394,6 +441,14 @@ TABLE = (
         _has_contacts,
         _gauges,
         "measures contacts: `Gauges`",
+        "the measure; a failure is noted",
+    ),
+    Row(
+        Hook.EFFECTS,
+        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        _has_contact_slopes,
+        _of_contacts("measure_effects"),
+        "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
         "the measure; a failure is noted",
     ),
     Row(

@@ -15,6 +15,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.hooks import (
     Contacts,
     Dry,
+    Effects,
     Gauges,
     Hook,
     Joints,
@@ -36,11 +37,12 @@ from mbsim.core.problem import (
     IMPACTS_ALONE,
     Taken,
 )
+from mbsim.dynamics.bodies.configuration import differ, move_on
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
 from mbsim.dynamics.contact.points import first_depth, reversal
 from mbsim.dynamics.events.stability import stable_step
-from mbsim.dynamics.pipeline.audit import examine, examine_fold
+from mbsim.dynamics.pipeline.audit import examine
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.output import (
     gauged,
@@ -114,9 +116,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return gauged(scene, Gauges.IMPACT, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, a, b)
     if h == FRICTION_ALONE:
-        return gauged(scene, Gauges.FRICTION, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error
@@ -148,8 +150,6 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     examine(scene, t, h, y)
     passes = scene.sweep.quality[FOLDS] == 1.0
     left = passed and not passes
-    if left:
-        examine_fold(scene, t)
     word = 0
     if changed > 0 or left:
         word += Taken.Y_CHANGED
@@ -233,6 +233,21 @@ def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     return longest
 
 
+def retract(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Positions moved on by velocities."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    move_on(vector_at(a, n), h, len(scene.bodies.mass), vector_at(b, n))
+    return 0
+
+
+def difference(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Changes of positions as velocities, and what turns add to them."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return differ(vector_at(a, n), t, len(scene.bodies.mass), h, vector_at(b, n))
+
+
 def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs; behind an address so that small scenes need not compile it."""
     scene = view(context, Scene)
@@ -240,16 +255,17 @@ def list_near(context: int, y: Pointer) -> int:
     return 0
 
 
-#: By their names in `Problem`; `stable` is only of a method without error estimate.
+#: By their names in `Problem`.
 HOOKS = {
     "rhs": rhs,
     "project": _project,
     "norm": _norm,
     "commit": _commit,
-    "look": _look,
     "limit": _limit,
     "output": _output,
     "reject": _reject,
 }
 #: Of a scene with contacts.
-CONTACT_HOOKS = {"check": _check, "inner": _inner}
+CONTACT_HOOKS = {"check": _check, "inner": _inner, "look": _look}
+#: Of a method without error estimate.
+FIXED_STEP_HOOKS = {"stable": stable, "retract": retract}

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import Hook, failure_or
+from mbsim.arrays.hooks import ContactSlopes, Hook, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import Pointer
+from mbsim.core.codes import Code
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
@@ -108,6 +110,15 @@ def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     add_rubs_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
+
+
+def slopes_of_contacts(context: int, what: int, t: float, h: float, y: Pointer) -> int:
+    """The derivatives of contacts."""
+    scene = view(context, Scene)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
+    if what == ContactSlopes.COUPLE:
+        return 0 if couple_contacts(scene, T.pattern) else Code.NO_ROOM
+    return add_contacts_slopes(scene, T, t, h, vector_at(y, scene.rows.y.shape[1]))
 
 
 def bend(context: int, t: float, y: Pointer) -> int:

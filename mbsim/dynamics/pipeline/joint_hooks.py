@@ -31,6 +31,7 @@ from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_s
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
+from mbsim.dynamics.pipeline.audit import examine_equations, examine_fold
 
 
 @jitable
@@ -106,8 +107,11 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         code = keep_selection(scene, t, y)
         if code == LEFT:
             return_to_equations(scene, t, y)
+            examine_fold(scene, t)
             return 0
         return code
+    elif what == Joints.AUDIT:
+        examine_equations(scene, t)
     elif what == Joints.MATRIX:
         use_all(scene, 0)
         prepare_equations(scene, t, y)

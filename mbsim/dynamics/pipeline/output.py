@@ -27,7 +27,7 @@ from mbsim.arrays.codes import (
     INC_X,
     STORED_ENERGY,
 )
-from mbsim.arrays.hooks import Contacts, Gauges, Hook, Joints, answer_of, note_failure
+from mbsim.arrays.hooks import Contacts, Effects, Gauges, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V2, V3
@@ -354,10 +354,10 @@ def carried_square(scene: Scene, e: F1) -> float:
 
 
 @jitable
-def gauged(scene: Scene, what: int, t: float, h: float, e: F1, y: F1) -> float:
-    """Return what is measured of contacts: `Gauges`; 0 where there are none."""
-    hook = scene.world.hooks[Hook.GAUGES]
-    return call_float(hook, (scene, what, t, h, e, y)) if hook != 0 else 0.0
+def gauged(scene: Scene, hook: int, what: int, t: float, h: float, e: F1, y: F1) -> float:
+    """Return what is measured of contacts: `Gauges` or `Effects`; 0 where there is no such hook."""
+    address = scene.world.hooks[hook]
+    return call_float(address, (scene, what, t, h, e, y)) if address != 0 else 0.0
 
 
 @jitable
@@ -388,7 +388,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         )
         if not square <= largest:
             largest, worst = square, b
-    largest = max(largest, gauged(scene, Gauges.ERROR, 0.0, h, e, y))
+    largest = max(largest, gauged(scene, Hook.GAUGES, Gauges.ERROR, 0.0, h, e, y))
     # the energy balance closes as well as the motion
     first, most = len(e) - max(1, len(scene.contacts.id)), 0.0
     for c in range(len(scene.contacts.id)):
@@ -407,7 +407,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         # what was not integrated but put right, as after a motion that jumps
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     else:
-        largest = max(largest, gauged(scene, Gauges.REVERSAL, 0.0, h, e, y) ** 2)
+        largest = max(largest, gauged(scene, Hook.EFFECTS, Effects.REVERSAL, 0.0, h, e, y) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

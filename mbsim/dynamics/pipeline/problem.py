@@ -16,16 +16,22 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
 from mbsim.dynamics.pipeline.hook_table import Method, fill
-from mbsim.dynamics.pipeline.hooks import CONTACT_HOOKS, HOOKS, stable
+from mbsim.dynamics.pipeline.hooks import (
+    CONTACT_HOOKS,
+    FIXED_STEP_HOOKS,
+    HOOKS,
+    difference,
+    retract,
+)
 
 
 def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
     """Return the mechanism as a `Problem`, and the table that must live as long as it is used.
 
-    Only a method without error estimate, `fixed_step`, needs the last hook.
+    A method without error estimate, `fixed_step`, has hooks of its own.
     """
     table = pack(scene)
-    hooks = HOOKS | {"stable": stable} if fixed_step else dict(HOOKS)
+    hooks = HOOKS | FIXED_STEP_HOOKS if fixed_step else dict(HOOKS)
     if len(scene.contacts.id) > 0:
         hooks |= CONTACT_HOOKS
     if len(scene.angles.i) > 0:
@@ -43,7 +49,7 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.events.switching import switching_hook
 
         hooks["switching"] = switching_hook
-    found = {"check": 0, "inner": 0} | addresses(hooks)
+    found = {"check": 0, "inner": 0, "look": 0} | addresses(hooks)
     problem = Problem(int(table.ctypes.data), **found)
     fill(scene)
     if "switching" in hooks:
@@ -74,5 +80,7 @@ def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem,
     scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
     _find_slopes(scene)
     fill(scene, Method(tangent, pair))
-    hooks = of.HOOKS | of.PAIR_HOOKS if pair else of.HOOKS
+    # with complex coefficients stages are solved for, else accelerations that lead to positions
+    more = of.PAIR_HOOKS if pair else {"retract": retract}
+    hooks = of.HOOKS | {"difference": difference} | more
     return problem._replace(**addresses(hooks)), (tangent, table)

@@ -12,13 +12,13 @@ with the law's force 0 there or not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mbsim.arrays.codes import AXIS_FORCE, AXIS_TORQUE
 from mbsim.core.arrays import V3
 from mbsim.core.jitable import jitable
-from mbsim.forces.catalog import Acts, Switched, Values, force
+from mbsim.forces.catalog import Acts, Given, Parameter, Reading, Switched, Values, force
 from mbsim.forces.formula import Kept, ask
 
 
@@ -57,6 +57,50 @@ def _side(x: float, rate: float, par: Sequence[float], kept: Kept, law: Any) -> 
     return (1.0 if x < par[0] else 2.0) + (2.0 if size != 0.0 else 0.0)
 
 
+def _bound(name: str, about: str) -> Parameter:
+    return Parameter(
+        name, signed=True, optional=True, about=about, unit="L or rad", shown="none", default=None
+    )
+
+
+_NORMAL = (
+    *("stiffness", "exponent", "damping", "dmax", "penalty", "restitution_coef"),
+    *("ref_velocity", "normal_trans_vel"),
+)
+_ATTRIBUTES = (
+    Parameter("joint_id", None, kind="id", about="joint in which it acts"),
+    Parameter(
+        "motion_type",
+        None,
+        words=("R", "T"),
+        others={"R": "ROTATION", "T": "TRANSLATION"},
+        about="R turns, T slides",
+    ),
+    _bound("lower", "least displacement; this, upper or both"),
+    _bound("upper", "largest displacement"),
+    Parameter("cnf_type", None, kind="law of limits", about="law of the stop"),
+    *(Parameter(name, kind="of contacts") for name in _NORMAL),
+)
+
+
+def _read(given: Given, values: dict[str, Any]) -> Mapping[str, Any] | None:
+    if not {"cnf_type", "motion_type"} <= set(values):
+        return None
+    values["direction"] = values.pop("motion_type")
+    given.check_law("cnf_type")
+    turns = values["direction"] == "R"
+    if values["cnf_type"] == "POISSON" and turns and not given.given("normal_trans_vel"):
+        given.fault(
+            "normal_trans_vel: missing; POISSON needs it with motion_type R, a number > 0 [rad/T]"
+        )
+    lower, upper = values.get("lower"), values.get("upper")
+    if not given.given("lower") and not given.given("upper"):
+        given.fault("lower, upper: missing; at least one must be given, a number")
+    if lower is not None and upper is not None and not lower < upper:
+        given.fault(f"must be greater than lower ({lower:g})", "upper")
+    return values
+
+
 force(
     "JOINTLIMIT",
     "Force_JointLimit",
@@ -64,6 +108,8 @@ force(
     form=Switched(_acts, _constants, _force, _side, law="cnf_type"),
     title="joint limit",
     table="joint_limits",
+    reading=Reading(_ATTRIBUTES, _read),
     changes="lower upper stiffness exponent damping dmax penalty restitution_coef ref_velocity "
     "normal_trans_vel",
+    about="stops of a joint's displacement",
 )

@@ -6,8 +6,22 @@ I about J's z. `action_only`: nothing acts on J, and the line (or axis) is J's z
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from mbsim.arrays.codes import AXIS_FORCE, AXIS_TORQUE, LINE_FORCE
-from mbsim.forces.catalog import Acts, Adams, Expressed, Values, force
+from mbsim.forces.catalog import (
+    USERS,
+    Acts,
+    Adams,
+    Expressed,
+    Given,
+    Parameter,
+    Reading,
+    Values,
+    force,
+    marker,
+)
 
 
 def _acts(values: Values) -> Acts:
@@ -20,6 +34,36 @@ def _alone(values: Values) -> bool:
     return alone
 
 
+_ATTRIBUTES = (
+    Parameter(
+        "type",
+        None,
+        words=("TRANSLATIONAL", "ROTATIONAL"),
+        others={"TRANSLATIONAL": "FORCE FORCE_ONLY", "ROTATIONAL": "TORQUE TORQUE_ONLY"},
+        about="force along I-J, torque about J's z",
+    ),
+    marker("i_marker_id"),
+    marker("j_marker_id"),
+    Parameter(
+        "expr",
+        kind="expression",
+        optional=True,
+        about="the force, > 0 pushes apart; or the torque on I",
+        unit="F or F L",
+    ),
+    USERS,
+    # ours; Adams' ACTIONONLY
+    Parameter("action_only", kind="flag", optional=True, about="nothing acts on J", shown="FALSE"),
+)
+
+
+def _read(given: Given, values: dict[str, Any]) -> Mapping[str, Any] | None:
+    user = given.subroutine("SFOSUB") if given.by_user() else None
+    if user is not None:
+        values["expr"] = given.result(user)
+    return values | {"user": user} if {"type", "expr"} <= set(values) else None
+
+
 force(
     "SFORCE",
     "Force_Scalar_TwoBody",
@@ -29,5 +73,7 @@ force(
     functions="SFORCE",
     adams=Adams("SFORCE"),
     table="scalar_forces",
+    reading=Reading(_ATTRIBUTES, _read),
     changes="expr",
+    about="a force along a line or a torque, by an expression",
 )

@@ -6,7 +6,7 @@ from mbsim.forces.catalog import FORCES
 from mbsim.model import elements as el
 from mbsim.reader.adm.draft import require
 from mbsim.reader.adm.subroutine import function_or_user, routine
-from mbsim.reader.marker_forces import add_force
+from mbsim.reader.forces import add_force
 from mbsim.reader.statement import Entry
 from mbsim.reader.subroutine import result
 

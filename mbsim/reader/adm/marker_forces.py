@@ -6,8 +6,8 @@ from typing import Any
 
 from mbsim.forces.catalog import FORCES, Adams, ForceKind
 from mbsim.reader.adm.declare import AdmStatement, numbers
+from mbsim.reader.forces import add_force, kind_of
 from mbsim.reader.kinds import ID
-from mbsim.reader.marker_forces import add_force, kind_of
 from mbsim.reader.statement import Entry, Spec
 
 
