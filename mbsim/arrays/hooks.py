@@ -128,7 +128,7 @@ class Dry(IntEnum):
 class Sticking(IntEnum):
     """What contacts are asked for whose friction is rigid: see stiction.rigid_contact."""
 
-    PLACE = 0  # where equations of what sticks act
+    LOCATE = 0  # where equations of what sticks act
     SHARE = 1  # share the friction that holds between the contacts
     ASK = 2  # whether one asks for another mode than it has: 1, else 0
     LOAD = 3  # a million times the largest force that holds over its limit

@@ -67,7 +67,7 @@ class Contacts(NamedTuple):
     ignore_deeper: F1  # (nc,) inf if not given
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts
-    user_normal: I1  # (nc,) where `laws.user_normal` has its place, 0 for a built-in normal law
+    user_normal: I1  # (nc,) where `laws.user_normal` has its inputs, 0 for a built-in normal law
     rigid: I1  # (nc,) 1 where friction holds by equations: stiction.rigid_contact
 
 
@@ -235,10 +235,10 @@ class Tree(NamedTuple):
     """
 
     body: I1  # (nt,)
-    parent: I1  # (nt,) place in the tree, -1 for ground
-    of_body: I1  # (nb + 1,) place in the tree, -1 for none
-    root: I1  # (nt,) place of the first body of its tree
-    end: I1  # (nt,) one behind the last place of its tree
+    parent: I1  # (nt,) tree index, -1 for ground
+    of_body: I1  # (nb + 1,) tree index, -1 for none
+    root: I1  # (nt,) index of the first body of its tree
+    end: I1  # (nt,) one behind the last index of its tree
     turn: I1  # (nt,) what of the rotation is free: TURN_...
     slide: I2  # (nt, 3) 1 where the child may move along that axis of the parent's marker
     axis: I2  # (nt, 2) of UNIVERSAL: axis of the child's and of the parent's marker
@@ -281,7 +281,7 @@ class Connections(NamedTuple):
 
     i: I1  # (nj,) markers
     j: I1  # (nj,)
-    tree: I1  # (nj,) place in the tree, -1 where equations hold it
+    tree: I1  # (nj,) tree index, -1 where equations hold it
     flip: I1  # (nj,) 1 where I is on the parent
 
 

@@ -1,7 +1,7 @@
 """Every array of the compiled pipeline, grouped by use: shape and meaning on its line.
 
-Counts: nb moving bodies (row nb of a body array is ground), ng graphics, nk kinds, np places
-for pairs, nc contacts, ns slots. A *slot* is a place for one incident: a pair owns a range of
+Counts: nb moving bodies (row nb of a body array is ground), ng graphics, nk kinds, np rows
+for pairs, nc contacts, ns slots. A *slot* is room for one incident: a pair owns a range of
 slots. A contact of few graphics lists all its pairs for good; one of many, a *large contact*, lists
 those that are near, and the list follows the motion (contact.broadphase). Everything is in model
 units, global frame unless said otherwise.

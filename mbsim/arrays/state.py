@@ -20,9 +20,9 @@ class Pairs(NamedTuple):
     touches: I1  # (np,) slots that touched at the committed state
     gap: F1  # (np,) distance that the pair kept when last measured
     left: F1  # (np,) what the motion since has left of it for certain
-    active: I1  # (np,) places in use, ascending; those of large contacts behind all others
-    free: I1  # (np,) places not in use, the next one last
-    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, places that a listing lacked
+    active: I1  # (np,) rows in use, ascending; those of large contacts behind all others
+    free: I1  # (np,) rows not in use, the next one last
+    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, rows that a listing lacked
 
 
 @tags.state
@@ -50,9 +50,9 @@ class Broadphase(NamedTuple):
     cell: tags.Scratch[I1]  # (ng,) of the grid
     order: tags.Scratch[I1]  # (ng,) members cell by cell
     start: tags.Scratch[I1]  # (cells + 1,) where a cell begins in `order`
-    head: tags.Scratch[I1]  # (ng,) first place of a pair whose I is this graphic, -1 for none
-    next: tags.Scratch[I1]  # (np,) next place of the same I
-    moved: tags.Scratch[I2]  # (np, 5) new place of a pair, and its kind, graphics and touches
+    head: tags.Scratch[I1]  # (ng,) first row of a pair whose I is this graphic, -1 for none
+    next: tags.Scratch[I1]  # (np,) next row of the same I
+    moved: tags.Scratch[I2]  # (np, 5) new row of a pair, and its kind, graphics and touches
     spare: tags.Scratch[F2]  # (ns, SPARE) what is moved with the slots that touch
 
 

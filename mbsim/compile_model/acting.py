@@ -98,7 +98,7 @@ def acting(
     residuals: Mapping[int, UserResidual] | None = None,
     rigid_slots: Sequence[RigidSlot] = (),
 ) -> Acting:
-    """Return forces, constraints, states, sensors and requests; `first_state`: place in y.
+    """Return forces, constraints, states, sensors and requests; `first_state`: offset in y.
 
     `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
     look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.

@@ -135,7 +135,7 @@ def _ends(model: Model, markers: MarkerTable, element: Any) -> tuple[int, int]:
     return markers.row(between.i_marker_id), markers.row(getattr(between, j))
 
 
-def _place(to: _Rows, k: int, acts: Acts) -> None:
+def _act_as(to: _Rows, k: int, acts: Acts) -> None:
     """Let row k act where a scalar force does."""
     to.made.form[k] = acts.form
     to.made.axes[k] = to.markers.turned(int(to.made.j[k]), acts.axis)
@@ -146,7 +146,7 @@ def _place(to: _Rows, k: int, acts: Acts) -> None:
 
 def _fill_scalar(to: _Rows, k: int, form: Scalar | Switched, element: Any) -> None:
     """Fill row k with a force by one displacement and its rate."""
-    _place(to, k, form.acts(_values(element)))
+    _act_as(to, k, form.acts(_values(element)))
     if form.bounds is not None:
         bounds = form.bounds(to.made.par[k])
         to.made.bound[k] = (*bounds[: codes.REST], *bounds.rest)
@@ -157,7 +157,7 @@ def _fill_expressed(to: _Rows, k: int, form: Expressed, element: Any) -> None:
     """Fill row k with a force by an expression."""
     to.made.program[k] = to.programs.add(element.expr, element, forces=True)
     to.made.alone[k] = int(form.alone(_values(element)))
-    _place(to, k, form.acts(_values(element)))
+    _act_as(to, k, form.acts(_values(element)))
 
 
 def _fill_wrench(to: _Rows, k: int, form: Wrench, element: Any) -> None:

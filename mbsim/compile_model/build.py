@@ -96,8 +96,8 @@ class System:
 
     def given_velocities(self) -> dict[int, np.ndarray[Any, Any]]:
         """Return the velocities that the deck gives, by body row: see `placement.BodyPlace`."""
-        places = self.placement.bodies
-        rows = {k: places[id].given for k, id in enumerate(self.body_ids)}
+        placed = self.placement.bodies
+        rows = {k: placed[id].given for k, id in enumerate(self.body_ids)}
         return {k: given for k, given in rows.items() if len(given)}
 
     def pull(self, gravity: Gravity) -> Pull:

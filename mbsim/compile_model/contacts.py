@@ -126,25 +126,25 @@ def _broadphase_rows(plans: Plans) -> tuple[int, int]:
     """Return how many pairs of large contacts can be near at once, and the slots of one."""
     if not plans.broadphase:
         return 0, 0
-    places = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.broadphase)
-    return places, max(
+    capacity = sum(min(c.pairs, NEAR_EACH * len({*c.i, *c.j}) + 4096) for c in plans.broadphase)
+    return capacity, max(
         kind.slots for contact_set in plans.broadphase for kind in contact_set.kinds.values()
     )
 
 
 def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[Pairs, int]:
-    """Return the places for pairs and the number of their slots; `rows`: graphic row by id.
+    """Return the rows for pairs and the number of their slots; `rows`: graphic row by id.
 
-    Listed pairs come first and stay; the places of large contacts have slots for any of their
+    Listed pairs come first and stay; the rows of large contacts have slots for any of their
     kinds.
     """
     fixed = len(plans.pairs)
-    places, wide = _broadphase_rows(plans)
-    n = fixed + places
+    capacity, wide = _broadphase_rows(plans)
+    n = fixed + capacity
     row_of = {kind: k for k, kind in enumerate(kinds)}
     listed = np.array([plan.kind.slots for plan in plans.pairs], dtype=np.int64)
     ends = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(listed)])
-    broadphase_slots = ends[-1] + wide * np.arange(places + 1)
+    broadphase_slots = ends[-1] + wide * np.arange(capacity + 1)
     made = Pairs(
         kind=np.zeros(n, dtype=np.int64),
         graphic_i=np.zeros(n, dtype=np.int64),
@@ -156,7 +156,7 @@ def pairs_table(plans: Plans, kinds: list[Kind], rows: dict[int, int]) -> tuple[
         left=np.zeros(n),
         active=np.arange(n),
         free=np.arange(n)[::-1].copy(),
-        count=np.array([fixed, places, fixed, 0], dtype=np.int64),
+        count=np.array([fixed, capacity, fixed, 0], dtype=np.int64),
     )
     for k, plan in enumerate(plans.pairs):
         made.kind[k] = row_of[plan.kind]
@@ -171,7 +171,7 @@ def broadphase_table(
     graphics: Graphics,
     shapes: list[str],
     contacts: dict[int, int],
-    places: int,
+    capacity: int,
     slots: int,
     memory: int,
 ) -> Broadphase:
@@ -195,8 +195,8 @@ def broadphase_table(
         order=np.zeros(ng if n else 0, dtype=np.int64),
         start=np.zeros(CELLS_EACH * ng + 64 if n else 0, dtype=np.int64),
         head=np.zeros(ng if n else 0, dtype=np.int64),
-        next=np.zeros(places if n else 0, dtype=np.int64),
-        moved=np.zeros((places if n else 0, 5), dtype=np.int64),
+        next=np.zeros(capacity if n else 0, dtype=np.int64),
+        moved=np.zeros((capacity if n else 0, 5), dtype=np.int64),
         spare=np.zeros((slots if n else 0, codes.SPARE + 2 * memory)),
     )
     at = 0
@@ -296,7 +296,7 @@ def contacts_table(
             [c.cff_type != "USERCFF" or user[c.id].reads_x for c in contacts], dtype=np.int64
         ),
         user_normal=np.array(
-            [user_normal[c.id].place.ctypes.data if c.id in user_normal else 0 for c in contacts],
+            [user_normal[c.id].inputs.ctypes.data if c.id in user_normal else 0 for c in contacts],
             dtype=np.int64,
         ),
         rigid=np.array([c.rigid for c in contacts], dtype=np.int64),
@@ -325,8 +325,8 @@ def slots_table(
         end = pairs.slot[k] + 1 if plan.kind.region else pairs.last[k]
         wide[pairs.slot[k] : end] = each[rows[plan.kind.contact]]
     for contact_set in plans.broadphase:
-        places = wide[pairs.slot[len(plans.pairs)] :]
-        places[...] = np.maximum(places, each[rows[contact_set.contact]])
+        room = wide[pairs.slot[len(plans.pairs)] :]
+        room[...] = np.maximum(room, each[rows[contact_set.contact]])
     begins = first + np.concatenate([[0], np.cumsum(wide.ravel())])
     x, z = np.where(wide > 0, begins[:-1].reshape(ns, 2), -1).T.copy()
     slot_pair = np.repeat(np.arange(len(pairs.slot)), pairs.last - pairs.slot)

@@ -95,14 +95,14 @@ def _needed(
     programs: ProgramTable,
 ) -> tuple[set[int], bool]:
     """Return the rows of forces that programs need, and whether they need a reaction."""
-    place = {element: k for k, element in enumerate(elements)}
+    row_of = {element: k for k, element in enumerate(elements)}
     held = set(connection_ids)
     rows: set[int] = set()
     reaction = False
     for program in wanted:
         for op, given, _, element in programs.programs[program]:
-            if op == ELEMENT and element in place:
-                rows.add(place[element])
+            if op == ELEMENT and element in row_of:
+                rows.add(row_of[element])
             elif op == ELEMENT:
                 reaction |= element in held
             elif op == NET:
@@ -164,20 +164,20 @@ def _order(model: Model, elements: list[tuple[str, int]], needs: _Needs) -> list
     order: list[int] = []
     done = [False] * len(elements)
     for first in range(len(elements)):
-        way: list[tuple[int, list[int]]] = [] if done[first] else [(first, _sorted(needs, first))]
-        while way:
-            row, waiting = way[-1]
+        path: list[tuple[int, list[int]]] = [] if done[first] else [(first, _sorted(needs, first))]
+        while path:
+            row, waiting = path[-1]
             if not waiting:
                 done[row] = True
                 order.append(row)
-                way.pop()
+                path.pop()
                 continue
             other = waiting.pop(0)
-            if any(other == k for k, _ in way):
-                rows = [k for k, _ in way]
+            if any(other == k for k, _ in path):
+                rows = [k for k, _ in path]
                 raise _circle(model, [elements[k] for k in [*rows[rows.index(other) :], other]])
             if not done[other]:
-                way.append((other, _sorted(needs, other)))
+                path.append((other, _sorted(needs, other)))
     return order
 
 

@@ -182,8 +182,8 @@ def find_groups(model: Model, placement: Placement) -> Groups:
 
     for met in mets:
         for id in met.markers:
-            place = placement.markers[id]
-            add([place.body_id] if place.body_id in bodies else met.bodies, (place.p, place.p))
+            placed = placement.markers[id]
+            add([placed.body_id] if placed.body_id in bodies else met.bodies, (placed.p, placed.p))
     # of two sets that touch within and a third one, a graphic stands on many sides
     around: dict[int, tuple[Any, Any]] = {}
     contacts = []
@@ -196,10 +196,10 @@ def find_groups(model: Model, placement: Placement) -> Groups:
         for side, other in ((0, 1), (1, 0)):
             for g in (contact.i_graphics_id, contact.j_graphics_id)[side]:
                 graphic = model.graphics[g]
-                place = placement.markers[graphic.marker_id]
+                placed = placement.markers[graphic.marker_id]
                 if g not in around:
-                    around[g] = graphic_box(graphic, place.p, place.R) or (place.p, place.p)
-                add([place.body_id] if place.body_id in bodies else moving[other], around[g])
+                    around[g] = graphic_box(graphic, placed.p, placed.R) or (placed.p, placed.p)
+                add([placed.body_id] if placed.body_id in bodies else moving[other], around[g])
     row: dict[int, int] = {}
     of_body = [row.setdefault(sets.root(body), len(row)) for body in bodies]
     if not row:

@@ -11,7 +11,7 @@ up to five numbers:
 | DISTANCE           | markers i, j                                                          |
 | OFFSET             | markers i, j, k and axis of k                                         |
 | ANGLE              | row of `Angles`                                                       |
-| TURN               | markers i, j, place in `TURNS`                                        |
+| TURN               | markers i, j, index in `TURNS`                                        |
 | ORIENT             | markers i, j, which Euler parameter (0 to 3)                          |
 | SPEED              | markers i, j, l                                                       |
 | CLOSING            | markers i, j                                                          |
@@ -22,7 +22,7 @@ up to five numbers:
 | ACCELERATION       | markers i, j, k, l and axis of k, 3 for the magnitude                 |
 | SPIN_UP            | the same                                                              |
 | NET                | markers i, j, k and component 1 to 8; j is 0 for forces on i alone    |
-| STATE              | place in y                                                            |
+| STATE              | offset in y                                                           |
 | SENSED             | row of `Sensors`                                                      |
 | ELEMENT            | 0 a connection, 1 an applied force, 2 a contact, its row, jflag,      |
 |                    | comp, marker k                                                        |

@@ -50,9 +50,9 @@ class MarkerTable:
         if not marker_id:
             return 0
         if marker_id not in self.rows:
-            place = self.placement.markers[marker_id]
-            body = self.body_row[place.body_id]
-            self.rows[marker_id] = self.add(body, place.p_B, place.R_B)
+            placed = self.placement.markers[marker_id]
+            body = self.body_row[placed.body_id]
+            self.rows[marker_id] = self.add(body, placed.p_B, placed.R_B)
         return self.rows[marker_id]
 
     def add(self, body: int, p: Array, R: Array) -> int:
@@ -65,8 +65,8 @@ class MarkerTable:
         body, p, R = self.frames[row]
         if body == self.ground:
             return p, R
-        place = list(self.placement.bodies.values())[body]
-        return place.p + place.R @ p, place.R @ R
+        placed = list(self.placement.bodies.values())[body]
+        return placed.p + placed.R @ p, placed.R @ R
 
     def turned(self, row: int, axis: int) -> int:
         """Return the row of a marker turned so that an angle about `axis` is one about its z.

@@ -20,7 +20,14 @@ from mbsim.arrays.scratch import Sweep
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
-from mbsim.compile_model.tree import AXES, TreeJoint, empty_tree, is_plain, limb_of, nearest_flip
+from mbsim.compile_model.tree import (
+    AXES,
+    TreeJoint,
+    empty_tree,
+    is_plain,
+    nearest_flip,
+    tree_joint_of,
+)
 from mbsim.errors import DeckError, Fault
 from mbsim.forces.catalog import ForceKind, Switched
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
@@ -164,7 +171,7 @@ class _Builder:
         i, j = self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
         connection = self.connect(statement, joint.id, i, j)
         self.joints[connection] = joint
-        tree_joint = limb_of(connection, i, j, JOINTS[joint.type].equations)
+        tree_joint = tree_joint_of(connection, i, j, JOINTS[joint.type].equations)
         if tree_joint is not None and tree_joint.turn == codes.TURN_CROSS:
             self.check_cross(statement, joint, tree_joint)
         if tree_joint is not None and tree_joint.held >= _LEAST_ROWS:
@@ -257,12 +264,13 @@ class _Builder:
         self.add_term(row, i, j, 1.0)
         self.sums.close(-1, f"{kind.statement}[{force.id}]", 0.0, self.unit([row]), level=1)
 
-    def add_rigid_slot(self, grip: RigidSlot) -> None:
+    def add_rigid_slot(self, sticking: RigidSlot) -> None:
         """Add the two velocities that rigid friction of a slot holds while it sticks."""
-        for way in range(2):
-            self.sums.terms.append((codes.TOUCHING, grip.i, grip.j, way, grip.slot, 1.0, -1))
-            self.sums.close(-1, f"Force_Contact[{grip.contact}]", 0.0, self.length, level=1)
-            self.sums.slot[-1] = grip.slot
+        for axis in range(2):
+            term = (codes.TOUCHING, sticking.i, sticking.j, axis, sticking.slot, 1.0, -1)
+            self.sums.terms.append(term)
+            self.sums.close(-1, f"Force_Contact[{sticking.contact}]", 0.0, self.length, level=1)
+            self.sums.slot[-1] = sticking.slot
 
     # the tree
 
@@ -309,7 +317,7 @@ class _Builder:
         return self.markers.frames[row][0]
 
     def tree(self, others: list[int]) -> tuple[Tree, dict[int, tuple[int, bool]]]:
-        """Return the tree; for each connection in it its place and whether I is on the parent."""
+        """Return the tree; for each connection in it its index and whether I is on the parent."""
         ground = self.markers.ground
         hung = self.grow(others)
         children: dict[int, list[int]] = {}
@@ -325,14 +333,14 @@ class _Builder:
                 root_of[body] = top
                 stack.extend(reversed(children.get(body, [])))
         # bodies of one root follow each other
-        n, place = len(order), {body: k for k, body in enumerate(order)}
+        n, index = len(order), {body: k for k, body in enumerate(order)}
         made = empty_tree(ground, n)
         of_connection: dict[int, tuple[int, bool]] = {}
         for k, body in enumerate(order):
             parent, tree_joint, flip = hung[body]
             made.body[k], made.of_body[body] = body, k
-            made.parent[k] = place[parent] if tree_joint is not None and parent != ground else -1
-            made.root[k] = place[root_of[body]]
+            made.parent[k] = index[parent] if tree_joint is not None and parent != ground else -1
+            made.root[k] = index[root_of[body]]
             made.end[made.root[k]] = k + 1
             if tree_joint is None:
                 made.turn[k], made.free[k] = codes.TURN_ROOT, 6
@@ -391,20 +399,20 @@ def constrain(
     rigid = rigid_forces(model)
     held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
     others = [markers.row(marker) for marker in held]
-    others += [marker for grip in rigid_slots for marker in (grip.i, grip.j)]
-    tree, places = builder.tree(others)
-    builder.add_joint_equations(set(places))
+    others += [marker for sticking in rigid_slots for marker in (sticking.i, sticking.j)]
+    tree, hung = builder.tree(others)
+    builder.add_joint_equations(set(hung))
     for kind, force in rigid:
         builder.add_rigid_force(kind, force)
-    for grip in rigid_slots:
-        builder.add_rigid_slot(grip)
+    for sticking in rigid_slots:
+        builder.add_rigid_slot(sticking)
     n = len(builder.pairs)
     pairs = np.array(builder.pairs, dtype=np.int64).reshape(-1, 2)
     connections = Connections(
         i=pairs[:, 0].copy(),
         j=pairs[:, 1].copy(),
-        tree=np.array([places.get(c, (-1, False))[0] for c in range(n)], dtype=np.int64),
-        flip=np.array([places.get(c, (-1, False))[1] for c in range(n)], dtype=np.int64),
+        tree=np.array([hung.get(c, (-1, False))[0] for c in range(n)], dtype=np.int64),
+        flip=np.array([hung.get(c, (-1, False))[1] for c in range(n)], dtype=np.int64),
     )
     return Mechanism(tree, builder.sums.arrays(), connections, builder.elements, builder.sums.names)
 

@@ -245,8 +245,8 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
             broadphase.append(contact_set)
             faults += wrong
             continue
-        for place, i in enumerate(i_ids):
-            for j in j_ids[place + 1 :] if same else j_ids:
+        for first, i in enumerate(i_ids):
+            for j in j_ids[first + 1 :] if same else j_ids:
                 a, b = model.graphics[i], model.graphics[j]
                 if (
                     same

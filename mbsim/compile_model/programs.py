@@ -265,11 +265,11 @@ class _Compiler:
 
     def entry(self, node: Call) -> Instruction:
         """Return a number of an array."""
-        key, place = self.number(node, 0), self.number(node, 1)
+        key, position = self.number(node, 0), self.number(node, 1)
         array = self.table.arrays_of_numbers.get(key)
         if array is None:
             raise ExpressionError(f"ARYVAL: there is no array {key}", node.column)
-        return Instruction(NUMBER, value=array.values[place - 1])
+        return Instruction(NUMBER, value=array.values[position - 1])
 
     def leaf(self, node: Node) -> list[Instruction]:
         """Return the instructions of what takes nothing from the stack."""
@@ -316,18 +316,18 @@ class _Compiler:
         self.made[key] = made
         return made
 
-    def number(self, node: Call, place: int) -> int:
+    def number(self, node: Call, position: int) -> int:
         """Return an argument that is a whole number, 0 where it is left out."""
-        if place >= len(node.args):
+        if position >= len(node.args):
             return 0
-        arg = node.args[place]
+        arg = node.args[position]
         if not isinstance(arg, Number):
             raise ExpressionError(f"{node.name} needs ids that are numbers", node.column)
         return int(arg.value)
 
-    def marker(self, node: Call, place: int) -> int:
+    def marker(self, node: Call, position: int) -> int:
         """Return the row of a marker, that of the global frame where it is left out."""
-        key = self.number(node, place)
+        key = self.number(node, position)
         if key and key not in self.table.markers.placement.markers:
             raise ExpressionError(f"{node.name}: there is no marker {key}", node.column)
         return self.table.markers.row(key)
@@ -375,7 +375,7 @@ class _Compiler:
     def acceleration(self, node: Call) -> Instruction:
         """Return the derivative of a velocity; of a magnitude the third marker is the observer."""
         axis = "XYZM".index(node.name[3])
-        i, j, third, fourth = (self.marker(node, place) for place in range(4))
+        i, j, third, fourth = (self.marker(node, position) for position in range(4))
         k, observer = (third, fourth) if axis < 3 else (self.table.markers.row(0), third)
         op = ACCELERATION if node.name[0] == "A" else SPIN_UP
         return Instruction(op, (i, j, k, observer, axis))
@@ -383,7 +383,7 @@ class _Compiler:
     def force(self, node: Call) -> Instruction:
         """Return a force between markers, or of one element whose row is found later."""
         if node.name in _COMPONENTS:
-            i, j, k = (self.marker(node, place) for place in range(3))
+            i, j, k = (self.marker(node, position) for position in range(3))
             return Instruction(NET, (i, 0 if j == i else j, k, 1 + _COMPONENTS.index(node.name)))
         element = (FUNCTIONS[node.name].args[0], self.number(node, 0))
         rows = (self.number(node, 1), self.number(node, 2), self.marker(node, 3))

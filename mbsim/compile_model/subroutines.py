@@ -81,7 +81,7 @@ class StateReader:
         """Look at this scene from now on."""
         self.scene = scene
         at = int(scene.programs.quick_start[self.spare])
-        self.place = scene.programs.quick[at].ctypes.data
+        self.instruction = scene.programs.quick[at].ctypes.data
         self.words = scene.programs.quick.shape[1]
         self.values = scene.programs.values.data
         self.shown = b""
@@ -126,7 +126,7 @@ class StateReader:
         if isinstance(found, int):
             return self.variable(found)
         if found is not self.shown:
-            ctypes.memmove(self.place, found, len(found))
+            ctypes.memmove(self.instruction, found, len(found))
             self.shown = found
         scene, time, y = host.state
         # one measure leaves the stack alone: its value is what is returned

@@ -25,20 +25,20 @@ MOST_BODIES = 4000
 #: Fields with one entry a block: room is made for more than are in use.
 _BY_BLOCK = {"pair", "neighbour", "K", "D", "A"}
 #: Of this table of pairs the entries in use are kept as a list.
-_TABLE = "tangent/pattern/place"
+_TABLE = "tangent/pattern/block"
 
 
 @tags.state
 class Pattern(NamedTuple):
     """Which bodies are coupled, and in what order they are eliminated."""
 
-    place: I2  # (nb, nb) block of a pair, -1 for none
+    block: I2  # (nb, nb) block of a pair, -1 for none
     pair: I2  # (couplings, 2) bodies of the blocks that forces fill
     order: I1  # (nb,) bodies
     start: I1  # (nb + 1,) first neighbour of each step
     neighbour: I1  # (blocks,) bodies that are eliminated later
     count: I1  # type: ignore[assignment]  # (3,) couplings, blocks, 1 where the order is to be found anew
-    joint: tags.Constant[I1]  # (nb,) place in the tree of what hangs, -1 for roots and free bodies
+    joint: tags.Constant[I1]  # (nb,) tree index of what hangs, -1 for roots and free bodies
     parent: tags.Constant[I1]  # (nb,) body row, -1 for ground
     children: tags.Constant[I1]  # (nb,) that hang on it
     waiting: tags.Scratch[I1]  # (nb,) children not yet eliminated, -1 when done itself
@@ -268,10 +268,10 @@ def _in_use(tangent: Tangent) -> Iterator[tuple[str, np.ndarray]]:
 
 def saved(tangent: Tangent) -> dict[str, Any]:
     """Return what a run needs to go on with the same linearisation and factors, by name."""
-    place = tangent.pattern.place.ravel()
+    block = tangent.pattern.block.ravel()
     found = {name: np.array(array) for name, array in _in_use(tangent)}
-    found["tangent/where"] = np.flatnonzero(place >= 0)
-    found["tangent/block"] = place[found["tangent/where"]]
+    found["tangent/where"] = np.flatnonzero(block >= 0)
+    found["tangent/block"] = block[found["tangent/where"]]
     return found
 
 
@@ -280,5 +280,5 @@ def restore(tangent: Tangent, kept: Mapping[str, Any]) -> None:
     tangent.pattern.count[...] = kept["tangent/pattern/count"]
     for name, array in _in_use(tangent):
         array[...] = kept[name]
-    tangent.pattern.place[...] = -1
-    tangent.pattern.place.ravel()[kept["tangent/where"]] = kept["tangent/block"]
+    tangent.pattern.block[...] = -1
+    tangent.pattern.block.ravel()[kept["tangent/where"]] = kept["tangent/block"]

@@ -62,8 +62,8 @@ class _Group:
 
     def __init__(self, members: Sequence[Function], curves: dict[tuple[int, ...], Any]) -> None:
         self.code, self.curves = members[0].code, curves
-        places = [k for k, code in enumerate(self.code) if code.op == NUMBER]
-        self.numbers = {k: np.array([member.code[k].value for member in members]) for k in places}
+        numbers = [k for k, code in enumerate(self.code) if code.op == NUMBER]
+        self.numbers = {k: np.array([member.code[k].value for member in members]) for k in numbers}
         self.role = np.array([member.role for member in members])
         self.sizes = np.array([member.sizes for member in members])
         self.known: Any = self.sizes.any(axis=1)

@@ -71,7 +71,7 @@ def is_plain(rows: tuple[Row, ...]) -> bool:
     return len(rows) == 1 and rows[0].kind in ("offset", "perp")
 
 
-def limb_of(
+def tree_joint_of(
     connection: int, i: int, j: int, equations: tuple[tuple[Row, ...], ...]
 ) -> TreeJoint | None:
     """Return what a joint is as a joint of the tree, None where it cannot be one."""
@@ -87,7 +87,7 @@ def limb_of(
 
 
 def empty_tree(ground: int, n: int) -> Tree:
-    """Return a tree of n places to be filled."""
+    """Return a tree of n bodies to be filled."""
 
     def ints(*shape: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
         return np.zeros(shape, dtype=np.int64)

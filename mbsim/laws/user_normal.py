@@ -2,7 +2,7 @@
 
 A normal law has the signature (depth, rate, parameters) -> force, force at rate 0, stored energy.
 A user's CNFSUB takes more than that and gives the force alone. The rest of what it takes lies in
-an array of PLACE numbers, one a contact, which `contact.forces` fills; force at rate 0 and
+an array of NORMAL_INPUTS numbers, one a contact, which `contact.forces` fills; force at rate 0 and
 stored energy are asked of it only where somebody looks for depths, times or step lengths
 (EXPLORE). In the equations of motion all its work counts as dissipated: what it stores, if
 anything, nobody can tell.
@@ -30,7 +30,7 @@ MODE, TIME, LOCI, NI, LOCJ, NJ, DEPTH, RATE, ID, PYTHON, AREA = (
     17,
     18,
 )
-PLACE = 19
+NORMAL_INPUTS = 19
 
 # what is asked: forces on bodies, how they change with depth and rate, or more; dflag but for the
 # first
@@ -44,11 +44,11 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @jitable
-def questions(place: Sequence[float] | F1, depth: float) -> int:
+def questions(inputs: Sequence[float] | F1, depth: float) -> int:
     """Return at how many depths and rates the law is asked."""
     if not depth > 0.0:
         return 0
-    return 5 if place[MODE] == EXPLORE else 1
+    return 5 if inputs[MODE] == EXPLORE else 1
 
 
 @jitable

@@ -51,13 +51,13 @@ def load_normal(
     say = log or host.log
     element, name = f"Force_Contact[{contact.id}]", contact.cnf.fnc_name
     source = find_source(contact.cnf, name, element, "cnf", plugin_files, scripts)
-    place = np.zeros(at.PLACE)
-    place[at.MODE], place[at.ID] = at.EXPLORE, contact.id
+    inputs = np.zeros(at.NORMAL_INPUTS)
+    inputs[at.MODE], inputs[at.ID] = at.EXPLORE, contact.id
     made = UserNormal(
         address=0,
         par=np.array(contact.cnf.par, dtype=np.float64),
-        place=place,
-        hidden=(float(place.ctypes.data),),
+        inputs=inputs,
+        hidden=(float(inputs.ctypes.data),),
         source=source.path,
         name=name,
         element=contact.id,
@@ -76,7 +76,7 @@ def load_normal(
         say(f"{element}: {name} of {source.path} stays interpreted: {reason}")
         made = replace(made, compiled=False, reason=reason, looks=source.looks)
     assert made.function is not None
-    place[at.PYTHON] = 1.0
+    inputs[at.PYTHON] = 1.0
     asked, why = dependence(made.function, normal_arguments(contact))
     if why:
         say(f"{element}: {name} of {source.path}: note: its call with iflag 1 fails: {why}")
@@ -99,14 +99,14 @@ def _from_library(
         address=np.array([address_of(library, symbol, say)], dtype=np.int64),
         whole=np.array([made.element, len(made.par), 0, 1], dtype=np.int32),
         par=made.par.copy(),
-        place=made.place,
+        inputs=made.inputs,
         gap=np.zeros(4),
         result=np.zeros(8),
     )
     id, npar, dflag, iflag = (call.whole[k:].ctypes.data for k in range(4))
-    vectors = [made.place[k:].ctypes.data for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
+    vectors = [made.inputs[k:].ctypes.data for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
     gaps = [call.gap[k:].ctypes.data for k in range(4 if spoken == FORTRAN else 3)]
-    given = [id, made.place[at.TIME :].ctypes.data, call.par.ctypes.data, npar, *vectors, *gaps]
+    given = [id, made.inputs[at.TIME :].ctypes.data, call.par.ctypes.data, npar, *vectors, *gaps]
     given += [dflag, iflag, call.result.ctypes.data]
     ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(given))(int(call.address[0]))(*given)
     table = pack(call)
@@ -130,9 +130,9 @@ def _compiled(made: UserNormal, script: Script) -> tuple[int, str]:
     if reason:
         return 0, reason
     read = [reads_parameter(script.text, made.name, k) for k in (4, 5, 6, 7)]
-    before = made.place.copy()
+    before = made.inputs.copy()
     reason = normal_disagreement(address, made, script.text, script.values, read)
-    made.place[:] = before
+    made.inputs[:] = before
     return (0, reason) if reason else (address, "")
 
 
@@ -140,7 +140,7 @@ def _callback(made: UserNormal) -> tuple[int, object]:
     """Return the address of the interpreted function as a normal law, and what keeps it alive."""
     from mbsim.core.codes import Code
 
-    out_at, place = guard.Views(3), made.place.data
+    out_at, inputs = guard.Views(3), made.inputs.data
     call = watched(made.call, f"Force_Contact[{made.element}]: {made.name} ({made.source})")
 
     def guarded(depth: float, rate: float, par: int, out: int) -> int:
@@ -149,15 +149,15 @@ def _callback(made: UserNormal) -> tuple[int, object]:
             results = out_at[out]
             at.begin(results, depth)
             if host.seen is not None:
-                host.state = (host.seen[0], place[at.TIME], host.seen[1])
-            for k in range(at.questions(place, depth)):
+                host.state = (host.seen[0], inputs[at.TIME], host.seen[1])
+            for k in range(at.questions(inputs, depth)):
                 at.keep(results, k, depth, call(*at.question(k, depth, rate)))
             return 0
         except guard.PassedOn:
             return Code.RAISED_INTERPRETED
         except BaseException as error:
             title, source = f"Force_Contact[{made.element}]", str(made.source)
-            guard.failure.store(error, title, place[at.TIME], made.name, source)
+            guard.failure.store(error, title, inputs[at.TIME], made.name, source)
             return guard.code_of(error)
         finally:
             host.state = outer
@@ -167,14 +167,14 @@ def _callback(made: UserNormal) -> tuple[int, object]:
 
 
 def reproduce_normal(user: UserNormal) -> NoReturn:
-    """Raise why a normal law failed where its place says that it was asked last.
+    """Raise why a normal law failed where its inputs say that it was asked last.
 
     Raises
     ------
     PluginError
         Always.
     """
-    depth, rate, time = (float(user.place[k]) for k in (at.DEPTH, at.RATE, at.TIME))
+    depth, rate, time = (float(user.inputs[k]) for k in (at.DEPTH, at.RATE, at.TIME))
     title = f"Force_Contact[{user.element}]: {user.name}"
     where = f"at time {time:.12g}, gap {-depth:.9g}, gapdot {-rate:.9g}"
     if user.function is None:
@@ -182,7 +182,7 @@ def reproduce_normal(user: UserNormal) -> NoReturn:
             f"{title} returned no finite number {where} ({user.source}); what is unset is nan"
         )
     try:
-        user.place[at.MODE] = at.EVALUATE
+        user.inputs[at.MODE] = at.EVALUATE
         force = user.call(depth, rate)
     except BaseException as error:
         guard.failure.clear()

@@ -135,7 +135,7 @@ class UserNormal(_Called):
         Of the C function behind `laws.abi.NORMAL_SIGNATURE`.
     par : ndarray, shape (n,)
         The values of cnf_param_string.
-    place : ndarray, shape (user_normal.PLACE,)
+    inputs : ndarray, shape (user_normal.NORMAL_INPUTS,)
         What the law is given beside depth and rate.
     hidden : tuple of float
         What the C function reads of its parameters before `par`.
@@ -145,7 +145,7 @@ class UserNormal(_Called):
 
     address: int
     par: npt.NDArray[np.float64]
-    place: npt.NDArray[np.float64]
+    inputs: npt.NDArray[np.float64]
     hidden: tuple[float, ...]
     source: Path
     name: str
@@ -161,7 +161,7 @@ class UserNormal(_Called):
     def call(self, depth: float, rate: float) -> float:
         """Return the force of the interpreted function at its place; exceptions come through."""
         assert self.function is not None
-        given = self.place.tolist()
+        given = self.inputs.tolist()
         vectors = [given[k : k + 3] for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
         dflag, par = int(given[at.MODE] != at.EVALUATE), self.par.tolist()
         host.time, host.area = given[at.TIME], given[at.AREA]

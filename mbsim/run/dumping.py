@@ -143,8 +143,8 @@ class ContactProblems:
         shape = (6 * nb, 3 * len(hit))
         if not rows:
             return sparse.csc_array(shape), force
-        places = (np.concatenate(rows), np.concatenate(columns))
-        return sparse.coo_array((np.concatenate(values), places), shape=shape).tocsc(), force
+        coordinates = (np.concatenate(rows), np.concatenate(columns))
+        return sparse.coo_array((np.concatenate(values), coordinates), shape=shape).tocsc(), force
 
     def _responses(self, t: float, h: float, y: Array, H: Any, pushed: Array) -> tuple[Any, Array]:
         """Return W, and the velocities q of the contacts after h without them."""

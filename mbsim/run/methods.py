@@ -36,7 +36,7 @@ FEW = 16
 #: The part of a step's error that Newton's iteration may leave where friction holds without give.
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
-LEFT_OF_HELD = 3e-4
+LEFT_OF_STICKING = 3e-4
 
 
 class Methods:
@@ -64,7 +64,7 @@ class Methods:
         length, speed = system.scene.world.scale[:2]
         self.arrays.memory[scheme.OWN_TIME] = length / speed
         if system.scene.contacts.rigid.any() or (system.scene.applied.equation >= 0).any():
-            self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_HELD
+            self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_STICKING
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem

@@ -137,17 +137,17 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
     for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
         if source is None or source.integr_tol is None:
             continue
-        place = f"{model.file}:{source.source.line}"
+        where = f"{model.file}:{source.source.line}"
         if adams:
             # the reader has made it of ERROR
-            name, said, chosen = "tol", f"1e-5 of INTEGRATOR/ERROR ({place})", source.integr_tol
+            name, said, chosen = "tol", f"1e-5 of INTEGRATOR/ERROR ({where})", source.integr_tol
         else:
             name, chosen = "integr_tol", source.integr_tol / PER_TOL
-            said = f"{1.0 / PER_TOL:g} of integr_tol {source.integr_tol:g} in {part} ({place})"
+            said = f"{1.0 / PER_TOL:g} of integr_tol {source.integr_tol:g} in {part} ({where})"
         try:
             return _checked("tol", chosen, 1e-15, 0.1), said
         except ModelError as error:
-            raise ModelError(f"{place}: Param_Transient: {name}: {error}") from None
+            raise ModelError(f"{where}: Param_Transient: {name}: {error}") from None
     return DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL, "the default"
 
 

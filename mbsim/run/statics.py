@@ -93,15 +93,15 @@ def _report(system: System, found: Balance, before: Array, y: Array, t: float) -
     """Return what the log says of an equilibrium."""
     count = len(system.body_ids)
     n = BODY_SIZE * count
-    way = (y[:n] - before[:n]).reshape(-1, BODY_SIZE)[:, :3]
-    ways = np.linalg.norm(way, axis=1)
+    shift = (y[:n] - before[:n]).reshape(-1, BODY_SIZE)[:, :3]
+    shifts = np.linalg.norm(shift, axis=1)
     lines = [
         f"static at time {t:.9g}: {found.iterations} iterations, {found.evaluations} evaluations, "
         + _share(found)
     ]
     if count:
-        b = int(ways.argmax())
-        lines.append(f"static: {system.body_name(b)} moved furthest, by {ways[b]:.6g}")
+        b = int(shifts.argmax())
+        lines.append(f"static: {system.body_name(b)} moved furthest, by {shifts[b]:.6g}")
     if found.unstable:
         lines.append("static: without friction this equilibrium is unstable")
     return lines

@@ -247,7 +247,7 @@ def test_calls_of_users_normal_laws(tmp_path, how):
     file = example(tmp_path, how) if "." in how else USERFUNCS / "cnfsub.py"
     par = Subroutine((1e5, 1.5, 0.4), "CNFSUB")
     user = load_normal(Contact(1, cnf=par), [file], how == "interpreted", {}, print)
-    user.place[user_normal.MODE] = user_normal.EVALUATE
+    user.inputs[user_normal.MODE] = user_normal.EVALUATE
     run, out, count = jit.function(_normal_calls), np.zeros(3), 200_000
     times = []
     for _ in range(7):

@@ -116,14 +116,14 @@ def lasting(scene: Scene) -> np.ndarray:
 def fill_equations(scene: Scene, t: float, y: F1) -> None:
     """Fill gradient, residual and rates of the equations in use."""
     if scene.world.hooks[Hook.STICKING] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.PLACE, t, y)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOCATE, t, y)))
     for r in range(active_count(scene)):
         fill_equation(scene, t, y, scene.equations.active[r])
 
 
 @jitable
-def side_place(scene: Scene, m: int) -> int:
-    """Return the place in the tree of the body of marker m, -1 for none."""
+def tree_index(scene: Scene, m: int) -> int:
+    """Return the tree index of the body of marker m, -1 for none."""
     return scene.tree.of_body[scene.markers.body[m]]
 
 
@@ -133,26 +133,26 @@ def add_wrench(scene: Scene, e: int, factor: float) -> None:
     eq, sweep = scene.equations, scene.sweep
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place >= 0:
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index >= 0:
                 for c in range(6):
-                    sweep.p[place, c] -= factor * sweep.G[k, 6 * side + c]
+                    sweep.p[index, c] -= factor * sweep.G[k, 6 * side + c]
 
 
 @jitable
 def along(scene: Scene, e: int, motion: F2, stamp: int) -> float:
-    """Return G_e times the spatial motions of all places.
+    """Return G_e times the spatial motions of all bodies of the tree.
 
     With stamp >= 0 only trees whose root carries that mark count.
     """
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place < 0 or (stamp >= 0 and sweep.mark[scene.tree.root[place]] != stamp):
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index < 0 or (stamp >= 0 and sweep.mark[scene.tree.root[index]] != stamp):
                 continue
             for c in range(6):
-                total += sweep.G[k, 6 * side + c] * motion[place, c]
+                total += sweep.G[k, 6 * side + c] * motion[index, c]
     return total
 
 
@@ -162,9 +162,9 @@ def answer(scene: Scene, e: int, stamp: int) -> None:
     eq, sweep, tree = scene.equations, scene.sweep, scene.tree
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place >= 0 and sweep.mark[tree.root[place]] != stamp:
-                root = tree.root[place]
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index >= 0 and sweep.mark[tree.root[index]] != stamp:
+                root = tree.root[index]
                 sweep.mark[root] = stamp
                 for q in range(root, tree.end[root]):
                     for c in range(6):
@@ -172,19 +172,19 @@ def answer(scene: Scene, e: int, stamp: int) -> None:
     add_wrench(scene, e, 1.0)
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place < 0:
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index < 0:
                 continue
-            root = tree.root[place]
+            root = tree.root[index]
             # a tree that two terms act on answers once: its mark says so
             if sweep.mark[root] == stamp:
                 respond(scene, root, tree.end[root], 0, sweep.answer)
                 sweep.mark[root] = -2 - stamp
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place >= 0:
-                sweep.mark[tree.root[place]] = stamp
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index >= 0:
+                sweep.mark[tree.root[index]] = stamp
 
 
 @jitable
@@ -250,7 +250,7 @@ def solve_matrix(scene: Scene) -> None:
 
 @jitable
 def hold(scene: Scene, t: float, y: F1) -> None:
-    """Fill the accelerations of all places under joints and equations."""
+    """Fill the accelerations of all bodies of the tree under joints and equations."""
     load(scene)
     respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)
     if active_count(scene) == 0:
@@ -387,13 +387,13 @@ def along_motion(scene: Scene, e: int) -> float:
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place < 0:
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index < 0:
                 continue
-            b = scene.tree.body[place]
+            b = scene.tree.body[index]
             G = sweep.G[k, 6 * side : 6 * side + 6]
             for c in range(6):
-                total += G[c] * sweep.a[place, c]
+                total += G[c] * sweep.a[index, c]
             total += dot(
                 (G[3], G[4], G[5]), cross(vector(scene.work.w[b]), vector(scene.work.v[b]))
             )

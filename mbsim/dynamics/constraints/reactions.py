@@ -18,8 +18,8 @@ from mbsim.dynamics.constraints.equations import (
     add_wrench,
     along,
     fill_equation,
-    side_place,
     solve_matrix,
+    tree_index,
 )
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
 from mbsim.dynamics.constraints.tree import respond
@@ -42,13 +42,13 @@ def add_equation_reaction(scene: Scene, y: F1, e: int, multiplier: float, out: F
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
             m = eq.i[k] if side == 0 else eq.j[k]
-            place = side_place(scene, m)
+            index = tree_index(scene, m)
             G = sweep.G[k, 6 * side : 6 * side + 6]
-            if place >= 0 and scene.markers.body[m] == body:
-                add_reaction(scene, y, c, place, G, multiplier, out)
-            elif place >= 0 and body == len(scene.bodies.mass) and scene.markers.body[m] == other:
+            if index >= 0 and scene.markers.body[m] == body:
+                add_reaction(scene, y, c, index, G, multiplier, out)
+            elif index >= 0 and body == len(scene.bodies.mass) and scene.markers.body[m] == other:
                 # on ground acts the opposite of what acts on J
-                add_reaction(scene, y, c, place, G, -multiplier, out)
+                add_reaction(scene, y, c, index, G, -multiplier, out)
 
 
 @jitable

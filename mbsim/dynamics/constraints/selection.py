@@ -37,7 +37,7 @@ from mbsim.dynamics.constraints.equations import (
     fill_equations,
     fill_matrix,
     keep_accelerations,
-    side_place,
+    tree_index,
 )
 from mbsim.dynamics.constraints.folding import leave_fold, near_fold, watch_fold
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
@@ -66,13 +66,13 @@ def fill_size(scene: Scene, e: int) -> None:
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            place = side_place(scene, eq.i[k] if side == 0 else eq.j[k])
-            if place < 0:
+            index = tree_index(scene, eq.i[k] if side == 0 else eq.j[k])
+            if index < 0:
                 continue
-            b = scene.tree.body[place]
+            b = scene.tree.body[index]
             G = sweep.G[k, 6 * side : 6 * side + 6]
             force = (G[3], G[4], G[5])
-            torque = sub((G[0], G[1], G[2]), cross(vector(sweep.arm[place]), force))
+            torque = sub((G[0], G[1], G[2]), cross(vector(sweep.arm[index]), force))
             J = scene.bodies.inertia[b]
             total += dot(force, force) / scene.bodies.mass[b]
             total += dot(torque, torque) / (J[0, 0] + J[1, 1] + J[2, 2])
@@ -85,13 +85,13 @@ def share_tree(scene: Scene, e: int, f: int) -> bool:
     eq, root = scene.equations, scene.tree.root
     for k in range(eq.first[e], eq.first[e + 1]):
         for s in range(2):
-            place = side_place(scene, eq.i[k] if s == 0 else eq.j[k])
-            if place < 0:
+            index = tree_index(scene, eq.i[k] if s == 0 else eq.j[k])
+            if index < 0:
                 continue
             for q in range(eq.first[f], eq.first[f + 1]):
                 for u in range(2):
-                    other = side_place(scene, eq.i[q] if u == 0 else eq.j[q])
-                    if other >= 0 and root[other] == root[place]:
+                    other = tree_index(scene, eq.i[q] if u == 0 else eq.j[q])
+                    if other >= 0 and root[other] == root[index]:
                         return True
     return False
 

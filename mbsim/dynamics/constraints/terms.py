@@ -147,7 +147,7 @@ def distance_term(scene: Scene, y: F1, i: int, j: int, G: F1) -> V3:
 
 
 @jitable
-def touching_term(scene: Scene, y: F1, i: int, j: int, way: int, s: int, G: F1) -> V2:
+def touching_term(scene: Scene, y: F1, i: int, j: int, axis: int, s: int, G: F1) -> V2:
     """Return rate and second rate of slip along x or y of slot s, and fill its gradient.
 
     With p where the surfaces touch, t the axis and n the normal, which all go with the contact:
@@ -159,7 +159,7 @@ def touching_term(scene: Scene, y: F1, i: int, j: int, way: int, s: int, G: F1) 
     """
     row = scene.work.sticking_point[s]
     p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
-    if way == 1:
+    if axis == 1:
         t = cross(n, t)
     dp, dn = (row[9], row[10], row[11]), (row[12], row[13], row[14])
     bi, bj = scene.markers.body[i], scene.markers.body[j]

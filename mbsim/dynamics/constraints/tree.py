@@ -26,13 +26,13 @@ from mbsim.dynamics.bodies.kinematics import position
 
 @jitable
 def origin(scene: Scene, y: F1, k: int) -> V3:
-    """Return O of the tree that place k belongs to."""
+    """Return O of the tree that tree index k belongs to."""
     return position(scene, y, scene.tree.body[scene.tree.root[k]])
 
 
 @jitable
 def parent_body(scene: Scene, k: int) -> int:
-    """Return the body row of the parent of place k."""
+    """Return the body row of the parent of tree index k."""
     parent = scene.tree.parent[k]
     return scene.tree.body[parent] if parent >= 0 else len(scene.bodies.mass)
 
@@ -99,7 +99,7 @@ def put(row: F1, a: V3, b: V3) -> None:
 
 @jitable
 def fill_directions(scene: Scene, y: F1, k: int) -> None:
-    """Fill the free directions of place k, and the acceleration that velocities cause in them.
+    """Fill the free directions at tree index k, and the acceleration that velocities cause in them.
 
     A turn about e through P, e fixed to a body with angular velocity w_e and P to the child, has
     S = (e, P x e) and dS/dt = (w_e x e, v_P x e + P x (w_e x e)); a slide along e of the parent
@@ -195,7 +195,7 @@ def fill_body(scene: Scene, y: F1, k: int) -> None:
 
 @jitable
 def factor_free(scene: Scene, k: int) -> None:
-    """Fill L and W of place k: D = S'HS = L L', W = L^-1 S'H."""
+    """Fill L and W at tree index k: D = S'HS = L L', W = L^-1 S'H."""
     sweep, free = scene.sweep, scene.tree.free[k]
     H, S, W, L = sweep.H[k], sweep.S[k], sweep.W[k], sweep.L[k]
     for q in range(free):
@@ -215,7 +215,7 @@ def factor_free(scene: Scene, k: int) -> None:
 
 @jitable
 def hang(scene: Scene, k: int) -> None:
-    """Factor what place k resists in its free directions and hang the rest, H - W'W, above."""
+    """Factor what tree index k resists in its free directions and hang the rest, H - W'W, above."""
     factor_free(scene, k)
     sweep, parent = scene.sweep, scene.tree.parent[k]
     if parent < 0:
@@ -243,7 +243,7 @@ def prepare(scene: Scene, y: F1) -> None:
 
 @jitable
 def load(scene: Scene) -> None:
-    """Start the forces p of all places: what velocities call for less what acts."""
+    """Start the forces p of all bodies of the tree: what velocities call for less what acts."""
     sweep, work, tree = scene.sweep, scene.work, scene.tree
     for k in range(len(tree.body)):
         b = tree.body[k]
@@ -256,7 +256,7 @@ def load(scene: Scene) -> None:
 
 @jitable
 def pass_up(scene: Scene, k: int, moving: int) -> None:
-    """Find what the forces p of place k ask of its free directions; pass the rest to its parent."""
+    """Find what p at tree index k asks of its free directions; pass the rest to its parent."""
     sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
     S, W, L, z, p = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k], six(sweep.p[k])
     for q in range(free):
@@ -281,7 +281,7 @@ def pass_up(scene: Scene, k: int, moving: int) -> None:
 
 @jitable
 def pass_down(scene: Scene, k: int, moving: int, out: F2) -> None:
-    """Find the acceleration of place k from that of its parent: L' q'' = z - W a."""
+    """Find the acceleration at tree index k from that of its parent: L' q'' = z - W a."""
     sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
     S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
     a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -305,7 +305,7 @@ def pass_down(scene: Scene, k: int, moving: int, out: F2) -> None:
 
 @jitable
 def respond(scene: Scene, first: int, end: int, moving: int, out: F2) -> None:
-    """Fill the accelerations `out` of places first..end that the forces p cause.
+    """Fill the accelerations `out` at tree indices first..end that the forces p cause.
 
     `moving` 0 leaves out what velocities cause. On return p is the articulated force.
     """
@@ -317,7 +317,7 @@ def respond(scene: Scene, first: int, end: int, moving: int, out: F2) -> None:
 
 @jitable
 def write_accelerations(scene: Scene, dy: F1) -> float:
-    """Write the accelerations of all places into y'; return their sum, finite if all are."""
+    """Write accelerations of the tree's bodies into y'; return their sum, finite if all are."""
     total = 0.0
     for k in range(len(scene.tree.body)):
         b = scene.tree.body[k]

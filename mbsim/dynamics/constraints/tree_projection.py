@@ -102,7 +102,7 @@ def joint_arms(scene: Scene, y: F1, k: int) -> tuple[V3, V3]:
 
 @jitable
 def project_child(scene: Scene, y: F1, k: int) -> None:
-    """Put the child of place k where its joint has it."""
+    """Put the child at tree index k where its joint has it."""
     tree = scene.tree
     body = tree.body[k]
     turn_body(scene, y, body, wanted_turn(scene, k))
@@ -126,7 +126,7 @@ def project_tree(scene: Scene, y: F1) -> None:
 
 @jitable
 def carry(scene: Scene, y: F1, k: int) -> None:
-    """Give the child of place k a velocity that its joint allows."""
+    """Give the child at tree index k a velocity that its joint allows."""
     tree, work = scene.tree, scene.work
     turn, body, parent = tree.turn[k], tree.body[k], parent_body(scene, k)
     w_p = vector(work.w[parent])

@@ -12,10 +12,10 @@ from mbsim.dynamics.constraints.tree import origin
 
 @jitable
 def add_reaction(
-    scene: Scene, y: F1, c: int, place: int, wrench: F1, factor: float, out: F1
+    scene: Scene, y: F1, c: int, index: int, wrench: F1, factor: float, out: F1
 ) -> None:
-    """Add `factor` times a wrench about O of that place to the reaction of connection c."""
-    at = sub(marker_point(scene, y, scene.connections.i[c]), origin(scene, y, place))
+    """Add `factor` times a wrench about O of that tree to the reaction of connection c."""
+    at = sub(marker_point(scene, y, scene.connections.i[c]), origin(scene, y, index))
     force = scale(factor, (wrench[3], wrench[4], wrench[5]))
     moment = cross(at, force)
     for i in range(3):

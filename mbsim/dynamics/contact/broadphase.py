@@ -4,7 +4,7 @@ Every member has a box around it, aligned with the global axes and grown by half
 whose boxes meet are listed. While no point of a member has moved by more than half the skin
 since, no other pair can touch; that much is its room. Members of usual size are sorted into the
 cells of a grid as wide as the largest of them, so boxes that meet are in neighbouring
-cells; planes and giants are few and are held against everybody. A pair keeps its place, and
+cells; planes and giants are few and are held against everybody. A pair keeps its row, and
 with it its incidents, as long as it is near.
 """
 
@@ -99,8 +99,8 @@ def near(scene: Scene, i: int, j: int, skin: float) -> bool:
 
 
 @jitable
-def place_of(scene: Scene, kind: int, i: int, j: int) -> int:
-    """Return the place of a listed pair, -1 if there is none."""
+def listed_row(scene: Scene, kind: int, i: int, j: int) -> int:
+    """Return the row of a listed pair, -1 if there is none."""
     pairs, at = scene.pairs, scene.broadphase.head[i]
     while at >= 0:
         if pairs.graphic_j[at] == j and pairs.kind[at] == kind:
@@ -111,7 +111,7 @@ def place_of(scene: Scene, kind: int, i: int, j: int) -> int:
 
 @jitable
 def hold(scene: Scene, pair: int) -> None:
-    """Keep a place in the list."""
+    """Keep a row in the list."""
     pairs, broadphase = scene.pairs, scene.broadphase
     pairs.active[pairs.count[ACTIVE]] = pair
     pairs.count[ACTIVE] += 1
@@ -133,7 +133,7 @@ def add_pair(scene: Scene, contact_set: int, i: int, j: int) -> None:
         return
     if broadphase.swap[contact_set, match] == 1:
         i, j = j, i
-    if place_of(scene, kind, i, j) >= 0:
+    if listed_row(scene, kind, i, j) >= 0:
         return
     if pairs.count[FREE] == 0:
         pairs.count[WANTED] += 1
@@ -356,10 +356,10 @@ def put_aside(scene: Scene, k: int, s: int, row: F1) -> None:
 
 @jitable
 def close_ranks(scene: Scene) -> None:
-    """Move pairs to places in the order of the list, with their slots that touch.
+    """Move pairs to rows in the order of the list, with their slots that touch.
 
     An evaluation then walks through memory from front to back; pairs that come and go would
-    scatter them. Where a law carries X or integrates memory its places in y stay, so nothing is
+    scatter them. Where a law carries X or integrates memory its offsets in y stay, so nothing is
     moved.
     """
     pairs, broadphase, state, work = scene.pairs, scene.broadphase, scene.state, scene.work
@@ -380,10 +380,10 @@ def close_ranks(scene: Scene) -> None:
         pairs.gap[k] = broadphase.spare[k, SPARE_GAP]
         pairs.left[k] = broadphase.spare[k, SPARE_LEFT]
         pairs.active[k] = k
-    places = len(pairs.active)
-    pairs.count[FREE] = places - active
-    for k in range(places - active):
-        pairs.free[k] = places - 1 - k
+    capacity = len(pairs.active)
+    pairs.count[FREE] = capacity - active
+    for k in range(capacity - active):
+        pairs.free[k] = capacity - 1 - k
 
     for h in range(state.hit[last]):
         s = state.hit[h]

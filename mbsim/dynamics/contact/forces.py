@@ -61,11 +61,21 @@ from mbsim.laws.abi import (
     X_IN,
     XDOT_IN,
 )
-from mbsim.laws.user_normal import AREA as PLACE_AREA
-from mbsim.laws.user_normal import DEPTH as PLACE_DEPTH
-from mbsim.laws.user_normal import EVALUATE, EXPLORE, LOCI, LOCJ, NI, NJ, PLACE, PYTHON, TIME
-from mbsim.laws.user_normal import MODE as PLACE_MODE
-from mbsim.laws.user_normal import RATE as PLACE_RATE
+from mbsim.laws.user_normal import AREA as INPUT_AREA
+from mbsim.laws.user_normal import DEPTH as INPUT_DEPTH
+from mbsim.laws.user_normal import (
+    EVALUATE,
+    EXPLORE,
+    LOCI,
+    LOCJ,
+    NI,
+    NJ,
+    NORMAL_INPUTS,
+    PYTHON,
+    TIME,
+)
+from mbsim.laws.user_normal import MODE as INPUT_MODE
+from mbsim.laws.user_normal import RATE as INPUT_RATE
 
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
@@ -224,21 +234,21 @@ def ask_normal(
         return call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
     # a user's law looks at more, as if in the middle of a question for forces
     gi, gj, p, n, area = at
-    place = floats_at(contacts.user_normal[c], PLACE)
-    place[TIME], place[PLACE_DEPTH], place[PLACE_RATE] = t, depth, rate
-    place[PLACE_AREA] = area
+    inputs = floats_at(contacts.user_normal[c], NORMAL_INPUTS)
+    inputs[TIME], inputs[INPUT_DEPTH], inputs[INPUT_RATE] = t, depth, rate
+    inputs[INPUT_AREA] = area
     loci = in_marker(scene, y, gi, sub(p, scale(0.5 * depth, n)))
     locj = in_marker(scene, y, gj, add(p, scale(0.5 * depth, n)))
     ni, nj = along_marker(scene, gi, scale(-1.0, n)), along_marker(scene, gj, n)
     for k in range(3):
-        place[LOCI + k], place[NI + k] = loci[k], ni[k]
-        place[LOCJ + k], place[NJ + k] = locj[k], nj[k]
-    if place[PYTHON] == 1.0:
+        inputs[LOCI + k], inputs[NI + k] = loci[k], ni[k]
+        inputs[LOCJ + k], inputs[NJ + k] = locj[k], nj[k]
+    if inputs[PYTHON] == 1.0:
         scene.log.counters[PYTHON_CALLS] += 1
         show_state(scene, y)
-    place[PLACE_MODE] = EVALUATE
+    inputs[INPUT_MODE] = EVALUATE
     code = call_int(contacts.normal_law[c], (depth, rate, contacts.normal_par[c], out))
-    place[PLACE_MODE] = EXPLORE
+    inputs[INPUT_MODE] = EXPLORE
     if code == 0 and math.isfinite(depth + rate) and not math.isfinite(out[LOAD]):
         return Code.USER_NORMAL_FAILED
     return code
@@ -305,8 +315,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     # normal force; out: force, force at rate 0, stored energy
     out = work.law_out
     scene.log.counters[NORMAL_CALLS] += 1
-    at_place = (gi, gj, p, n, patch(scene, s))
-    code = ask_normal(scene, t, y, c, at_place, depth, rate, out)
+    touching_point = (gi, gj, p, n, patch(scene, s))
+    code = ask_normal(scene, t, y, c, touching_point, depth, rate, out)
     if code != 0:
         return code
     weight = point[AT_WEIGHT]

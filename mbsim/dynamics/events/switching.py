@@ -179,8 +179,8 @@ def load(scene: Scene, context: int, t: float, y: F1) -> float:
             if not math.isnan(force):
                 most = max(most, abs(force) / scene.applied.par[f, SLIDER_STATIC])
     if scene.world.hooks[Hook.STICKING] != 0:
-        held = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
-        most = max(most, 1e-6 * answer_of(scene, held))
+        load = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
+        most = max(most, 1e-6 * answer_of(scene, load))
     return most
 
 

@@ -186,11 +186,11 @@ def _changes(
     length, speed = scene.world.scale[SCALE_LENGTH], scene.world.scale[SCALE_SPEED]
     for b in scene.tree.body:
         old, new = (v[BODY_SIZE * b : BODY_SIZE * (b + 1)] for v in (before, after))
-        way = float(np.linalg.norm(new[0:3] - old[0:3]))
+        shift = float(np.linalg.norm(new[0:3] - old[0:3]))
         along = min(1.0, abs(float(old[3:7] @ new[3:7])))
         turn = 2.0 * float(np.arccos(along)) if along < 1.0 - 1e-14 else 0.0
-        if way > 1e-7 * length or turn > 1e-6:
-            moved.append((int(b), way, turn))
+        if shift > 1e-7 * length or turn > 1e-6:
+            moved.append((int(b), shift, turn))
         dv = float(np.linalg.norm(new[7:10] - old[7:10]))
         dw = float(np.linalg.norm(new[10:13] - old[10:13]))
         if dv > 1e-7 * speed or dw > 1e-7 * speed / length:
@@ -223,8 +223,8 @@ def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
             f"{len(assembly.implied)} equations follow from others (redundant): {names}; "
             "reactions are those of least norm"
         )
-    for b, way, turn in assembly.moved:
-        warnings.append(f"assembly: {system.body_name(b)} moved by {way:.6g} and {turn:.6g} rad")
+    for b, shift, turn in assembly.moved:
+        warnings.append(f"assembly: {system.body_name(b)} moved by {shift:.6g} and {turn:.6g} rad")
     length, speed = system.scene.world.scale[:2]
     for b, v, w in assembly.sped:
         lines.append(

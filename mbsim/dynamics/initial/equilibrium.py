@@ -37,7 +37,7 @@ LOOSE = 1e-9
 #: Rows of equations smaller than this part of the largest are implied by others.
 _RANK = 1e-9
 #: The most of a step: part of the model's length, of the thinnest side (from its middle), radians.
-_MOST_WAY, _MOST_OF_SIDE, _MOST_TURN = 0.1, 0.5, 0.2
+_MOST_SHIFT, _MOST_OF_SIDE, _MOST_TURN = 0.1, 0.5, 0.2
 #: Bodies that have gone further than this many lengths rest on nothing.
 FAR_AWAY = 1e3
 _MOST_CUTS = 40
@@ -93,14 +93,14 @@ class Search:
         self.gyration = np.sqrt(inertia / (2.0 * scene.bodies.mass))
         thin = scene.graphics.thin[np.isfinite(scene.graphics.thin)]
         side = _MOST_OF_SIDE * float(thin.min()) if len(thin) else np.inf
-        self.longest = min(_MOST_WAY * self.length, side)
+        self.longest = min(_MOST_SHIFT * self.length, side)
 
     def rest(self, y: Array) -> None:
         """Take all velocities away."""
         for b in range(self.count):
             y[BODY_SIZE * b + 7 : BODY_SIZE * b + 13] = 0.0
 
-    def place(self, y: Array) -> None:
+    def move_to(self, y: Array) -> None:
         """Bring y onto the constraints, at rest."""
         self.rest(y)
         self.hooks.project(y)
@@ -134,12 +134,12 @@ class Search:
     def moved(self, y: Array, twist: Array) -> Array:
         """Return y with every body displaced by (translation, rotation), back on its joints."""
         new: Array = y.copy()
-        for b, (way, turn) in enumerate(zip(twist[:, :3], twist[:, 3:], strict=True)):
+        for b, (shift, turn) in enumerate(zip(twist[:, :3], twist[:, 3:], strict=True)):
             at = BODY_SIZE * b
             if twist[b].any():
-                new[at : at + 3] += way
+                new[at : at + 3] += shift
                 new[at + 3 : at + 7] = _turned(new[at + 3 : at + 7], turn)
-        self.place(new)
+        self.move_to(new)
         return new
 
     def directions(self, y: Array) -> Array:
@@ -226,16 +226,16 @@ class Search:
 
     def limit(self, twist: Array) -> float:
         """Return the part of a step that is short enough."""
-        way = float(np.linalg.norm(twist[:, :3], axis=1).max(initial=0.0))
+        shift = float(np.linalg.norm(twist[:, :3], axis=1).max(initial=0.0))
         turn = float(np.linalg.norm(twist[:, 3:], axis=1).max(initial=0.0))
-        return min(1.0, self.longest / way if way else 1.0, _MOST_TURN / turn if turn else 1.0)
+        return min(1.0, self.longest / shift if shift else 1.0, _MOST_TURN / turn if turn else 1.0)
 
     def gone(self) -> bool:
         """Return whether a body is far from where it was."""
         shape = (-1, BODY_SIZE)
         n = BODY_SIZE * self.count
-        way = self.y[:n].reshape(shape)[:, :3] - self.first[:n].reshape(shape)[:, :3]
-        return bool(np.abs(way).max(initial=0.0) > FAR_AWAY * self.length)
+        shift = self.y[:n].reshape(shape)[:, :3] - self.first[:n].reshape(shape)[:, :3]
+        return bool(np.abs(shift).max(initial=0.0) > FAR_AWAY * self.length)
 
     def keep(self, y: Array) -> Array | None:
         """Take a point as the best so far; return the accelerations there."""
@@ -340,7 +340,7 @@ def balance(
         weighs, of the largest force at the start), or what rounding leaves.
     """
     search = Search(scene, y, hooks)
-    search.place(search.y)
+    search.move_to(search.y)
     a = search.keep(search.y)
     if a is None:
         return Balance(0, search.evaluations, np.inf, 1.0, 0, False, False, False, False), y

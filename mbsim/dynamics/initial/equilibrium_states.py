@@ -49,22 +49,22 @@ class _States:
 
     def __init__(self, scene: Scene, y: Array, hooks: Hooks) -> None:
         self.search = Search(scene, y, hooks)
-        self.place, self.scale = scene.states.place, scene.states.scale
-        self.search.place(self.search.y)
+        self.offsets, self.scale = scene.states.place, scene.states.scale
+        self.search.move_to(self.search.y)
 
     def residual(self, y: Array, P: Array, R: Array) -> Array | None:
         """Return forces along P and slopes; None where they cannot be evaluated."""
         a = self.search.accelerations(y)
         if a is None:
             return None
-        slopes = self.search.f[self.place]
+        slopes = self.search.f[self.offsets]
         return np.concatenate([P.T @ self.search.forces(a, R).ravel(), slopes])
 
     def moved(self, step: Array, P: Array) -> Array:
         """Return the point after a step from the best one."""
         n = P.shape[1]
         y = self.search.moved(self.search.y, (P @ step[:n]).reshape(-1, 6))
-        y[self.place] += step[n:]
+        y[self.offsets] += step[n:]
         return y
 
     def look(self) -> _Local | None:
@@ -75,9 +75,9 @@ class _States:
         P = search.directions(search.y)
         R = search.scene.work.R[: search.count].copy()
         F = self.residual(search.y, P, R)
-        size = np.maximum(np.abs(search.y[self.place]), self.scale)
-        way = np.tile([search.length] * 3 + [1.0] * 3, search.count)
-        across = [1.0 / np.abs(column / way).max() for column in P.T]
+        size = np.maximum(np.abs(search.y[self.offsets]), self.scale)
+        unit = np.tile([search.length] * 3 + [1.0] * 3, search.count)
+        across = [1.0 / np.abs(column / unit).max() for column in P.T]
         unit = np.concatenate([across, size])
         J = np.zeros((len(unit), len(unit)))
         for k, whole in enumerate(unit):

@@ -25,9 +25,9 @@ _MISMATCH, _FLOW = 1, 3
 
 
 def tree_map(scene: Scene) -> Array:
-    """Return how (v_cg, w) of all places, global, follow from rates in the free directions.
+    """Return how (v_cg, w) of the tree's bodies, global, follow from rates in the free directions.
 
-    Shape (6 places, free directions); the tree has been prepared.
+    Shape (6 bodies, free directions); the tree has been prepared.
     """
     tree, sweep = scene.tree, scene.sweep
     n = len(tree.body)
@@ -55,13 +55,13 @@ def equation_rows(scene: Scene, found: Array, held: Array) -> Array:
         row = np.zeros(found.shape[1])
         for k in range(equations.first[e], equations.first[e + 1]):
             for side, m in enumerate((equations.i[k], equations.j[k])):
-                place = int(tree.of_body[scene.markers.body[m]])
-                if place < 0:
+                index = int(tree.of_body[scene.markers.body[m]])
+                if index < 0:
                     continue
                 G = sweep.G[k, 6 * side : 6 * side + 6]
                 # about the cg
-                torque = G[:3] - np.cross(sweep.arm[place], G[3:])
-                at = found[6 * place : 6 * place + 6]
+                torque = G[:3] - np.cross(sweep.arm[index], G[3:])
+                at = found[6 * index : 6 * index + 6]
                 row += G[3:] @ at[:3] + torque @ at[3:]
         rows.append(row)
     return np.array(rows).reshape(-1, found.shape[1])

@@ -34,8 +34,8 @@ def forget_pattern(P: Pattern) -> None:
     nb = len(P.order)
     for a in range(nb):
         for b in range(nb):
-            P.place[a, b] = -1
-        P.place[a, a] = a
+            P.block[a, b] = -1
+        P.block[a, a] = a
         P.pair[a, BLOCK_ROW] = P.pair[a, BLOCK_COLUMN] = a
     P.count[COUPLINGS] = nb
     P.count[STALE] = 1
@@ -44,7 +44,7 @@ def forget_pattern(P: Pattern) -> None:
 @jitable
 def couple(P: Pattern, a: int, b: int) -> bool:
     """Make room for what body b does to a and a to b; return whether there is room."""
-    if P.place[a, b] >= 0 and P.place[a, b] < P.count[COUPLINGS]:
+    if P.block[a, b] >= 0 and P.block[a, b] < P.count[COUPLINGS]:
         return True
     # blocks of fill behind the couplings are found anew
     if P.count[STALE] == 0:
@@ -53,7 +53,7 @@ def couple(P: Pattern, a: int, b: int) -> bool:
     k = P.count[COUPLINGS]
     if k + 2 > len(P.pair):
         return False
-    P.place[a, b], P.place[b, a] = k, k + 1
+    P.block[a, b], P.block[b, a] = k, k + 1
     P.pair[k, BLOCK_ROW], P.pair[k, BLOCK_COLUMN] = a, b
     P.pair[k + 1, BLOCK_ROW], P.pair[k + 1, BLOCK_COLUMN] = b, a
     P.count[COUPLINGS] = k + 2
@@ -66,17 +66,17 @@ def drop_fill(P: Pattern) -> None:
     nb = len(P.order)
     for a in range(nb):
         for b in range(nb):
-            if P.place[a, b] >= P.count[COUPLINGS]:
-                P.place[a, b] = -1
+            if P.block[a, b] >= P.count[COUPLINGS]:
+                P.block[a, b] = -1
 
 
 @jitable
 def place_block(P: Pattern, a: int, b: int) -> bool:
     """Make room for a block; return whether there is room."""
-    if P.place[a, b] < 0:
+    if P.block[a, b] < 0:
         if P.count[BLOCKS] >= len(P.neighbour):
             return False
-        P.place[a, b] = P.count[BLOCKS]
+        P.block[a, b] = P.count[BLOCKS]
         P.count[BLOCKS] += 1
     return True
 
@@ -86,7 +86,7 @@ def count_neighbours(P: Pattern, a: int) -> int:
     """Return with how many bodies that are not yet eliminated body a is coupled."""
     count = 0
     for b in range(len(P.order)):
-        if b != a and P.waiting[b] >= 0 and P.place[a, b] >= 0:
+        if b != a and P.waiting[b] >= 0 and P.block[a, b] >= 0:
             count += 1
     return count
 
@@ -120,7 +120,7 @@ def find_order(P: Pattern) -> bool:
         P.start[step] = at
         P.waiting[c] = -1
         for j in range(nb):
-            if P.waiting[j] >= 0 and P.place[c, j] >= 0:
+            if P.waiting[j] >= 0 and P.block[c, j] >= 0:
                 P.neighbour[at] = j
                 at += 1
         first = P.start[step]
@@ -262,13 +262,13 @@ def hang(P: Pattern, M: Real | Pair, linear: Linear, free: I1, c: int, first: in
     size, A, pivot = free[k], M.A, M.pivot[c]
     for at in range(first, end):
         i = P.neighbour[at]
-        block = A[P.place[i, c]]
+        block = A[P.block[i, c]]
         if p >= 0:
-            add_block(A[P.place[i, p]], block)
+            add_block(A[P.block[i, p]], block)
         times_directions(block, S, size, block)
-    body = A[P.place[c, c]]
+    body = A[P.block[c, c]]
     if p >= 0:
-        add_block(A[P.place[c, p]], body)
+        add_block(A[P.block[c, p]], body)
     times_directions(body, S, size, own)
     # rows of dq
     for q in range(size):
@@ -279,17 +279,17 @@ def hang(P: Pattern, M: Real | Pair, linear: Linear, free: I1, c: int, first: in
             pivot[q, j] = total
     for at in range(first, end):
         j = P.neighbour[at]
-        block = A[P.place[c, j]]
+        block = A[P.block[c, j]]
         directions_times(S, block, size, spare)
         if j == p:
             for q in range(size):
                 for i in range(spare.shape[1]):
                     spare[q, i] += U[q, i] + U[6 + q, i]
         if p >= 0:
-            add_block(A[P.place[p, j]], block)
+            add_block(A[P.block[p, j]], block)
         copy_rows(block, spare, size)
     if p >= 0:
-        above = A[P.place[p, c]]
+        above = A[P.block[p, c]]
         for i in range(above.shape[0]):
             for q in range(size):
                 above[i, q] += own[i, q]
@@ -305,17 +305,17 @@ def eliminate(P: Pattern, M: Real | Pair, linear: Linear, free: I1) -> bool:
         if P.joint[c] >= 0:
             size = hang(P, M, linear, free, c, first, end)
         else:
-            copy_rows(M.pivot[c], M.A[P.place[c, c]], 6)
+            copy_rows(M.pivot[c], M.A[P.block[c, c]], 6)
         if not factor_small(M.pivot[c], M.swap[c], size):
             return False
         for at in range(first, end):
-            solve_rows(M.pivot[c], M.swap[c], size, M.A[P.place[c, P.neighbour[at]]])
+            solve_rows(M.pivot[c], M.swap[c], size, M.A[P.block[c, P.neighbour[at]]])
         for at in range(first, end):
             i = P.neighbour[at]
-            Q = M.A[P.place[i, c]]
+            Q = M.A[P.block[i, c]]
             for other in range(first, end):
                 j = P.neighbour[other]
-                take_product(M.A[P.place[i, j]], Q, M.A[P.place[c, j]], size)
+                take_product(M.A[P.block[i, j]], Q, M.A[P.block[c, j]], size)
     return True
 
 
@@ -342,7 +342,7 @@ def solve_bodies(P: Pattern, M: Real | Pair, linear: Linear, free: I1, g: N2) ->
         solve_small(M.pivot[c], M.swap[c], size, g[c])
         for at in range(first, end):
             i = P.neighbour[at]
-            Q = M.A[P.place[i, c]]
+            Q = M.A[P.block[i, c]]
             for r in range(g.shape[1]):
                 for q in range(size):
                     g[i, r] -= Q[r, q] * g[c, q]
@@ -353,7 +353,7 @@ def solve_bodies(P: Pattern, M: Real | Pair, linear: Linear, free: I1, g: N2) ->
             size = free[k]
         for at in range(first, end):
             j = P.neighbour[at]
-            X = M.A[P.place[c, j]]
+            X = M.A[P.block[c, j]]
             for q in range(size):
                 for r in range(g.shape[1]):
                     g[c, q] -= X[q, r] * g[j, r]

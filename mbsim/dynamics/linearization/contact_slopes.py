@@ -45,7 +45,7 @@ from mbsim.geometry.catalog import (
 from mbsim.laws.abi import DFLAG, LOAD
 from mbsim.laws.catalog import SLIP
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_X, KEPT_Y
-from mbsim.laws.user_normal import AREA, EXPLORE, MODE, PLACE, SLOPES
+from mbsim.laws.user_normal import AREA, EXPLORE, MODE, NORMAL_INPUTS, SLOPES
 
 if TYPE_CHECKING:
     from mbsim.compile_model.tangent import Pattern, Tangent
@@ -203,10 +203,10 @@ def add_region_stiffness(
 
 
 @jitable
-def add_moves_of_place(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) -> None:
-    """Add that friction acts elsewhere, and at another slip, where tilting moves the place.
+def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float) -> None:
+    """Add that friction acts elsewhere, and at another slip, where tilting moves their centre.
 
-    The place is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
+    The centre is sum w_i d_i p_i / sum w_i d_i: as point i gets deeper by 1, it moves by
     w_i (p_i - p) / sum w_i d_i. Rows 1 to 5 of `basis` are those of friction, `law` its slopes.
     """
     P, L, work, nb = T.pattern, T.linear, scene.work, len(scene.bodies.mass)
@@ -247,8 +247,8 @@ def normal_slopes(
     contacts, out, weight = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
     user = contacts.user_normal[c]
     if user != 0:
-        place = floats_at(user, PLACE)
-        place[MODE], place[AREA] = SLOPES, patch(scene, s)
+        inputs = floats_at(user, NORMAL_INPUTS)
+        inputs[MODE], inputs[AREA] = SLOPES, patch(scene, s)
     step = PART * depth
     call = (depth + step, rate, contacts.normal_par[c], out)
     code = call_int(contacts.normal_law[c], call)
@@ -261,7 +261,7 @@ def normal_slopes(
     code += call_int(contacts.normal_law[c], (depth, rate - step, contacts.normal_par[c], out))
     by_rate = weight * (upper - out[LOAD]) / (2.0 * step)
     if user != 0:
-        floats_at(user, PLACE)[MODE] = EXPLORE
+        floats_at(user, NORMAL_INPUTS)[MODE] = EXPLORE
     return code, by_depth, by_rate
 
 
@@ -349,7 +349,7 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        add_moves_of_place(scene, T, y, s, by_rate)
+        add_moves_of_centre(scene, T, y, s, by_rate)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]

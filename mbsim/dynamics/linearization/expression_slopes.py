@@ -125,8 +125,8 @@ def add_program_slopes(
             a = i if side == 0 else j
             if a < nb:
                 sign = 1.0 if side == 0 else -1.0
-                add_product(L.K[P.place[a, b]], sign, u[side], L.rise[0:6])
-                add_product(L.D[P.place[a, b]], sign, u[side], L.rise[6:12])
+                add_product(L.K[P.block[a, b]], sign, u[side], L.rise[0:6])
+                add_product(L.D[P.block[a, b]], sign, u[side], L.rise[6:12])
     first = len(scene.equations.program)
     for at in range(T.depends.state_start[program], T.depends.state_start[program + 1]):
         z = T.depends.state[at]
@@ -141,15 +141,15 @@ def add_program_slopes(
 @jitable
 def state_rise(scene: Scene, T: Tangent, t: float, y: F1, program: int, z: int) -> float:
     """Return the derivative of a program by state z."""
-    place = scene.states.place[z]
+    at = scene.states.place[z]
     if T.depends.user[program] == 0:
-        run(scene, t, y, program, A_STATE, place)
+        run(scene, t, y, program, A_STATE, at)
         return scene.programs.stack[0, JET_SLOPE]
-    before, kept = value_anew(scene, t, y, program), y[place]
+    before, kept = value_anew(scene, t, y, program), y[at]
     size = PUSH * max(abs(kept), scene.states.scale[z])
-    y[place] = kept + size
+    y[at] = kept + size
     rise = (value_anew(scene, t, y, program) - before) / size
-    y[place] = kept
+    y[at] = kept
     return rise
 
 

@@ -35,7 +35,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body
-from mbsim.dynamics.constraints.equations import fill_equation, side_place
+from mbsim.dynamics.constraints.equations import fill_equation, tree_index
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import child_axis, origin, parent_axis
@@ -102,7 +102,7 @@ def fill_joint_forces(scene: Scene, L: Linear) -> None:
         e = eq.active[row]
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):
-                k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+                k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
                 if k >= 0:
                     for i in range(6):
                         L.f[k, i] -= sweep.multiplier[row] * sweep.G[term, 6 * side + i]
@@ -127,7 +127,7 @@ def write_turn(U: F2, q: int, e: V3, P: V3, f: F1, on_child: int) -> None:
 
 @jitable
 def fill_joint(scene: Scene, L: Linear, y: F1, k: int) -> None:
-    """Fill directions of the joint of place k, and how their product with its force changes."""
+    """Fill directions of joint k of the tree, and how their product with its force changes."""
     tree, S, U, f = scene.tree, scene.sweep.S[k], L.U[k], L.f[k]
     for q in range(6):
         for i in range(6):
@@ -242,7 +242,7 @@ def fill_rows(scene: Scene, L: Linear, t: float) -> None:
         L.released[row] = 0 if is_sticking(scene, e, t) else 1
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):
-                k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+                k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
                 if k >= 0:
                     for i in range(6):
                         G = scene.sweep.G[term, 6 * side + i]
@@ -268,7 +268,7 @@ def take_bend(
     """
     eq, sweep = scene.equations, scene.sweep
     for side in range(2):
-        k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+        k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
         G = sweep.G[term, 6 * side : 6 * side + 6]
         force = (G[3], G[4], G[5])
         moment = (G[0], G[1], G[2])
@@ -281,9 +281,9 @@ def take_bend(
 
 
 @jitable
-def place_of_origin(scene: Scene, y: F1, m: int) -> V3:
+def tree_origin(scene: Scene, y: F1, m: int) -> V3:
     """Return O of the body of marker m; the global origin for ground."""
-    k = side_place(scene, m)
+    k = tree_index(scene, m)
     return origin(scene, y, k) if k >= 0 else (0.0, 0.0, 0.0)
 
 
@@ -291,7 +291,7 @@ def place_of_origin(scene: Scene, y: F1, m: int) -> V3:
 def bend_by(scene: Scene, T: Tangent, t: float, y: F1, row: int, e: int, term: int, b: int) -> None:
     """Add how the force of a term turns as body b is displaced."""
     L, eq, P, at = T.linear, scene.equations, T.pattern, BODY_SIZE * b
-    origins = (place_of_origin(scene, y, eq.i[term]), place_of_origin(scene, y, eq.j[term]))
+    origins = (tree_origin(scene, y, eq.i[term]), tree_origin(scene, y, eq.j[term]))
     kept = (y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5], y[at + 6])
     size = scene.sweep.multiplier[row] / (2.0 * _PUSH)
     for i in range(6):
@@ -309,10 +309,10 @@ def bend_by(scene: Scene, T: Tangent, t: float, y: F1, row: int, e: int, term: i
             place_body(scene, y, b)
     r = vector(L.r[b])
     for side in range(2):
-        k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+        k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
         if k < 0:
             continue
-        block = L.K[P.place[scene.tree.body[k], b]]
+        block = L.K[P.block[scene.tree.body[k], b]]
         for i in range(6):
             F = (L.law[i, 6 * side], L.law[i, 6 * side + 1], L.law[i, 6 * side + 2])
             # a turn about O displaces the cg by theta x r

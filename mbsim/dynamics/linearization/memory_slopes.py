@@ -38,7 +38,7 @@ _GIVEN = 6
 
 
 @jitable
-def place_of(scene: Scene, s: int, j: int) -> int:
+def offset_of(scene: Scene, s: int, j: int) -> int:
     """Return where the j-th number that slot s carries stands in y."""
     x = scene.slots.x[s]
     if x < 0:
@@ -78,7 +78,7 @@ def push_of(scene: Scene, y: F1, s: int, given: F1, column: int) -> float:
         j = column - _GIVEN
         if scene.slots.x[s] >= 0 and j < 3:
             length = scene.world.scale[SCALE_LENGTH] if j < 2 else 1.0
-            return _PUSH_X * (length + abs(y[place_of(scene, s, j)]))
+            return _PUSH_X * (length + abs(y[offset_of(scene, s, j)]))
         size = scene.work.law_out[SIZE_OUT]
         return _PUSH * (size if size > 0.0 else 1.0)
     if column < 2:
@@ -130,17 +130,17 @@ def fill(scene: Scene, T: Tangent, y: F1) -> int:
                 code = ask_at(scene, y, s, around, given, out)
                 given[column] = kept
             else:
-                place = place_of(scene, s, column - _GIVEN)
-                kept = y[place]
-                y[place] = kept + change
+                offset = offset_of(scene, s, column - _GIVEN)
+                kept = y[offset]
+                y[offset] = kept + change
                 code = ask_at(scene, y, s, around, given, out)
-                y[place] = kept
+                y[offset] = kept
             if code != 0:
                 return code
         for row in range(5 + n):
             table[row, column] = (upper[row] - lower[row]) / (2.0 * size)
     for i in range(K.carries.shape[1]):
-        K.carries[count, i] = place_of(scene, s, i) if i < n else -1
+        K.carries[count, i] = offset_of(scene, s, i) if i < n else -1
     for side in range(2):
         K.body[count, side] = scene.graphics.body[gi if side == 0 else gj]
         for direction in range(6):
@@ -249,7 +249,7 @@ def add_to_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:  # noqa: C9
                     if a >= nb:
                         continue
                     sign = 1.0 if of == by else -1.0
-                    block, lever = M.A[P.place[a, b]], K.lever[k, of, 1 + row]
+                    block, lever = M.A[P.block[a, b]], K.lever[k, of, 1 + row]
                     for i in range(6):
                         for j in range(6):
                             block[i, j] -= sign * lever[i] * by_move[j]

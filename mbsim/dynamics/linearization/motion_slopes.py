@@ -15,7 +15,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
-from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, side_place
+from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, tree_index
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
@@ -35,7 +35,7 @@ def acceleration_along(scene: Scene, L: Linear, y: F1, e: int) -> float:
     eq, sweep, total = scene.equations, scene.sweep, 0.0
     for term in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+            k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
             if k < 0:
                 continue
             b, G = scene.tree.body[k], sweep.G[term, 6 * side : 6 * side + 6]
@@ -106,7 +106,7 @@ def slip_row(scene: Scene, L: Linear, row: int, e: int) -> None:
     eq = scene.equations
     for term in range(eq.first[e], eq.first[e + 1]):
         for side in range(2):
-            k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+            k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
             if k >= 0:
                 for i in range(POSES):
                     L.row_rate[row, scene.tree.body[k], i] += scene.sweep.G[term, 6 * side + i]
@@ -125,7 +125,7 @@ def add_motion_rows(scene: Scene, T: Tangent, t: float, y: F1) -> None:
             continue
         for term in range(eq.first[e], eq.first[e + 1]):
             for side in range(2):
-                k = side_place(scene, eq.i[term] if side == 0 else eq.j[term])
+                k = tree_index(scene, eq.i[term] if side == 0 else eq.j[term])
                 if k >= 0:
                     drive_by(scene, T.linear, t, y, row, e, scene.tree.body[k])
         fill_equation(scene, t, y, e)

@@ -163,7 +163,7 @@ def fill_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:
                     for j in range(A.shape[1]):
                         A[i, j] -= part * E[q, j]
     for b in range(len(P.order)):
-        add_inertia(scene, L, M, b, M.A[P.place[b, b]])
+        add_inertia(scene, L, M, b, M.A[P.block[b, b]])
 
 
 @jitable
@@ -286,7 +286,7 @@ def held_residual(scene: Scene, L: Linear, M: Real | Pair, row: int, r: N1) -> c
 def factor_rest(scene: Scene, T: Tangent, M: Real | Pair) -> int:
     """Factor the border: what equations and states ask of the bodies."""
     P, L = T.pattern, T.linear
-    held, size = active_count(scene), border_count(scene)
+    active, size = active_count(scene), border_count(scene)
     for k in range(size):
         row, y = bordered(scene, k), M.answer[k]
         for b in range(len(P.order)):
@@ -296,15 +296,15 @@ def factor_rest(scene: Scene, T: Tangent, M: Real | Pair) -> int:
     for k in range(size):
         row = bordered(scene, k)
         for other in range(size):
-            if k < held:
+            if k < active:
                 M.border[k, other] = held_row(scene, L, M, row, M.answer[other])
                 if L.released[k] == 1:
                     # its multiplier is 0
                     M.border[k, other] = 1.0 if k == other else 0.0
                 continue
             M.border[k, other] = -along_row(L, M, row, 1, M.answer[other])
-            if other >= held:
-                M.border[k, other] -= L.slopes[k - held, other - held]
+            if other >= active:
+                M.border[k, other] -= L.slopes[k - active, other - active]
             if other == k:
                 M.border[k, other] += M.c[0, C3]
     factor_border(M.border, M.border_swap, size)
@@ -379,17 +379,17 @@ def fill_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
 def solve_border_part(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
     """Solve for multipliers and states, and add what they do to g, which holds displacements."""
     P, L = T.pattern, T.linear
-    held, size = active_count(scene), border_count(scene)
+    active, size = active_count(scene), border_count(scene)
     x = M.extra[1]
     for k in range(size):
         row = bordered(scene, k)
-        if k < held:
+        if k < active:
             x[k] = held_residual(scene, L, M, row, r) - held_row(scene, L, M, row, M.g)
             if L.released[k] == 1:
                 x[k] = 0.0 * x[k]
             continue
-        place = scene.states.place[k - held]
-        x[k] = r[place] + along_row(L, M, row, 1, M.g)
+        at = scene.states.place[k - active]
+        x[k] = r[at] + along_row(L, M, row, 1, M.g)
         for b in range(len(P.order)):
             for i in range(M.rate.shape[1]):
                 x[k] += L.row_rate[row, b, i] * M.rate[b, i]
@@ -432,7 +432,7 @@ def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
         d[k] = r[k] / M.c[0, C3]
     ask_memory(scene, M, Memory.RECOVER, r, d)
     write_answer(scene, T, M, r, d)
-    held = active_count(scene)
+    active = active_count(scene)
     for z in range(len(scene.states.program)):
-        d[scene.states.place[z]] = M.extra[1, held + z]
+        d[scene.states.place[z]] = M.extra[1, active + z]
     return 0

@@ -70,7 +70,7 @@ def add_two_sided(
             b = i if by == 0 else j
             if a < nb and b < nb:
                 size = factor if of == by else -factor
-                add_product(blocks[P.place[a, b]], size, u[of], v[by])
+                add_product(blocks[P.block[a, b]], size, u[of], v[by])
 
 
 @jitable
@@ -106,7 +106,7 @@ def add_turn(
     nb = len(scene.bodies.mass)
     if b == nb or by == nb:
         return
-    block, at = T.linear.K[T.pattern.place[b, by]], from_origin(scene, T.linear, y, b, p)
+    block, at = T.linear.K[T.pattern.block[b, by]], from_origin(scene, T.linear, y, b, p)
     for k in range(3):
         turned = cross(unit(k), force)
         moment = add(cross(at, turned), cross(unit(k), torque))
@@ -133,7 +133,7 @@ def add_lever(
 @jitable
 def carry(scene: Scene, T: Tangent, b: int, by: int, at: V3, force: V3, sign: float) -> None:
     """Add the moment on body b of a force whose point, at from O, moves with body `by`."""
-    block = T.linear.K[T.pattern.place[b, by]]
+    block = T.linear.K[T.pattern.block[b, by]]
     for k in range(3):
         moment, slide = cross(cross(unit(k), at), force), cross(unit(k), force)
         for i in range(3):
@@ -189,7 +189,7 @@ def add_one_sided(
     for other in range(2):
         a = both[other]
         if a < nb:
-            add_product(L.K[P.place[a, b]], factor if other == 0 else -factor, u[other], L.rise)
+            add_product(L.K[P.block[a, b]], factor if other == 0 else -factor, u[other], L.rise)
 
 
 @jitable

@@ -43,7 +43,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     most_capacity,
     share_sticking,
 )
-from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, look_around, place_sticking
+from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, locate_sticking, look_around
 from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
@@ -91,8 +91,8 @@ def sticking_part(scene: Scene) -> float:
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue
-        held, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
-        force = math.hypot(held[0], held[1])
+        along, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
+        force = math.hypot(along[0], along[1])
         if able > 0.0:
             part = max(part, force / able)
         elif force > 0.0:
@@ -201,7 +201,7 @@ def begin_sticking(scene: Scene, y: F1) -> int:
     rest beside what comes to rest: what of it slips is found for all together (`release_sticking`).
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
-    changed, held, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
+    changed, sticking, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
     for e in range(first, len(slot), 2):
         s = slot[e]
         mode = state.memory[s, KEPT_MODE]
@@ -209,11 +209,11 @@ def begin_sticking(scene: Scene, y: F1) -> int:
             begun = max(begun, 1 if mode == BEGUN else 0)
             changed = max(changed, begin_slot(scene, y, s))
         mode = state.memory[s, KEPT_MODE]
-        held = max(held, 1 if mode == STICK else 0)
+        sticking = max(sticking, 1 if mode == STICK else 0)
         if (mode == STICK) != was_sticking(scene, s):
             changed = 1
     # what begins to touch beside what sticks may be held by that
-    if changed == 0 and (held == 0 or begun == 0):
+    if changed == 0 and (sticking == 0 or begun == 0):
         return 0
     for e in range(first, len(slot), 2):
         s = slot[e]
@@ -228,7 +228,7 @@ def begin_sticking(scene: Scene, y: F1) -> int:
 
 @jitable
 def was_sticking(scene: Scene, s: int) -> bool:
-    """Return whether slot s has been held so far."""
+    """Return whether slot s has stuck so far."""
     return scene.state.before[s, KEPT_MODE] == STICK
 
 
@@ -358,8 +358,8 @@ def changed_sticking(scene: Scene) -> int:
 @jitable
 def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
     """Do what contacts with rigid friction are asked for (`Sticking`); return an answer or 0."""
-    if what == Sticking.PLACE:
-        place_sticking(scene, t, y)
+    if what == Sticking.LOCATE:
+        locate_sticking(scene, t, y)
     elif what == Sticking.SHARE:
         share_sticking(scene, t, y)
     elif what == Sticking.ASK:

@@ -71,8 +71,8 @@ def fill_load(scene: Scene, first: int, m: F1) -> None:
 @jitable
 def capacity(scene: Scene, s: int) -> float:
     """Return what slot s holds at most."""
-    held = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC]
-    return held * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
+    mu = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC]
+    return mu * max(0.0, scene.work.slot[s, NORMAL]) if scene.work.touching[s] == 1 else 0.0
 
 
 @jitable
@@ -123,7 +123,7 @@ def is_loaded(scene: Scene, r: int) -> bool:
 
 @jitable
 def spread(scene: Scene, t: float, y: F1, most: float) -> None:
-    """Share what is held out over all slots that stick, in `Work.held`."""
+    """Share what is held out over all slots that stick, in `Work.sticking_force`."""
     sweep, slot = scene.sweep, scene.equations.slot
     count, r = fill_cones(scene, t, y, most)
     if not is_loaded(scene, r):
@@ -137,16 +137,16 @@ def spread(scene: Scene, t: float, y: F1, most: float) -> None:
 @jitable
 def share_sticking(scene: Scene, t: float, y: F1) -> None:
     """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
-    held, active, first = scene.work.sticking_force, scene.equations.active, first_of_slots(scene)
+    force, active, first = scene.work.sticking_force, scene.equations.active, first_of_slots(scene)
     slot, count = scene.equations.slot, 0
     for e in range(first, len(slot), 2):
-        held[slot[e], 0] = held[slot[e], 1] = 0.0
+        force[slot[e], 0] = force[slot[e], 1] = 0.0
         count += 2 if sticks(scene, e) else 0
     if count == 0:
         return
     for r in range(active_count(scene)):
         if active[r] >= first:
-            held[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
+            force[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
             count -= 1
     most = most_capacity(scene)
     if count > 0 and most > 0.0:
@@ -159,10 +159,10 @@ def share_sticking(scene: Scene, t: float, y: F1) -> None:
 @jitable
 def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
-    row, held = scene.work.slot[s], scene.work.sticking_force[s]
+    row, force = scene.work.slot[s], scene.work.sticking_force[s]
     point = scene.work.points[s]
     n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
-    rubs = add(scale(held[0], tx), scale(held[1], cross(n, tx)))
+    rubs = add(scale(force[0], tx), scale(force[1], cross(n, tx)))
     force = add(scale(row[NORMAL], n), rubs)
     for k in range(3):
         row[FORCE + k] = force[k]

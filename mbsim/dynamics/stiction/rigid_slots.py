@@ -100,9 +100,9 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     now, later, before = points[0, k], points[1, k], points[2, k]
     ahead = sub(vector(later[1:4]), vector(now[1:4]))
     back = sub(vector(now[1:4]), vector(before[1:4]))
-    jump, way = norm(sub(ahead, back)), norm(add(ahead, back))
+    jump, path = norm(sub(ahead, back)), norm(add(ahead, back))
     first, last, time = 2, 1, 2.0 * moment
-    if jump > 0.1 * way + SMOOTH * scene.world.scale[SCALE_LENGTH]:
+    if jump > 0.1 * path + SMOOTH * scene.world.scale[SCALE_LENGTH]:
         # the shapes touch at another corner: the side on which they do not
         if norm(ahead) < norm(back):
             first, time = 0, moment
@@ -119,7 +119,7 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
 
 
 @jitable
-def place_sticking(scene: Scene, t: float, y: F1) -> None:
+def locate_sticking(scene: Scene, t: float, y: F1) -> None:
     """Find where the slots that stick are at y, and how that changes; bodies have been placed."""
     slot, last = scene.equations.slot, -1
     moment = MOMENT * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]

@@ -118,8 +118,8 @@ def _dynamic_limit(inputs: FrictionInput, mu_dynamic: float) -> float:
 #: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown; in
 #: place of that force, while it slips, the speed at the committed state, and that at which it was
 #: let go: what sticks moves as its neighbours let it, that is by how they turn over its depth.
-KEPT_MODE, KEPT_X, KEPT_Y, HELD_X, HELD_Y = range(5)
-KEPT_SPEED, KEPT_PLAY = HELD_X, HELD_Y
+KEPT_MODE, KEPT_X, KEPT_Y, STICKING_X, STICKING_Y = range(5)
+KEPT_SPEED, KEPT_PLAY = STICKING_X, STICKING_Y
 #: Its parameters.
 _RIGID_PARAMETERS = ("mu_static", "mu_dynamic")
 MU_STATIC = _RIGID_PARAMETERS.index("mu_static")
@@ -141,7 +141,7 @@ def rigid(
     """Return the same where k is infinite; what holds is not told but asked for by equations."""
     mode, dx, dy = memory[KEPT_MODE], memory[KEPT_X], memory[KEPT_Y]
     if mode == STICK:
-        held = (memory[HELD_X], memory[HELD_Y], 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0)
+        held = (memory[STICKING_X], memory[STICKING_Y], 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0)
         return held, memory
     limit = _dynamic_limit(inputs, mu_dynamic)
     ux, uy = inputs.xdot[0], inputs.xdot[1]

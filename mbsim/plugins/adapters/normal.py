@@ -1,7 +1,7 @@
 """CNFSUB in compiled Python, C and Fortran behind the internal signature of normal laws.
 
 A file of its own, as `friction` and `library` are, for the cache's sake. The parameters
-of such a law begin with an address: of its place (`laws.user_normal`), or of a `NormalCall`.
+of such a law begin with an address: of its inputs (`laws.user_normal`), or of a `NormalCall`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mbsim.laws.user_normal import (
     MODE,
     NI,
     NJ,
-    PLACE,
+    NORMAL_INPUTS,
     TIME,
     begin,
     keep,
@@ -45,7 +45,7 @@ class NormalCall(NamedTuple):
     address: I1  # (1,) of the user's function
     whole: Annotated[npt.NDArray[np.int32], "int32", 1]  # id, npar, dflag, iflag
     par: F1  # (npar,) a copy: what the function writes there is gone at the next call
-    place: F1  # (PLACE,)
+    inputs: F1  # (NORMAL_INPUTS,)
     gap: F1  # (4,) gap, its rate, its second derivative (0), area
     result: F1  # (8,) what it returns, with room for a function that returns too much
 
@@ -55,10 +55,10 @@ def prepare(call: NormalCall, values: F1, depth: float, rate: float) -> None:
     """Write down what one question to a library is."""
     for k in range(len(call.par)):
         call.par[k] = values[k]
-    call.whole[0], call.whole[1] = int(call.place[ID]), len(call.par)
-    call.whole[2], call.whole[3] = int(call.place[MODE] != EVALUATE), 0
+    call.whole[0], call.whole[1] = int(call.inputs[ID]), len(call.par)
+    call.whole[2], call.whole[3] = int(call.inputs[MODE] != EVALUATE), 0
     call.gap[0], call.gap[1], call.gap[2] = -depth, -rate, 0.0
-    call.gap[3] = call.place[AREA]
+    call.gap[3] = call.inputs[AREA]
     call.result[0] = np.nan
 
 
@@ -69,7 +69,7 @@ def call_c(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
     iflag, result.
     """
     call: NormalCall = view(np.int64(vector_at(par, 1)[0]), NormalCall)
-    result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
+    result, at, gap, whole = vector_at(out, 3), call.inputs, call.gap, call.whole
     values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
     for k in range(questions(at, depth)):
@@ -88,7 +88,7 @@ def call_c(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
 def call_fortran(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
     """As `call_c`, with AREA before DFLAG."""
     call: NormalCall = view(np.int64(vector_at(par, 1)[0]), NormalCall)
-    result, at, gap, whole = vector_at(out, 3), call.place, call.gap, call.whole
+    result, at, gap, whole = vector_at(out, 3), call.inputs, call.gap, call.whole
     values = vector_at(par, 1 + len(call.par))[1:]
     begin(result, depth)
     for k in range(questions(at, depth)):
@@ -127,7 +127,7 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
 
     def entry(depth: float, rate: float, par: Pointer, out: Pointer) -> int:
         row = as_tuple(vector_at(par, wide), wide)
-        at, values = floats_at(row[0], PLACE), row[1:]
+        at, values = floats_at(row[0], NORMAL_INPUTS), row[1:]
         result = vector_at(out, 3)
         begin(result, depth)
         code = 0

@@ -139,7 +139,7 @@ def normal_disagreement(
     entry, c_out = ctypes.CFUNCTYPE(*signature)(address), (ctypes.c_double * 3)()
     row, chance = user.row, random.Random(20)
     sizes = thresholds(text, user.par.tolist(), values)
-    quiet = user.place.tolist()
+    quiet = user.inputs.tolist()
     quiet[at.TIME], quiet[at.MODE] = 0.7, at.EVALUATE
     steps = sorted({s * side for s in (*sizes, 1.0) for side in (_BELOW, _ABOVE, 0.5)})
     steps += [1e-12, 1e-9, 1e-6, 1e-3, 1e3]
@@ -162,12 +162,12 @@ def normal_disagreement(
             yield [*given, depth, rate, *quiet[at.ID : at.AREA], chance.choice([0.0, 1e-4, 0.3])]
 
     def run(given: list[float]) -> tuple[bool, list[float]]:
-        user.place[:] = given
+        user.inputs[:] = given
         code = entry(given[at.DEPTH], given[at.RATE], row.ctypes.data, ctypes.addressof(c_out))
         return code != 0, [c_out[0]]
 
     def call(given: list[float]) -> list[float]:
-        user.place[:] = given
+        user.inputs[:] = given
         return [user.call(given[at.DEPTH], given[at.RATE])]
 
     def shown(given: list[float]) -> str:
