@@ -94,8 +94,8 @@ class Recorder:
         self._identity = Identity(system, how)
         self.directory = directory
         self.checkpoint: dict[str, Table] = {}
-        #: What the log says of all rows, those before a resume included.
-        self.watch = Watch(acting(system))
+        self._watch = Watch(acting(system))
+        self._watched = 0  # of the rows gathered, how many it has looked at
         self._gathered = Gathered(system)
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
@@ -241,6 +241,17 @@ class Recorder:
                 self._target.with_suffix(suffix).unlink()
 
     @property
+    def watch(self) -> Watch:
+        """What the log says of all rows, those before a resume included."""
+        self._look(self._gathered.block)
+        return self._watch
+
+    def _look(self, block: Block) -> None:
+        """Look at the rows gathered since the last look: many at once, for each look costs."""
+        first, self._watched = self._watched, len(block.time)
+        self._watch.add(block.time[first:], block.energy[first:], block.wrenches[first:])
+
+    @property
     def empty(self) -> bool:
         """Whether not one row was recorded, by this run or by the one that it resumes."""
         return not (self._started or self._gathered.bytes)
@@ -331,12 +342,13 @@ class Recorder:
         if self._started and not self._gathered.bytes:
             return
         block = self._gathered.block
+        self._look(block)
         self._gathered.clear()
+        self._watched = 0
         rows = dict(self._signals(block))
         room, size = self._store.room(), sum(table.nbytes for table in rows.values())
         # with the first rows, so that a run that dies has them too
         columns = {} if self._started else request_columns(self.system)
-        self.watch.add(block.time, block.energy, block.wrenches)
         if room is not None and size > room:
             self._fill(first_rows(block, max(0, len(block.time) * room // size)), columns)
         self._store.update(rows=rows, attributes=columns, last=last)

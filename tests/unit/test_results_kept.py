@@ -234,7 +234,7 @@ def test_a_run_goes_on_after_a_full_disk(tmp_path: Path, monkeypatch: pytest.Mon
     recorder.flush(checkpoint(5))
     add_rows(system, 5, 40)
     recorder.take()
-    size = sum(table.nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    size = sum(table.nbytes for _, table in recorder._signals(recorder._gathered.block))
     with monkeypatch.context() as patch:
         patch.setattr(PartFile, "room", lambda part: (1 << 18) + int(0.7 * size))
         with pytest.raises(ResultsError, match=r"rows up to time \d.*--resume goes on"):
@@ -256,7 +256,7 @@ def test_a_run_that_goes_on_needs_room_for_the_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recorder = recording(tmp_path, 50)
-    size = sum(table[0].nbytes for _, table in recorder._signals(recorder._blocks[-1]))
+    size = sum(table[0].nbytes for _, table in recorder._signals(recorder._gathered.block))
     recorder.flush(checkpoint(50))
     recorder.abandon()
     again = Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
