@@ -49,7 +49,7 @@ class _States:
 
     def __init__(self, scene: Scene, y: Array, hooks: Hooks) -> None:
         self.search = Search(scene, y, hooks)
-        self.offsets, self.scale = scene.states.place, scene.states.scale
+        self.offsets, self.scale = scene.states.offset, scene.states.scale
         self.search.move_to(self.search.y)
 
     def residual(self, y: Array, P: Array, R: Array) -> Array | None:

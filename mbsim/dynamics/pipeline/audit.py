@@ -39,7 +39,6 @@ from mbsim.arrays.codes import (
     FOUND_ELEMENT,
     FOUND_TIME,
     FOUND_VALUE,
-    HELD_SLIP,
     HITS_THEN,
     LARGEST_ENERGY,
     MOMENTUM,
@@ -49,6 +48,7 @@ from mbsim.arrays.codes import (
     SPIN,
     STEPS_ALL,
     STEPS_SINCE,
+    STICKING_SLIP,
     TIME_THEN,
     USUAL_ENERGY,
     VELOCITY,
@@ -245,7 +245,7 @@ def examine_equations(scene: Scene, t: float) -> None:
         e = eq.active[r]
         rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e] * own_time(scene, e)
         if is_friction(scene, e):
-            note(scene, HELD_SLIP, rate, allowed, t, e)
+            note(scene, STICKING_SLIP, rate, allowed, t, e)
             continue
         if not is_sticking(scene, e, t):
             continue
