@@ -42,10 +42,11 @@ class Hook(IntEnum):
     MEMORY_PAIR = 18  # as MEMORY in complex systems
     GAUGES = 19  # what is measured of contacts: `Gauges`
     EFFECTS = 20  # what an error does to contacts, as implicit methods ask: `Effects`
-    DRY = 21  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 22  # turns of followed angles
-    NEAR = 23  # the lists of near pairs
-    REQUESTS = 24  # expressions of requests
+    STABILITY = 21  # what contacts bound steps of fixed length by: `Stability`
+    DRY = 22  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 23  # turns of followed angles
+    NEAR = 24  # the lists of near pairs
+    REQUESTS = 25  # expressions of requests
 
 
 class Contacts(IntEnum):
@@ -78,6 +79,13 @@ class Effects(IntEnum):
     FRICTION = 0  # change of friction that it causes, over the normal force
     REVERSAL = 1  # the same, with a slip that it turns round
     IMPACT = 2  # change of a closing speed that it causes, over that in a step
+
+
+class Stability(IntEnum):
+    """What contacts add to the bound of a step of fixed length: see events.contact_stability."""
+
+    TOUCHING = 0  # to the blocks of bodies; the step that lets nothing pass through anything
+    MEETING = 1  # of pairs that are yet to touch, to the bounds of all bodies
 
 
 class Recall(IntEnum):

@@ -25,6 +25,7 @@ from mbsim.arrays.hooks import (
     Joints,
     Memory,
     Recall,
+    Stability,
     Sticking,
 )
 from mbsim.core import jit
@@ -61,6 +62,7 @@ CASES = [
     (Hook.MEMORY_PAIR, None, "lugre_stick_slip", "RADAU5"),
     *((Hook.GAUGES, what, "bowling_ball", "DOPRI5") for what in Gauges),
     *((Hook.EFFECTS, what, "bowling_ball", METHOD_OF.get(what, "RADAU5")) for what in Effects),
+    *((Hook.STABILITY, what, "bowling_ball", "VERLET") for what in Stability),
     *((Hook.DRY, what, "dry_friction_element", "DOPRI5") for what in Dry),
     (Hook.ANGLES, None, "cam", "DOPRI5"),
     (Hook.NEAR, None, "crowd", "DOPRI5"),
@@ -123,7 +125,7 @@ class Failure:
             if self.request is not None and given[1] != self.request:
                 return own(*given)
             self.asked += 1
-            if self.hook in (Hook.VALUE, Hook.GAUGES, Hook.EFFECTS):
+            if self.hook in (Hook.VALUE, Hook.GAUGES, Hook.EFFECTS, Hook.STABILITY):
                 # it returns a number: its code is noted
                 scene.users.failed[0] = FAILS
                 return math.nan
@@ -159,6 +161,7 @@ def test_every_hook_and_request_is_tried():
         Hook.GAUGES: Gauges,
         Hook.EFFECTS: Effects,
         Hook.RECALL: Recall,
+        Hook.STABILITY: Stability,
         Hook.CONTACT_SLOPES: ContactSlopes,
         Hook.JOINTS: Joints,
         Hook.STICKING: Sticking,

@@ -19,56 +19,28 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
-    ACTIVE,
     AXIS_TORQUE,
-    BEST_CONTACT,
-    BEST_ENERGY,
-    BEST_FORCE,
-    BEST_INVERSE,
     BOUND_DAMPING,
     BOUND_FORCE,
     BOUND_STIFFNESS,
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
-    CENTRE_ACCELERATION,
-    FASTEST_POINT,
     REST,
-    SCALE_LENGTH,
-    SCALE_SPEED,
     WRENCH,
 )
+from mbsim.arrays.hooks import Hook, Stability
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, F2, V2, V3
+from mbsim.core.address import call_float
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate, vector
+from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate
 from mbsim.dynamics.bodies.kinematics import place_bodies, position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point
-from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides
-from mbsim.dynamics.contact.points import deepest_of_impact
-from mbsim.dynamics.events.step_limits import longest_travel
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, REGION_ROWS
-from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
 #: Largest step over half of the bound; the bound is below the true limit.
 LARGEST_PART = 1.8
-#: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
-AT_REST = 0.1
-#: Substitutions that find the depth of an impact under a force to a few per cent.
-SUBSTITUTIONS = 6
-
-
-@jitable
-def slopes(scene: Scene, c: int, depth: float, out: F1) -> V2:
-    """Return stiffness dF/dd and damping dF/dd' of contact c's law at a depth."""
-    contacts, speed = scene.contacts, scene.world.scale[SCALE_SPEED]
-    call_int(contacts.normal_law[c], (depth, speed, contacts.normal_par[c], out))
-    here, damping = out[ELASTIC], (out[LOAD] - out[ELASTIC]) / speed
-    call_int(contacts.normal_law[c], (1.001 * depth, 0.0, contacts.normal_par[c], out))
-    return max(0.0, (out[ELASTIC] - here) / (0.001 * depth)), max(0.0, damping)
 
 
 @jitable
@@ -85,52 +57,6 @@ def translation(scene: Scene, b: int) -> float:
 
 
 @jitable
-def turning(scene: Scene, g: int) -> float:
-    """Return a bound of n' J I^-1 J' n for a touch anywhere on graphic g: ground and planes 0.
-
-    With the box half edges a (from the cg) and D = I^-1 in its axes (r x n)' D (r x n) is at most
-    the two largest of D_k (a_i^2 + a_j^2), as the three (n_i^2 + n_j^2) are at most 1
-    and 2 together; products of inertia are left out.
-    """
-    graphics, b = scene.graphics, scene.graphics.body[g]
-    if b == len(scene.bodies.mass) or math.isinf(graphics.radius[g]):
-        return 0.0
-    R, p, inverse = graphics.R[g], graphics.p[g], scene.bodies.inverse[b]
-    is_round = graphics.turns[g] == 0
-    if is_round and p[0] == 0.0 and p[1] == 0.0 and p[2] == 0.0:
-        return 0.0
-    square = (0.0, 0.0, 0.0)
-    for k in range(3):
-        # a sphere's surface has its normal through the centre
-        a = abs(p[0] * R[0, k] + p[1] * R[1, k] + p[2] * R[2, k])
-        a += 0.0 if is_round else graphics.half[g, k]
-        square = (square[1], square[2], a * a)
-    total, least = 0.0, math.inf
-    for k in range(3):
-        column = (R[0, k], R[1, k], R[2, k])
-        part = dot(column, rotate(inverse, column)) * (
-            square[0] + square[1] + square[2] - square[k]
-        )
-        total += part
-        least = min(least, part)
-    return total - least
-
-
-@jitable
-def depth_to_come(scene: Scene, c: int, energy: float, force: float) -> float:
-    """Return the depth at which contact c has stored an impact's energy and what `force` adds.
-
-    E(d) = energy + force d, by repeated substitution: of a power law of exponent e an error
-    shrinks by 1/(e + 1) each time.
-    """
-    # without an impact something has to begin the substitution
-    depth = 1e-4 * scene.world.scale[SCALE_LENGTH]
-    for _ in range(SUBSTITUTIONS if force > 0.0 else 1):
-        depth = deepest_of_impact(scene, c, energy + force * depth)
-    return depth
-
-
-@jitable
 def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float) -> None:
     """Add stiffness and damping along n to the block of a body; `turn`: see `yielding`."""
     for r in range(3):
@@ -139,55 +65,6 @@ def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float
             block[10 + 3 * r + q] += damping * n[r] * n[q]
     block[9] += stiffness * turn
     block[19] += damping * turn
-
-
-@jitable
-def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) -> None:
-    """Add the points that slot s stands for to the block of body b, each with its weight."""
-    rows = scene.work.points
-    first = s + REGION_ROWS
-    for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
-        if rows[row, AT_DEPTH] > 0.0:
-            p, n, weight = (
-                vector(rows[row, AT_POINT:]),
-                vector(rows[row, AT_NORMAL:]),
-                rows[row, AT_WEIGHT],
-            )
-            turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
-            add_to_block(scene.work.block[b], n, weight * k, weight * damping, turn)
-
-
-@jitable
-def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
-    """Add stiffness and damping of slot s to the blocks of its bodies."""
-    work, bodies, state = scene.work, scene.bodies, scene.state
-    point = work.points[s]
-    c, depth, weight = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
-    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
-    gi, gj = sides(scene, s)
-    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    ground = len(bodies.mass)
-    rate = state.rate[s] if state.touching[s] == 1 else 0.0
-    inverse = translation(scene, bi) + translation(scene, bj)
-    kinetic = 0.5 * rate * rate / (weight * inverse)
-    push = work.speed[gi, CENTRE_ACCELERATION] + work.speed[gj, CENTRE_ACCELERATION]
-    force = push / (weight * inverse)
-    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    if kinetic + force * depth > AT_REST * out[ENERGY]:
-        energy = max(0.0, out[ENERGY] + kinetic - force * depth)
-        depth = max(depth, depth_to_come(scene, c, energy, force))
-    k, damping = slopes(scene, c, depth, out)
-    k *= weight
-    damping *= weight
-    both = 2.0 if bi < ground and bj < ground else 1.0
-    for b in (bi, bj):
-        if b == ground:
-            continue
-        if face_weight_of(scene, s) > 0.0:
-            add_points(scene, y, s, b, both * k / weight, both * damping / weight)
-            continue
-        turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
-        add_to_block(work.block[b], n, both * k, both * damping, turn)
 
 
 @jitable
@@ -266,45 +143,6 @@ def add_spring(scene: Scene, y: F1, f: int) -> None:
 
 
 @jitable
-def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
-    """Return whether a pair that may come to touch can be stiffer than the one in `best`.
-
-    If so `best` becomes it: contact, its energy at touch, the force behind it, inverse mass.
-    """
-    pairs, graphics = scene.pairs, scene.graphics
-    i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
-    speed = scene.work.speed[i, FASTEST_POINT] + scene.work.speed[j, FASTEST_POINT]
-    push = scene.work.speed[i, CENTRE_ACCELERATION] + scene.work.speed[j, CENTRE_ACCELERATION]
-    inverse = translation(scene, graphics.body[i]) + translation(scene, graphics.body[j])
-    if inverse == 0.0 or speed + push == 0.0:
-        return False
-    c = float(scene.kinds.contact[pairs.kind[pair]])
-    force = push / inverse
-    energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
-    inverse += turning(scene, i) + turning(scene, j)
-    if (
-        c == best[BEST_CONTACT]
-        and energy <= best[BEST_ENERGY]
-        and force <= best[BEST_FORCE]
-        and inverse <= best[BEST_INVERSE]
-    ):
-        return False
-    best[BEST_CONTACT], best[BEST_ENERGY] = c, energy
-    best[BEST_FORCE], best[BEST_INVERSE] = force, inverse
-    return True
-
-
-@jitable
-def add_meeting(scene: Scene, best: F1, out: F1, bound: F1) -> None:
-    """Raise the squared frequency and the rate in `bound` to those of the pair in `best`."""
-    c, inverse = int(best[BEST_CONTACT]), best[BEST_INVERSE]
-    depth = depth_to_come(scene, c, best[BEST_ENERGY], best[BEST_FORCE])
-    k, damping = slopes(scene, c, depth, out)
-    bound[0] = max(bound[0], k * inverse)
-    bound[1] = max(bound[1], damping * inverse)
-
-
-@jitable
 def anisotropy(inertia: F2) -> float:
     """Return |I - E tr I / 3| over tr I / 3 (Frobenius): 0 of a ball, 1.22 of a thin rod."""
     mean = (inertia[0, 0] + inertia[1, 1] + inertia[2, 2]) / 3.0
@@ -337,21 +175,22 @@ def turning_step(scene: Scene, tol: float) -> float:
 @jitable
 def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     """Return the step that a method without error estimate is to take from the committed point."""
-    work, bodies, pairs = scene.work, scene.bodies, scene.pairs
+    work, bodies = scene.work, scene.bodies
     # what was evaluated last may be another point: an output within the step, or nothing yet
     place_bodies(scene, y)
-    if find_contacts(scene, y) != 0:
-        return math.inf
-    longest = min(longest_travel(scene, y, f, 0.0), turning_step(scene, tol))
+    longest = turning_step(scene, tol)
     for b in range(len(bodies.mass)):
         for k in range(20):
             work.block[b, k] = 0.0
-    hit = work.hit
-    for k in range(hit[len(hit) - 1]):
-        add_touching(scene, y, hit[k], work.law_out)
+    hook = scene.world.hooks[Hook.STABILITY]
+    if hook != 0:
+        travel = call_float(hook, (scene, Stability.TOUCHING, y, f))
+        if travel < 0.0:
+            return math.inf
+        longest = min(travel, longest)
     for k in range(len(scene.applied.form)):
         add_spring(scene, y, k)
-    bound, best = work.bound, work.best
+    bound = work.bound
     bound[0] = bound[1] = 0.0
     for b in range(len(bodies.mass)):
         block, stiff, damped = work.block[b], 0.0, 0.0
@@ -360,10 +199,8 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
             damped += block[10 + k] * block[10 + k]
         bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
         bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
-    best[BEST_CONTACT] = -1.0
-    for k in range(pairs.count[ACTIVE]):
-        if pairs.touches[pairs.active[k]] == 0 and fast_pair(scene, pairs.active[k], best):
-            add_meeting(scene, best, work.law_out, bound)
+    if hook != 0:
+        call_float(hook, (scene, Stability.MEETING, y, f))
 
     # the limit of the method is (h w)^2 / 4 + h c = 1 (w frequency, c rate of damping), so h =
     # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance. Friction is held back

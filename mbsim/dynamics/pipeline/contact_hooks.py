@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import Contacts, Effects, Gauges, Recall, failure_or
+from mbsim.arrays.hooks import Contacts, Effects, Gauges, Recall, Stability, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
@@ -12,6 +12,7 @@ from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
 from mbsim.dynamics.contact.tilting import damp_tilting
+from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine_friction, hardest, mark_touched
 from mbsim.dynamics.pipeline.output import (
@@ -119,3 +120,16 @@ def measure_effects(context: int, what: int, t: float, h: float, a: Pointer, b: 
     if what == Effects.IMPACT:
         return impact_left(scene, t, e, y)
     return friction_left(scene, e, y, what == Effects.REVERSAL)
+
+
+def bound_contacts(context: int, what: int, a: Pointer, b: Pointer) -> float:
+    """What contacts bound steps of fixed length by; `a` and `b` are y and y'."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    longest = 0.0
+    if what == Stability.TOUCHING:
+        longest = add_all_touching(scene, vector_at(a, n), vector_at(b, n))
+    else:
+        add_all_meeting(scene)
+    failure_or(scene, 0)  # laws are explored, not asked
+    return longest

@@ -17,6 +17,7 @@ step, and the run where a shorter step does not help.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,13 +68,11 @@ def _has_contacts(scene: Scene, method: Method) -> bool:
     return len(scene.contacts.id) > 0
 
 
-def _of_contacts(name: str) -> Callable[[Scene], Callable[..., Any]]:
-    """Return what finds a hook of contacts that is the same in all scenes that have it."""
+def _of(module: str, name: str) -> Callable[[Scene], Callable[..., Any]]:
+    """Return what finds a function that is the same in all scenes that have the hook."""
 
     def entry(scene: Scene) -> Callable[..., Any]:
-        from mbsim.dynamics.pipeline import contact_hooks
-
-        found: Callable[..., Any] = getattr(contact_hooks, name)
+        found: Callable[..., Any] = getattr(import_module(f"mbsim.dynamics.{module}"), name)
         return found
 
     return entry
@@ -98,20 +97,8 @@ def _has_contact_slopes(scene: Scene, method: Method) -> bool:
     return method.tangent is not None and _has_contacts(scene, method)
 
 
-def _contact_slopes(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.implicit_hooks import slopes_of_contacts
-
-    return slopes_of_contacts
-
-
 def _has_programs(scene: Scene, method: Method) -> bool:
     return len(scene.programs.start) > 1
-
-
-def _value(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import evaluate_expression
-
-    return evaluate_expression
 
 
 def _needs_jets(scene: Scene, method: Method) -> bool:
@@ -119,12 +106,6 @@ def _needs_jets(scene: Scene, method: Method) -> bool:
     if (scene.equations.program >= 0).any():
         return True
     return _needs_slopes(scene, method) and len(scene.programs.start) > 1
-
-
-def _jet(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import express
-
-    return express
 
 
 def _has_applied(scene: Scene, method: Method) -> bool:
@@ -157,12 +138,6 @@ def _has_elements(scene: Scene, method: Method) -> bool:
     return len(scene.residuals.id) > 0
 
 
-def _element(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.element_hooks import serve_element
-
-    return serve_element
-
-
 def _has_joints(scene: Scene, method: Method) -> bool:
     return len(scene.tree.body) > 0
 
@@ -177,12 +152,6 @@ def _joints(scene: Scene) -> Callable[..., Any]:
 
 def _has_sticking(scene: Scene, method: Method) -> bool:
     return bool(scene.contacts.rigid.any())
-
-
-def _sticking(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import serve_sticking_contacts
-
-    return serve_sticking_contacts
 
 
 def _has_reaction_forces(scene: Scene, method: Method) -> bool:
@@ -200,12 +169,6 @@ def _always(scene: Scene, method: Method) -> bool:
     return True
 
 
-def _evaluate(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.hooks import rhs
-
-    return rhs
-
-
 def _has_equations(scene: Scene, method: Method) -> bool:
     return method.tangent is not None and len(scene.equations.program) > 0
 
@@ -218,12 +181,6 @@ def _bend(scene: Scene) -> Callable[..., Any]:
 
 def _has_memory(scene: Scene, method: Method) -> bool:
     return method.tangent is not None and len(method.tangent.keeps.table) > 0
-
-
-def _memory(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.linearization.memory_slopes import serve_memory
-
-    return serve_memory
 
 
 def _needs_slopes(scene: Scene, method: Method) -> bool:
@@ -243,12 +200,6 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
     if WRENCH in forms:
         return of.slopes_with_both if rubs else of.slopes_with_marker_forces
     return of.slopes_with_rubs if rubs else of.slopes
-
-
-def _memory_pair(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.linearization.memory_slopes import serve_memory_pair
-
-    return serve_memory_pair
 
 
 def _has_dry(scene: Scene, method: Method) -> bool:
@@ -275,30 +226,12 @@ def _has_angles(scene: Scene, method: Method) -> bool:
     return len(scene.angles.i) > 0
 
 
-def _angles(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import commit_turns
-
-    return commit_turns
-
-
 def _has_broadphase(scene: Scene, method: Method) -> bool:
     return len(scene.broadphase.contact) > 0
 
 
-def _near(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.hooks import list_near
-
-    return list_near
-
-
 def _has_requests(scene: Scene, method: Method) -> bool:
     return scene.rows.value.shape[1] > 0
-
-
-def _requests(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import evaluate_requests
-
-    return evaluate_requests
 
 
 TABLE = (
@@ -307,7 +240,7 @@ TABLE = (
         Hook.CONTACTS,
         _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
         _has_contacts,
-        _of_contacts("serve_contacts"),
+        _of("pipeline.contact_hooks", "serve_contacts"),
         "does what contacts are asked for: `Contacts`",
         "an answer, or less a code",
     ),
@@ -322,14 +255,14 @@ TABLE = (
         Hook.TILTING,
         _INT(_INT, _INT, _T, _T, _PTR),  # context, slot, t, normal force, y
         _has_faces,
-        _of_contacts("damp_contact"),
+        _of("pipeline.contact_hooks", "damp_contact"),
         "finds the couple against tilting of a flat face that is one incident",
     ),
     Row(
         Hook.RECALL,
         _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
         _recalls,
-        _of_contacts("recall_friction"),
+        _of("pipeline.contact_hooks", "recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
         "an answer, or less a code",
     ),
@@ -337,7 +270,7 @@ TABLE = (
         Hook.VALUE,
         _T(_INT, _T, _PTR, _INT),  # context, t, y, program
         _has_programs,
-        _value,
+        _of("pipeline.force_hooks", "evaluate_expression"),
         "evaluates an expression",
         "the value; a user's subroutine that fails notes its code, and the value is nan",
     ),
@@ -345,7 +278,7 @@ TABLE = (
         Hook.JET,
         _INT(_INT, _T, _PTR, _INT, _INT, _INT),  # context, t, y, program, body, direction
         _needs_jets,
-        _jet,
+        _of("pipeline.force_hooks", "express"),
         "leaves an expression and its rates in the first row of `Programs.stack`",
     ),
     Row(
@@ -366,7 +299,7 @@ TABLE = (
         Hook.ELEMENT,
         _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
         _has_elements,
-        _element,
+        _of("pipeline.element_hooks", "serve_element"),
         "solves a Force_Element for what expressions ask of it",
     ),
     Row(
@@ -380,7 +313,7 @@ TABLE = (
         Hook.STICKING,
         _KEEPS,
         _has_sticking,
-        _sticking,
+        _of("pipeline.force_hooks", "serve_sticking_contacts"),
         "does what contacts are asked for whose friction is rigid: `Sticking`",
         "an answer, or less a code",
     ),
@@ -395,7 +328,7 @@ TABLE = (
         Hook.EVALUATE,
         HOOK,
         _always,
-        _evaluate,
+        _of("pipeline.hooks", "rhs"),
         "evaluates y' at a point that is no step's: of a row, within one, of another branch",
     ),
     # linearisation
@@ -410,14 +343,14 @@ TABLE = (
         Hook.CONTACT_SLOPES,
         _INT(_INT, _INT, _T, _T, _PTR),  # context, request, t, h, y
         _has_contact_slopes,
-        _contact_slopes,
+        _of("pipeline.implicit_hooks", "slopes_of_contacts"),
         "does what derivatives of contacts are asked for: `ContactSlopes`",
     ),
     Row(
         Hook.MEMORY,
         _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
         _has_memory,
-        _memory,
+        _of("linearization.memory_slopes", "serve_memory"),
         "does what friction with memory is asked for in real systems: `Memory`",
     ),
     Row(
@@ -431,7 +364,7 @@ TABLE = (
         Hook.MEMORY_PAIR,
         _INT(_INT, _INT, _COMPLEX, _COMPLEX),
         lambda scene, method: _has_memory(scene, method) and method.pair,
-        _memory_pair,
+        _of("linearization.memory_slopes", "serve_memory_pair"),
         "does the same in complex systems",
     ),
     # a step is taken
@@ -447,9 +380,17 @@ TABLE = (
         Hook.EFFECTS,
         _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
         _has_contact_slopes,
-        _of_contacts("measure_effects"),
+        _of("pipeline.contact_hooks", "measure_effects"),
         "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
         "the measure; a failure is noted",
+    ),
+    Row(
+        Hook.STABILITY,
+        _T(_INT, _INT, _PTR, _PTR),  # context, request, y, y'
+        lambda scene, method: _has_contacts(scene, method) and scene.world.fixed_step[0] == 1,
+        _of("pipeline.contact_hooks", "bound_contacts"),
+        "bounds steps of a method without error estimate: `Stability`",
+        "a step or 0; a failure is noted",
     ),
     Row(
         Hook.DRY,
@@ -463,14 +404,14 @@ TABLE = (
         Hook.ANGLES,
         _INT(_INT),
         _has_angles,
-        _angles,
+        _of("pipeline.force_hooks", "commit_turns"),
         "counts the turns of angles",
     ),
     Row(
         Hook.NEAR,
         _INT(_INT, _PTR),  # context, y
         _has_broadphase,
-        _near,
+        _of("pipeline.hooks", "list_near"),
         "lists near pairs anew where shapes have moved far enough",
     ),
     # a row is written
@@ -478,7 +419,7 @@ TABLE = (
         Hook.REQUESTS,
         _AT,
         _has_requests,
-        _requests,
+        _of("pipeline.force_hooks", "evaluate_requests"),
         "evaluates the expressions of requests",
     ),
 )
