@@ -140,8 +140,8 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
     k = first
-    for k in range(work.hit[len(work.hit) - 1]):
-        s = work.hit[k]
+    for touching in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[touching]
         row = rows.incidents[k]
         at = scene.slots.x[s]
         row[INC_SLOT] = s
