@@ -132,8 +132,8 @@ JET_VALUE, JET_SLOPE, JET_CURVATURE = range(3)
 CODE_OPERATION, CODE_OPERAND = range(2)
 PIECE_BEGIN = 0
 
-# columns of `Work.applied`: force 3, torque 3, then
-STORED_ENERGY, LOST_POWER = 6, 7
+# columns of `Work.applied`; force and torque take three
+APPLIED_FORCE, APPLIED_TORQUE, STORED_ENERGY, LOST_POWER = 0, 3, 6, 7
 
 # rows of `Audit.found`, one for everything that a run is judged by; `results.audit` has their names
 (
@@ -143,7 +143,7 @@ STORED_ENERGY, LOST_POWER = 6, 7
     SPIN,  # its angular momentum about its cg
     POSITION,  # residual of an equation of joints and motions over its unit
     VELOCITY,  # of its rate
-    HELD_SLIP,  # slip where friction holds
+    STICKING_SLIP,  # slip where friction holds
     CONE,  # friction over mu N, as a part of the contact's largest mu N
     NEWTON,  # what Newton's iteration left of an implicit step
     FOLD,  # velocities across a fold behind it, over the usual ones
@@ -191,7 +191,7 @@ TALLIES = 18
 
 #: What `commit` returns where the motion is held otherwise from here on: equations were taken into
 #: use or out of it, or what friction carries became something else.
-HELD_OTHERWISE = 2
+CONSTRAINTS_CHANGED = 2
 
 # kinds of `Rows.events`
 TOUCH, LEAVE, STICK, SLIP, SENSOR = range(5)

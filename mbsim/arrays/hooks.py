@@ -53,7 +53,8 @@ class Contacts(IntEnum):
     """What contacts are asked for."""
 
     PUSH = 0  # find who touches whom, and add the forces
-    KEEP = 1  # write the incident table at a committed state: 0, 1 if f changed, HELD_OTHERWISE
+    # write the incident table at a committed state: 0, 1 if f changed, CONSTRAINTS_CHANGED
+    KEEP = 1
     WATCH = 2  # keep the largest force, depth and slip
     GAPS = 3  # take what shapes moved from the distance of every pair
     ENERGY = 4  # add what is stored and lost to a row of energies
@@ -92,7 +93,7 @@ class Recall(IntEnum):
 
     GIVE = 0  # give the law what it kept
     TAKE = 1  # keep what the law made of it
-    COMMIT = 2  # keep it of a step: 0, 1 if f changed, HELD_OTHERWISE
+    COMMIT = 2  # keep it of a step: 0, 1 if f changed, CONSTRAINTS_CHANGED
 
 
 class ContactSlopes(IntEnum):
@@ -121,8 +122,8 @@ class Joints(IntEnum):
 class Dry(IntEnum):
     """What dry friction is asked for."""
 
-    HOLD_AGAIN = 0  # that what sticks at the point to be evaluated is held, and nothing else
-    KEEP = 1  # what it is at a committed state; the answer is 0 or `HELD_OTHERWISE`
+    RESTICK = 0  # that what sticks at the point to be evaluated is held, and nothing else
+    KEEP = 1  # what it is at a committed state; the answer is 0 or `CONSTRAINTS_CHANGED`
 
 
 class Sticking(IntEnum):

@@ -119,7 +119,7 @@ class States(NamedTuple):
     """States of the user's own."""
 
     program: I1  # (nz,) their slopes
-    place: I1  # (nz,) in y
+    offset: I1  # (nz,) in y
     scale: F1  # (nz,) size below which an error counts as one at this size
 
 
@@ -173,7 +173,7 @@ class Residuals(NamedTuple):
     angle: I1  # (directions,) row of `Angles` of a turn, -1 for a slide
     kind: I1  # (unknowns,) of laws.residual
     state: I1  # (unknowns,) row of `States`, -1 for none
-    place: I1  # (unknowns,) in y, -1 for none
+    offset: I1  # (unknowns,) in y, -1 for none
     initial: F1  # (unknowns,)
     scale: F1  # (unknowns,) a usual size
     address: I1  # (n,) of the residual

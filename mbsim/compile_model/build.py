@@ -203,14 +203,14 @@ def _start(
     friction_at = np.where(rubs, first_state + nz + kept + np.cumsum(rubs) - 1, -1)
     kept += int(rubs.sum()) + max(1, len(model.contacts))
     y0 = _initial_y(placement, carried + nz + kept)
-    y0[states.place[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
+    y0[states.offset[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
     residuals = acts.residuals
     if residuals is None:
         return y0, accumulators, friction_at, no_residuals()
     from mbsim.compile_model.force_elements import fill_scales
 
     fill_scales(residuals, states, judged.load, judged.length)
-    y0[residuals.place[residuals.place >= 0]] = residuals.initial[residuals.place >= 0]
+    y0[residuals.offset[residuals.offset >= 0]] = residuals.initial[residuals.offset >= 0]
     return y0, accumulators, friction_at, residuals
 
 

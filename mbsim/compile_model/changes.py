@@ -56,7 +56,7 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     bodies = {body.id: len(system.body_ids) for body in model.bodies.values()}
     bodies.update({id: k for k, id in enumerate(system.body_ids)})
     table = MarkerTable(system.placement, bodies)
-    offsets = scene.states.place
+    offsets = scene.states.offset
     first_state = int(offsets[0]) if len(offsets) else 0
     looks = system.reader is not None
     rows = acting(model, table, first_state, system.subroutines, looks, residuals=system.residuals)

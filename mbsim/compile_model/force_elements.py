@@ -59,9 +59,9 @@ def residuals_table(
     kind = np.array([u.kind for u in unknowns], dtype=np.int64)
     is_state = kind == DIFFERENTIAL
     nz, count = len(states.program), int(is_state.sum())
-    state, place = np.full(len(kind), -1), np.full(len(kind), -1)
+    state, offset = np.full(len(kind), -1), np.full(len(kind), -1)
     state[is_state] = nz + np.arange(count)
-    place[is_state] = programs.first_state + state[is_state]
+    offset[is_state] = programs.first_state + state[is_state]
     most_axes = max((len(e.directions) for e in elements), default=0)
     most = max((len(user.unknowns) for user in users.values()), default=0)
     width = max([1, *(len(user.par) for user in users.values())]) if users else 0
@@ -82,7 +82,7 @@ def residuals_table(
         angle=whole([angle for _, angle in axes]),
         kind=kind,
         state=whole(state),
-        place=whole(place),
+        offset=whole(offset),
         initial=np.array([u.initial for u in unknowns], dtype=np.float64),
         scale=np.array([u.scale or np.nan for u in unknowns], dtype=np.float64),
         address=whole([user.address for user in users.values()]),
@@ -113,7 +113,7 @@ def residuals_table(
     ]
     return table, States(
         np.append(states.program, whole(made)),
-        np.append(states.place, table.place[is_state]),
+        np.append(states.offset, table.offset[is_state]),
         np.append(states.scale, table.scale[is_state]),
     )
 

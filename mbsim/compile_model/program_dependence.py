@@ -29,7 +29,7 @@ def find_depends(scene: Scene) -> Depends:
     A subroutine may look at anything; its force is taken to depend on the bodies it acts on.
     """
     programs, nb = scene.programs, len(scene.bodies.mass)
-    row_of = {int(offset): z for z, offset in enumerate(scene.states.place)}
+    row_of = {int(offset): z for z, offset in enumerate(scene.states.offset)}
     bodies, states, user = [], [], []
     acts_on = _bodies_of_forces(scene)
     for k in range(len(programs.start) - 1):

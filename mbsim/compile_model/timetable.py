@@ -32,6 +32,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.instructions import SPLINE
 from mbsim.compile_model.time_functions import GLANCED, PART, Function, functions
+from mbsim.core.problem import TIMETABLE_ENDS, TIMETABLE_HORIZON
 from mbsim.expressions import bounds, intervals
 from mbsim.expressions.bounds import Bound
 from mbsim.expressions.curve_bounds import Curve
@@ -192,7 +193,7 @@ class Timetable:
         How long the rows before were says with how coarse cells to begin.
         """
         top = 2.0 ** math.ceil(math.log2(max(end - t, 1e-300)))
-        before = table[np.isfinite(table[:, 0]), 0]
+        before = table[np.isfinite(table[:, TIMETABLE_ENDS]), TIMETABLE_ENDS]
         if len(before) > 1:
             usual = 4.0 * (before[-1] - before[0]) / (len(before) - 1)
             top = min(top, 2.0 ** math.ceil(math.log2(usual)))
@@ -204,9 +205,9 @@ class Timetable:
         table[...] = -math.inf
         table[: len(rows)] = rows
         if horizon >= end:
-            table[len(rows) - 1, 0] = math.inf
-            if table[len(rows) - 1, 1] >= end:
-                table[len(rows) - 1, 1] = math.inf
+            table[len(rows) - 1, TIMETABLE_ENDS] = math.inf
+            if table[len(rows) - 1, TIMETABLE_HORIZON] >= end:
+                table[len(rows) - 1, TIMETABLE_HORIZON] = math.inf
 
     def _divide(
         self, group: _Group, t: float, horizon: float, end: float, top: float

@@ -175,6 +175,9 @@ AS_VELOCITIES, AS_POSITIONS, BRACKET, BOW, TURNED = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_DUE = range(8)
+#: Columns of a timetable: where a row ends, and how far a step may go from it.
+TIMETABLE_ENDS, TIMETABLE_HORIZON = range(2)
+
 #: The rows of the timetable are over: it is to be filled from here on.
 TABLE_OVER = 8
 #: Steps from one WATCH_DUE to the next: the caller looks whether the run gets anywhere.

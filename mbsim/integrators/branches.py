@@ -144,7 +144,7 @@ def horizon_of(p: Problem, m: Method, t: float, h: float, begin: float) -> float
 
 
 @jitable
-def way_error(p: Problem, m: Method, t: float, h: float) -> float:
+def path_error(p: Problem, m: Method, t: float, h: float) -> float:
     """Return the error, over tol, of friction that follows the way of the fitted step in one.
 
     Its closed form takes the way for a cubic, whatever the method makes of it, and no difference of
@@ -194,7 +194,7 @@ def look_into(p: Problem, m: Method, t: float, h: float) -> None:
     if looks == SIDES or looks == SIDES + WAYS:
         m.memory[SWITCHED] = hidden_side(p, m, t, h)
     if looks >= WAYS and m.memory[SWITCHED] == 0.0:
-        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], way_error(p, m, t, h))
+        m.memory[LAST_ERROR] = max(m.memory[LAST_ERROR], path_error(p, m, t, h))
 
 
 def serve(context: int, what: int, t: float, h: float, whole: float) -> float:

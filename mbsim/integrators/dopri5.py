@@ -122,7 +122,7 @@ def rate_of(moved: float, faster: float, pulled: float) -> float:
 def fill_differences(m: Method, h: float) -> None:
     """Write what `stiffness` is told by behind the stages.
 
-    Ways, changes of velocity and of f of two pairs of stages, and the change of f over the step.
+    Shifts, changes of velocity and of f of two pairs of stages, and the change of f over the step.
     """
     k, d, n = m.k, m.k[DIFFERENCES:], len(m.y)
     first = not has_positions(m)
@@ -132,14 +132,14 @@ def fill_differences(m: Method, h: float) -> None:
     for i in range(n):
         if m.kinds[i] == STATE and not first:
             continue
-        way = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
-        way += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
+        shift = (B1 - A61) * k[0, i] + (B3 - A63) * k[2, i] + (B4 - A64) * k[3, i]
+        shift += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
         come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
         come += (A64 - A54) * k[3, i] + A65 * k[4, i]
         # f of a position is its velocity: that says nothing
         is_rate = m.kinds[i] != POSITION
         j = 1 if is_rate else 0
-        d[j, i], d[3 + j, i] = h * way, h * come
+        d[j, i], d[3 + j, i] = h * shift, h * come
         if is_rate:
             d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
             d[6, i] = k[6, i] - k[0, i]

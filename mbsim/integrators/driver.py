@@ -26,6 +26,8 @@ from mbsim.core.problem import (
     STABLE_EVERY,
     STEP_TOO_SMALL,
     TABLE_OVER,
+    TIMETABLE_ENDS,
+    TIMETABLE_HORIZON,
     WATCH_DUE,
     WATCH_EVERY,
     Problem,
@@ -220,12 +222,13 @@ def look_up(m: Method, t: float) -> bool:
     A row from which no step may go is a switch: a force jumps within it.
     """
     row, table = m.counts[ROW], m.timetable
-    while row < len(table) and table[row, 0] <= t:
+    while row < len(table) and table[row, TIMETABLE_ENDS] <= t:
         row += 1
     m.counts[ROW] = row
     if row == len(table):
         return False
-    m.memory[ROW_ENDS], m.memory[HORIZON] = table[row, 0], table[row, 1]
+    m.memory[ROW_ENDS] = table[row, TIMETABLE_ENDS]
+    m.memory[HORIZON] = table[row, TIMETABLE_HORIZON]
     return True
 
 

@@ -277,7 +277,7 @@ def mean_velocity(m: Method, h: float, i: int) -> float:
 
 
 @jitable
-def place(p: Problem, m: Method, h: float) -> None:
+def predict(p: Problem, m: Method, h: float) -> None:
     """Write the point that a leads to into m.trial."""
     y, w = m.y, m.trial
     for i in range(len(y)):
@@ -296,7 +296,7 @@ def settle(p: Problem, m: Method, t: float, h: float) -> bool:
     So a has across joints what velocities on them ask for, as in a formulation of index 2, and
     what is stiff does not come in. Of free bodies `project` leaves velocities as they are.
     """
-    place(p, m, h)
+    predict(p, m, h)
     for i in range(len(m.y)):
         m.error[i] = m.trial[i]
     project(p, m, t + h, h, m.trial)
@@ -319,7 +319,7 @@ def show_drift(p: Problem, m: Method, t: float, h: float) -> None:
     n = len(m.y)
     for i in range(n):
         m.k[D, i] = m.trial[i]
-    place(p, m, h)
+    predict(p, m, h)
     project(p, m, t + h, h, m.trial)
     for i in range(n):
         m.trial[i] = m.k[D, i]

@@ -241,7 +241,7 @@ def correct(p: Problem, m: Method, t: float, h: float) -> tuple[int, float]:
 
 
 @jitable
-def place(m: Method, t: float, h: float) -> float:
+def linearised_at(m: Method, t: float, h: float) -> float:
     """Return the time at which a step of length h is linearised."""
     return t if m.memory[FRESH] == 1.0 or is_short(m, h) else t + m.memory[WHERE] * h
 
@@ -284,7 +284,7 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
         before = size
     m.memory[RATE] = rate
     m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
-    if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == place(m, t, h)):
+    if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == linearised_at(m, t, h)):
         return 0 if is_good_enough(p, m, t, h, before, rate) else -1
     return 0 if word == SOLVED else -1
 
@@ -315,7 +315,7 @@ def is_stale(m: Method, t: float, h: float) -> bool:
     if m.memory[HAVE_JACOBIAN] == 0.0:
         return True
     at = m.memory[JACOBIAN_TIME]
-    within = t < at <= t + h or at == place(m, t, h)
+    within = t < at <= t + h or at == linearised_at(m, t, h)
     return not within and m.memory[RATE] > KEEP
 
 
@@ -339,7 +339,7 @@ def solve_stages(p: Problem, m: Method, t: float, h: float) -> int:
             code = iterate(p, m, t, h, False)
             if code == 0:
                 return 0
-        if m.memory[JACOBIAN_TIME] == place(m, t, h) or not may_help(code):
+        if m.memory[JACOBIAN_TIME] == linearised_at(m, t, h) or not may_help(code):
             return as_failure(code)
         stale = True
 

@@ -70,7 +70,11 @@ ENTRIES = (
         "equation",
     ),
     Judged(
-        codes.HELD_SLIP, "held_slip", "what friction holds slips, by {value:.3g}", 10.0, "equation"
+        codes.STICKING_SLIP,
+        "held_slip",
+        "what friction holds slips, by {value:.3g}",
+        10.0,
+        "equation",
     ),
     Judged(codes.CONE, "cone", "friction is {value:.3g} above mu N", 10.0, "contact"),
     Judged(

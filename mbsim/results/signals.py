@@ -135,7 +135,7 @@ def signals(
     yield from _contacts(system, block, asked)
     yield from _elements(system, block, asked)
     states = list(system.model.differentials)
-    places = np.asarray(system.scene.states.place[: len(states)], dtype=np.int64)
+    places = np.asarray(system.scene.states.offset[: len(states)], dtype=np.int64)
     yield from asked.stacked("diffs", states, {"value": lambda: block.y[:, places]})
     for name, column in system.unknowns():
         if asked(name):

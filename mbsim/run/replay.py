@@ -233,7 +233,7 @@ class Replay:
             "rate": float(slot[at.RATE]),
             "nforce": nforce,
             "friction": friction,
-            "stored": float(slot[at.STORED] + slot[at.HELD]),
+            "stored": float(slot[at.STORED] + slot[at.FRICTION_STORED]),
             "point": row[codes.INC_POINT : codes.INC_POINT + 3],
             "normal": row[codes.INC_NORMAL : codes.INC_NORMAL + 3],
             "area": float(row[-codes.INC_REGION]) if self.region else 0.0,

@@ -208,7 +208,7 @@ NAMES = [case.text for case in CASES]
 def test_functions_of_numbers(k):
     system, first = elementary_scene()
     args, n = arguments(k), count_of(CASES[k])
-    place = int(system.scene.states.place[0])
+    place = int(system.scene.states.offset[0])
     states = np.ascontiguousarray(args.T)
     found = both_ways(values_of_states, system.scene, place, states, first + k, np.zeros(POINTS))
     for way in found:
@@ -609,7 +609,7 @@ def test_splines(name):
     rng = np.random.default_rng(23)
     args = np.column_stack([rng.uniform(-5, 6, POINTS), rng.uniform(-2, 2, POINTS)])
     assert args[:, 0].min() < _KNOTS[0] < _KNOTS[-1] < args[:, 0].max()
-    place = int(system.scene.states.place[0])
+    place = int(system.scene.states.offset[0])
     for k, (spline, order) in enumerate(calls):
         found = both_ways(values_of_states, system.scene, place, args, first + k, np.zeros(POINTS))
         for way in found:
@@ -661,7 +661,7 @@ def test_what_the_model_keeps(name):
     )
     system.scene.state.sensed[:, SHOWN] = 0.125, 0.625
     args = np.random.default_rng(32).normal(size=(POINTS, 2))
-    place = int(system.scene.states.place[0])
+    place = int(system.scene.states.offset[0])
     for way in both_ways(values_of_states, system.scene, place, args, first, np.zeros(POINTS)):
         assert_near(way, truth(*args.T))
 

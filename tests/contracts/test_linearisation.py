@@ -46,7 +46,7 @@ class Linearised:
         self.problem, self.kept = implicit_hooks(self.scene, self.runner.problem, True)
         self.y = self.runner.method.y.copy()
         self.n, self.bodies = len(self.y), len(self.scene.bodies.mass)
-        self.rows = np.r_[: 13 * self.bodies, self.scene.states.place].astype(int)
+        self.rows = np.r_[: 13 * self.bodies, self.scene.states.offset].astype(int)
 
     def call(self, name, t, a, b):
         pointer = ctypes.c_void_p
@@ -73,7 +73,7 @@ class Linearised:
         for b in range(self.bodies):
             y[13 * b : 13 * b + 7] += move * rng.normal(size=7)
             y[13 * b + 7 : 13 * b + 13] += speed * rng.normal(size=6)
-        for place in self.scene.states.place:
+        for place in self.scene.states.offset:
             y[place] += rng.normal()
         for _ in range(5):
             y = self.on_manifold(y, t)

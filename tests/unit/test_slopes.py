@@ -116,7 +116,7 @@ def test_slope_is_the_limit_of_differences(text, seed):
         for direction in range(DIRECTIONS)
     ]
     np.testing.assert_allclose(found, asked, rtol=1e-8, atol=1e-8 * (1 + np.abs(asked).max()))
-    place = scene.states.place[0]
+    place = scene.states.offset[0]
 
     def pushed(h):
         z = y.copy()

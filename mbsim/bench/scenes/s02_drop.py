@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from mbsim.bench import deck as text
@@ -58,43 +60,40 @@ def _errors(outcome: Outcome, variant: str) -> dict[str, float]:
     return {"z_first_bounce": float(error[first].max()), "z_max": float(error.max())}
 
 
-_UNIT = "largest error of the height up to 0.86 s (one bounce) [m]"
+def _scene(name: str, title: str, deck: Callable[[Variation], str], *variants: str) -> Scene:
+    return Scene(
+        name=name,
+        title=title,
+        end_time=p.S2.end_time,
+        measure="z_first_bounce",
+        unit="largest error of the height up to 0.86 s (one bounce) [m]",
+        deck=deck,
+        errors=_errors,
+        targets=(Target(1 / 20),),
+        variants=variants,
+        second=("z_max", "up to 3 s (six to ten bounces)"),
+    )
+
 
 SCENES = (
-    Scene(
-        name="S2a",
-        title="bouncing sphere, IMPACT k = 1e8, e = 1.5, c = 200, dmax = 1e-4, 3 s",
-        end_time=p.S2.end_time,
-        measure="z_first_bounce",
-        unit=_UNIT,
-        deck=_impact,
-        errors=_errors,
-        targets=(Target(1 / 20),),
-        variants=("impact",),
-        second=("z_max", "up to 3 s (six to ten bounces)"),
+    _scene(
+        "S2a",
+        "bouncing sphere, IMPACT k = 1e8, e = 1.5, c = 200, dmax = 1e-4, 3 s",
+        _impact,
+        "impact",
     ),
-    Scene(
-        name="S2b",
-        title="bouncing sphere, linear spring 1e6 and damper 60, 3 s",
-        end_time=p.S2.end_time,
-        measure="z_first_bounce",
-        unit=_UNIT,
-        deck=_linear,
-        errors=_errors,
-        targets=(Target(1 / 20),),
-        variants=("linear", "linear_noclip", "mujoco"),
-        second=("z_max", "up to 3 s (six to ten bounces)"),
+    _scene(
+        "S2b",
+        "bouncing sphere, linear spring 1e6 and damper 60, 3 s",
+        _linear,
+        "linear",
+        "linear_noclip",
+        "mujoco",
     ),
-    Scene(
-        name="S2c",
-        title="bouncing sphere, Hunt-Crossley k = 1e6, 0.05 s/m, 3 s",
-        end_time=p.S2.end_time,
-        measure="z_first_bounce",
-        unit=_UNIT,
-        deck=_hunt_crossley,
-        errors=_errors,
-        targets=(Target(1 / 20),),
-        variants=("hc",),
-        second=("z_max", "up to 3 s (six to ten bounces)"),
+    _scene(
+        "S2c",
+        "bouncing sphere, Hunt-Crossley k = 1e6, 0.05 s/m, 3 s",
+        _hunt_crossley,
+        "hc",
     ),
 )

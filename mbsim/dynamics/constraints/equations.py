@@ -262,7 +262,7 @@ def hold(scene: Scene, t: float, y: F1) -> None:
 
 
 @jitable
-def hold_again(scene: Scene, t: float) -> None:
+def restick(scene: Scene, t: float) -> None:
     """Fill the accelerations anew after forces changed; all else is as `hold` left it."""
     load(scene)
     respond(scene, 0, len(scene.tree.body), 1, scene.sweep.a)

@@ -26,8 +26,8 @@ from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import prepare, respond
 from mbsim.dynamics.constraints.tree_projection import (
-    carry_all,
     project_tree,
+    project_tree_velocities,
     set_spin,
     set_velocity,
     turn_body,
@@ -192,7 +192,7 @@ def project(scene: Scene, t: float, y: F1, level: int) -> None:
     project_tree(scene, y)
     if active_count(scene) > 0:
         close_loops(scene, t, y)
-    carry_all(scene, y)
+    project_tree_velocities(scene, y)
     if active_count(scene) > 0:
         fill_equations(scene, t, y)
         part = FORGIVEN * scene.world.scale[SCALE_LENGTH] / scene.world.scale[SCALE_SPEED]

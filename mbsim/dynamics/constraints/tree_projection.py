@@ -125,7 +125,7 @@ def project_tree(scene: Scene, y: F1) -> None:
 
 
 @jitable
-def carry(scene: Scene, y: F1, k: int) -> None:
+def project_child_velocity(scene: Scene, y: F1, k: int) -> None:
     """Give the child at tree index k a velocity that its joint allows."""
     tree, work = scene.tree, scene.work
     turn, body, parent = tree.turn[k], tree.body[k], parent_body(scene, k)
@@ -155,8 +155,8 @@ def carry(scene: Scene, y: F1, k: int) -> None:
 
 
 @jitable
-def carry_all(scene: Scene, y: F1) -> None:
+def project_tree_velocities(scene: Scene, y: F1) -> None:
     """Give all bodies of the trees velocities that their joints allow, parents first."""
     for k in range(len(scene.tree.body)):
         if scene.tree.turn[k] != TURN_ROOT:
-            carry(scene, y, k)
+            project_child_velocity(scene, y, k)

@@ -81,7 +81,7 @@ from mbsim.laws.user_normal import RATE as INPUT_RATE
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
 # of friction with memory: dF/d(depth) of the normal force, energy stored, mode
-STIFFNESS, HELD, MODE = 12, 13, 14
+STIFFNESS, FRICTION_STORED, MODE = 12, 13, 14
 # of a pair that is one incident: its area, and how its normal force damps tilting
 PATCH, TILTING = 15, 16
 # of friction with memory: its branch, the velocity as which an error of 1 in what it integrates
@@ -324,7 +324,7 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     lost = (normal - elastic) * rate
     # of weights that turn with the shapes
     couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
-    row[HELD] = row[MODE] = row[BRANCH] = 0.0
+    row[FRICTION_STORED] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
         row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0

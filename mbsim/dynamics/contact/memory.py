@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import HELD_OTHERWISE, NOW, STICK
+from mbsim.arrays.codes import CONSTRAINTS_CHANGED, NOW, STICK
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -14,7 +14,7 @@ from mbsim.dynamics.contact.forces import (
     ALONG_Y,
     BRANCH,
     FOUND_AT,
-    HELD,
+    FRICTION_STORED,
     LIMIT_SLOPE,
     MODE,
     NORMAL_SLOPE,
@@ -83,7 +83,7 @@ def keep(scene: Scene, dy: F1, s: int) -> None:
     """Keep what a friction law with memory made of it."""
     c, out = contact_of(scene, s), scene.work.law_out
     row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
-    row[HELD], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
+    row[FRICTION_STORED], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
     row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[0], out[1]
     for k in range(n):
         scene.work.memory[s, k] = out[MEMORY_OUT + k]
@@ -95,7 +95,7 @@ def keep(scene: Scene, dy: F1, s: int) -> None:
 def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
     """Keep what friction in slot s makes of the step, anew if `fresh`.
 
-    Returns 1 if f changed, HELD_OTHERWISE if what is carried became something else.
+    Returns 1 if f changed, CONSTRAINTS_CHANGED if what is carried became something else.
     """
     state, work, z = scene.state, scene.work, scene.slots.z[s]
     for k in range(state.memory.shape[1]):
@@ -112,4 +112,4 @@ def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
         for k in range(scene.contacts.carried[contact_of(scene, s)]):
             y[z + k] = state.memory[s, k]
     state.mode[s] = branch
-    return HELD_OTHERWISE if mode != before else 1
+    return CONSTRAINTS_CHANGED if mode != before else 1

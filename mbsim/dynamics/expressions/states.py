@@ -17,7 +17,7 @@ def add_slopes(scene: Scene, t: float, y: F1, dy: F1) -> int:
     states = scene.states
     for k in range(len(states.program)):
         slope = value(scene, t, y, states.program[k])
-        dy[states.place[k]] = slope
+        dy[states.offset[k]] = slope
         if not math.isfinite(slope):
             return Code.NOT_FINITE
     return 0

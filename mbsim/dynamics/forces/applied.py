@@ -24,6 +24,10 @@ import math
 from mbsim.arrays.codes import (
     AXIS_FORCE_AT_I,
     AXIS_TORQUE,
+    EVENT_ELEMENT,
+    EVENT_KIND,
+    EVENT_SLOT,
+    EVENT_TIME,
     LINE_FORCE,
     LOST_POWER,
     RESIDUAL,
@@ -208,8 +212,8 @@ def record_mode(scene: Scene, t: float, kind: int, f: int) -> None:
     rows = scene.rows
     k = rows.used[2]
     if k < len(rows.events):
-        rows.events[k, 0], rows.events[k, 1] = t, kind
-        rows.events[k, 2], rows.events[k, 3] = scene.applied.id[f], -1.0
+        rows.events[k, EVENT_TIME], rows.events[k, EVENT_KIND] = t, kind
+        rows.events[k, EVENT_ELEMENT], rows.events[k, EVENT_SLOT] = scene.applied.id[f], -1.0
         rows.used[2] = k + 1
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import AT_TIME
 from mbsim.arrays.hooks import Dry
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -113,7 +114,7 @@ def find_unknowns(scene: Scene, t: float, y: F1, e: int) -> int:
     for k in range(nu):
         u = R.begin[e] + k
         f = memory[1 + na + k] if known else R.initial[u]
-        R.base[k] = y[R.place[u]] if R.kind[u] == DIFFERENTIAL else f
+        R.base[k] = y[R.offset[u]] if R.kind[u] == DIFFERENTIAL else f
         if R.kind[u] == ALGEBRAIC:
             R.start[k] = f
         else:
@@ -198,7 +199,7 @@ def keep_residuals(scene: Scene, what: int, t: float, y: F1) -> int:
         if not good:
             # it has just been solved there
             continue
-        kept[NOW, 0] = t
+        kept[NOW, AT_TIME] = t
         for k in range(na):
             kept[NOW, 1 + k] = R.given[1 + k]
         for k in range(2 * nu):

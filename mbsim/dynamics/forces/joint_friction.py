@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    APPLIED_FORCE,
     BALL_FRICTION,
     FRICTION_CALLS,
     LOST_POWER,
@@ -37,7 +38,7 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.markers import marker_axis, marker_velocity
-from mbsim.dynamics.constraints.equations import hold_again
+from mbsim.dynamics.constraints.equations import restick
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.forces.applied import push
@@ -165,7 +166,7 @@ def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
         scene.work.trouble[1] = row
         if not math.isfinite(worst):
             # this tells which it is, and no contact is at fault
-            scene.work.applied[row, 0] = worst
+            scene.work.applied[row, APPLIED_FORCE] = worst
             scene.work.trouble[1] = -1
             return Code.NOT_FINITE
         enough = SETTLED if k < MOST_ROUNDS - 1 else GOOD_ENOUGH
@@ -176,7 +177,7 @@ def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
         for f in range(len(applied.form)):
             if applied.connection[f] >= 0:
                 add_force(scene, f, step * rub[f, MISS])
-        hold_again(scene, t)
+        restick(scene, t)
     return Code.JAMMED
 
 
@@ -190,7 +191,7 @@ def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     stresses = 0
     if active_count(scene) < len(scene.equations.program):
         stresses = fill_stresses(scene, t, y)
-        hold_again(scene, t)
+        restick(scene, t)
     code = settle_friction(scene, t, y, stresses)
     if code != 0:
         return code

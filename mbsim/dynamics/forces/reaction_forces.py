@@ -17,9 +17,13 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    APPLIED_FORCE,
     AXIS_TORQUE,
+    COMPONENT,
     JOINT_FRICTION,
     LOST_POWER,
+    PROGRAM,
+    ROW_OF,
     SCALAR,
     SCALE_LENGTH,
 )
@@ -31,7 +35,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
-from mbsim.dynamics.constraints.equations import hold_again
+from mbsim.dynamics.constraints.equations import restick
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.expressions.jets import value
@@ -98,7 +102,7 @@ def add_to_all(scene: Scene, y: F1) -> None:
     """Add the last step of every unknown to the bodies."""
     by_reactions, work = scene.applied.by_reactions, scene.work.by_reactions
     for u in range(len(by_reactions)):
-        f, c, size = by_reactions[u, 0], by_reactions[u, 1], work[u, STEP]
+        f, c, size = by_reactions[u, ROW_OF], by_reactions[u, COMPONENT], work[u, STEP]
         work[u, SIZE] += size
         if c == JOINT_FRICTION:
             add_force(scene, f, size)
@@ -127,10 +131,12 @@ def fill_rows(scene: Scene) -> None:
     """Fill force and torque of all rows that are settled."""
     by_reactions, work = scene.applied.by_reactions, scene.work
     for u in range(len(by_reactions)):
-        for k in range(len(work.applied[by_reactions[u, 0]])):
-            work.applied[by_reactions[u, 0], k] = 0.0
+        for k in range(len(work.applied[by_reactions[u, ROW_OF]])):
+            work.applied[by_reactions[u, ROW_OF], k] = 0.0
     for u in range(len(by_reactions)):
-        add_to_row(scene, by_reactions[u, 0], by_reactions[u, 1], work.by_reactions[u, SIZE])
+        add_to_row(
+            scene, by_reactions[u, ROW_OF], by_reactions[u, COMPONENT], work.by_reactions[u, SIZE]
+        )
 
 
 @jitable
@@ -146,13 +152,13 @@ def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
     for k in range(len(work.reaction)):
         reaction = max(reaction, abs(work.reaction[k]) / (1.0 if k % 6 < 3 else length))
     for u in range(len(by_reactions)):
-        f, row = by_reactions[u, 0], work.by_reactions[u]
-        if by_reactions[u, 1] == JOINT_FRICTION:
+        f, row = by_reactions[u, ROW_OF], work.by_reactions[u]
+        if by_reactions[u, COMPONENT] == JOINT_FRICTION:
             asked = ask_law(scene, t, f)
         else:
-            asked = value(scene, t, y, by_reactions[u, 2])
+            asked = value(scene, t, y, by_reactions[u, PROGRAM])
         if not math.isfinite(asked):
-            work.applied[f, 0] = asked
+            work.applied[f, APPLIED_FORCE] = asked
             return u, largest, reaction
         miss = asked - row[SIZE]
         row[CHANGE] = miss - row[MISS]
@@ -164,7 +170,7 @@ def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
 @jitable
 def unit(scene: Scene, u: int) -> float:
     """Return what makes a force of unknown u: the length for torques, else 1."""
-    f, c = scene.applied.by_reactions[u, 0], scene.applied.by_reactions[u, 1]
+    f, c = scene.applied.by_reactions[u, ROW_OF], scene.applied.by_reactions[u, COMPONENT]
     turns = (c >= 3 and c < SCALAR) or scene.applied.form[f] == AXIS_TORQUE
     return scene.world.scale[SCALE_LENGTH] if turns else 1.0
 
@@ -218,10 +224,10 @@ def begin(scene: Scene, y: F1) -> None:
     """Set all unknowns to 0, H to -1, and fill the directions in which they act."""
     by_reactions, work = scene.applied.by_reactions, scene.work
     for u in range(len(by_reactions)):
-        f = by_reactions[u, 0]
-        if by_reactions[u, 1] == JOINT_FRICTION:
+        f = by_reactions[u, ROW_OF]
+        if by_reactions[u, COMPONENT] == JOINT_FRICTION:
             fill_slip(scene, f)
-        elif by_reactions[u, 1] == SCALAR:
+        elif by_reactions[u, COMPONENT] == SCALAR:
             fill_direction(scene, y, f)
         for k in range(work.by_reactions.shape[1]):
             work.by_reactions[u, k] = 0.0
@@ -250,13 +256,17 @@ def settle(scene: Scene, t: float, y: F1, stresses: int) -> int:
         if largest <= bound and worst <= max(part * largest, ROUNDING * reaction):
             work.trouble[1] = -1
             return 0
-        work.trouble[1] = by_reactions[at, 0]
+        work.trouble[1] = by_reactions[at, ROW_OF]
         if k > 0:
             update_secant(scene)
         next_step(scene)
         add_to_all(scene, y)
-        hold_again(scene, t)
-    return Code.JAMMED if scene.applied.by_reactions[at, 1] == JOINT_FRICTION else Code.UNSETTLED
+        restick(scene, t)
+    return (
+        Code.JAMMED
+        if scene.applied.by_reactions[at, COMPONENT] == JOINT_FRICTION
+        else Code.UNSETTLED
+    )
 
 
 @jitable
@@ -264,8 +274,8 @@ def lost_power(scene: Scene, y: F1, u: int) -> float:
     """Return the power of unknown u with the sign turned."""
     applied, f, c = (
         scene.applied,
-        scene.applied.by_reactions[u, 0],
-        scene.applied.by_reactions[u, 1],
+        scene.applied.by_reactions[u, ROW_OF],
+        scene.applied.by_reactions[u, COMPONENT],
     )
     size = scene.work.by_reactions[u, SIZE]
     if c >= SCALAR:
@@ -289,13 +299,13 @@ def add_reaction_forces(scene: Scene, t: float, y: F1, dy: F1) -> int:
     stresses = 0
     if active_count(scene) < len(scene.equations.program):
         stresses = fill_stresses(scene, t, y)
-        hold_again(scene, t)
+        restick(scene, t)
     code = failure_or(scene, settle(scene, t, y, stresses))
     if code != 0:
         return code
     for u in range(len(by_reactions)):
         power = lost_power(scene, y, u)
-        work.applied[by_reactions[u, 0], LOST_POWER] += power
+        work.applied[by_reactions[u, ROW_OF], LOST_POWER] += power
         lost += power
     dy[scene.world.accumulators[1]] += lost
     # bodies that no joint holds may be pushed too

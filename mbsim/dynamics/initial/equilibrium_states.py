@@ -49,7 +49,7 @@ class _States:
 
     def __init__(self, scene: Scene, y: Array, hooks: Hooks) -> None:
         self.search = Search(scene, y, hooks)
-        self.offsets, self.scale = scene.states.place, scene.states.scale
+        self.offsets, self.scale = scene.states.offset, scene.states.scale
         self.search.move_to(self.search.y)
 
     def residual(self, y: Array, P: Array, R: Array) -> Array | None:
@@ -76,8 +76,8 @@ class _States:
         R = search.scene.work.R[: search.count].copy()
         F = self.residual(search.y, P, R)
         size = np.maximum(np.abs(search.y[self.offsets]), self.scale)
-        unit = np.tile([search.length] * 3 + [1.0] * 3, search.count)
-        across = [1.0 / np.abs(column / unit).max() for column in P.T]
+        shift = np.tile([search.length] * 3 + [1.0] * 3, search.count)
+        across = [1.0 / np.abs(column / shift).max() for column in P.T]
         unit = np.concatenate([across, size])
         J = np.zeros((len(unit), len(unit)))
         for k, whole in enumerate(unit):

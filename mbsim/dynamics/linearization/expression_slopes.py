@@ -141,7 +141,7 @@ def add_program_slopes(
 @jitable
 def state_rise(scene: Scene, T: Tangent, t: float, y: F1, program: int, z: int) -> float:
     """Return the derivative of a program by state z."""
-    at = scene.states.place[z]
+    at = scene.states.offset[z]
     if T.depends.user[program] == 0:
         run(scene, t, y, program, A_STATE, at)
         return scene.programs.stack[0, JET_SLOPE]

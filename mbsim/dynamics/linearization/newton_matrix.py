@@ -388,7 +388,7 @@ def solve_border_part(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
             if L.released[k] == 1:
                 x[k] = 0.0 * x[k]
             continue
-        at = scene.states.place[k - active]
+        at = scene.states.offset[k - active]
         x[k] = r[at] + along_row(L, M, row, 1, M.g)
         for b in range(len(P.order)):
             for i in range(M.rate.shape[1]):
@@ -434,5 +434,5 @@ def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
     write_answer(scene, T, M, r, d)
     active = active_count(scene)
     for z in range(len(scene.states.program)):
-        d[scene.states.place[z]] = M.extra[1, active + z]
+        d[scene.states.offset[z]] = M.extra[1, active + z]
     return 0

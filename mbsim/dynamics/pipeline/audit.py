@@ -45,7 +45,6 @@ from mbsim.arrays.codes import (
     FOUND_ELEMENT,
     FOUND_TIME,
     FOUND_VALUE,
-    HELD_SLIP,
     HITS_THEN,
     LARGEST_ENERGY,
     LOST_POWER,
@@ -57,6 +56,7 @@ from mbsim.arrays.codes import (
     SPIN,
     STEPS_ALL,
     STEPS_SINCE,
+    STICKING_SLIP,
     TIME_THEN,
     TOUCHED_NOW,
     USUAL_ENERGY,
@@ -276,7 +276,7 @@ def examine_equations(scene: Scene, t: float) -> None:
         e = eq.active[r]
         rate = abs(sweep.rate[e, MISMATCH]) / eq.unit[e] * own_time(scene, e)
         if is_friction(scene, e):
-            note(scene, HELD_SLIP, rate, allowed, t, e)
+            note(scene, STICKING_SLIP, rate, allowed, t, e)
             continue
         if not is_sticking(scene, e, t):
             continue

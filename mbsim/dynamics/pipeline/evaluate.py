@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import NEAR_FOLD, NOW, WITHIN
+from mbsim.arrays.codes import NEAR_FOLD, NOISE_FORCE, NOISE_TORQUE, NOW, WITHIN
 from mbsim.arrays.hooks import Contacts, Dry, Hook, Joints, Sticking, answer_of, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -25,7 +25,7 @@ def add_gravity(scene: Scene) -> None:
         for k in range(3):
             work.force[b, k] = mass * g[k]
             work.torque[b, k] = 0.0
-        work.noise[b, 0] = work.noise[b, 1] = 0.0
+        work.noise[b, NOISE_FORCE] = work.noise[b, NOISE_TORQUE] = 0.0
 
 
 @jitable
@@ -66,7 +66,7 @@ def evaluate_past(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     """Do the same at a point within the last step, where friction knows what it did before it."""
     scene.world.past[0] = WITHIN
     if scene.world.hooks[Hook.DRY] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, y)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.RESTICK, t, y)))
     code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, h, y, dy))
     if code == 0 and scene.world.hooks[Hook.STICKING] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.SHARE, t, y)))

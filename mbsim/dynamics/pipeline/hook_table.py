@@ -276,7 +276,7 @@ TABLE = (
     ),
     Row(
         Hook.JET,
-        _INT(_INT, _T, _PTR, _INT, _INT, _INT),  # context, t, y, program, body, way
+        _INT(_INT, _T, _PTR, _INT, _INT, _INT),  # context, t, y, program, body, direction
         _needs_jets,
         _of("pipeline.force_hooks", "express"),
         "leaves an expression and its rates in the first row of `Programs.stack`",

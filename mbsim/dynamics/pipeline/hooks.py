@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    CONSTRAINTS_CHANGED,
     ENERGY_LOST,
     ERROR_NOW,
     FOLD_HALT,
     FOLDS,
-    HELD_OTHERWISE,
     LISTINGS,
 )
 from mbsim.arrays.hooks import (
@@ -59,7 +59,7 @@ from mbsim.dynamics.pipeline.output import (
 def accept(scene: Scene, t: float, h: float, y: F1) -> int:
     """Take the point evaluated last as accepted.
 
-    Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.
+    Returns 1 if y changed so that f did, CONSTRAINTS_CHANGED if the motion goes on otherwise.
     """
     state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
     contacts, changed = scene.world.hooks[Hook.CONTACTS], 0
@@ -164,7 +164,7 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     if scene.log.counters[LISTINGS] > listings:
         # pairs that were not near, and so not counted, are now
         word += Taken.STABLE_IS_STALE
-    if changed == HELD_OTHERWISE or passed != passes:
+    if changed == CONSTRAINTS_CHANGED or passed != passes:
         word += Taken.BEGIN_ANEW
     code = failure_or(scene, 0)
     return word if code == 0 else -code
@@ -179,7 +179,7 @@ def _look(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
         contacts = scene.world.hooks[Hook.CONTACTS]
         answer_of(scene, call_int(contacts, (scene, Contacts.WATCH, t, h, a, a)))
     if scene.world.hooks[Hook.DRY] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.RESTICK, t, a)))
     return failure_or(scene, code)
 
 
@@ -209,7 +209,7 @@ def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
         return -failure_or(scene, code)
     full = write_row(scene, t, h, vector_at(a, n), f)
     if scene.world.hooks[Hook.DRY] != 0:
-        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
+        answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.RESTICK, t, a)))
     code = failure_or(scene, 0)
     if code != 0:
         return -code

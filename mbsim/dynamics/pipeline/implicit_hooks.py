@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import FORM
 from mbsim.arrays.hooks import ContactSlopes, Hook, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
@@ -49,7 +50,7 @@ def _factor_pair(context: int, t: float, h: float, a: Pointer, b: Pointer) -> in
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     for k in range(3):
         T.pair.c[0, k] = complex(a[2 * k], a[2 * k + 1])
-    T.pair.c[0, 3] = a[6]
+    T.pair.c[0, FORM] = a[6]
     return failure_or(scene, factor(scene, T, T.pair, h))
 
 

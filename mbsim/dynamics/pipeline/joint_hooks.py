@@ -29,7 +29,7 @@ from mbsim.dynamics.constraints.projection import (
 from mbsim.dynamics.constraints.reactions import fill_reactions, show_sticking
 from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
-from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
+from mbsim.dynamics.constraints.tree_projection import project_tree, project_tree_velocities
 from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
 from mbsim.dynamics.pipeline.audit import examine_equations, examine_fold
 
@@ -128,7 +128,7 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     elif what == Joints.SPEED_UP:
         push(scene)
         speed_up(scene, y)
-        carry_all(scene, y)
+        project_tree_velocities(scene, y)
     return 0
 
 
@@ -151,7 +151,7 @@ def serve_tree_joints(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     elif what == Joints.PROJECT or what == Joints.ALONG:
         place_bodies(scene, y)
         project_tree(scene, y)
-        carry_all(scene, y)
+        project_tree_velocities(scene, y)
     return 0
 
 

@@ -25,6 +25,8 @@ from mbsim.arrays.codes import (
     INC_TOUCHES,
     INC_WEIGHT,
     INC_X,
+    NOISE_FORCE,
+    NOISE_TORQUE,
     STORED_ENERGY,
 )
 from mbsim.arrays.hooks import Contacts, Effects, Gauges, Hook, Joints, answer_of, note_failure
@@ -41,7 +43,7 @@ from mbsim.dynamics.contact.forces import (
     ALONG_Y,
     DEPTH,
     FORCE,
-    HELD,
+    FRICTION_STORED,
     MODE,
     NORMAL,
     RATE,
@@ -103,8 +105,8 @@ def add_stored(scene: Scene, y: F1, row: F1) -> None:
     """Add what contacts have stored and lost to a row of energies."""
     hit = scene.work.hit
     for k in range(hit[len(hit) - 1]):
-        row[1] += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], HELD]
-        row[2] -= scene.work.slot[hit[k], HELD]
+        row[1] += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], FRICTION_STORED]
+        row[2] -= scene.work.slot[hit[k], FRICTION_STORED]
     for c in range(len(scene.contacts.id)):
         row[2] += y[len(y) - len(scene.contacts.id) + c]
 
@@ -138,8 +140,8 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     rows, work, state = scene.rows, scene.work, scene.state
     first = rows.used[1]
     k = first
-    for place in range(work.hit[len(work.hit) - 1]):
-        s = work.hit[place]
+    for touching in range(work.hit[len(work.hit) - 1]):
+        s = work.hit[touching]
         row = rows.incidents[k]
         at = scene.slots.x[s]
         row[INC_SLOT] = s
@@ -230,11 +232,11 @@ def no_room(scene: Scene) -> bool:
 def beyond_noise(scene: Scene, b: int, h: float, dv: float, dw: float) -> V2:
     """Return the squares of a velocity error less what detection noise does in a step h."""
     bodies, noise = scene.bodies, scene.work.noise
-    if noise[b, 0] == 0.0:
+    if noise[b, NOISE_FORCE] == 0.0:
         return dv, dw
-    ease = h * noise[b, 0] / bodies.mass[b]
+    ease = h * noise[b, NOISE_FORCE] / bodies.mass[b]
     least = min(bodies.inertia[b, 0, 0], min(bodies.inertia[b, 1, 1], bodies.inertia[b, 2, 2]))
-    turn = h * noise[b, 1] / least
+    turn = h * noise[b, NOISE_TORQUE] / least
     return max(0.0, math.sqrt(dv) - ease) ** 2, max(0.0, math.sqrt(dw) - turn) ** 2
 
 
@@ -400,8 +402,8 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         if kept >= 0:
             largest = max(largest, (e[kept] / most) ** 2)
     states = scene.states
-    for k in range(len(states.place)):
-        at = states.place[k]
+    for k in range(len(states.offset)):
+        at = states.offset[k]
         largest = max(largest, (e[at] / max(abs(y[at]), states.scale[k])) ** 2)
     if h > 0.0:
         # what was not integrated but put right, as after a motion that jumps

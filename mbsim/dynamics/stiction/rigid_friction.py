@@ -14,7 +14,7 @@ import math
 
 from mbsim.arrays.codes import (
     AXIS_TORQUE,
-    HELD_OTHERWISE,
+    CONSTRAINTS_CHANGED,
     SCALE_LENGTH,
     SCALE_SPEED,
     SLIDER,
@@ -150,7 +150,7 @@ def release(scene: Scene) -> int:
 
 @jitable
 def commit_rigid(scene: Scene, t: float, y: F1) -> int:
-    """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
+    """Keep what rigid frictions do at the point evaluated last; return 0 or CONSTRAINTS_CHANGED."""
     changed = ask_contacts(scene, Sticking.BEGIN, t, y) == 1
     for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
@@ -176,11 +176,11 @@ def commit_rigid(scene: Scene, t: float, y: F1) -> int:
             kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
         elif kept[SLIDES] != kept[SLIDES_BEFORE]:
             record_mode(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
-    return HELD_OTHERWISE
+    return CONSTRAINTS_CHANGED
 
 
 @jitable
-def hold_again(scene: Scene, t: float, y: F1) -> None:
+def restick(scene: Scene, t: float, y: F1) -> None:
     """Take into use what holds at the point to be evaluated, where the last step changed that."""
     kept, contacts = scene.state.dry, ask_contacts(scene, Sticking.CHANGED, t, y)
     if contacts == 1:
@@ -194,9 +194,9 @@ def hold_again(scene: Scene, t: float, y: F1) -> None:
 
 @jitable
 def serve_rigid(scene: Scene, what: int, t: float, y: F1) -> int:
-    """Do what dry friction is asked for (`Dry`); return 0, HELD_OTHERWISE, or less a code."""
+    """Do what dry friction is asked for (`Dry`); return 0, CONSTRAINTS_CHANGED, or less a code."""
     if what == Dry.KEEP:
         commit_kept(scene, t, y)
         return commit_rigid(scene, t, y)
-    hold_again(scene, t, y)
+    restick(scene, t, y)
     return 0

@@ -159,10 +159,10 @@ def share_sticking(scene: Scene, t: float, y: F1) -> None:
 @jitable
 def show_sticking(scene: Scene, s: int) -> None:
     """Write the force on slot s with what holds it."""
-    row, force = scene.work.slot[s], scene.work.sticking_force[s]
+    row, sticking = scene.work.slot[s], scene.work.sticking_force[s]
     point = scene.work.points[s]
     n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
-    rubs = add(scale(force[0], tx), scale(force[1], cross(n, tx)))
+    rubs = add(scale(sticking[0], tx), scale(sticking[1], cross(n, tx)))
     force = add(scale(row[NORMAL], n), rubs)
     for k in range(3):
         row[FORCE + k] = force[k]
