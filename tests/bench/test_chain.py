@@ -19,6 +19,7 @@ from mbsim.bench.scenes.s08_linkages import chain_deck
 from mbsim.core import jit
 from mbsim.core.problem import DONE
 from mbsim.integrators import catalog, driver, scheme
+from mbsim.integrators.binding import bind
 
 pytestmark = pytest.mark.bench
 
@@ -78,7 +79,7 @@ def of_joints(integrator, tol, tilt):
     chain = joint_chain.make(RODS, len(TIMES) - 1, tilt)
     problem, _table = joint_chain.problem(chain)
     state = scheme.make(method, np.zeros(2 * RODS), 0.0)
-    steps, _bench = scheme.bind(method, problem, state)
+    steps, _bench = bind(method, problem, state)
     advance = jit.function(driver.advance)
     assert advance(steps, TIMES[-1], tol, math.inf, 0.0, TIMES[1:], 10**8) == DONE
     start = [p.S8.length, 0.0, 0.0]
