@@ -133,9 +133,9 @@ def judge(
 def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -> bool:
     """Return whether a correction e of `size`, no better than the one before, is rounding.
 
-    It is if it is a small part of the step's error. Friction that turns over within 1e-3 of what
-    bodies are fast shows 1e4 times as much of the rounding of velocities, the more the tighter
-    joints hold them: of it counts what it can do, not what tol is.
+    It is if it is a small part of the step's error. Friction that turns over within 1e-3 of the
+    usual speed changes by 1e3 times what velocities are rounded by, and joints near a singular
+    position round these worse: of friction counts what it can do, not what tol is.
     """
     most = LEFT * m.memory[TOL]
     if size <= most:
