@@ -202,7 +202,9 @@ class Incline:
             solid = f"""type="BoxDefinedFromCenter" center_marker_id="20"
   length_x="{width!r}" length_y="{width!r}" length_z="{side!r}\""""
         else:
-            solid = f'type="Cylinder" center_marker_id="21" radius="{0.5 * width!r}" length="{side!r}"'
+            solid = (
+                f'type="Cylinder" center_marker_id="21" radius="{0.5 * width!r}" length="{side!r}"'
+            )
         # a cylinder is given by the middle of its base
         low = [-self.height * math.sin(start[TILT]) * scale * math.cos(self.down)]
         low.append(-self.height * math.sin(start[TILT]) * scale * math.sin(self.down))
