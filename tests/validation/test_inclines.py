@@ -1,4 +1,4 @@
-"""STICTION without give on inclines, against a planar integration that shares nothing with mbsim."""
+"""STICTION without give on inclines, against a planar integration of its own."""
 
 from __future__ import annotations
 
