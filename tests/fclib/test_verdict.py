@@ -325,3 +325,21 @@ def test_solved_relative_ends_with_0_and_is_said(tmp_path, monkeypatch):
     (entry,) = json.loads(CliRunner().invoke(main, ["fclib", "solve", str(file), "--json"]).stdout)
     assert entry["status"] == "solved_relative"
     assert {"scale_free", "velocity_error", "own_error"} <= entry.keys()
+
+
+def test_a_chain_of_weak_contacts_is_mended_to_its_end():
+    """Bodies that lie by themselves press on each other by 1e-40: impulses come one by one."""
+    strong, weak = 400, 10
+    w = np.eye(2 * (strong + weak))
+    rows = 2 * strong + 2 * np.arange(weak)
+    w[rows, rows] = 2.0
+    w[rows[1:], rows[:-1]] = w[rows[:-1], rows[1:]] = -0.5
+    q = np.zeros(len(w))
+    q[: 2 * strong : 2] = -1.0
+    q[rows[0]] = -1e-40
+    problem = Local(2, matrix(w), q, np.full(strong + weak, 0.3))
+    r = np.maximum(0.0, -q)
+    r[rows] = 0.0
+    assert clock.compiled(sweeps.mend_weak)(reduce(problem).system, r, 1e-7, 1 + weak)
+    right = np.linalg.solve(w[np.ix_(rows, rows)], -q[rows])
+    np.testing.assert_allclose(r[rows], right, rtol=1e-5)

@@ -210,8 +210,8 @@ class Incline:
         low.append(-self.height * math.sin(start[TILT]) * scale * math.sin(self.down))
         low.append((float(start[Z]) - self.height * math.cos(start[TILT])) * scale)
         at = " ".join(f'pos_{axis}="{x!r}"' for axis, x in zip("xyz", low, strict=True))
-        tilt, spin = float(start[TILT]), self.turned - 0.5 * math.pi
-        turns = f'psi="{about!r}" theta="{tilt!r}" phi="{spin!r}"'
+        turns = f'psi="{about!r}" theta="{float(start[TILT])!r}" '
+        turns += f'phi="{self.turned - 0.5 * math.pi!r}"'
         friction = self.mu
         return f"""
 <Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="{unit}" time_unit="SECOND"/>
