@@ -90,7 +90,9 @@ def run_beside(line: list[str], out: Path, ballast: Path, left: int) -> tuple[in
         found = os.statvfs(out)
         with ballast.open("wb") as file:
             size = found.f_bavail * found.f_frsize - left
-            os.posix_fallocate(file.fileno(), 0, max(1, size))
+            with contextlib.suppress(OSError):  # the run takes some of it meanwhile
+                for at in range(0, size, 1 << 16):
+                    os.posix_fallocate(file.fileno(), at, 1 << 16)
         _, said = process.communicate(timeout=900.0)
     changes.close()
     return process.returncode, said.decode()
