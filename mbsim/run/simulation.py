@@ -198,7 +198,7 @@ def simulate(
             log.line(str(error))
             raise
         except KeyboardInterrupt:
-            status, runner.torn = "interrupted", True
+            status = "interrupted"
             log.line(str(stopped := runner.stopped()))
             raise stopped from None
         except Exception as error:

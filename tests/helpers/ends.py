@@ -81,6 +81,23 @@ def run_until(
     return process.returncode, said.decode()
 
 
+def run_beside(line: list[str], out: Path, ballast: Path, left: int) -> tuple[int, str]:
+    """Run a command; after its first result another file leaves so many bytes of the disk."""
+    changes = Changes(out, with_bytes=False)
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        while process.poll() is None and not changes.published:
+            changes.wait(0.2)
+        found = os.statvfs(out)
+        with ballast.open("wb") as file:
+            size = found.f_bavail * found.f_frsize - left
+            with contextlib.suppress(OSError):  # the run takes some of it meanwhile
+                for at in range(0, size, 1 << 16):
+                    os.posix_fallocate(file.fileno(), at, 1 << 16)
+        _, said = process.communicate(timeout=900.0)
+    changes.close()
+    return process.returncode, said.decode()
+
+
 def visible(folder: Path) -> list[str]:
     """Return the names of the files that a user sees."""
     return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))

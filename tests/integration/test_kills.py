@@ -26,6 +26,7 @@ from helpers.ends import (
     hidden,
     looked_at,
     resized,
+    run_beside,
     run_until,
     same,
     small_disk,
@@ -190,14 +191,20 @@ def test_a_run_on_a_full_disk_goes_on_when_there_is_room(
     whole, chance = straight(case), random.Random(f"{SEED} disk {case}")
     size = sum(path.stat().st_size for path in whole.out.iterdir()) / 2**20
     for k in range(share(KILLS // 10, case)):
-        # from where hardly a row fits to where two files almost do
-        room = 0.3 + chance.uniform(0.0, 2.0) * size
+        # its rows just fit, or nothing does once there is a result
+        beside = chance.random() < 0.7
+        room = 10.0 + 5.0 * size if beside else 0.3 + chance.uniform(0.8, 2.0) * size
         with small_disk(tmp_path / f"disk{k}", room) as disk:
-            out = disk / "out"
-            code, said = run_until(whole.line(out))
+            out, ballast = disk / "out", disk / "ballast"
+            if beside:
+                left = int(chance.choice([0.0, 0.1, 0.3, 1.0]) * 2**20)
+                code, said = run_beside(whole.line(out), out, ballast, left)
+                ballast.unlink()
+            else:
+                code, said = run_until(whole.line(out))
             status = looked_at(out) if out.exists() else ""
-            rows = can_go_on(out) if status else None
-            print(f"{case}: {room:.2f} of {size:.2f} MB: {code}, {status or 'nothing'}, {rows}")
+            how = "with a checkpoint" if status and can_go_on(out) else "without"
+            print(f"{case}: {room:.1f} of {size:.1f} MB: {code}, {status or 'nothing'} {how}")
             if code == 0:
                 whole.is_like(out)
                 continue
