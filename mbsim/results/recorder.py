@@ -6,11 +6,13 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
+from mbsim.core.stored import apart
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.asked import Asked
 from mbsim.results.audit import Audit, to_attributes
@@ -130,23 +132,30 @@ class Recorder:
         if not self._target.is_file():
             raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
         try:
-            with open_results(self._target) as results:
-                check_same(self._target, results, settings, self._identity)
-                if "state/incident_offsets" in results:
-                    self._incidents = int(results["state/incident_offsets"][-1])
-                tables = results.tables("checkpoint")
-                if results.attribute("checkpoint", "sha256") != digest(tables):
-                    raise ModelError(
-                        f"--resume: {self._target}: the checkpoint is damaged: its numbers are not "
-                        "those that were written; start without --resume"
-                    )
-                self._started = self._shown = True
-                self._saved = set(tables)
-                tables.pop(MADE_OF, None)
-                self.watch.restore(tables)
-                return tables
+            self._incidents, tables = apart(
+                partial(self._read, self._target, settings), self._target
+            )
         except ResultsError as error:
             raise ModelError(f"--resume: {error}") from None
+        self._started = self._shown = True
+        self._saved = set(tables)
+        tables.pop(MADE_OF, None)
+        self.watch.restore(tables)
+        return tables
+
+    def _read(self, target: Path, settings: Mapping[str, Value]) -> tuple[int, dict[str, Table]]:
+        """Return how many incidents there are, and the tables of the checkpoint."""
+        with open_results(target) as results:
+            check_same(target, results, settings, self._identity)
+            tables = results.tables("checkpoint")
+            if results.attribute("checkpoint", "sha256") != digest(tables):
+                raise ModelError(
+                    f"--resume: {target}: the checkpoint is damaged: its numbers are not "
+                    "those that were written; start without --resume"
+                )
+            results.check_rows(dict(self._signals(nothing(self.system))))
+            offsets = "state/incident_offsets"
+            return int(results[offsets][-1]) if offsets in results else 0, tables
 
     def check_room(self, rows: float) -> None:
         """Raise `ModelError` where so many output rows cannot be kept.

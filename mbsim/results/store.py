@@ -165,6 +165,8 @@ class Store:
         if self._growing and name in file:
             if len(rows):
                 dataset = file[name]
+                if dataset.maxshape[0] is not None:
+                    raise OSError(f"/{name} takes no more rows")
                 count = dataset.shape[0]
                 dataset.resize(count + len(rows), axis=0)
                 dataset[count:] = rows
