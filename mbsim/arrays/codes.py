@@ -26,26 +26,28 @@ ACTIVE, FREE, FIXED, WANTED = range(4)
 # why a step was rejected: columns of `Log.rejections`, one row a contact, the last row for none
 REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
 
-# entries of `Applied.kind`, in no order
+# entries of `Applied.form`, in no order
 (
-    LINE_FORCE,
+    LINE_FORCE,  # scalar forces: dynamics.forces.applied
     AXIS_FORCE,
+    AXIS_FORCE_AT_I,
     AXIS_TORQUE,
-    VECTOR_FORCE,
-    MARKER_FORCE,  # of `forces.catalog`
+    VECTOR_FORCE,  # components by expressions
+    WRENCH,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
-    SLIDE_LIMIT,
-    TURN_LIMIT,
-    DRY_SLIDE,  # Force_DryFriction along an axis, then about one: forces.dry_friction
-    DRY_TURN,
     SLIDE_FRICTION,  # in joints, as the next three
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(14)
+) = range(11)
 
-# entries of `Applied.par` of a marker force: `forces.catalog.Bounds`, from REST on three numbers
+# columns of `Applied.bound`: `forces.catalog.Bounds`, from REST on three numbers
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
+BOUNDS = 8
+
+# columns of `Applied.par` of what slides (`Applied.keeps`): stiffness, 0 where it is rigid; the
+# force of slip, and the one that begins it
+SLIDER_STIFFNESS, SLIDER_LIMIT, SLIDER_STATIC = range(3)
 
 # second column of `Applied.by_reactions`: components 0 to 5 of a vector force, then
 SCALAR, JOINT_FRICTION = 6, 7

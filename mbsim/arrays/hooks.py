@@ -21,25 +21,53 @@ if TYPE_CHECKING:
 class Hook(IntEnum):
     """Entries of `World.hooks`, in the order in which a step comes to them first."""
 
-    FCL = 0  # distances of pairs without a closed form
-    VALUE = 1  # value of an expression
-    JET = 2  # its value and rates
-    APPLIED = 3  # forces between markers, states of the user's own
-    WRENCH = 4  # a bushing or a vector force
-    ELEMENT = 5  # a Force_Element by its residual
-    JOINTS = 6  # what joints are asked for: `Joints`
-    STICKING = 7  # contacts whose friction holds without give: `Sticking`
-    REACTION_FORCES = 8  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 9  # the whole rhs
-    TANGENT = 10  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 11  # how forces of equations turn with the bodies
-    MEMORY = 12  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 13  # derivatives of forces between markers
-    MEMORY_PAIR = 14  # as MEMORY in complex systems
-    DRY = 15  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 16  # turns of followed angles
-    NEAR = 17  # the lists of near pairs
-    REQUESTS = 18  # expressions of requests
+    CONTACTS = 0  # what contacts are asked for: `Contacts`
+    FCL = 1  # distances of pairs without a closed form
+    VALUE = 2  # value of an expression
+    JET = 3  # its value and rates
+    APPLIED = 4  # forces between markers, states of the user's own
+    WRENCH = 5  # a bushing or a vector force
+    ELEMENT = 6  # a Force_Element by its residual
+    JOINTS = 7  # what joints are asked for: `Joints`
+    STICKING = 8  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 9  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 10  # the whole rhs
+    TANGENT = 11  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 12  # how forces of equations turn with the bodies
+    MEMORY = 13  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 14  # derivatives of forces between markers
+    MEMORY_PAIR = 15  # as MEMORY in complex systems
+    GAUGES = 16  # what is measured of contacts: `Gauges`
+    DRY = 17  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 18  # turns of followed angles
+    NEAR = 19  # the lists of near pairs
+    REQUESTS = 20  # expressions of requests
+
+
+class Contacts(IntEnum):
+    """What contacts are asked for."""
+
+    PUSH = 0  # find who touches whom, and add the forces
+    KEEP = 1  # write the incident table at a committed state: 0, 1 if f changed, HELD_OTHERWISE
+    WATCH = 2  # keep the largest force, depth and slip
+    GAPS = 3  # take what shapes moved from the distance of every pair
+    ENERGY = 4  # add what is stored and lost to a row of energies
+    ROW = 5  # write the columns of contacts in a row of results
+    INCIDENTS = 6  # append its incidents: how many
+    HARDEST = 7  # which presses hardest, their number for none
+    TOUCHED = 8  # mark groups of bodies that ground touches
+    CONE = 9  # look whether friction is within its cone
+    BLAME = 10  # which presses hardest on the body with the worst error, and 1; 0 for none
+
+
+class Gauges(IntEnum):
+    """What is measured of contacts."""
+
+    ERROR = 0  # square of the scaled error of what incidents carry
+    FRICTION = 1  # change of friction that an error causes, over the normal force
+    REVERSAL = 2  # the same, with a slip that it turns round
+    IMPACT = 3  # change of a closing speed that an error causes, over that in a step
+    STEP = 4  # how much of a step may be tried
 
 
 class Joints(IntEnum):

@@ -140,8 +140,8 @@ class Sensors(NamedTuple):
 class Switching(NamedTuple):
     """What may change its branch within a step, which then ends there: compile_model.switching."""
 
-    program: I1  # (n,) that tells the sides of an expression's switches, -1 for a limit
-    limit: I1  # (n,) row of `Applied`, -1 for an expression; the last may have neither: it is
+    program: I1  # (n,) that tells the sides of an expression's switches, -1 for a force
+    force: I1  # (n,) row of `Applied`, -1 for an expression; the last may have neither: it is
     # for what all incidents do whose friction has modes
 
 
@@ -200,26 +200,26 @@ class Residuals(NamedTuple):
 
 @tags.constant
 class Applied(NamedTuple):
-    """Forces between two markers: springs, dampers, expressions, limits and friction of joints."""
+    """Forces between two markers, of the kinds of `forces.catalog`."""
 
-    kind: I1  # (nf,) see forces.applied
+    form: I1  # (nf,) LINE_FORCE, ...
     # 1 where it is settled with the reactions: friction in joints, and what looks at reactions
     # (forces.reaction_forces)
     with_reactions: I1  # (nf,)
     i: I1  # (nf,) markers
     j: I1  # (nf,)
-    par: F2  # (nf, widest) stiffness, damping, length, preload; of friction radius, preload, arm;
-    # of marker forces what a step must follow; of dry friction its stiffness (0: rigid) and the
-    # force at which it slides on and at which it begins to
+    formula: I1  # (nf,) address of the formula of its kind (forces.abi), 0 for none
+    par: F2  # (nf, widest) what that takes; of friction in joints radius, preload, arm
+    bound: F2  # (nf, BOUNDS) what a step without error estimate must follow
+    keeps: I1  # (nf,) 1 where it remembers a slider and a mode: `State.dry`
     program: I1  # (nf,) -1 for none
     components: I2  # (nf, 6) programs of force and torque of a vector force, -1 for none
-    axes: I1  # (nf,) marker whose axes those components are along, whose z dry friction is
+    axes: I1  # (nf,) marker whose axes components are along, whose z an axis is
     angle: I1  # (nf,) row of `Angles`, -1 for none
     alone: I1  # (nf,) 1 where nothing acts on J
-    bounds: F2  # (nf, 2) of limits
-    law: I1  # (nf,) address of a normal or friction law or a marker force, 0 for none
+    law: I1  # (nf,) address of a normal or friction law, 0 for none
     law_par: F2  # (nf, widest)
-    slopes: I1  # (nf,) address of the slopes of a marker force, 0 for none or where not asked for
+    slopes: I1  # (nf,) address of the slopes of a wrench, 0 for none or where not asked for
     id: I1  # (nf,) of the element
     connection: I1  # (nf,) whose reaction presses, -1 for none
     equation: I1  # (nf,) that holds rigid dry friction while it sticks, -1 for none

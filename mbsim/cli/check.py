@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 def _without_file(deck: Model) -> Iterator[str]:
     """Yield forces and variables whose user subroutine is in no file that the deck names."""
+    from mbsim.forces.catalog import Components, Expressed, OfResidual, of_form
+
+    kinds = of_form(Expressed, Components, OfResidual)
     for name, table in (
-        ("Force_Scalar_TwoBody", deck.scalar_forces),
-        ("Force_Vector_TwoBody", deck.vector_forces),
-        ("Force_Vector_OneBody", deck.body_forces),
+        *((kind.statement, deck.table(kind.name)) for kind in kinds),
         ("Reference_Variable", deck.variables),
-        ("Force_Element", deck.force_elements),
     ):
         for element in table.values():
             if element.user is not None and not element.user.script_name:

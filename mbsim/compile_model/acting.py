@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mbsim.arrays.model import Applied, Residuals, Sensors, States, Switching
 from mbsim.compile_model.applied import applied_forces
+from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
 from mbsim.compile_model.markers import MarkerTable, body_rows
@@ -71,18 +72,18 @@ class Acting:
     residuals: Residuals | None
 
 
-def _link_dry(
+def _link_rigid(
     model: Model, mechanism: Mechanism, applied: Applied, applied_ids: list[tuple[str, int]]
 ) -> None:
-    """Let rigid dry frictions and their equations, know each other.
+    """Let rigid forces and their equations know each other.
 
     Theirs are the last but for those of contacts.
     """
-    rigid = [id for id, friction in model.dry_frictions.items() if friction.dx == 0.0]
+    rigid = model.rigid_forces()
     rigid_slots = int((mechanism.equations.slot >= 0).sum())
     first = len(mechanism.equations.program) - rigid_slots - len(rigid)
-    for k, id in enumerate(rigid):
-        row = applied_ids.index(("DRYFRICTION", id))
+    for k, (kind, force) in enumerate(rigid):
+        row = applied_ids.index((kind.name, force.id))
         applied.equation[row], mechanism.equations.dry[first + k] = first + k, row
 
 
@@ -111,14 +112,14 @@ def acting(
         model.splines,
         model.arrays,
     )
-    elements = [("FORCEELEMENT", id) for id in model.force_elements]
+    elements = [(STATEMENT, id) for id in model.force_elements]
     programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)
     mechanism = constrain(model, table, programs, rigid_slots)
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )
-    _link_dry(model, mechanism, applied, applied_ids)
+    _link_rigid(model, mechanism, applied, applied_ids)
     states = states_table(model, programs)
     table_of_residuals, modes = None, []
     if residuals:
@@ -135,7 +136,7 @@ def acting(
         mechanism,
         states,
         sensors_table(model, programs),
-        switching_table(model, programs, applied, modes),
+        switching_table(model, programs, applied_ids, modes),
         _state_reader(model, programs, looks) if runs else None,
         pulls(model, programs),
         _values(model, programs, residuals),  # the last of all

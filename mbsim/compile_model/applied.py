@@ -1,10 +1,10 @@
-"""Springs, dampers, scalar and vector forces, kinds of `forces.catalog`, what acts in joints."""
+"""Applied forces as rows: what acts, where, and by which formula, form by form."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,262 +12,196 @@ from mbsim.arrays import codes
 from mbsim.arrays.model import Applied
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
-from mbsim.forces.catalog import FORCES
-from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
-from mbsim.model.elements import (
-    DryFriction,
-    ForceElement,
-    JointFriction,
-    JointLimit,
-    MarkerForce,
-    Model,
-    ScalarForce,
-    SpringDamper,
-    VectorForce,
+from mbsim.forces.catalog import (
+    FORCES,
+    Acts,
+    Components,
+    Expressed,
+    ForceKind,
+    Form,
+    OfReactions,
+    OfResidual,
+    Scalar,
+    Switched,
+    Values,
+    Wrench,
 )
+from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.model.elements import MarkerForce, Model
 
-_FRICTIONS = {
-    "TRANSLATIONAL": codes.SLIDE_FRICTION,
-    "REVOLUTE": codes.TURN_FRICTION,
-    "CYLINDRICAL": codes.SCREW_FRICTION,
-    "SPHERICAL": codes.BALL_FRICTION,
-}
+Array = np.ndarray[Any, Any]
+_NONE = np.zeros(0)
+
+
+class _Rows(NamedTuple):
+    """What is filled, and what that takes."""
+
+    model: Model
+    markers: MarkerTable
+    programs: ProgramTable
+    made: Applied
 
 
 def applied_forces(
     model: Model, markers: MarkerTable, programs: ProgramTable, laws: bool = True
 ) -> tuple[Applied, list[tuple[str, int]]]:
-    """Return the forces between markers, and for each row its element: (statement, id).
+    """Return the forces between markers, and for each row its element: (kind, id).
 
-    Without `laws` those of friction and limits are left out, which would be compiled.
+    Without `laws` formulas and laws are left out, which would be compiled.
     """
-    given = [
-        (statement, element)
-        for statement, table in _tables(model).items()
-        for element in table.values()
-    ]
+    given = [(FORCES[name], element) for name in FORCES for element in model.table(name).values()]
     n = len(given)
-    found = [_law(element) if laws else (0, np.zeros(0)) for _, element in given]
+    constants = [_constants(kind, element) for kind, element in given]
+    found = [_law(kind, element) if laws else (0, _NONE) for kind, element in given]
     made = Applied(
-        kind=np.zeros(n, dtype=np.int64),
+        form=np.zeros(n, dtype=np.int64),
         with_reactions=np.zeros(n, dtype=np.int64),
         i=np.zeros(n, dtype=np.int64),
         j=np.zeros(n, dtype=np.int64),
-        par=np.zeros((n, 8 if model.marker_forces else 4)),
+        formula=np.zeros(n, dtype=np.int64),
+        par=np.zeros((n, max([1, *map(len, constants)]))),
+        bound=np.zeros((n, codes.BOUNDS)),
+        keeps=np.zeros(n, dtype=np.int64),
         program=np.full(n, -1, dtype=np.int64),
         components=np.full((n, 6), -1, dtype=np.int64),
         axes=np.zeros(n, dtype=np.int64),
         angle=np.full(n, -1, dtype=np.int64),
         alone=np.zeros(n, dtype=np.int64),
-        bounds=np.zeros((n, 2)),
-        law=np.zeros(n, dtype=np.int64),
-        slopes=np.zeros(n, dtype=np.int64),
+        law=np.array([address for address, _ in found], dtype=np.int64),
         law_par=np.zeros((n, max([1, *(len(values) for _, values in found)]))),
+        slopes=np.zeros(n, dtype=np.int64),
         id=np.array([element.id for _, element in given], dtype=np.int64),
         connection=np.full(n, -1, dtype=np.int64),
         equation=np.full(n, -1, dtype=np.int64),
         by_reactions=np.zeros((0, 3), dtype=np.int64),
     )
-    for k, (statement, element) in enumerate(given):
-        made.law[k], values = found[k]
-        made.law_par[k, : len(values)] = values
-        _FILL[statement](model, markers, programs, made, k, element)
-    return made, [(statement, element.id) for statement, element in given]
+    to = _Rows(model, markers, programs, made)
+    for k, (kind, element) in enumerate(given):
+        made.par[k, : len(constants[k])] = constants[k]
+        made.law_par[k, : len(found[k][1])] = found[k][1]
+        made.i[k], made.j[k] = _ends(model, markers, element)
+        made.axes[k] = made.j[k]
+        if laws and len(constants[k]) > 0 and not isinstance(kind.form, OfReactions):
+            made.formula[k] = _formula(kind, constants[k])
+        _FILL[type(kind.form)](to, k, kind.form, element)
+    return made, [(kind.name, element.id) for kind, element in given]
 
 
-def _tables(model: Model) -> dict[str, Mapping[int, Any]]:
-    """Return the elements that push, by statement."""
-    return {
-        "SPRINGDAMPER": model.spring_dampers,
-        "SFORCE": model.scalar_forces,
-        **{name: model.table(name) for name in FORCES},
-        "VECTORFORCE": model.vector_forces,
-        "BODYFORCE": model.body_forces,
-        "JOINTFRICTION": model.joint_frictions,
-        "JOINTLIMIT": model.joint_limits,
-        "DRYFRICTION": model.dry_frictions,
-        "FORCEELEMENT": model.force_elements,
-    }
+def _values(element: Any) -> Values:
+    """Return the attributes of an element by name."""
+    if isinstance(element, MarkerForce):
+        return element.values
+    return {each.name: getattr(element, each.name) for each in fields(element)}
 
 
-def _add_spring(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    spring: SpringDamper,
-) -> None:
-    """Fill row k with a spring-damper."""
-    made.i[k], made.j[k] = markers.row(spring.i_marker_id), markers.row(spring.j_marker_id)
-    made.par[k, :4] = spring.stiffness, spring.damping, spring.length, spring.preload
-    made.kind[k] = codes.LINE_FORCE
-    if spring.type == "ROTATIONAL":
-        made.kind[k] = codes.AXIS_TORQUE
-        made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
+def _constants(kind: ForceKind, element: Any) -> Array:
+    """Return what the formula of an element takes, shape (n,)."""
+    if isinstance(kind.form, (Scalar, Switched, Wrench)):
+        return np.array(kind.form.constants(_values(element)), dtype=np.float64)
+    if isinstance(kind.form, OfReactions):
+        return np.array(element.constants, dtype=np.float64)
+    return _NONE
 
 
-def _add_scalar(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    force: ScalarForce,
-) -> None:
-    """Fill row k with a scalar force by an expression."""
-    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
-    made.program[k] = programs.add(force.expr, force, forces=True)
-    made.alone[k] = int(force.action_only)
-    along = codes.AXIS_FORCE if force.action_only else codes.LINE_FORCE
-    made.kind[k] = codes.AXIS_TORQUE if force.type == "ROTATIONAL" else along
+def _formula(kind: ForceKind, constants: Array) -> int:
+    """Return the address of the formula of a kind."""
+    from mbsim.forces.abi import formula_address  # what only a run needs
+
+    return formula_address(kind.name, len(constants))
 
 
-def _add_marker_force(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    force: MarkerForce,
-) -> None:
-    """Fill row k with a force of a kind of `forces.catalog`."""
-    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_marker_id)
-    made.kind[k] = codes.MARKER_FORCE
-    kind = FORCES[force.kind]
-    bounds = kind.bounds(kind.constants(force.values))
-    made.par[k] = (*bounds[: codes.REST], *bounds.rest)
-
-
-def _add_vector(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    force: VectorForce,
-) -> None:
-    """Fill row k with a vector force by expressions."""
-    made.i[k], made.j[k] = markers.row(force.i_marker_id), markers.row(force.j_floating_marker_id)
-    made.kind[k] = codes.VECTOR_FORCE
-    made.alone[k] = int(force.action_only)
-    made.axes[k] = markers.row(force.ref_marker_id)
-    for c, expression in enumerate(force.exprs):
-        if expression is not None:
-            made.components[k, c] = programs.add(expression, force, forces=True)
-
-
-def _law(element: Any) -> tuple[int, np.ndarray[Any, Any]]:
+def _law(kind: ForceKind, element: Any) -> tuple[int, Array]:
     """Return address and parameters of the law of an element; address 0 where it has none."""
-    if isinstance(element, JointLimit):
-        normal = NORMAL_LAWS[element.cnf_type]
+    name = getattr(element, getattr(kind.form, "law", "") or "id")
+    if isinstance(kind.form, Switched) and kind.form.law:
         from mbsim.laws import abi  # what only a run needs
 
+        normal = NORMAL_LAWS[name]
         return abi.normal_address(normal), abi.normal_constants(normal, element)
-    if isinstance(element, MarkerForce):
-        kind = FORCES[element.kind]
-        constants = np.array(kind.constants(element.values), dtype=np.float64)
-        from mbsim.forces.abi import wrench_address  # what only a run needs
+    if isinstance(kind.form, OfReactions) and name in FRICTION_LAWS:
+        from mbsim.laws import abi
 
-        return wrench_address(kind.name, len(constants)), constants
-    if not isinstance(element, JointFriction) or element.cff_type == "COULOMB_OFF":
-        return 0, np.zeros(0)
-    friction = FRICTION_LAWS[element.cff_type]
-    from mbsim.laws import abi  # what only a run needs
-
-    return abi.friction_address(friction), abi.friction_parameters(friction, element)
+        friction = FRICTION_LAWS[name]
+        return abi.friction_address(friction), abi.friction_parameters(friction, element)
+    return 0, _NONE
 
 
-def _place(model: Model, markers: MarkerTable, made: Applied, k: int, joint_id: int) -> None:
-    """Put row k between the markers of its joint."""
-    joint = model.joints[joint_id]
-    made.i[k], made.j[k] = markers.row(joint.i_marker_id), markers.row(joint.j_marker_id)
+def _ends(model: Model, markers: MarkerTable, element: Any) -> tuple[int, int]:
+    """Return the rows of an element's markers, or of its joint's."""
+    joint = getattr(element, "joint_id", None)
+    between = element if joint is None else model.joints[joint]
+    j = "j_marker_id" if hasattr(between, "j_marker_id") else "j_floating_marker_id"
+    return markers.row(between.i_marker_id), markers.row(getattr(between, j))
 
 
-def _add_friction(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    friction: JointFriction,
-) -> None:
-    """Fill row k with friction in a joint."""
-    _place(model, markers, made, k, friction.joint_id)
-    made.kind[k] = _FRICTIONS[model.joints[friction.joint_id].type]
-    made.par[k, : len(friction.constants)] = friction.constants
-    made.with_reactions[k] = 1
+def _place(to: _Rows, k: int, acts: Acts) -> None:
+    """Let row k act where a scalar force does."""
+    to.made.form[k] = acts.form
+    to.made.axes[k] = to.markers.turned(int(to.made.j[k]), acts.axis)
+    if acts.turns:
+        i = to.markers.turned(int(to.made.i[k]), acts.axis)
+        to.made.angle[k] = to.markers.angle(i, int(to.made.axes[k]))
+
+
+def _fill_scalar(to: _Rows, k: int, form: Scalar | Switched, element: Any) -> None:
+    """Fill row k with a force by one displacement and its rate."""
+    _place(to, k, form.acts(_values(element)))
+    if form.bounds is not None:
+        bounds = form.bounds(to.made.par[k])
+        to.made.bound[k] = (*bounds[: codes.REST], *bounds.rest)
+    to.made.keeps[k] = int(isinstance(form, Switched) and form.commit is not None)
+
+
+def _fill_expressed(to: _Rows, k: int, form: Expressed, element: Any) -> None:
+    """Fill row k with a force by an expression."""
+    to.made.program[k] = to.programs.add(element.expr, element, forces=True)
+    to.made.alone[k] = int(form.alone(_values(element)))
+    _place(to, k, form.acts(_values(element)))
+
+
+def _fill_wrench(to: _Rows, k: int, form: Wrench, element: Any) -> None:
+    """Fill row k with a wrench."""
+    to.made.form[k] = codes.WRENCH
+    bounds = form.bounds(form.constants(_values(element)))
+    to.made.bound[k] = (*bounds[: codes.REST], *bounds.rest)
+
+
+def _fill_components(to: _Rows, k: int, form: Components, element: Any) -> None:
+    """Fill row k with a vector force by expressions."""
+    to.made.form[k] = codes.VECTOR_FORCE
+    to.made.alone[k] = int(form.alone)
+    to.made.axes[k] = to.markers.row(element.ref_marker_id)
+    for c, expression in enumerate(element.exprs):
+        if expression is not None:
+            to.made.components[k, c] = to.programs.add(expression, element, forces=True)
+
+
+def _fill_friction(to: _Rows, k: int, form: OfReactions, element: Any) -> None:
+    """Fill row k with what follows from the reactions of a joint."""
+    to.made.form[k] = form.forms[to.model.joints[element.joint_id].type]
+    to.made.with_reactions[k] = 1
     # joints are the first connections, in the order of the model
-    made.connection[k] = list(model.joints).index(friction.joint_id)
+    to.made.connection[k] = list(to.model.joints).index(element.joint_id)
 
 
-def _add_limit(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    limit: JointLimit,
-) -> None:
-    """Fill row k with a limit of a joint."""
-    _place(model, markers, made, k, limit.joint_id)
-    made.kind[k] = codes.TURN_LIMIT if limit.direction == "R" else codes.SLIDE_LIMIT
-    made.bounds[k, 0] = -math.inf if limit.lower is None else limit.lower
-    made.bounds[k, 1] = math.inf if limit.upper is None else limit.upper
-    if limit.direction == "R":
-        made.angle[k] = markers.angle(int(made.i[k]), int(made.j[k]))
-
-
-def _add_dry(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    friction: DryFriction,
-) -> None:
-    """Fill row k with dry friction."""
-    made.i[k], made.j[k] = markers.row(friction.i_marker_id), markers.row(friction.j_marker_id)
-    axis = "XYZ".index(friction.type[1])
-    made.axes[k] = markers.turned(int(made.j[k]), axis)
-    made.kind[k] = codes.DRY_SLIDE
-    if friction.type[0] == "R":
-        made.kind[k] = codes.DRY_TURN
-        made.angle[k] = markers.angle(markers.turned(int(made.i[k]), axis), int(made.axes[k]))
-    static = friction.friction_static
-    made.par[k, 0] = friction.friction / friction.dx if friction.dx > 0.0 else 0.0
-    made.par[k, 1] = friction.friction
-    made.par[k, 2] = friction.friction if static is None else static
-
-
-def _add_element(
-    model: Model,
-    markers: MarkerTable,
-    programs: ProgramTable,
-    made: Applied,
-    k: int,
-    element: ForceElement,
-) -> None:
+def _fill_residual(to: _Rows, k: int, form: OfResidual, element: Any) -> None:
     """Fill row k with an element of a user's residual."""
     from mbsim.compile_model.force_elements import force_program
 
-    made.i[k], made.j[k] = markers.row(element.i_marker_id), markers.row(element.j_marker_id)
-    made.kind[k], made.axes[k] = codes.RESIDUAL, made.j[k]
-    made.par[k, 0] = list(model.force_elements).index(element.id)
+    to.made.form[k] = codes.RESIDUAL
+    to.made.par[k, 0] = list(to.model.force_elements).index(element.id)
     for at, direction in enumerate(element.directions):
         c = 3 * "TR".index(direction[0]) + "XYZ".index(direction[1])
-        made.components[k, c] = force_program(programs, element.id, at)
+        to.made.components[k, c] = force_program(to.programs, element.id, at)
 
 
-#: What fills a row, by statement.
-_FILL: dict[str, Callable[..., None]] = {
-    "SPRINGDAMPER": _add_spring,
-    "SFORCE": _add_scalar,
-    **{name: _add_marker_force for name in FORCES},
-    "VECTORFORCE": _add_vector,
-    "BODYFORCE": _add_vector,
-    "JOINTFRICTION": _add_friction,
-    "JOINTLIMIT": _add_limit,
-    "DRYFRICTION": _add_dry,
-    "FORCEELEMENT": _add_element,
+#: What fills a row, by form.
+_FILL: dict[type[Form], Callable[..., None]] = {
+    Scalar: _fill_scalar,
+    Expressed: _fill_expressed,
+    Wrench: _fill_wrench,
+    Components: _fill_components,
+    OfReactions: _fill_friction,
+    Switched: _fill_scalar,
+    OfResidual: _fill_residual,
 }

@@ -231,7 +231,7 @@ def _sizes(
         forces=len(acts.applied_ids),
         by_reactions=len(acts.applied.by_reactions),
         sensors=len(acts.sensors.id),
-        dry_frictions=len(model.dry_frictions),
+        sliders=int(acts.applied.keeps.sum()),
         switching=len(acts.switching.program),
         values=len(acts.values),
         memory=contacts.memory,

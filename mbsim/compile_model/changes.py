@@ -20,7 +20,7 @@ from mbsim.model.elements import Change
 
 Array = np.ndarray[Any, Any]
 _OF_CONTACTS = ("normal_par", "friction_par", "ignore_deeper", "dmax")
-_OF_APPLIED = ("par", "bounds", "law_par")
+_OF_APPLIED = ("par", "bound", "law_par")
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
         raise _refused(system, changes, "asks for another law than before: not built yet")
     if rows.applied_ids != system.applied or not all(
         np.array_equal(getattr(applied, n), getattr(scene.applied, n))
-        for n in ("kind", "by_reactions")
+        for n in ("form", "by_reactions")
     ):
         raise _refused(system, changes, "follows from other forces than before: not built yet")
     programs = rows.programs.arrays(rows.mechanism.elements, rows.applied_ids, system.contact_ids)

@@ -11,13 +11,15 @@ from mbsim.arrays.model import Residuals, States
 from mbsim.compile_model.instructions import USER, Instruction
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
+from mbsim.forces.catalog import OfResidual, of_form
 from mbsim.laws.residual import DIFFERENTIAL, inputs
 from mbsim.model.elements import ForceElement, Model
 
 if TYPE_CHECKING:
     from mbsim.plugins.types import UserResidual
 
-STATEMENT = "FORCEELEMENT"
+#: Kind of these elements.
+(STATEMENT,) = (kind.name for kind in of_form(OfResidual))
 
 
 def results_of(element: ForceElement, user: UserResidual) -> int:

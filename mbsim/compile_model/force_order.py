@@ -19,14 +19,9 @@ from mbsim.arrays.model import Applied, Connections, States
 from mbsim.compile_model.instructions import ELEMENT, NET
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.errors import DeckError, Fault
+from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Model
 from mbsim.model.names import element_name
-
-_TABLES = {
-    "SFORCE": ("Force_Scalar_TwoBody", "scalar_forces"),
-    "VECTORFORCE": ("Force_Vector_TwoBody", "vector_forces"),
-    "BODYFORCE": ("Force_Vector_OneBody", "body_forces"),
-}
 
 
 @dataclass
@@ -123,7 +118,7 @@ def _needed(
 def _between(i: int, j: int, applied: Applied) -> set[int]:
     """Return the rows of what acts between two markers, and of what acts on i alone without j."""
     found = set()
-    for k in range(len(applied.kind)):
+    for k in range(len(applied.form)):
         if applied.alone[k] == 1:
             counts = applied.i[k] == i and j == 0
         else:
@@ -192,18 +187,18 @@ def _sorted(needs: _Needs, row: int) -> list[int]:
 
 def _circle(model: Model, ring: list[tuple[str, int]]) -> DeckError:
     """Return the fault of forces that need each other."""
-    names = [element_name(model.file, _TABLES[statement][0], id) for statement, id in ring]
-    statement, id = ring[0]
-    source = getattr(model, _TABLES[statement][1])[id].source
+    names = [element_name(model.file, FORCES[name].statement, id) for name, id in ring]
+    kind, id = ring[0]
+    source = model.table(kind)[id].source
     what = "a force that needs itself" if len(ring) == 2 else "forces that need each other"
-    name = element_name(source.file, _TABLES[statement][0], id)
+    name = element_name(source.file, FORCES[kind].statement, id)
     return DeckError([Fault(source.file, source.line, name, f"{what}: {' -> '.join(names)}")])
 
 
 def _by_reactions(applied: Applied) -> np.ndarray[Any, Any]:
     """Return the unknowns that are settled together: row, component and program of each."""
     found = []
-    for row in range(len(applied.kind)):
+    for row in range(len(applied.form)):
         if applied.with_reactions[row] == 1:
             if applied.program[row] >= 0:
                 found.append((row, codes.SCALAR, int(applied.program[row])))

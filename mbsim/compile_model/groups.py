@@ -23,19 +23,15 @@ from mbsim.model.placement import Placement, graphic_box
 
 #: Tables of a model whose elements act.
 _ACTING = (
-    *("joints", "primitives", "couplers", "motions", "general_constraints", "spring_dampers"),
-    *("scalar_forces", *FORCES, "vector_forces", "body_forces", "joint_frictions"),
-    *("joint_limits", "dry_frictions", "force_elements"),
+    *("joints", "primitives", "couplers", "motions", "general_constraints"),
+    *FORCES,
 )
 #: Where an expression's references lead, by their statement.
 _TABLES = {
     "JOINT": "joints",
     "JPRIM": "primitives",
     "MOTION": "motions",
-    "SFORCE": "scalar_forces",
-    "SPRINGDAMPER": "spring_dampers",
     **{name: name for name in FORCES},
-    "VECTORFORCE": "vector_forces",
     "VARIABLE": "variables",
     "DIFF": "differentials",
     "SENSOR": "sensors",

@@ -22,8 +22,9 @@ from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.tree import AXES, TreeJoint, empty_tree, is_plain, limb_of, nearest_flip
 from mbsim.errors import DeckError, Fault
+from mbsim.forces.catalog import Acts, ForceKind
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
-from mbsim.model.elements import Coupler, DryFriction, GeneralConstraint, Joint, Model, Motion
+from mbsim.model.elements import Coupler, GeneralConstraint, Joint, MarkerForce, Model, Motion
 from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
 
@@ -241,17 +242,18 @@ class _Builder:
             self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
-    def add_dry(self, friction: DryFriction) -> None:
-        """Add the velocity that rigid dry friction holds while it sticks; it is no connection."""
-        i, j = self.markers.row(friction.i_marker_id), self.markers.row(friction.j_marker_id)
-        axis = "XYZ".index(friction.type[1])
-        if friction.type[0] == "R":
+    def add_rigid_force(self, kind: ForceKind, force: MarkerForce) -> None:
+        """Add the velocity that a rigid force holds while it sticks; it is no connection."""
+        i, j = self.markers.row(force.i_marker_id), self.markers.row(force.j_marker_id)
+        acts: Acts = kind.form.acts(force.values)  # type: ignore[attr-defined]
+        axis = acts.axis
+        if acts.turns:
             row = angle()
             i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
         else:
             row = offset(AXES[axis])
         self.add_term(row, i, j, 1.0)
-        self.sums.close(-1, f"Force_DryFriction[{friction.id}]", 0.0, self.unit([row]), level=1)
+        self.sums.close(-1, f"{kind.statement}[{force.id}]", 0.0, self.unit([row]), level=1)
 
     def add_rigid_slot(self, grip: RigidSlot) -> None:
         """Add the two velocities that rigid friction of a slot holds while it sticks."""
@@ -384,14 +386,14 @@ def constrain(
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
     # friction is held by none of the tree, and its equations are the last
-    rigid = [friction for friction in model.dry_frictions.values() if friction.dx == 0.0]
-    held = [marker for f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
+    rigid = model.rigid_forces()
+    held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
     others = [markers.row(marker) for marker in held]
     others += [marker for grip in rigid_slots for marker in (grip.i, grip.j)]
     tree, places = builder.tree(others)
     builder.add_joint_equations(set(places))
-    for friction in rigid:
-        builder.add_dry(friction)
+    for kind, force in rigid:
+        builder.add_rigid_force(kind, force)
     for grip in rigid_slots:
         builder.add_rigid_slot(grip)
     n = len(builder.pairs)

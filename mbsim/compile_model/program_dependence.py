@@ -55,7 +55,7 @@ def _bodies_of_forces(scene: Scene) -> dict[int, set[int]]:
     """Return the bodies that forces act on, by their programs."""
     found: dict[int, set[int]] = {}
     applied, body = scene.applied, scene.markers.body
-    for f in range(len(applied.kind)):
+    for f in range(len(applied.form)):
         both = {int(body[applied.i[f]]), int(body[applied.j[f]])}
         for program in (applied.program[f], *applied.components[f]):
             if program >= 0:

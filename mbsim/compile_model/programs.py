@@ -51,9 +51,6 @@ _COMPONENTS = ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")
 _STATEMENTS = {
     "Motion": "Motion_Joint",
     "GeneralConstraint": "Constraint_General",
-    "ScalarForce": "Force_Scalar_TwoBody",
-    "VectorForce": "Force_Vector_TwoBody",
-    "BodyForce": "Force_Vector_OneBody",
     "Gravity": "Force_Gravity",
     "Variable": "Reference_Variable",
     "Differential": "Control_Diff",

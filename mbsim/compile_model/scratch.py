@@ -32,7 +32,7 @@ class Sizes:
     forces: int
     by_reactions: int  # forces that depend on reactions
     sensors: int
-    dry_frictions: int
+    sliders: int  # forces that remember
     switching: int  # programs with branches
     values: int  # columns of requests
     memory: int  # most numbers that a law of a contact remembers
@@ -49,7 +49,7 @@ def start_state(
     """Return the incident table before anything touched."""
     nb, ng, ns, memory = n.bodies, len(graphics.body), n.slots, n.memory
     dry = np.zeros((n.forces, 4))
-    # dry friction begins without force where the first committed state is
+    # what slides begins without force where the first committed state is
     dry[:, [codes.SLIDER, codes.SLIDER_BEFORE]] = np.nan
     sensed = np.zeros((n.sensors, 5))
     sensed[:, codes.EXCESS] = np.nan
@@ -160,7 +160,7 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
 def empty_rows(n: Sizes) -> Rows:
     """Return the tables in which compiled code leaves its output rows."""
     ns = n.slots
-    events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.dry_frictions
+    events = min(max(EVENTS, 8 * ns), 2 * ns + INCIDENTS) + n.sensors + n.sliders
     return Rows(
         time=np.zeros(ROWS),
         y=np.zeros((ROWS, n.y)),

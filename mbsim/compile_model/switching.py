@@ -23,12 +23,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mbsim.arrays import codes
-from mbsim.arrays.model import Applied, Switching
+from mbsim.arrays.model import Switching
 from mbsim.compile_model.instructions import ELEMENT, NET, USER, Instruction
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.expressions.elementary import NUMBER
 from mbsim.expressions.tree import Call, Expression, Node, Number
+from mbsim.forces.catalog import FORCES, Components, Expressed, Switched, memories, of_form
 from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.model.elements import Model
 
@@ -118,10 +118,10 @@ def _sides(found: list[Node]) -> Node:
 
 def _acting(model: Model) -> Iterator[Expression]:
     """Yield the expressions of forces and of slopes of states."""
-    for force in model.scalar_forces.values():
-        yield force.expr
-    for group in (model.vector_forces, model.body_forces):
-        for element in group.values():
+    for kind in of_form(Expressed):
+        yield from (force.expr for force in model.table(kind.name).values())
+    for kind in of_form(Components):
+        for element in model.table(kind.name).values():
             yield from (expression for expression in element.exprs if expression is not None)
     for state in model.differentials.values():
         yield state.expr
@@ -129,18 +129,22 @@ def _acting(model: Model) -> Iterator[Expression]:
 
 def has_modes(model: Model) -> bool:
     """Return whether some friction is one that sticks or slips."""
-    if model.dry_frictions:
+    if any(model.table(kind.name) for kind in memories()):
         return True
     laws = [contact.cff_type for contact in model.contacts.values()]
     return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
 
 
 def switching_table(
-    model: Model, programs: ProgramTable, applied: Applied, modes: Sequence[int] = ()
+    model: Model,
+    programs: ProgramTable,
+    applied: Sequence[tuple[str, int]],
+    modes: Sequence[int] = (),
 ) -> Switching:
-    """Return what is watched: a program for each expression, limits, dry friction, modes.
+    """Return what is watched: a program for each expression, forces with branches, modes.
 
-    `modes` are programs that tell the modes of users' elements.
+    `applied` are kind and id of the applied forces, `modes` programs that tell the modes of users'
+    elements.
     """
     variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
     rows, any_found = [], any(s.changes for s in model.simulations)
@@ -156,10 +160,10 @@ def switching_table(
     if not any_found:
         rows = []
     rows += modes
-    watched = (codes.SLIDE_LIMIT, codes.TURN_LIMIT, codes.DRY_SLIDE, codes.DRY_TURN)
-    limits = [f for f, kind in enumerate(applied.kind) if kind in watched]
+    forms = [FORCES[name].form for name, _ in applied]
+    branched = [f for f, form in enumerate(forms) if isinstance(form, Switched)]
     last = [-1] if has_modes(model) else []
     return Switching(
-        np.array([*rows, *(-1 for _ in limits), *last], dtype=np.int64),
-        np.array([*(-1 for _ in rows), *limits, *last], dtype=np.int64),
+        np.array([*rows, *(-1 for _ in branched), *last], dtype=np.int64),
+        np.array([*(-1 for _ in rows), *branched, *last], dtype=np.int64),
     )

@@ -153,11 +153,11 @@ def _lever(scene: Scene, marker: int, tol_v: float, tol_l: float, turning: bool)
 def _forces(scene: Scene, tol_v: float, tol_l: float) -> Iterator[tuple[int, int, Any]]:
     """Yield program, role and factors of the applied forces."""
     applied = scene.applied
-    for f in range(len(applied.kind)):
+    for f in range(len(applied.form)):
         ends = (int(applied.i[f]), int(applied.j[f]))
         whole = int(applied.program[f])
         if whole >= 0:
-            turning = applied.kind[f] == AXIS_TORQUE
+            turning = applied.form[f] == AXIS_TORQUE
             yield whole, 0, sum(_lever(scene, m, tol_v, tol_l, turning) for m in ends)
         for c, program in enumerate(applied.components[f]):
             if program >= 0:

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mbsim.arrays.scene import Scene
+from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.instructions import SPLINE
 from mbsim.compile_model.time_functions import GLANCED, PART, Function, functions
 from mbsim.expressions import bounds, intervals
@@ -335,7 +336,7 @@ def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
     from mbsim.plugins.source.diagnose import reads_parameter
 
-    if any(name[0] != "FORCEELEMENT" for name in system.subroutines):
+    if any(name[0] != STATEMENT for name in system.subroutines):
         return True
     for _, user in system.user_laws:
         source = user.source

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.arrays.model import Residuals, Users
-from mbsim.model.elements import Model, Variable
-from mbsim.model.forces import ScalarForce, VectorForce
+from mbsim.forces.catalog import Components, Expressed, of_form
+from mbsim.model.elements import Model
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -110,11 +110,9 @@ def _load_subroutines(
     scripts: dict[Path, Script],
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Load the users' subroutines of forces and variables."""
-    elements: tuple[ScalarForce | Variable | VectorForce, ...] = (
-        *model.scalar_forces.values(),
+    elements = (
         *model.variables.values(),
-        *model.vector_forces.values(),
-        *model.body_forces.values(),
+        *(e for kind in of_form(Expressed, Components) for e in model.table(kind.name).values()),
     )
     if all(element.user is None for element in elements):
         return {}

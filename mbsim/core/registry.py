@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
 Entry = TypeVar("Entry")
 
 
 class Registry(Generic[Entry]):
-    """Entries by name, found in the modules of one package, read at the first question."""
+    """Entries found in the modules of one package, read at the first question.
 
-    def __init__(self, package: str) -> None:
+    They are in the order of `key`, where there is one, and of their names.
+    """
+
+    def __init__(self, package: str, key: Callable[[Entry], int] = lambda entry: 0) -> None:
         self._package = package
+        self._key = key
         self._entries: dict[str, Entry] = {}
         self._loaded = False
 
@@ -42,4 +46,4 @@ class Registry(Generic[Entry]):
 
     def __iter__(self) -> Iterator[str]:
         self._load()
-        return iter(sorted(self._entries))
+        return iter(sorted(self._entries, key=lambda name: (self._key(self._entries[name]), name)))

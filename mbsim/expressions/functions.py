@@ -265,17 +265,9 @@ def _element(kind: str, **about: str) -> None:
 _element("JOINT", JOINT="reaction of a joint on I (jflag 0) or on J (jflag 1)")
 _element("JPRIM", JPRIM="of a joint primitive")
 _element("MOTION", MOTION="of a motion")
-_element("SFORCE", SFORCE="of a Force_Scalar_TwoBody")
-_element("SPRINGDAMPER", SPDP="of a Force_SpringDamper")
 for _name in FORCES:
-    if FORCES[_name].function:
-        _element(_name, **{FORCES[_name].function: f"of a {FORCES[_name].statement}"})
-_element(
-    "VECTORFORCE",
-    VFORCE="of a Force_Vector_TwoBody",
-    VTORQ="of a Force_Vector_TwoBody",
-    GFORCE="of a Force_Vector_TwoBody",
-)
+    _about = f"of a {FORCES[_name].statement}"
+    _element(_name, **dict.fromkeys(FORCES[_name].functions.split(), _about))
 _put(Kind.VARIABLE, "VARIABLE", None, "id", VARVAL="value of a Reference_Variable")
 _put(Kind.VARIABLE, "DIFF", None, "id", DIF1="z' of a Control_Diff")
 _put(Kind.STATE, "DIFF", None, "id", DIF="z of a Control_Diff")

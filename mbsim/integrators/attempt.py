@@ -69,10 +69,12 @@ def attempt(
     # one that ends before a switch at the end is taken for the end
     until = t + h + smallest_step(t + h, m.memory[OWN_TIME], 0.0)
     if steps.order > 0.0:
-        part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
-        if part < 1.0:
-            return 0, part, -1.0, 0.0, 1.0
-        asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
+        if p.check != 0:
+            part = call_float(p.check, (p.context, t + h, h, m.trial, m.k[steps.last]))
+            if part < 1.0:
+                return 0, part, -1.0, 0.0, 1.0
+        if p.inner != 0:
+            asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if p.switching != 0:
         differs = ask_switching(p, m, t + h, ASK, m.trial, m.error)
         switched = 1.0 if differs > 0 else 0.0

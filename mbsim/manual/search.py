@@ -9,6 +9,7 @@ from mbsim.manual.book import Page, pages, plain
 
 #: What a word counts in a page's title, in a heading, at a table row's head, and in the text.
 _TITLE, _HEADING, _ROW, _TEXT = 40.0, 12.0, 6.0, 1.0
+_QUESTION = 30.0  # in a heading that is a question: its answer is a few lines
 _MOST = 8  # times that a word in the text counts
 _PART = 0.4  # of what a part of a longer word counts
 _TOGETHER = 60.0  # for a heading that has all words, where there are several
@@ -64,7 +65,8 @@ def _hit(page: Page, words: list[str]) -> Hit | None:
     score = sum(_TITLE * _weight(word, page.title.lower()) for word in words)
     for heading in page.headings:
         weights = [_weight(word, heading.text.lower()) for word in words]
-        score += _HEADING * sum(weights) * (heading.level > 1)
+        counts = _QUESTION if heading.text.endswith("?") else _HEADING
+        score += counts * sum(weights) * (heading.level > 1)
         if len(words) > 1 and all(weight == 1.0 for weight in weights):
             score += _TOGETHER
     best, line, number = 0.0, "", 0
@@ -78,7 +80,7 @@ def _hit(page: Page, words: list[str]) -> Hit | None:
                 head = text.startswith(("|", "-")) and word in folded[: len(word) + 6]
                 here += weight * (_ROW if head else _TEXT)
                 counted[word] = min(_MOST, counted[word] + weight * (_ROW if head else _TEXT))
-        if here > best and not text.startswith(("# ", "<!--")):
+        if here > best and not text.startswith(("# ", "<!--", "```")):
             best, line, number = here, text, k
     score += sum(counted.values())
     if not score:

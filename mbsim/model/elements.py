@@ -17,16 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.expressions import Expression
-from mbsim.forces.catalog import FORCES
+from mbsim.forces.catalog import FORCES, ForceKind, memories
 from mbsim.model.forces import (
     BodyForce,
-    DryFriction,
     ForceElement,
     JointFriction,
     JointLimit,
     MarkerForce,
     ScalarForce,
-    SpringDamper,
     VectorForce,
 )
 from mbsim.model.source import ASIDE, NO_RESULT, Source, Subroutine
@@ -40,7 +38,6 @@ __all__ = [
     "Contact",
     "Coupler",
     "Differential",
-    "DryFriction",
     "ForceElement",
     "GeneralConstraint",
     "Graphic",
@@ -58,7 +55,6 @@ __all__ = [
     "Simulation",
     "Source",
     "Spline",
-    "SpringDamper",
     "Static",
     "Subroutine",
     "Transient",
@@ -240,7 +236,7 @@ class Static:
 
 @dataclass(frozen=True)
 class Change:
-    """An element as a statement of <Command> leaves it; `table` is the field of `Model`."""
+    """An element as a statement of <Command> leaves it; `table` is what `Model.table` takes."""
 
     table: str
     element: Any
@@ -453,14 +449,12 @@ class Model:
     couplers: dict[int, Coupler] = field(default_factory=dict)
     motions: dict[int, Motion] = field(default_factory=dict)
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
-    spring_dampers: dict[int, SpringDamper] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, MarkerForce]] = field(default_factory=dict)  # by kind
     vector_forces: dict[int, VectorForce] = field(default_factory=dict)
     body_forces: dict[int, BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, JointFriction] = field(default_factory=dict)
     joint_limits: dict[int, JointLimit] = field(default_factory=dict)
-    dry_frictions: dict[int, DryFriction] = field(default_factory=dict)
     force_elements: dict[int, ForceElement] = field(default_factory=dict)
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
@@ -479,16 +473,29 @@ class Model:
     overrides: tuple[str, ...] = field(default=(), metadata=NO_RESULT)
 
     def table(self, name: str) -> Mapping[int, Any]:
-        """Return the elements of a field by id, or those of a kind of forces between markers."""
-        if name in FORCES:
+        """Return the elements of a field by id, or those of a kind of `forces.catalog`."""
+        field = FORCES[name].table if name in FORCES else name
+        if not field:
             return self.marker_forces.get(name, {})
-        found: dict[int, Any] = getattr(self, name)
+        found: dict[int, Any] = getattr(self, field)
         return found
+
+    def rigid_forces(self) -> list[tuple[ForceKind, MarkerForce]]:
+        """Return the applied forces that are held by an equation while they stick."""
+        return [
+            (kind, force)
+            for kind in memories()
+            for force in self.table(kind.name).values()
+            if kind.form.is_rigid(force.values)
+        ]
 
     def changed(self, changes: tuple[Change, ...]) -> Model:
         """Return the model with elements as the changes leave them, the last of each."""
         tables: dict[str, Any] = {}
         for change in changes:
-            table = tables.setdefault(change.table, dict(getattr(self, change.table)))
+            table = tables.setdefault(change.table, dict(self.table(change.table)))
             table[change.element.id] = change.element
+        kinds = {name: tables.pop(name) for name in [*tables] if name in FORCES}
+        if kinds:
+            tables["marker_forces"] = self.marker_forces | kinds
         return replace(self, **tables) if tables else self

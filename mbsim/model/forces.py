@@ -3,30 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from mbsim.expressions import Expression
 from mbsim.model.source import Source, Subroutine
-
-
-@dataclass(frozen=True)
-class SpringDamper:
-    """Force_SpringDamper, Adams' SPRINGDAMPER: F = preload - k (x - length) - c dx/dt.
-
-    `type` TRANSLATIONAL: x [L] is the distance of the markers, F > 0 pushes them apart;
-    ROTATIONAL: x [rad] is the angle of I about J's z, F the torque on I about it.
-    """
-
-    id: int
-    type: str = "TRANSLATIONAL"
-    label: str = ""
-    i_marker_id: int = 0
-    j_marker_id: int = 0
-    stiffness: float = 0.0
-    damping: float = 0.0
-    length: float = 0.0
-    preload: float = 0.0
-    source: Source = Source()
 
 
 @dataclass(frozen=True)
@@ -36,6 +16,8 @@ class ScalarForce:
     `type` TRANSLATIONAL: a positive force pushes I and J apart; ROTATIONAL: a positive torque
     acts on I about J's z. `action_only`: nothing acts on J; the line (or axis) is J's z.
     """
+
+    statement: ClassVar[str] = "Force_Scalar_TwoBody"
 
     id: int
     type: str
@@ -68,6 +50,13 @@ class MarkerForce:
         """The attributes by name."""
         return dict(self.parameters)
 
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the statement."""
+        for known, value in self.__dict__.get("parameters", ()):
+            if known == name:
+                return value
+        raise AttributeError(name)
+
 
 @dataclass(frozen=True)
 class VectorForce:
@@ -77,6 +66,8 @@ class VectorForce:
     None where there is none. The body of the floating J marker takes the opposite at the origin
     of I, wherever that marker is.
     """
+
+    statement: ClassVar[str] = "Force_Vector_TwoBody"
 
     id: int
     type: str = "FORCEANDTORQUE"
@@ -97,6 +88,8 @@ class VectorForce:
 @dataclass(frozen=True)
 class BodyForce(VectorForce):
     """Force_Vector_OneBody: the same on I alone."""
+
+    statement: ClassVar[str] = "Force_Vector_OneBody"
 
     @property
     def action_only(self) -> bool:
@@ -156,26 +149,6 @@ class JointLimit:
     restitution_coef: float | None = None
     ref_velocity: float | None = None
     normal_trans_vel: float = 1e-3
-    source: Source = Source()
-
-
-@dataclass(frozen=True)
-class DryFriction:
-    """Force_DryFriction (ours; Muscade's DryFriction): a slider, with a spring in series.
-
-    `type` TX, TY, TZ: along that axis of J [L]; RX, RY, RZ: the angle about it [rad]. `friction`
-    is the force or torque of slip, `friction_static` the one that begins it, and `dx` what the
-    spring gives until it reaches `friction`: its stiffness is friction/dx. 0: there is none.
-    """
-
-    id: int
-    type: str
-    friction: float
-    dx: float = 0.0
-    friction_static: float | None = None
-    label: str = ""
-    i_marker_id: int = 0
-    j_marker_id: int = 0
     source: Source = Source()
 
 

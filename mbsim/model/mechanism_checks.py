@@ -9,7 +9,7 @@ from mbsim.errors import Fault
 from mbsim.expressions import Expression
 from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.tree import Call, Number
-from mbsim.forces.catalog import FORCES
+from mbsim.forces.catalog import FORCES, Components, of_form
 from mbsim.joints.catalog import JOINTS
 from mbsim.model.elements import Model, Source
 
@@ -19,15 +19,7 @@ STATEMENTS = {
     "JOINT": "Constraint_Joint",
     "JPRIM": "Constraint_Jprim",
     "MOTION": "Motion_Joint",
-    "SFORCE": "Force_Scalar_TwoBody",
-    "SPRINGDAMPER": "Force_SpringDamper",
     **{name: FORCES[name].statement for name in FORCES},
-    "VECTORFORCE": "Force_Vector_TwoBody",
-    "BODYFORCE": "Force_Vector_OneBody",
-    "JOINTFRICTION": "Force_JointFriction",
-    "JOINTLIMIT": "Force_JointLimit",
-    "DRYFRICTION": "Force_DryFriction",
-    "FORCEELEMENT": "Force_Element",
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
     "DIFF": "Control_Diff",
@@ -61,15 +53,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Constraint_Coupler": model.couplers,
         "Constraint_General": model.general_constraints,
         "Motion_Joint": model.motions,
-        "Force_SpringDamper": model.spring_dampers,
-        "Force_Scalar_TwoBody": model.scalar_forces,
         **{FORCES[name].statement: model.table(name) for name in FORCES},
-        "Force_Vector_TwoBody": model.vector_forces,
-        "Force_Vector_OneBody": model.body_forces,
-        "Force_JointFriction": model.joint_frictions,
-        "Force_JointLimit": model.joint_limits,
-        "Force_DryFriction": model.dry_frictions,
-        "Force_Element": model.force_elements,
         "Reference_Variable": model.variables,
         "Control_Diff": model.differentials,
         "Reference_Spline": model.splines,
@@ -114,14 +98,11 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
             expression = getattr(element, "expr", None)
             if expression is not None:
                 yield element.source, name_of(statement, element), "expr", expression
-    for statement, forces in (
-        ("Force_Vector_TwoBody", model.vector_forces),
-        ("Force_Vector_OneBody", model.body_forces),
-    ):
-        for force in forces.values():
+    for kind in of_form(Components):
+        for force in model.table(kind.name).values():
             for attribute, expression in zip(COMPONENTS, force.exprs, strict=True):
                 if expression is not None:
-                    yield force.source, f"{statement}[{force.id}]", attribute, expression
+                    yield force.source, f"{kind.statement}[{force.id}]", attribute, expression
     for sensor in model.sensors.values():
         if sensor.evaluate is not None:
             yield sensor.source, f"Sensor_Event[{sensor.id}]", "evaluate", sensor.evaluate

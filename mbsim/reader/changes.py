@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Change
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
@@ -16,20 +17,17 @@ from mbsim.reader.keywords import fold
 from mbsim.reader.parse import Node
 from mbsim.reader.statement import Statement
 
-_SPRING = "stiffness damping length preload"
 _NORMAL = "stiffness exponent damping dmax penalty restitution_coef ref_velocity normal_trans_vel"
 _FRICTION = "mu_static mu_dynamic stiction_trans_vel friction_trans_vel"
 _ELASTIC = "i_elastic_modulus j_elastic_modulus i_poisson_ratio j_poisson_ratio i_radius j_radius"
 #: Statement, the table of its elements, and what of them may change between simulations.
 CHANGEABLE = {
-    "Force_SpringDamper": ("spring_dampers", _SPRING),
+    **{
+        kind.statement: (kind.table or name, " ".join(kind.changes))
+        for name in FORCES
+        if (kind := FORCES[name]).changes
+    },
     "Force_Contact": ("contacts", f"{_NORMAL} {_FRICTION} {_ELASTIC}"),
-    "Force_Scalar_TwoBody": ("scalar_forces", "expr"),
-    "Force_JointFriction": (
-        "joint_frictions",
-        f"{_FRICTION} pin_radius ball_radius preload bending_reaction_arm",
-    ),
-    "Force_JointLimit": ("joint_limits", f"lower upper {_NORMAL}"),
     "Motion_Joint": ("motions", "expr"),
     "Reference_Variable": ("variables", "expr"),
 }
@@ -48,7 +46,7 @@ def change(statement: Statement, node: Node, draft: Draft) -> None:
         draft.fault(node.line, label, message)
         return
     allowed = {fold(word): word for word in words.split()}
-    names = statement.spec_names()
+    names = statement.spec_names
     for attribute in node.attributes:
         name = fold(names.get(fold(attribute.name), attribute.name))
         if name not in allowed and name != "id":
@@ -62,11 +60,14 @@ def change(statement: Statement, node: Node, draft: Draft) -> None:
     kept = [a for a in before.attributes if fold(names.get(fold(a.name), a.name)) not in new]
     merged = replace(before, line=node.line, attributes=[*kept, *node.attributes])
     # warnings and notes of what did not change have been said
-    empty: dict[str, Any] = {table: {}}
+    of_kind = table in FORCES and not FORCES[table].table
+    empty: dict[str, Any] = {"marker_forces" if of_kind else table: {}}
     scratch = replace(draft, **empty, in_command=False, broken=set(), warnings=[], note_lines={})
     statement.read(merged, scratch)
     complete_motions(scratch)
-    elements: dict[int, Any] = getattr(scratch, table)
+    elements: dict[int, Any] = (
+        scratch.marker_forces.get(table, {}) if of_kind else getattr(scratch, table)
+    )
     for element in elements.values():
         draft.nodes[statement.name, key] = merged
         said = " ".join(f'{a.name}="{a.value}"' for a in node.attributes if fold(a.name) != "id")

@@ -1,4 +1,4 @@
-"""Force_SpringDamper, _Scalar_TwoBody, _Vector_..., and Reference_Variable."""
+"""Force_Scalar_TwoBody, _Vector_..., and Reference_Variable."""
 
 from __future__ import annotations
 
@@ -6,33 +6,10 @@ from typing import Any
 
 from mbsim.model import elements as el
 from mbsim.model.mechanism_checks import COMPONENTS
-from mbsim.reader.keywords import SCALAR_TYPES, SPRING_TYPES, VECTOR_TYPES
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, NOT_NEGATIVE, REAL, keyword
+from mbsim.reader.keywords import SCALAR_TYPES, VECTOR_TYPES
+from mbsim.reader.kinds import EXPRESSION, FLAG, ID, keyword
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
-
-
-def _build_spring(entry: Entry) -> None:
-    """Add a spring-damper."""
-    if entry.get("type") is None:
-        return
-    if entry.get("stiffness", 0.0) == entry.get("damping", 0.0) == entry.get("preload", 0.0) == 0.0:
-        entry.warn("stiffness, damping and preload are 0: the spring does nothing")
-    if entry.get("type") == "TRANSLATIONAL" and entry.get("length", 0.0) < 0.0:
-        entry.fault("must be a number >= 0: it is a distance", "length")
-    spring = el.SpringDamper(
-        id=entry.get("id", 0),
-        type=entry.get("type"),
-        label=entry.get("label", ""),
-        i_marker_id=entry.get("i_marker_id", 0),
-        j_marker_id=entry.get("j_marker_id", 0),
-        stiffness=entry.get("stiffness", 0.0),
-        damping=entry.get("damping", 0.0),
-        length=entry.get("length", 0.0),
-        preload=entry.get("preload", 0.0),
-        source=entry.source,
-    )
-    entry.register(entry.draft.spring_dampers, spring)
 
 
 def _build_scalar(entry: Entry) -> None:
@@ -130,20 +107,6 @@ def _build_variable(entry: Entry) -> None:
     entry.register(entry.draft.variables, variable)
 
 
-FORCE_SPRINGDAMPER = Statement(
-    "Force_SpringDamper",
-    {
-        **NAMED,
-        "type": Spec(keyword(SPRING_TYPES), "along the line I-J, or about J's z", required=True),
-        **MARKERS,
-        "stiffness": Spec(NOT_NEGATIVE, "stiffness", "F/L or F L/rad", "0"),
-        "damping": Spec(NOT_NEGATIVE, "damping", "F T/L or F L T/rad", "0"),
-        "length": Spec(REAL, "length or angle without force", "L or rad", "0"),
-        "preload": Spec(REAL, "force at that length, > 0 pushes apart", "F or F L", "0"),
-    },
-    _build_spring,
-    about="a linear spring with a damper",
-)
 FORCE_SCALAR_TWOBODY = Statement(
     "Force_Scalar_TwoBody",
     {

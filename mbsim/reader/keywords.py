@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 from collections.abc import Iterable
 
 from mbsim.forces.catalog import FORCES
@@ -10,6 +11,8 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.request_types import TYPES
 
 
+# names repeat: a deck of thousands of bodies has a few hundred
+@functools.lru_cache(maxsize=1 << 14)
 def fold(name: str) -> str:
     """Return `name` without case, `_` and outer blanks, the form in which names are compared."""
     return name.strip().replace("_", "").lower()
@@ -60,15 +63,7 @@ FORCE_ELEMENTS = spellings(
     JOINT="CONSTRAINT_JOINT",
     JPRIM="CONSTRAINT_JPRIM",
     MOTION="MOTION_JOINT MOTION_MARKER",
-    SPRINGDAMPER="FORCE_SPRINGDAMPER",
-    SFORCE="FORCE_SCALAR_TWOBODY",
-    **{name: FORCES[name].statement.upper() for name in FORCES},
-    VECTORFORCE="FORCE_VECTOR_TWOBODY VFORCE VTORQUE GFORCE",
-    BODYFORCE="FORCE_VECTOR_ONEBODY",
-    JOINTFRICTION="FORCE_JOINTFRICTION",
-    JOINTLIMIT="FORCE_JOINTLIMIT",
-    DRYFRICTION="FORCE_DRYFRICTION",
-    FORCEELEMENT="FORCE_ELEMENT",
+    **{name: f"{kind.statement} {kind.spellings}" for name in FORCES if (kind := FORCES[name])},
     CONTACT="FORCE_CONTACT",
 )
 
@@ -83,7 +78,6 @@ PRIMITIVES = spellings(
 DIRECTIONS = spellings(R="ROTATION", T="TRANSLATION")
 MARKER_DIRECTIONS = spellings(X="", Y="", Z="", B1="", B2="", B3="")
 VALUE_TYPES = spellings(D="DISPLACEMENT", V="VELOCITY", A="ACCELERATION")
-SPRING_TYPES = spellings(TRANSLATIONAL="", ROTATIONAL="")
 DRY_TYPES = spellings(TX="", TY="", TZ="", RX="", RY="", RZ="")
 SCALAR_TYPES = spellings(TRANSLATIONAL="FORCE FORCE_ONLY", ROTATIONAL="TORQUE TORQUE_ONLY")
 VECTOR_TYPES = spellings(FORCEONLY="FORCE", TORQUEONLY="TORQUE", FORCEANDTORQUE="")

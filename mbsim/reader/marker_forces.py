@@ -8,6 +8,7 @@ from typing import Any
 
 from mbsim.forces.catalog import FORCES, ForceKind, Parameter
 from mbsim.model import elements as el
+from mbsim.reader.keywords import spellings
 from mbsim.reader.kinds import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -15,12 +16,15 @@ from mbsim.reader.kinds import (
     REALS,
     BadValueError,
     Kind,
+    keyword,
 )
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 
 
 def kind_of(parameter: Parameter) -> Kind:
-    """Return what one number of an attribute may be."""
+    """Return what an attribute may be, or one number of it."""
+    if parameter.words:
+        return keyword(spellings(**dict.fromkeys(parameter.words, "")))
     if parameter.signed:
         return REAL
     return POSITIVE if parameter.positive else NOT_NEGATIVE
@@ -50,7 +54,8 @@ def add_force(
 
     Attributes that must be given and are not have the value None, and their fault already.
     """
-    if None not in values.values():
+    needed = [each.name for each in kind.parameters if not each.optional]
+    if all(values[name] is not None for name in needed):
         for finding in kind.check(values):
             say = entry.warn if finding.warns else entry.fault
             say(finding.message, words.get(finding.attribute, finding.attribute))
@@ -83,13 +88,15 @@ def _statement(kind: ForceKind) -> Statement:
             kind_of(each) if each.count == 1 else _several(each.count),
             each.about,
             each.unit,
-            f"{each.default:g}" if isinstance(each.default, float) else "",
+            f"{each.default:g}" if isinstance(each.default, float) else each.shown,
             alias=each.alias,
         )
-        attributes[each.name] = replace(found, required=each.default is None)
+        needed = each.default is None and not each.optional
+        attributes[each.name] = replace(found, required=needed)
+    attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
     return Statement(kind.statement, attributes, build, about=kind.about)
 
 
 def marker_forces() -> list[Statement]:
-    """Return the XML statements of all kinds."""
-    return [_statement(FORCES[name]) for name in FORCES]
+    """Return the XML statements of all kinds that have no reader of their own."""
+    return [_statement(kind) for name in FORCES if not (kind := FORCES[name]).table]

@@ -69,7 +69,11 @@ class Node:
 
     def find(self, name: str) -> Attribute | None:
         """Return the attribute of that name, in any spelling, or None."""
-        return next((a for a in self.attributes if fold(a.name) == fold(name)), None)
+        wanted = fold(name)
+        for attribute in self.attributes:
+            if fold(attribute.name) == wanted:
+                return attribute
+        return None
 
 
 def parse(data: bytes, file: str) -> Node:
@@ -146,27 +150,31 @@ def _decode(data: bytes, file: str) -> str:
 def _to_nodes(root: etree._Element, text: str, file: str) -> Node:
     """Return the tree of `root` as `Node`s, walking without recursion."""
     lines = _tag_lines(text)
-    nodes: dict[etree._Element, Node] = {}
-    depth: dict[etree._Element, int] = {}
-    for element in root.iter("*"):
+    top = Node("", 0)
+    above = [top]
+    for event, element in etree.iterwalk(root, events=("start", "end"), tag="*"):
+        if event == "end":
+            above.pop()
+            continue
         line, attribute_lines = next(lines, (0, {}))
-        parent = element.getparent()
-        depth[element] = depth[parent] + 1 if parent is not None else 1
-        if depth[element] > MAX_DEPTH:
+        if len(above) > MAX_DEPTH:
             raise _refused(file, line, f"elements nested more than {MAX_DEPTH} deep")
 
-        node = Node(etree.QName(element).localname, line)
+        node = Node(str(element.tag).rpartition("}")[2], line)
         for name, value in element.attrib.items():
-            if str(name).startswith(_SCHEMA):
+            local = str(name)
+            if local.startswith(_SCHEMA):
                 continue
-            local = etree.QName(str(name)).localname
+            if local.startswith("{"):
+                local = etree.QName(local).localname
             node.attributes.append(Attribute(local, str(value), attribute_lines.get(local, line)))
-        pieces = [element.text, *(child.tail for child in element)]
-        node.text = "".join(piece for piece in pieces if piece).strip()
-        nodes[element] = node
-        if parent is not None:
-            nodes[parent].children.append(node)
-    return nodes[root]
+        text_of = element.text or ""
+        if len(element):
+            text_of += "".join(child.tail or "" for child in element)
+        node.text = text_of.strip()
+        above[-1].children.append(node)
+        above.append(node)
+    return top.children[0]
 
 
 def _tag_lines(text: str) -> Iterator[tuple[int, dict[str, int]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeVar
 
 from mbsim.model.elements import Source
@@ -81,6 +82,7 @@ class Statement:
     text: str = ""
     about: str = ""
 
+    @cached_property
     def spec_names(self) -> dict[str, str]:
         """Return folded spelling -> attribute name, aliases included."""
         names = {fold(name): name for name in self.attributes}
@@ -169,7 +171,7 @@ class Entry:
 
     def _collect(self) -> None:
         """Match the attributes with the declared names; unknown and repeated ones are faults."""
-        names = self.statement.spec_names()
+        names = self.statement.spec_names
         for attribute in self.node.attributes:
             name = names.get(fold(attribute.name))
             if name is None:
@@ -204,7 +206,7 @@ class Entry:
 
     def _check_content(self) -> None:
         """Refuse text and child elements that the statement does not have."""
-        allowed = {fold(name) for name in self.statement.children}
+        allowed = {fold(name) for name in self.statement.children} if self.node.children else ()
         for child in self.node.children:
             if child.key not in allowed:
                 close = nearest(child.tag, self.statement.children)

@@ -16,11 +16,9 @@ from mbsim.reader.constraints import (
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
-from mbsim.reader.dry_friction import FORCE_DRYFRICTION
 from mbsim.reader.force_element import FORCE_ELEMENT
 from mbsim.reader.forces import (
     FORCE_SCALAR_TWOBODY,
-    FORCE_SPRINGDAMPER,
     FORCE_VECTOR_ONEBODY,
     FORCE_VECTOR_TWOBODY,
     REFERENCE_VARIABLE,
@@ -59,14 +57,12 @@ STATEMENTS = (
     CONSTRAINT_GENERAL,
     MOTION_JOINT,
     MOTION_MARKER,
-    FORCE_SPRINGDAMPER,
     FORCE_SCALAR_TWOBODY,
     *marker_forces(),
     FORCE_VECTOR_TWOBODY,
     FORCE_VECTOR_ONEBODY,
     FORCE_JOINTFRICTION,
     FORCE_JOINTLIMIT,
-    FORCE_DRYFRICTION,
     FORCE_ELEMENT,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,

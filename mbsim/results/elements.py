@@ -33,25 +33,12 @@ GROUPS = {
     "GCON": Group(
         "general_constraints", "general_constraints", "general constraint", "Constraint_General"
     ),
-    "SPRINGDAMPER": Group("spring_dampers", "springs", "spring", "Force_SpringDamper"),
-    "SFORCE": Group("scalar_forces", "scalar_forces", "scalar force", "Force_Scalar_TwoBody"),
     **{name: Group(name, k.path, k.title, k.statement) for name in FORCES if (k := FORCES[name])},
-    "VECTORFORCE": Group("vector_forces", "vector_forces", "vector force", "Force_Vector_TwoBody"),
-    "BODYFORCE": Group("body_forces", "body_forces", "body force", "Force_Vector_OneBody"),
-    "JOINTFRICTION": Group(
-        "joint_frictions", "joint_frictions", "joint friction", "Force_JointFriction"
-    ),
-    "JOINTLIMIT": Group("joint_limits", "joint_limits", "joint limit", "Force_JointLimit"),
-    "DRYFRICTION": Group("dry_frictions", "dry_frictions", "dry friction", "Force_DryFriction"),
-    "FORCEELEMENT": Group("force_elements", "force_elements", "force element", "Force_Element"),
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
 CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON")
-APPLIED = (
-    *("SPRINGDAMPER", "SFORCE", *FORCES, "VECTORFORCE", "BODYFORCE"),
-    *("JOINTFRICTION", "JOINTLIMIT", "DRYFRICTION", "FORCEELEMENT"),
-)
+APPLIED = tuple(FORCES)
 
 
 def elements_of(model: Model, statement: str) -> Mapping[int, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mbsim.arrays.codes import CONTACT_COLUMNS
 from mbsim.errors import DeckError, Fault
+from mbsim.forces.catalog import Components, of_form
 from mbsim.model.elements import Array, Contact, Model, Request
 from mbsim.model.names import element_name
 from mbsim.results.elements import APPLIED, GROUPS, elements_of
@@ -18,6 +19,9 @@ from mbsim.results.motion import Motion, rotate
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+
+#: Forces whose J marker is wherever I is.
+_FLOATING = {kind.name for kind in of_form(Components)}
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class Forces:
             return on_i
         if acting.one_sided:
             return self.nothing()
-        if acting.statement == "VECTORFORCE":
+        if acting.statement in _FLOATING:
             # its J floats with I
             return on_i.reaction(np.zeros((1, 3)))
         return on_i.reaction(self.origin(acting.i) - self.origin(acting.j))

@@ -158,10 +158,11 @@ class Recorder:
             return int(results[offsets][-1]) if offsets in results else 0, tables
 
     def check_room(self, rows: float) -> None:
-        """Raise `ModelError` where so many output rows cannot be kept.
+        """Make ready for so many output rows; raise `ModelError` where they cannot be kept.
 
         `rows` is a float: of a mistyped end time there may be more than integers count.
         """
+        self._store.rows = int(min(rows, 1e9)) + 1
         empty = self._signals(nothing(self.system))
         size = sum(table.itemsize * math.prod(table.shape[1:]) for _, table in empty)
         if self._target is None:

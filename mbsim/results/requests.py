@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbsim.expressions import Expression
+from mbsim.expressions.functions import FUNCTIONS
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Array, Request
 from mbsim.model.placement import MarkerPlace
@@ -27,10 +28,7 @@ _MEASURES = {
     "torque": ("TM", "TX", "TY", "TZ"),
 }
 #: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
-_FORCES_OF_ELEMENTS = (
-    *("JOINT", "JPRIM", "MOTION", "SFORCE", "SPDP", "CONTACT"),
-    *("BUSH", "VFORCE", "VTORQ", "GFORCE"),
-)
+_FORCES_OF_ELEMENTS = {name for name, function in FUNCTIONS.items() if "jflag" in function.args}
 #: F1 and F5 are magnitudes of the three columns behind them.
 _MAGNITUDES = (1, 5)
 

@@ -25,8 +25,12 @@ if TYPE_CHECKING:
 
 Table = np.ndarray[Any, Any]
 Value = str | float | int
-#: Bytes of a chunk, of a signal that begins with few rows and of one that comes with many.
-_CHUNK, _LONG_CHUNK = 1 << 13, 1 << 16
+#: Most bytes of a chunk: small enough for many signals, large enough for long runs.
+_CHUNK = 1 << 16
+#: Rows of a chunk where nobody knows how many there will be: events, points of contact.
+_FEW = 256
+#: Groups whose datasets do not have a row an output time.
+_UNKNOWN = ("events", "state")
 #: Most elements in a chunk, so that one of thousands is read without all the others.
 _ELEMENTS = 64
 #: A signal is compressed where its first rows, up to so many bytes of them, shrink to this share:
@@ -51,6 +55,8 @@ class Store:
         self.broken = False
         self.failure: ResultsError | None = None
         self.publish_seconds = 0.0
+        #: How many rows signals will have; chunks are not longer.
+        self.rows = _FEW
         self._growing = resume
         self._part: PartFile | None = None
         self._lock: RunLock | None = None
@@ -178,8 +184,8 @@ class Store:
         if len(elements) > 1:
             elements = (min(elements[0], _ELEMENTS), *elements[1:])
         width = rows.itemsize * int(np.prod(elements))
-        chunk = _CHUNK if len(rows) * width < _LONG_CHUNK else _LONG_CHUNK
-        count = max(1, chunk // max(1, width))
+        likely = self.rows if name.partition("/")[0] not in _UNKNOWN else max(_FEW, len(rows))
+        count = max(1, min(likely, _CHUNK // max(1, width)))
         file.create_dataset(
             name,
             data=rows,

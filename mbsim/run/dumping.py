@@ -127,7 +127,8 @@ class ContactProblems:
         rows, columns, values, force = [], [], [], np.zeros(3 * len(hit))
         for k, s in enumerate(hit):
             point = scene.work.points[s]
-            p, n, tx = point[AT_POINT:], point[AT_NORMAL:], scene.work.t[s]
+            p, n = point[AT_POINT : AT_POINT + 3], point[AT_NORMAL : AT_NORMAL + 3]
+            tx = scene.work.t[s]
             axes = np.array([n, tx, np.cross(n, tx)])
             force[3 * k : 3 * k + 3] = axes @ scene.work.slot[s, at.FORCE : at.FORCE + 3]
             for g, sign in zip(at.sides(scene, s), (1.0, -1.0), strict=True):

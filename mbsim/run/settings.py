@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual
 from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
 from mbsim.model.elements import ASIDE, Model, Simulation
 from mbsim.model.names import element_name, is_adams
@@ -183,34 +184,37 @@ def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
 
 def _refuse_verlet(model: Model) -> None:
     """Raise where VERLET cannot run a model: its step is found from stiffness on free bodies."""
-    constraints: dict[str, Mapping[int, Any]] = {
-        "Force_JointFriction": model.joint_frictions,
-        "Force_JointLimit": model.joint_limits,
-        "Force_DryFriction": model.dry_frictions,
-        "Constraint_Joint": model.joints,
-        "Constraint_Jprim": model.primitives,
-        "Constraint_Coupler": model.couplers,
-        "Motion_Joint": model.motions,
-        "Constraint_General": model.general_constraints,
+    unknown = "forces of known stiffness, which {} does not say"
+    held = "free bodies and this model has joints or other constraints"
+    whys: dict[type[Form], str] = {
+        Expressed: unknown.format("an expression"),
+        Components: unknown.format("an expression"),
+        OfResidual: unknown.format("a user's residual"),
     }
-    expressed: dict[str, Mapping[int, Any]] = {
-        "Force_Scalar_TwoBody": model.scalar_forces,
-        "Force_Vector_TwoBody": model.vector_forces,
-        "Force_Vector_OneBody": model.body_forces,
-        "Force_Element": model.force_elements,
-        "Control_Diff": model.differentials,
-    }
-    for statement, elements in {**constraints, **expressed}.items():
+    kinds = [FORCES[name] for name in FORCES]
+    forces = [
+        (kind.statement, model.table(kind.name), type(kind.form))
+        for kind in kinds
+        if getattr(kind.form, "bounds", None) is None
+    ]
+    refused: list[tuple[str, Mapping[int, Any], str]] = [
+        *((name, table, held) for name, table, form in forces if form not in whys),
+        ("Constraint_Joint", model.joints, held),
+        ("Constraint_Jprim", model.primitives, held),
+        ("Constraint_Coupler", model.couplers, held),
+        ("Motion_Joint", model.motions, held),
+        ("Constraint_General", model.general_constraints, held),
+        *((name, table, whys[form]) for name, table, form in forces if form in whys),
+        (
+            "Control_Diff",
+            model.differentials,
+            "bodies alone, and this model has states of its own",
+        ),
+    ]
+    for statement, elements, why in refused:
         for element in elements.values():
             xml = getattr(element, "statement", statement)
             name = element_name(model.file, xml, element.id)
-            why = "free bodies and this model has joints or other constraints"
-            if statement not in constraints:
-                why = "forces of known stiffness, which an expression does not say"
-            if statement == "Force_Element":
-                why = "forces of known stiffness, which a user's residual does not say"
-            if statement == "Control_Diff":
-                why = "bodies alone, and this model has states of its own"
             raise ModelError(
                 f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
                 "take DOPRI5 or DOP853"
@@ -239,7 +243,7 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         For an explicit method: it has no unknown for the force that holds.
     """
     contact = next((c for c in model.contacts.values() if c.rigid), None)
-    dry = next((f for f in model.dry_frictions.values() if f.dx == 0.0), None)
+    dry = next(iter(model.rigid_forces()), None)
     if (contact is None and dry is None) or method in IMPLICIT_METHODS:
         return method, []
     if contact is not None:
@@ -247,8 +251,10 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
         said, instead = "tangential_stiffness=INFINITE", "a stiffness"
     else:
         assert dry is not None
-        source, name = dry.source, element_name(model.file, "Force_DryFriction", dry.id)
-        said, instead = "dx=0", "dx"
+        kind, force = dry
+        source, name = force.source, element_name(model.file, kind.statement, force.id)
+        instead = kind.form.rigid_by  # type: ignore[attr-defined]
+        said = f"{instead}=0"
     if method == AUTO:
         return IMPLICIT, [f"integrator AUTO: {IMPLICIT} from the start, for {name} is rigid"]
     raise ModelError(

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.core import tags
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.initial.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balance, Hooks, balance
 from mbsim.dynamics.initial.equilibrium_states import Rest, settle_states
 from mbsim.errors import SolverError
 from mbsim.expressions.elementary import NUMBER, TIME
+from mbsim.forces.catalog import FORCES
 from mbsim.model.elements import Simulation, Static
 from mbsim.model.names import element_name
 
@@ -107,7 +109,11 @@ def _report(system: System, found: Balance, before: Array, y: Array, t: float) -
 def _unsettled(system: System, rest: Rest, t: float) -> str:
     """Return which state has no equilibrium."""
     states = [("Control_Diff", id) for id in system.model.differentials]
-    states += [("Force_Element", id) for id, user in system.residuals.items() for _ in user.states]
+    states += [
+        (FORCES[STATEMENT].statement, id)
+        for id, user in system.residuals.items()
+        for _ in user.states
+    ]
     name = element_name(system.model.file, *states[rest.state])
     return (
         f"no static equilibrium found at time {t:.9g}: the rate of {name} stays "

@@ -15,7 +15,8 @@ from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
 from mbsim.arrays.codes import NEAR_FOLD
-from mbsim.arrays.hooks import Dry, Hook, Joints, Memory, Sticking
+from mbsim.arrays.hooks import Contacts, Dry, Gauges, Hook, Joints, Memory, Sticking
+from mbsim.core import jit
 from mbsim.dynamics.pipeline import hook_table, problem
 from mbsim.errors import SolverError
 
@@ -24,8 +25,12 @@ SIGNATURES = {row.hook: row.signature for row in hook_table.TABLE}
 #: Those that answer, so that a code is negative.
 ANSWERS = {row.hook for row in hook_table.TABLE if "answer" in row.result}
 
+#: What one method alone measures.
+METHOD_OF = {Gauges.FRICTION: "GALPHA", Gauges.IMPACT: "GALPHA"}
+
 # hook, request (None for any), deck, method
 CASES = [
+    *((Hook.CONTACTS, what, "bowling_ball", "DOPRI5") for what in Contacts),
     (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
     (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),
     (Hook.JET, None, "cam", "DOPRI5"),
@@ -40,6 +45,7 @@ CASES = [
     *((Hook.MEMORY, what, "lugre_stick_slip", "RADAU5") for what in Memory),
     (Hook.SLOPES, None, "stiff/bushing_chain", "RADAU5"),
     (Hook.MEMORY_PAIR, None, "lugre_stick_slip", "RADAU5"),
+    *((Hook.GAUGES, what, "bowling_ball", METHOD_OF.get(what, "RADAU5")) for what in Gauges),
     *((Hook.DRY, what, "dry_friction_element", "DOPRI5") for what in Dry),
     (Hook.ANGLES, None, "cam", "DOPRI5"),
     (Hook.NEAR, None, "crowd", "DOPRI5"),
@@ -90,7 +96,7 @@ class Failure:
     def put(self, scene):
         """Take the place of the hook of a scene, which has one."""
         address = int(scene.world.hooks[self.hook])
-        if address == 0 or self.kept:
+        if address in (0, jit.NOT_YET) or self.kept:
             return
         signature = SIGNATURES[self.hook]
         form = ctypes.CFUNCTYPE(c_type(signature.return_type), *map(c_type, signature.args))
@@ -102,7 +108,7 @@ class Failure:
             if self.request is not None and given[1] != self.request:
                 return own(*given)
             self.asked += 1
-            if self.hook is Hook.VALUE:
+            if self.hook in (Hook.VALUE, Hook.GAUGES):
                 # it returns a number: its code is noted
                 scene.users.failed[0] = FAILS
                 return math.nan
@@ -133,7 +139,14 @@ def test_a_hook_that_fails_ends_the_run(hook, request_, deck, method, tmp_path, 
 
 def test_every_hook_and_request_is_tried():
     tried = {(hook, what) for hook, what, *_ in CASES}
-    requests = {Hook.JOINTS: Joints, Hook.STICKING: Sticking, Hook.DRY: Dry, Hook.MEMORY: Memory}
+    requests = {
+        Hook.CONTACTS: Contacts,
+        Hook.GAUGES: Gauges,
+        Hook.JOINTS: Joints,
+        Hook.STICKING: Sticking,
+        Hook.DRY: Dry,
+        Hook.MEMORY: Memory,
+    }
     for hook in set(Hook) - {Hook.TANGENT}:
         for what in requests.get(hook, (None,)):
             assert (hook, what) in tried, (hook, what)

@@ -600,8 +600,9 @@ def judged(sizes, most=7, tol=1e-4, rest=1.0, late=0.0):
 
 def test_newtons_iteration_goes_on_while_it_is_worth_it():
     go_on, solved, hopeless = newton.GO_ON, newton.SOLVED, newton.HOPELESS
-    goal = newton.target(1e-4)
-    assert goal == pytest.approx(1e-6)
+    state = scheme.make(galpha.SCHEME, np.zeros(1), 0.0)
+    state.memory[scheme.TOL] = 1e-4
+    assert newton.target(state) == pytest.approx(1e-6)
     # a rate of 0.01 leaves a hundredth of 9e-5: enough
     words, memory = judged([9e-3, 9e-5])
     assert words == [go_on, solved]

@@ -379,18 +379,18 @@ def test_derivatives_of_displacements(name):
 
 def needed(kind):
     """Return what must be given of a kind of forces between markers."""
-    return {each.name: 1.0 for each in kind.parameters if each.default is None}
+    given = [each for each in kind.parameters if each.default is None and not each.optional]
+    return {each.name: each.words[-1] if each.words else 1.0 for each in given}
 
 
 #: One of every kind of forces between markers that has a function.
 MARKER_FORCES = [
     free.force(kind.name, 40 + k, 21, 31, **needed(kind))
     for k, kind in enumerate(KINDS[name] for name in KINDS)
-    if kind.function
+    if kind.functions and not kind.table
 ]
 PUSHES = {
     **{(force.kind, force.id): (21, 31) for force in MARKER_FORCES},
-    ("SPRINGDAMPER", 2): (31, 21),
     ("SFORCE", 1): (21, 31),
     ("SFORCE", 3): (21, 11),  # alone: nothing acts on J
     ("VECTORFORCE", 5): (21, 32),  # J floats: it is where I is
@@ -404,7 +404,6 @@ FORCES = {
         el.ScalarForce(1, "TRANSLATIONAL", parse("2"), "", 21, 31),
         el.ScalarForce(3, "TRANSLATIONAL", parse("5"), "", 21, 11, action_only=True),
     ],
-    "spring_dampers": [el.SpringDamper(2, "ROTATIONAL", "", 31, 21)],
     "marker_forces": MARKER_FORCES,
     "vector_forces": [
         el.VectorForce(5, exprs=(parse("1"),) * 6, i_marker_id=21, j_floating_marker_id=32)

@@ -12,11 +12,13 @@ from scipy.spatial.transform import Rotation
 
 import mbsim
 from mbsim.arrays import codes
-from mbsim.forces.catalog import FORCES, Motion
+from mbsim.forces.catalog import FORCES, Wrench, of_form
+from mbsim.forces.formula import Motion
 
 #: Half of the difference of displacements and velocities, and rounding over it.
 STEP = 1e-5
 MOTIONS = [0.0, 1e-5, 0.3, 2.0]
+WRENCHES = [kind.name for kind in of_form(Wrench)]
 
 
 def constants(kind, seed):
@@ -27,7 +29,7 @@ def constants(kind, seed):
         for each in kind.parameters
     }
     assert not [finding for finding in kind.check(values) if not finding.warns]
-    return np.array(kind.constants(values), dtype=float)
+    return np.array(kind.form.constants(values), dtype=float)
 
 
 def motion(size, seed):
@@ -46,7 +48,7 @@ def moved(at, shift, turn):
 
 def wrench(kind, at, par):
     """Return force and torque as one array, stored energy, lost power."""
-    force, torque, stored, lost = kind.wrench(at, par)
+    force, torque, stored, lost = kind.form.wrench(at, par)
     return np.array([*force, *torque]), stored, lost
 
 
@@ -65,13 +67,13 @@ def differences(kind, at, par):
 
 
 @pytest.mark.parametrize("size", MOTIONS)
-@pytest.mark.parametrize("name", list(FORCES))
+@pytest.mark.parametrize("name", WRENCHES)
 def test_slopes_are_the_differences_of_the_wrench(name, size):
     kind = FORCES[name]
     for seed in range(5):
         par, at = constants(kind, seed), motion(size, seed)
         K, D = np.zeros((6, 6)), np.zeros((6, 6))
-        kind.slopes(at, par, K, D)
+        kind.form.slopes(at, par, K, D)
         by_place, by_rate = differences(kind, at, par)
         most = max(np.abs(by_place).max(), np.abs(by_rate).max())
         # rounding over STEP is 1e-11, over a kind's own differences of angles 1e-9
@@ -80,7 +82,7 @@ def test_slopes_are_the_differences_of_the_wrench(name, size):
 
 
 @pytest.mark.parametrize("size", MOTIONS)
-@pytest.mark.parametrize("name", list(FORCES))
+@pytest.mark.parametrize("name", WRENCHES)
 def test_power_is_what_is_stored_and_lost(name, size):
     kind, h = FORCES[name], STEP
     for seed in range(5):
@@ -96,15 +98,15 @@ def test_power_is_what_is_stored_and_lost(name, size):
         assert power + rate + lost == pytest.approx(0.0, abs=2e-8 * size_of_all)
 
 
-@pytest.mark.parametrize("name", list(FORCES))
+@pytest.mark.parametrize("name", WRENCHES)
 def test_bounds_are_no_less_than_stiffness_damping_and_force(name):
     kind = FORCES[name]
     for seed in range(5):
         par = constants(kind, seed)
-        bounds = kind.bounds(par)
+        bounds = kind.form.bounds(par)
         at = Motion(bounds.rest, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
         K, D = np.zeros((6, 6)), np.zeros((6, 6))
-        kind.slopes(at, par, K, D)
+        kind.form.slopes(at, par, K, D)
         for matrix, along, about in (
             (K, bounds.stiffness, bounds.turning_stiffness),
             (D, bounds.damping, bounds.turning_damping),
@@ -116,7 +118,7 @@ def test_bounds_are_no_less_than_stiffness_damping_and_force(name):
         assert np.linalg.norm(force[:3]) <= bounds.force * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("name", list(FORCES))
+@pytest.mark.parametrize("name", WRENCHES)
 def test_nothing_of_a_kind_is_lost_where_it_does_not_move(name):
     kind = FORCES[name]
     at = motion(0.3, 1)._replace(v=(0.0,) * 3, w=(0.0,) * 3)
@@ -130,7 +132,7 @@ def test_kinds_have_names_of_their_own():
     for names in (
         [kind.statement for kind in kinds],
         [kind.path for kind in kinds],
-        [kind.function for kind in kinds if kind.function],
+        [name for kind in kinds for name in kind.functions.split()],
         [kind.adams.name for kind in kinds if kind.adams],
     ):
         assert len(names) == len(set(names))
@@ -141,11 +143,11 @@ def test_kinds_have_names_of_their_own():
             assert set(words) <= set(known)
 
 
-def test_the_numbers_of_kinds_have_no_order():
+def test_the_numbers_of_forms_have_no_order():
     names = "|".join(
         (
-            *("LINE_FORCE", "AXIS_FORCE", "AXIS_TORQUE", "VECTOR_FORCE", "MARKER_FORCE"),
-            *("RESIDUAL", "SLIDE_LIMIT", "TURN_LIMIT", "DRY_SLIDE", "DRY_TURN"),
+            *("LINE_FORCE", "AXIS_FORCE", "AXIS_FORCE_AT_I", "AXIS_TORQUE", "VECTOR_FORCE"),
+            *("WRENCH", "RESIDUAL"),
             *("SLIDE_FRICTION", "TURN_FRICTION", "SCREW_FRICTION", "BALL_FRICTION"),
         )
     )
@@ -153,3 +155,17 @@ def test_the_numbers_of_kinds_have_no_order():
     ordered = re.compile(rf"[<>]=?\s*(codes\.)?({names})\b|\b({names})\s*([<>+\-%]|\.\.)")
     for file in Path(mbsim.__file__).parent.rglob("*.py"):
         assert not ordered.search(file.read_text(encoding="utf-8")), file
+
+
+def test_what_is_no_force_knows_no_kind_by_name():
+    """Outside their files kinds are found in the registry: none is named where they act."""
+    names = "|".join([*FORCES, *(FORCES[name].statement for name in FORCES)])
+    known = re.compile(rf"[\"'](applied/)?({names})[\"']")
+    package = Path(mbsim.__file__).parent
+    found = [
+        f"{file.relative_to(package)}: {match.group()}"
+        for folder in ("arrays", "compile_model", "dynamics", "results", "run")
+        for file in (package / folder).rglob("*.py")
+        for match in known.finditer(file.read_text(encoding="utf-8"))
+    ]
+    assert not found

@@ -44,6 +44,13 @@ def force(kind, id, i, j, **values):
     return MarkerForce(id, kind, "", i, j, tuple((known | values).items()))
 
 
+def spring_damper(id, type, i, j, *numbers, **values):
+    """Return a spring-damper: stiffness, damping, length, preload."""
+    names = ("stiffness", "damping", "length", "preload")
+    given = dict(zip(names, map(float, numbers), strict=False)) | values
+    return force("SPRINGDAMPER", id, i, j, type=type, **given)
+
+
 def bushing(id, i, j, stiffness=(0,) * 6, damping=(0,) * 6, preload=(0,) * 6):
     """Return a bushing: six stiffnesses, dampings and preloads."""
     axes = ("x", "y", "z", "tx", "ty", "tz")

@@ -14,8 +14,9 @@ from mbsim.manual.book import Page
 ROOT = Path(__file__).parents[2]
 _FENCE = re.compile(r"^(```+)[ ]*(\S*)[ ]*(.*)$")
 _MARK = "\x01"
-#: What a program says on a machine that has not compiled yet, and seconds cannot be foreseen.
-_COMPILING = re.compile(r"^mbsim: (compiling|the first run)")
+#: What a program says on a machine that has not compiled yet.
+_COMPILING = re.compile(r"^mbsim: compiling")
+_OF_IT = re.compile(r" \([\d.]+ s of it compiling\)")
 
 
 @dataclass
@@ -98,6 +99,14 @@ def agrees(shown: list[str], printed: list[str]) -> bool:
     return bool(re.fullmatch(pattern, printed[0].rstrip())) and agrees(shown[1:], printed[1:])
 
 
+def as_if_warm(text: str) -> list[str]:
+    """Return the lines of output as they are once everything is compiled, without blank ends."""
+    lines = [_OF_IT.sub("", line) for line in text.splitlines() if not _COMPILING.match(line)]
+    while lines and not lines[-1].strip():
+        lines.pop()
+    return lines
+
+
 class Folder:
     """The folder of one page, in which its blocks are run."""
 
@@ -158,14 +167,9 @@ class Folder:
         pieces = re.split(f"\n{_MARK}(\\d+){_MARK}\n", printed)
         assert len(pieces) == 2 * len(asked) + 1, f"{where}: {printed}"
         for each, text, code in zip(asked, pieces[0::2], pieces[1::2], strict=False):
-            lines = [line for line in text.splitlines() if not _COMPILING.match(line)]
             failed = any("error" in line.lower() for line in each.shown)
             assert code == "0" or failed, f"{where}: {each.text} ended with {code}:\n{text}"
-            while lines and not lines[-1].strip():
-                lines.pop()
-            shown = list(each.shown)
-            while shown and not shown[-1].strip():
-                shown.pop()
-            assert not shown or agrees(shown, lines), (
+            shown = as_if_warm("\n".join(each.shown))
+            assert not shown or agrees(shown, as_if_warm(text)), (
                 f"{where}: {each.text} prints\n{text}\nand the page shows\n" + "\n".join(shown)
             )

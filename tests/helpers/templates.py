@@ -18,6 +18,7 @@ TEMPLATES = {
     "normal_law": Template("laws/normal/kelvin_voigt.py", 1),
     "joint": Template("joints/kinds/pin_in_slot.py", 1),
     "force": Template("forces/kinds/tether.py", 1),
+    "scalar_force": Template("forces/kinds/cubic_spring.py", 1),
     "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
     "integrator": Template(
         "integrators/heun.py",

@@ -207,10 +207,10 @@ def test_set_reaches_the_element_and_its_changes(tmp_path):
     """[7] is the element, [7][2] its first change; a change that is not there is named."""
     commands = simulate(1) + CHANGED + simulate(2)
     deck = read(tmp_path, commands, overrides=["Force_SpringDamper[7][2].stiffness=90"])
-    assert deck.spring_dampers[7].stiffness == 100
+    assert deck.table("SPRINGDAMPER")[7].stiffness == 100
     assert deck.simulations[1].changes[0].element.stiffness == 90
     deck = read(tmp_path, commands, overrides=["Force_SpringDamper[7].damping=3"])
-    assert deck.spring_dampers[7].damping == 3
+    assert deck.table("SPRINGDAMPER")[7].damping == 3
     changed = deck.simulations[1].changes[0].element
     assert (changed.stiffness, changed.damping) == (250, 3)
     with pytest.raises(mbsim.errors.ModelError, match=r"no Force_SpringDamper\[7\]\[3\].*2 of"):

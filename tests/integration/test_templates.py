@@ -12,13 +12,13 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.special import ellipj
 
 from helpers.decks import EARTH, GRAVITY, GROUND, contact, sphere
 from helpers.folders import MODELS, PACKAGES, TESTS
 from helpers.templates import TEMPLATES
 
 G = 9.81
-
 
 #: Runs decks in the copy, whose unchanged code is in the cache by its content.
 RUN = """
@@ -154,6 +154,7 @@ assert "slip_coef" in BY_KEY["forcecontact"].attributes
 assert "KELVIN_VOIGT" in NORMAL_LAWS and "KELVIN_VOIGT" in keywords.CNF_OF_LIMITS.values()
 assert "PIN_IN_SLOT" in JOINTS
 assert "TETHER" in FORCES and "forcetether" in BY_KEY
+assert "CUBICSPRING" in FORCES and "forcecubicspring" in BY_KEY
 assert "ELLIPSOID-MESH" in PAIRS
 assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
 assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
@@ -235,6 +236,21 @@ def test_force(copy_with, method):
     settings = {"integrator": method, "tol": 1e-8}
     (found,) = run_in_copy(copy_with("force"), (whole(deck, 1.0), ["bodies/2/position"], settings))
     np.testing.assert_allclose(found["bodies/2/position"], tethered(found["time"]), atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5"])
+def test_scalar_force(copy_with, method):
+    deck = body(x=1.0) + (
+        '<Force_CubicSpring id="1" i_marker_id="20" j_marker_id="10" stiffness="1"/>'
+    )
+    settings = {"integrator": method, "tol": 1e-8}
+    signals = ["bodies/2/position", "cubic_springs/1/force"]
+    (found,) = run_in_copy(copy_with("scalar_force"), (whole(deck, 1.0), signals, settings))
+    # x'' = -x^3, x(0) = 1: Jacobi's cn of modulus 1/sqrt(2)
+    x = ellipj(found["time"], 0.5)[1]
+    np.testing.assert_allclose(found["bodies/2/position"][:, 0], x, atol=1e-6)
+    np.testing.assert_allclose(found["cubic_springs/1/force"][:, 0], -(x**3), atol=4e-6)
 
 
 @pytest.mark.slow

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from mbsim.core.arrays import F2, V3
 from mbsim.core.rotation import dot, scale
-from mbsim.forces.catalog import Bounds, Motion, Parameter, Values, force
+from mbsim.forces.catalog import Bounds, Parameter, Values, Wrench, force
+from mbsim.forces.formula import Motion
 
 
 def _constants(values: Values) -> Sequence[float]:
@@ -37,9 +38,6 @@ force(
     "Force_Tether",
     "tethers",
     Parameter("stiffness", None, positive=True, about="stiffness", unit="F/L"),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
     about="a spring without length",
 )

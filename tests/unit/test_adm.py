@@ -165,7 +165,7 @@ def test_constraints_forces_and_variables(tmp_path: Path) -> None:
     assert (sliding.direction, sliding.val_type) == ("T", "A")
     assert (sliding.ic_disp, sliding.ic_vel) == (2.0, 3.0)
     assert (turning.direction, turning.joint_id, turning.val_type) == ("B3", None, "D")
-    spring, torsion = model.spring_dampers[1], model.spring_dampers[2]
+    spring, torsion = model.table("SPRINGDAMPER").values()
     assert (spring.type, spring.stiffness, spring.damping) == ("TRANSLATIONAL", 30.0, 2.0)
     assert (spring.length, spring.preload) == (0.4, 5.0)
     assert (torsion.type, torsion.stiffness, torsion.preload) == ("ROTATIONAL", 30.0, 5.0)

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from mbsim.laws.dry import dry_commit, dry_force, dry_mode, rigid_mode
+from mbsim.dynamics.stiction.rigid_friction import rigid_mode
+from mbsim.forces.kinds.dry_friction import dry_commit, dry_force, dry_mode
 
 # Muscade.jl, test/TestSweepX2.jl at commit 08f46e21 (MIT): x at steps 1, 11, ..., 91 of 0.15
 PUBLISHED = {

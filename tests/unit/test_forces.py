@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system_of
+from helpers.free_bodies import spring_damper
 from helpers.minimal_deck import added, read
 from mbsim.cli import info
 from mbsim.cli.main import main
@@ -60,7 +61,9 @@ PARTS: dict[str, Any] = {
     "couplers": {4: el.Coupler(4, "", (1, 2), ("R", "R"), (1.0, 2.0))},
     "motions": {6: el.Motion(6, "drive", joint_id=1, expr=text("2*TIME"))},
     "general_constraints": {8: el.GeneralConstraint(8, text("DX(21)"))},
-    "spring_dampers": {5: el.SpringDamper(5, "TRANSLATIONAL", "", 11, 31, 100.0, 0.0, 1.5)},
+    "marker_forces": {
+        "SPRINGDAMPER": {5: spring_damper(5, "TRANSLATIONAL", 11, 31, 100.0, 0.0, 1.5)}
+    },
     "scalar_forces": {
         7: el.ScalarForce(7, "TRANSLATIONAL", text("3"), "push", 21, 32, action_only=True)
     },
@@ -595,7 +598,7 @@ def test_many_writes_give_the_forces_of_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("member", "change"),
     [
-        ("spring_dampers", {"stiffness": 101.0}),
+        ("SPRINGDAMPER", {"parameters": spring_damper(5, "ROTATIONAL", 11, 31).parameters}),
         ("motions", {"expr": text("3*TIME")}),
         ("joints", {"type": "SPHERICAL"}),
         ("requests", {"jflag": True}),
@@ -603,10 +606,9 @@ def test_many_writes_give_the_forces_of_one(tmp_path: Path) -> None:
 )
 def test_resume_with_another_element(tmp_path: Path, member: str, change: Any) -> None:
     model = interrupted(tmp_path).model
-    elements = dict(getattr(model, member))
-    id = next(iter(elements))
-    elements[id] = dataclasses.replace(elements[id], **change)
-    other = fake_system_of(dataclasses.replace(model, **{member: elements}))
+    element = next(iter(model.table(member).values()))
+    changed = model.changed((el.Change(member, dataclasses.replace(element, **change), ""),))
+    other = fake_system_of(changed)
     with pytest.raises(ModelError, match="elements of the model have changed"):
         Recorder(other, SETTINGS, tmp_path, resume=True)
 

@@ -17,7 +17,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 from numba.core.types import Array, Tuple
 
-from helpers.folders import PACKAGES
+from helpers.folders import MODELS, PACKAGES
 from mbsim.core import jit, linking, numba_costs
 from mbsim.core.jitable import jitable
 
@@ -426,3 +426,46 @@ def test_a_location_is_taken_by_who_names_it():
 
     for function in (without, with_it, wraps_it, functools.partial(with_it, 1)):
         assert numba_costs._takes_location(function) == numba_costs._has_location(function)
+
+
+COMPILED = """
+import sys
+import mbsim
+from mbsim.core import jit
+from numba.core.lowering import Lower
+jit._register()
+lower, names = Lower.lower, set()
+
+def noted(self):
+    names.add(self.func_ir.func_id.func.__module__)
+    lower(self)
+
+Lower.lower = noted
+mbsim.simulate(mbsim.read_model(sys.argv[1]), end_time=1e-3, print_interval=1e-3)
+print(*sorted(names))
+"""
+
+
+@pytest.mark.parametrize(
+    ("deck", "lacks"),
+    [
+        ("four_bar", "contact stiction mbsim.laws mbsim.geometry linearization events"),
+        (
+            "bowling_ball",
+            "stiction constraints.tree constraints.equations linearization forces. expressions",
+        ),
+    ],
+)
+@pytest.mark.slow
+def test_a_deck_compiles_nothing_of_what_it_lacks(deck, lacks, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILED, str(MODELS / f"{deck}.xml")],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "MBSIM_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(MODELS.parent)},
+    )
+    assert done.returncode == 0, done.stderr
+    modules = [name for name in done.stdout.split() if name.startswith("mbsim.")]
+    assert "mbsim.dynamics.pipeline.evaluate" in modules
+    unwanted = ["dynamics." + part if part[0] != "m" else part for part in lacks.split()]
+    assert not [name for name in modules if any(part in name for part in unwanted)]

@@ -12,7 +12,7 @@ from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.expressions.jets import gradient, jet, value
 from mbsim.expressions.parse import parse
-from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper
+from mbsim.model.elements import Marker, Request, ScalarForce
 
 
 def random_rotation(rng):
@@ -333,7 +333,7 @@ def test_forces_between_markers_and_of_elements():
             ScalarForce(1, "TRANSLATIONAL", parse("2"), i_marker_id=21, j_marker_id=31),
             ScalarForce(3, "TRANSLATIONAL", parse("5"), "", 21, 11, action_only=True),
         ],
-        spring_dampers=[SpringDamper(2, "ROTATIONAL", i_marker_id=31, j_marker_id=21)],
+        marker_forces=[free.spring_damper(2, "ROTATIONAL", 31, 21)],
     )
     rng = np.random.default_rng(8)
     moving.at(0.0)

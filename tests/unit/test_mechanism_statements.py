@@ -96,7 +96,7 @@ def test_coupler_forces_and_variables(tmp_path: Path) -> None:
     coupler = model.couplers[1]
     assert (coupler.joint_ids, coupler.motion_types) == ((1, 2), ("R", "T"))
     assert coupler.scales == (1.0, -2.5)
-    spring = model.spring_dampers[4]
+    spring = model.table("SPRINGDAMPER")[4]
     assert (spring.type, spring.stiffness, spring.damping) == ("TRANSLATIONAL", 3.0, 2.0)
     assert (spring.length, spring.preload) == (0.5, -1.0)
     assert [force.type for force in model.scalar_forces.values()] == ["TRANSLATIONAL", "ROTATIONAL"]

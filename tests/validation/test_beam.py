@@ -195,7 +195,7 @@ def test_methods_agree(method):
 
 
 def test_a_damping_matrix_that_is_proportional_does_what_the_ratio_does():
-    par = FORCES["BEAM"].constants
+    par = FORCES["BEAM"].form.constants
     ratio = dict(free.force("BEAM", 1, 0, 0, **SOFT, cratio=0.01).parameters)
     K = np.reshape(par(ratio)[1:37], (6, 6))
     columns = tuple(0.01 * K[r, k] for k in range(6) for r in range(k, 6))

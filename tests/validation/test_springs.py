@@ -12,7 +12,7 @@ from helpers import free_bodies as free
 from helpers.free_bodies import imbalance
 from mbsim.errors import ModelError, SolverError
 from mbsim.expressions.parse import parse
-from mbsim.model.elements import Marker, Request, ScalarForce, SpringDamper, Variable
+from mbsim.model.elements import Marker, Request, ScalarForce, Variable
 
 K, C, M, LENGTH = 100.0, 2.0, 1.5, 0.5
 KINETIC, POTENTIAL, DISSIPATED = range(3)
@@ -32,9 +32,9 @@ def oscillation(t, x0, v0, mass, stiffness, damping):
 @pytest.mark.parametrize("flip", [False, True])
 def test_translational_spring_swings_as_its_closed_form(damping, flip):
     i, j = (10, 20) if flip else (20, 10)
-    spring = SpringDamper(1, "TRANSLATIONAL", "", i, j, K, damping, LENGTH, preload=3.0)
+    spring = free.spring_damper(1, "TRANSLATIONAL", i, j, K, damping, LENGTH, preload=3.0)
     body = free.body(2, mass=M, p=(0.0, 0.0, 0.7), v=(0, 0, 1.0))
-    rows, _ = free.run(free.model(body, spring_dampers=[spring], end_time=2.0))
+    rows, _ = free.run(free.model(body, marker_forces=[spring], end_time=2.0))
     rest = LENGTH + 3.0 / K
     x, v = oscillation(rows["time"], 0.7 - rest, 1.0, M, K, damping)
     np.testing.assert_allclose(rows["y"][:, 2], rest + x, atol=1e-8)
@@ -53,10 +53,10 @@ def test_translational_spring_swings_as_its_closed_form(damping, flip):
 
 def test_torsion_spring_counts_whole_turns():
     k, c, inertia = 0.4, 0.02, 0.3
-    spring = SpringDamper(1, "ROTATIONAL", "", 20, 10, k, c, 0.5, 0.1)
+    spring = free.spring_damper(1, "ROTATIONAL", 20, 10, k, c, 0.5, 0.1)
     body = free.body(2, inertia=(0.5, 0.5, inertia), w=(0, 0, 12.0))
     request = Request(1, "EXPRESSION", exprs=(parse("AZ(20,10)"), None, parse("SPDP(1,0,8)")))
-    model = free.model(body, spring_dampers=[spring], requests=[request], end_time=8.0)
+    model = free.model(body, marker_forces=[spring], requests=[request], end_time=8.0)
     rows, runner = free.run(model)
     assert runner.system.values == [(1, 1), (1, 3)]
     rest = 0.5 + 0.1 / k
@@ -74,8 +74,8 @@ def test_torsion_spring_counts_whole_turns():
 def test_spring_between_two_bodies_conserves_momentum():
     """Reduced mass: the distance oscillates with m1 m2 / (m1 + m2)."""
     bodies = [free.body(2, 2.0, v=(0, 0.3, 0)), free.body(3, 3.0, p=(0.8, 0, 0), v=(0, 0.3, 0))]
-    spring = SpringDamper(1, "TRANSLATIONAL", "", 20, 30, K, C, LENGTH)
-    rows, _ = free.run(free.model(*bodies, spring_dampers=[spring], end_time=2.0))
+    spring = free.spring_damper(1, "TRANSLATIONAL", 20, 30, K, C, LENGTH)
+    rows, _ = free.run(free.model(*bodies, marker_forces=[spring], end_time=2.0))
     x, _ = oscillation(rows["time"], 0.3, 0.0, 1.2, K, C)
     y = rows["y"]
     np.testing.assert_allclose(y[:, 13] - y[:, 0], LENGTH + x, atol=1e-8)
@@ -91,10 +91,10 @@ def test_springs_off_the_cg_close_the_energy_balance():
         free.body(3, 2.0, (0.3, 0.1, 0.2), p=(1.0, 0, 0), w=(0, -1, 2)),
     ]
     springs = [
-        SpringDamper(1, "TRANSLATIONAL", "", 21, 31, 50.0, 0.7, 0.4),
-        SpringDamper(2, "TRANSLATIONAL", "", 30, 21, 30.0, 0.2, 0.9, preload=1.0),
+        free.spring_damper(1, "TRANSLATIONAL", 21, 31, 50.0, 0.7, 0.4),
+        free.spring_damper(2, "TRANSLATIONAL", 30, 21, 30.0, 0.2, 0.9, preload=1.0),
     ]
-    model = free.model(*bodies, markers=markers, spring_dampers=springs, end_time=3.0)
+    model = free.model(*bodies, markers=markers, marker_forces=springs, end_time=3.0)
     rows, runner = free.run(model)
     assert imbalance(rows) < 1e-7
     assert rows["energy"][-1, DISSIPATED] > 0.1
@@ -113,7 +113,7 @@ def test_springs_off_the_cg_close_the_energy_balance():
 @pytest.mark.parametrize("kind", ["TRANSLATIONAL", "ROTATIONAL"])
 def test_a_scalar_force_by_expression_is_the_spring_that_it_spells(kind):
     body = free.body(2, M, (0.2, 0.2, 0.3), p=(0, 0.1, 0.7), v=(0.3, 0, 1), w=(0, 0, 3))
-    spring = SpringDamper(1, kind, "", 20, 10, K, C, LENGTH, 3.0)
+    spring = free.spring_damper(1, kind, 20, 10, K, C, LENGTH, 3.0)
     text = {
         "TRANSLATIONAL": "3 - VARVAL(7)*(DM(20,10) - 0.5)\n - 2.0*VR(20,10)",
         "ROTATIONAL": "3 - VARVAL(7)*RTOD*DTOR*(AZ(20,10) - 0.5) - 2.0*WZ(20,10,10)",
@@ -121,7 +121,7 @@ def test_a_scalar_force_by_expression_is_the_spring_that_it_spells(kind):
     force = ScalarForce(1, kind, parse(text), i_marker_id=20, j_marker_id=10)
     variable = Variable(7, parse("25*4"))
     common = free.model(body, end_time=1.0, g=(0, 0, -9.81))
-    by_spring, _ = free.run(replace(common, spring_dampers={1: spring}))
+    by_spring, _ = free.run(replace(common, marker_forces={"SPRINGDAMPER": {1: spring}}))
     by_force, _ = free.run(replace(common, scalar_forces={1: force}, variables={7: variable}))
     np.testing.assert_allclose(by_force["y"][:, :13], by_spring["y"][:, :13], atol=1e-7)
     np.testing.assert_allclose(by_force["applied"], by_spring["applied"], atol=1e-5)
@@ -158,8 +158,8 @@ def test_a_torque_acts_on_i_only_or_on_both():
 
 
 def test_markers_that_coincide_give_no_direction_and_no_fault():
-    spring = SpringDamper(1, "TRANSLATIONAL", "", 20, 10, K, C, LENGTH)
-    rows, _ = free.run(free.model(free.body(2), spring_dampers=[spring], end_time=0.1))
+    spring = free.spring_damper(1, "TRANSLATIONAL", 20, 10, K, C, LENGTH)
+    rows, _ = free.run(free.model(free.body(2), marker_forces=[spring], end_time=0.1))
     assert (rows["y"][:, :3] == 0.0).all()
     assert np.isfinite(rows["energy"]).all()
 
@@ -176,9 +176,9 @@ def test_a_force_that_is_no_number_ends_the_run_and_is_named(text):
 @pytest.mark.parametrize("kind", ["TRANSLATIONAL", "ROTATIONAL"])
 @pytest.mark.parametrize("damping", [0.0, 20.0])
 def test_the_method_without_error_estimate_takes_stable_steps(kind, damping):
-    spring = SpringDamper(1, kind, "", 20, 10, 1e4, damping, 1.0)
+    spring = free.spring_damper(1, kind, 20, 10, 1e4, damping, 1.0)
     body = free.body(2, M, (M, M, M), p=(0, 0, 1.01), v=(0, 0, 0.5), w=(0, 0, 0.5))
-    model = free.model(body, spring_dampers=[spring], end_time=0.5)
+    model = free.model(body, marker_forces=[spring], end_time=0.5)
     rows, _ = free.run(model, tol=1e-5, integrator="VERLET")
     if kind == "TRANSLATIONAL":
         x, _ = oscillation(rows["time"], 0.01, 0.5, M, 1e4, damping)

@@ -1,7 +1,7 @@
 """What happens to incidents when a step is tried, accepted, and watched.
 
-`first_depth` guards the beginning of an impact, `commit` writes the incident table after an
-accepted step, `reversal` says where in a step a contact force may have peaked.
+`first_depth` guards the beginning of an impact, `commit_incidents` writes the incident table after
+an accepted step, `reversal` says where in a step a contact force may have peaked.
 """
 
 from __future__ import annotations
@@ -31,12 +31,10 @@ from mbsim.arrays.codes import (
     USED_EVENTS,
 )
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
-from mbsim.arrays.hooks import Dry, Hook, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
@@ -394,36 +392,3 @@ def commit_gaps(scene: Scene) -> None:
             pairs.left[pair] -= travel
             if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
                 measure_gap(scene, pair, False)
-
-
-@jitable
-def commit(scene: Scene, t: float, h: float, y: F1) -> int:
-    """Take the point evaluated last as accepted.
-
-    Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.
-    """
-    state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
-    changed = commit_incidents(scene, t, h, y)
-    if scene.world.hooks[Hook.DRY] != 0:
-        answer = call_int(scene.world.hooks[Hook.DRY], (scene, Dry.KEEP, t, y))
-        changed = max(changed, answer_of(scene, answer))
-    watch_peaks(scene, t)
-    contacts = len(scene.contacts.id)
-    for c in range(contacts):
-        scene.log.contacts[c, ENERGY_LOST] = y[len(y) - contacts + c]
-    commit_gaps(scene)
-    for b in range(ground):
-        for k in range(4):
-            state.q[b, k] = y[BODY_SIZE * b + 3 + k]
-        for k in range(3):
-            state.w[b, k] = scene.work.w[b, k]
-    state.since[0] = t
-    for g in range(len(graphics.body)):
-        if graphics.body[g] < ground:
-            for k in range(3):
-                state.centre[g, k] = scene.work.frames[g, k]
-    if scene.world.hooks[Hook.ANGLES] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene,)))
-    if len(scene.broadphase.contact) > 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.NEAR], (scene, y)))
-    return changed

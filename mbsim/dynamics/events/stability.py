@@ -30,10 +30,10 @@ from mbsim.arrays.codes import (
     BOUND_STIFFNESS,
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
-    MARKER_FORCE,
     REST,
     SCALE_LENGTH,
     SCALE_SPEED,
+    WRENCH,
 )
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -188,23 +188,23 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
 
 
 @jitable
-def add_marker_force(scene: Scene, y: F1, f: int) -> None:
-    """Add the largest stiffness and damping of marker force f, along every axis and about it.
+def add_wrench(scene: Scene, y: F1, f: int) -> None:
+    """Add the largest stiffness and damping of wrench f, along every axis and about it.
 
     Both bodies are pushed at I's origin P, so arms go there. A turn of body b moves P by its
     arm, and turns the axes along which a force that already acts does: arm times
     force, as much again where J's axes turn with b.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
-    i, j, par = applied.i[f], applied.j[f], applied.par[f]
+    i, j, bound = applied.i[f], applied.j[f], applied.bound[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
-    k, c = par[BOUND_STIFFNESS], par[BOUND_DAMPING]
-    turn_k, turn_c = par[BOUND_TURNING], par[BOUND_TURNING_DAMPING]
+    k, c = bound[BOUND_STIFFNESS], bound[BOUND_DAMPING]
+    turn_k, turn_c = bound[BOUND_TURNING], bound[BOUND_TURNING_DAMPING]
     at = marker_point(scene, y, i)
     stretch = sub(at, marker_point(scene, y, j))
     for axis in range(3):
-        stretch = sub(stretch, scale(par[REST + axis], marker_axis(scene, j, axis)))
-    force = k * norm(stretch) + par[BOUND_FORCE]
+        stretch = sub(stretch, scale(bound[REST + axis], marker_axis(scene, j, axis)))
+    force = k * norm(stretch) + bound[BOUND_FORCE]
     for side in range(2):
         m = i if side == 0 else j
         b = markers.body[m]
@@ -229,23 +229,24 @@ def add_spring(scene: Scene, y: F1, f: int) -> None:
     torque F r. Stiffness across and by F is bounded by what the smallest moment of inertia gives.
     """
     applied, markers, ground = scene.applied, scene.markers, len(scene.bodies.mass)
-    if applied.kind[f] == MARKER_FORCE:
-        add_marker_force(scene, y, f)
+    if applied.form[f] == WRENCH:
+        add_wrench(scene, y, f)
         return
-    i, j, par = applied.i[f], applied.j[f], applied.par[f]
+    i, j, bound = applied.i[f], applied.j[f], applied.bound[f]
     both = 2.0 if markers.body[i] < ground and markers.body[j] < ground else 1.0
-    k, damping = both * par[0], both * par[1]
+    k, damping = both * bound[BOUND_STIFFNESS], both * bound[BOUND_DAMPING]
     line = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     d = norm(line)
     n = scale(1.0 / d, line) if d > 0.0 else (0.0, 0.0, 0.0)
-    force = abs(par[3] - par[0] * (d - par[2])) if d > 0.0 else 0.0
+    pull = bound[BOUND_FORCE] - bound[BOUND_STIFFNESS] * (d - bound[REST])
+    force = abs(pull) if d > 0.0 else 0.0
     for side in range(2):
         m = i if side == 0 else j
         b = markers.body[m]
         if b == ground:
             continue
         block, inverse = scene.work.block[b], scene.bodies.inverse[b]
-        if applied.kind[f] == AXIS_TORQUE:
+        if applied.form[f] == AXIS_TORQUE:
             axis = unrotate(scene.work.R[b], marker_axis(scene, j, 2))
             turn = dot(axis, rotate(inverse, axis))
             block[9] += k * turn
@@ -345,7 +346,7 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     hit = work.hit
     for k in range(hit[len(hit) - 1]):
         add_touching(scene, y, hit[k], work.law_out)
-    for k in range(len(scene.applied.kind)):
+    for k in range(len(scene.applied.form)):
         add_spring(scene, y, k)
     bound, best = work.bound, work.best
     bound[0] = bound[1] = 0.0

@@ -1,15 +1,15 @@
 """Where the step under trial leaves the branch that a force was on: see `compile_model.switching`.
 
-What an expression or a limit is on is a number, its side; so is what all incidents do whose
-friction has modes. The driver ends a step where a side
-becomes another than it was at the committed state.
+What an expression or a force with branches is on is a number, its side; so is what all incidents do
+whose friction has modes. The driver ends a step where a side becomes another than it was at the
+committed state.
 """
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDE_LIMIT, SLIDES
+from mbsim.arrays.codes import AUDIT_TOL, CHATTERING, CHATTERS, SIDE, SLIDER_STATIC, SLIDES
 from mbsim.arrays.hooks import Hook, Sticking, answer_of, failure_or, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -39,8 +39,8 @@ from mbsim.dynamics.contact.forces import (
     slipping_mass,
 )
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.forces.applied import along_axis, along_slide, at_limit
-from mbsim.dynamics.forces.dry_friction import STATIC, holding_force, is_dry, side_of_dry
+from mbsim.dynamics.forces.applied import side_of
+from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
 
@@ -54,20 +54,6 @@ CHATTERS_MODES = 8.0
 AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
-
-
-@jitable
-def side_of_limit(scene: Scene, y: F1, f: int) -> float:
-    """Return 0 between the bounds, 1 below, 2 above, and 2 more where the limit pushes."""
-    if scene.applied.kind[f] == SLIDE_LIMIT:
-        _, x, rate = along_slide(scene, y, f)
-    else:
-        _, x, rate = along_axis(scene, f)
-    lower, upper = scene.applied.bounds[f, 0], scene.applied.bounds[f, 1]
-    if lower <= x <= upper:
-        return 0.0
-    size, _, _ = at_limit(scene, f, x, rate)
-    return (1.0 if x < lower else 2.0) + (2.0 if size != 0.0 else 0.0)
 
 
 @jitable
@@ -134,10 +120,12 @@ def side(scene: Scene, t: float, y: F1, k: int) -> float:
     program = scene.switching.program[k]
     if program >= 0:
         return value(scene, t, y, program)
-    if scene.switching.limit[k] < 0:
+    if scene.switching.force[k] < 0:
         return modes(scene)
-    f = scene.switching.limit[k]
-    return side_of_dry(scene, y, f) if is_dry(scene.applied.kind[f]) else side_of_limit(scene, y, f)
+    f = scene.switching.force[k]
+    if scene.applied.equation[f] >= 0:
+        return side_of_rigid(scene, y, f)
+    return side_of(scene, y, f)
 
 
 @jitable
@@ -173,11 +161,11 @@ def load(scene: Scene, context: int, t: float, y: F1) -> float:
     if most < 0.0 or scene.state.frozen[0] == 0:
         return -1.0
     look_at(scene, context, t, y, scene.work.idle)
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0:
             force = holding_force(scene, f)
             if not math.isnan(force):
-                most = max(most, abs(force) / scene.applied.par[f, STATIC])
+                most = max(most, abs(force) / scene.applied.par[f, SLIDER_STATIC])
     if scene.world.hooks[Hook.STICKING] != 0:
         held = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
         most = max(most, 1e-6 * answer_of(scene, held))
@@ -191,7 +179,7 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
     sides, differs, last = scene.state.sides, 0, len(scene.switching.program) - 1
-    if scene.switching.program[last] < 0 and scene.switching.limit[last] < 0:
+    if scene.switching.program[last] < 0 and scene.switching.force[last] < 0:
         # what friction does follows from all the rest
         look_at(scene, context, t, y, scene.work.idle)
         if what == ASK and len(scene.work.ahead) > 0:
@@ -201,13 +189,13 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     for k in range(len(scene.switching.program)):
         now = side(scene, t, y, k)
         other = now != sides[k, SIDE]
-        f = scene.switching.limit[k]
-        dry = f >= 0 and is_dry(scene.applied.kind[f])
+        f = scene.switching.force[k]
+        keeps = f >= 0 and scene.applied.keeps[f] == 1
         # friction with a memory of its own is on the side that it keeps
-        exact = dry or (
+        exact = keeps or (
             k == last and f < 0 and scene.switching.program[k] < 0 and leaves_branch(scene)
         )
-        leaves = now != scene.state.dry[f, SLIDES] if dry else exact or other
+        leaves = now != scene.state.dry[f, SLIDES] if keeps else exact or other
         if what == PASS:
             differs = 1 if other else differs
         elif leaves and sides[k, CHATTERING] <= (
@@ -223,8 +211,8 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     # where modes change at nearly every step they are left to each evaluation
     chatters = sides[last, CHATTERING] > CHATTERS_MODES
     for k in range(last):
-        f = scene.switching.limit[k]
-        if f >= 0 and is_dry(scene.applied.kind[f]):
+        f = scene.switching.force[k]
+        if f >= 0 and scene.applied.keeps[f] == 1:
             chatters = chatters or sides[k, CHATTERING] > CHATTERS
     scene.state.frozen[0] = 0 if chatters else 1
     return differs

@@ -306,7 +306,7 @@ def on_i(scene: Scene, applied: int, row: int) -> tuple[V3, V3]:
 @jitable
 def floats(scene: Scene, applied: int, row: int) -> bool:
     """Return whether a row's J marker is a floating one, which is wherever I is."""
-    return applied == 1 and scene.applied.kind[row] == VECTOR_FORCE
+    return applied == 1 and scene.applied.form[row] == VECTOR_FORCE
 
 
 @jitable

@@ -1,23 +1,20 @@
-"""Forces between two markers: springs with dampers, scalar forces by expressions, limits.
+"""Forces between two markers: scalar ones along a line, along an axis or about it.
 
-With r = P_I - P_J, d = |r| and z the z-axis of J:
+With r = P_I - P_J, d = |r| and z the z-axis of `Applied.axes`, which is on J's body:
 
-| kind        | on I                         | on J                    | x, x'                 |
-|-------------|------------------------------|-------------------------|-----------------------|
-| LINE_FORCE  | F r/d at I's origin          | the opposite at J's     | d, d'                 |
-| AXIS_FORCE  | F z at I's origin            | nothing                 | -, v_I . z            |
-| AXIS_TORQUE | torque F z                   | the opposite            | angle, (w_I - w_J) . z|
-| SLIDE_LIMIT | F z at I's origin            | the opposite            | r . z, (v_I - v_J) . z|
-| TURN_LIMIT  | torque F z                   | the opposite            | as AXIS_TORQUE        |
+| form            | on I                    | on J              | x, x'                      |
+|-----------------|-------------------------|-------------------|----------------------------|
+| LINE_FORCE      | F r/d at I's origin     | opposite at J's   | d, d'                      |
+| AXIS_FORCE      | F z at I's origin       | opposite at J's   | r . z, (v_I - v_J) . z     |
+| AXIS_FORCE_AT_I | F z at I's origin       | opposite there    | the same, both v there     |
+| AXIS_TORQUE     | torque F z              | the opposite      | angle, (w_I - w_J) . z     |
 
-A spring has F = preload - k (x - length) - c x' and stores k (x - length)^2 / 2 - preload (x -
-length); its damper loses c x'^2. What an expression's force does, F x', counts as lost,
-with the sign turned, for nothing says what part of it could come back. Where the origins
-coincide a line has no direction and its force is 0. A limit's F is what its normal law makes of
-depth lower - x, or, turned round, x - upper. Friction in joints needs their reactions and comes
-later (`forces.joint_friction`), and so do forces by expressions of reactions
-(`forces.reaction_forces`); marker and vector forces are in `forces.wrenches`, dry friction in
-`forces.dry_friction`.
+F is what the formula of the kind makes of x and x' (`forces.catalog`), or an expression, whose
+work F x' counts as lost, with the sign turned, for nothing says what part of it could come back.
+Where a force acts on I alone x' is I's own. Where the origins coincide a line has no direction and
+its force is 0. Friction in joints needs their reactions and comes later (`forces.joint_friction`),
+and so do forces by expressions of reactions (`forces.reaction_forces`); wrenches and vector forces
+are in `forces.wrenches`.
 """
 
 from __future__ import annotations
@@ -25,17 +22,23 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
-    AXIS_FORCE,
+    AXIS_FORCE_AT_I,
     AXIS_TORQUE,
     LINE_FORCE,
     LOST_POWER,
-    MARKER_FORCE,
     RESIDUAL,
-    SLIDE_LIMIT,
+    SLIDER,
+    SLIDER_BEFORE,
+    SLIDES,
+    SLIDES_BEFORE,
+    SLIP,
+    STICK,
     STORED_ENERGY,
-    TURN_LIMIT,
     VECTOR_FORCE,
+    WITHIN,
+    WRENCH,
 )
+from mbsim.arrays.hooks import Dry
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
@@ -45,9 +48,8 @@ from mbsim.core.rotation import cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.forces.dry_friction import add_dry, is_dry
-from mbsim.dynamics.forces.wrenches import wrench
-from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
+from mbsim.dynamics.forces.wrenches import apply, velocity_at, wrench
+from mbsim.forces.formula import Asked
 
 
 @jitable
@@ -73,106 +75,168 @@ def along_line(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
 
 
 @jitable
-def along_axis(scene: Scene, f: int) -> tuple[V3, float, float]:
-    """Return J's z-axis, the angle if a row of `Angles` follows it (else 0), and its rate."""
-    i, j, row = scene.applied.i[f], scene.applied.j[f], scene.applied.angle[f]
-    w, z = scene.work.w, marker_axis(scene, j, 2)
-    spin = sub(vector(w[scene.markers.body[i]]), vector(w[scene.markers.body[j]]))
+def about_axis(scene: Scene, f: int) -> tuple[V3, float, float]:
+    """Return the axis, the angle if a row of `Angles` follows it (else 0), and its rate."""
+    applied, w = scene.applied, scene.work.w
+    row, z = applied.angle[f], marker_axis(scene, applied.axes[f], 2)
+    spin = vector(w[scene.markers.body[applied.i[f]]])
+    if applied.alone[f] == 0:
+        spin = sub(spin, vector(w[scene.markers.body[applied.j[f]]]))
     return z, followed_angle(scene, row) if row >= 0 else 0.0, dot(z, spin)
 
 
 @jitable
-def along_slide(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
-    """Return J's z-axis, how far I is along it, and its rate."""
-    i, j = scene.applied.i[f], scene.applied.j[f]
-    z = marker_axis(scene, j, 2)
-    r = sub(marker_point(scene, y, i), marker_point(scene, y, j))
-    return z, dot(z, r), dot(z, sub(marker_velocity(scene, i), marker_velocity(scene, j)))
+def along_axis(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
+    """Return the axis, how far I is along it, and its rate."""
+    applied, markers = scene.applied, scene.markers
+    i, j = applied.i[f], applied.j[f]
+    z, p = marker_axis(scene, applied.axes[f], 2), marker_point(scene, y, i)
+    if applied.alone[f] == 1:
+        v = marker_velocity(scene, i)
+    elif applied.form[f] == AXIS_FORCE_AT_I:
+        at_i = velocity_at(scene, y, markers.body[i], p)
+        v = sub(at_i, velocity_at(scene, y, markers.body[j], p))
+    else:
+        v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
+    return z, dot(z, sub(p, marker_point(scene, y, j))), dot(z, v)
 
 
 @jitable
-def at_limit(scene: Scene, f: int, x: float, rate: float) -> V3:
-    """Return F, stored energy and lost power of limit f at displacement x."""
-    applied, out = scene.applied, scene.work.law_out
-    lower, upper = applied.bounds[f, 0], applied.bounds[f, 1]
-    side, depth, closing = 1.0, lower - x, -rate
-    if x - upper > depth:
-        side, depth, closing = -1.0, x - upper, rate
-    # a displacement that is no number is passed on
-    if depth <= 0.0:
-        return 0.0, 0.0, 0.0
-    if call_int(applied.law[f], (depth, closing, applied.law_par[f], out)) != 0:
-        return math.nan, 0.0, 0.0
-    return side * out[LOAD], out[ENERGY], (out[LOAD] - out[ELASTIC]) * closing
+def displacement(scene: Scene, y: F1, f: int) -> tuple[V3, float, float]:
+    """Return direction, x and x' of scalar force f; the bodies have been placed."""
+    form = scene.applied.form[f]
+    if form == LINE_FORCE:
+        return along_line(scene, y, f)
+    if form == AXIS_TORQUE:
+        return about_axis(scene, f)
+    return along_axis(scene, y, f)
+
+
+@jitable
+def ask_formula(
+    scene: Scene, f: int, what: int, x: float, rate: float, slider: float, mode: float
+) -> int:
+    """Fill `Work.wrench` with what the formula of scalar force f says; return 0."""
+    applied, work = scene.applied, scene.work
+    kept = work.motion
+    kept[0], kept[1], kept[2] = slider, mode, scene.state.frozen[0]
+    law, law_par = applied.law[f], applied.law_par[f]
+    return call_int(
+        applied.formula[f],
+        (what, x, rate, applied.par[f], kept, law, law_par, work.law_out, work.wrench),
+    )
+
+
+@jitable
+def by_formula(scene: Scene, f: int, x: float, rate: float) -> int:
+    """Fill `Work.wrench` with F, stored energy, lost power and slopes at a point; return 0."""
+    kept = scene.state.dry[f]
+    if scene.world.past[0] == WITHIN:
+        slider, mode = kept[SLIDER_BEFORE], kept[SLIDES_BEFORE]
+    else:
+        slider, mode = kept[SLIDER], kept[SLIDES]
+    return ask_formula(scene, f, Asked.FORCE, x, rate, slider, mode)
+
+
+@jitable
+def side_of(scene: Scene, y: F1, f: int) -> float:
+    """Return on which side of its switches force f is; the bodies have been placed."""
+    kept = scene.state.dry[f]
+    _, x, rate = displacement(scene, y, f)
+    ask_formula(scene, f, Asked.SIDE, x, rate, kept[SLIDER], kept[SLIDES])
+    return scene.work.wrench[0]
 
 
 @jitable
 def strength(scene: Scene, t: float, y: F1, f: int, x: float, rate: float) -> V3:
-    """Return F, stored energy and lost power of applied force f at displacement x."""
-    par, program = scene.applied.par[f], scene.applied.program[f]
-    kind = scene.applied.kind[f]
-    if kind == SLIDE_LIMIT or kind == TURN_LIMIT:
-        return at_limit(scene, f, x, rate)
+    """Return F, stored energy and lost power of scalar force f at displacement x."""
+    program, out = scene.applied.program[f], scene.work.wrench
     if program >= 0:
         size = value(scene, t, y, program)
         return size, 0.0, -size * rate
-    stretch = x - par[2]
-    spring = par[3] - par[0] * stretch
-    stored = stretch * (0.5 * par[0] * stretch - par[3])
-    return spring - par[1] * rate, stored, par[1] * rate * rate
+    by_formula(scene, f, x, rate)
+    return out[0], out[1], out[2]
 
 
 @jitable
-def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:  # noqa: C901
-    """Add every applied force to its bodies and what it dissipates to y'; return 0.
+def add_scalar(scene: Scene, t: float, y: F1, f: int) -> int:
+    """Add scalar force f to its bodies and fill its row of `Work.applied`; return 0 or a code."""
+    applied, row, none = scene.applied, scene.work.applied[f], (0.0, 0.0, 0.0)
+    form = applied.form[f]
+    n, x, rate = displacement(scene, y, f)
+    size, stored, lost = strength(scene, t, y, f, x, rate)
+    load = scale(size, n)
+    force, torque = (none, load) if form == AXIS_TORQUE else (load, none)
+    if form == AXIS_FORCE_AT_I:
+        return apply(scene, y, f, force, torque, stored, lost)
+    push(scene, applied.i[f], force, torque)
+    if applied.alone[f] == 0:
+        push(scene, applied.j[f], scale(-1.0, force), scale(-1.0, torque))
+    for k in range(3):
+        row[k] = force[k]
+        row[3 + k] = torque[k]
+    row[STORED_ENERGY] = stored
+    row[LOST_POWER] = lost
+    return 0 if math.isfinite(size) else Code.NOT_FINITE
 
-    Many branches because kinds differ in their line or axis; how they push is one for all.
-    """
+
+@jitable
+def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:
+    """Add every applied force to its bodies and what it dissipates to y'; return 0."""
     applied, work, lost = scene.applied, scene.work, 0.0
-    none = (0.0, 0.0, 0.0)
-    for f in range(len(applied.kind)):
-        i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
+    for f in range(len(applied.form)):
+        form = applied.form[f]
         if applied.with_reactions[f] == 1:
             for k in range(len(work.applied[f])):
                 work.applied[f, k] = 0.0
             continue
-        if kind == VECTOR_FORCE or kind == MARKER_FORCE or kind == RESIDUAL:
+        if form == VECTOR_FORCE or form == WRENCH or form == RESIDUAL:
             code = wrench(scene, t, y, f)
-            if code != 0:
-                return code
-            lost += work.applied[f, LOST_POWER]
-            continue
-        if is_dry(kind):
-            lost += add_dry(scene, y, f)
-            if not math.isfinite(dot(vector(work.applied[f]), vector(work.applied[f]))):
-                return Code.NOT_FINITE
-            continue
-        if kind == LINE_FORCE:
-            n, x, rate = along_line(scene, y, f)
-        elif kind == AXIS_FORCE:
-            n, x = marker_axis(scene, j, 2), 0.0
-            rate = dot(n, marker_velocity(scene, i))
-        elif kind == SLIDE_LIMIT:
-            n, x, rate = along_slide(scene, y, f)
         else:
-            n, x, rate = along_axis(scene, f)
-        if kind == AXIS_TORQUE and applied.alone[f] == 1:
-            rate = dot(n, vector(work.w[scene.markers.body[i]]))
-        size, stored, power = strength(scene, t, y, f, x, rate)
-        load = scale(size, n)
-        turns = kind == AXIS_TORQUE or kind == TURN_LIMIT
-        force, torque = (none, load) if turns else (load, none)
-        push(scene, i, force, torque)
-        if applied.alone[f] == 0:
-            push(scene, j, scale(-1.0, force), scale(-1.0, torque))
-        for k in range(3):
-            work.applied[f, k] = force[k]
-            work.applied[f, 3 + k] = torque[k]
-        work.applied[f, STORED_ENERGY] = stored
-        work.applied[f, LOST_POWER] = power
-        lost += power
-        if not math.isfinite(size):
-            return Code.NOT_FINITE
+            code = add_scalar(scene, t, y, f)
+        if code != 0:
+            return code
+        lost += work.applied[f, LOST_POWER]
     if scene.world.accumulators[1] >= 0:
         dy[scene.world.accumulators[1]] = lost
+    return 0
+
+
+@jitable
+def record_mode(scene: Scene, t: float, kind: int, f: int) -> None:
+    """Append an event of force f that slides or sticks; it has no slot."""
+    rows = scene.rows
+    k = rows.used[2]
+    if k < len(rows.events):
+        rows.events[k, 0], rows.events[k, 1] = t, kind
+        rows.events[k, 2], rows.events[k, 3] = scene.applied.id[f], -1.0
+        rows.used[2] = k + 1
+
+
+@jitable
+def serve_kept(scene: Scene, what: int, t: float, y: F1) -> int:
+    """Do what forces that remember are asked for (`Dry`) where none is rigid; return 0."""
+    return commit_kept(scene, t, y) if what == Dry.KEEP else 0
+
+
+@jitable
+def commit_kept(scene: Scene, t: float, y: F1) -> int:
+    """Keep what forces that remember make of the point evaluated last; return 0.
+
+    What they lose at once is lost by the model. Those that equations hold have a memory of another
+    kind (`stiction.rigid_friction`).
+    """
+    for f in range(len(scene.applied.form)):
+        if scene.applied.keeps[f] == 0 or scene.applied.equation[f] >= 0:
+            continue
+        kept, new = scene.state.dry[f], scene.work.wrench
+        before = kept[SLIDES]
+        _, x, rate = displacement(scene, y, f)
+        ask_formula(scene, f, Asked.COMMIT, x, rate, kept[SLIDER], before)
+        kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], before
+        kept[SLIDER], kept[SLIDES] = new[0], new[1]
+        if scene.world.accumulators[1] >= 0:
+            y[scene.world.accumulators[1]] += new[2]
+        if kept[SLIDES] != before:
+            record_mode(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
     return 0

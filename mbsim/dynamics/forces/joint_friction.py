@@ -3,7 +3,7 @@
 With z the axis of J, v_z and w_z slide and spin of I against J, w all of the relative spin, F and
 T the reaction on I, r the radius of pin or ball:
 
-| kind           | slip                 | pressed by                       |
+| form           | slip                 | pressed by                       |
 |----------------|----------------------|----------------------------------|
 | SLIDE_FRICTION | v_z z                | abs(F across z)                  |
 | TURN_FRICTION  | r w_z, about z       | abs(F across z)                  |
@@ -60,14 +60,14 @@ MOST_ROUNDS = 60
 def fill_slip(scene: Scene, f: int) -> None:
     """Fill the wrench of a unit force along the slip of friction f, and its speed."""
     applied, row = scene.applied, scene.work.rub[f]
-    i, j, kind, radius = applied.i[f], applied.j[f], applied.kind[f], applied.par[f, RADIUS]
+    i, j, form, radius = applied.i[f], applied.j[f], applied.form[f], applied.par[f, RADIUS]
     w = scene.work.w
     spin = sub(vector(w[scene.markers.body[i]]), vector(w[scene.markers.body[j]]))
     slide = (0.0, 0.0, 0.0)
-    if kind != BALL_FRICTION:
+    if form != BALL_FRICTION:
         z = marker_axis(scene, j, 2)
-        spin = scale(dot(spin, z) if kind != SLIDE_FRICTION else 0.0, z)
-        if kind != TURN_FRICTION:
+        spin = scale(dot(spin, z) if form != SLIDE_FRICTION else 0.0, z)
+        if form != TURN_FRICTION:
             v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
             slide = scale(dot(v, z), z)
     speed = math.hypot(norm(slide), radius * norm(spin))
@@ -92,7 +92,7 @@ def press(scene: Scene, f: int) -> float:
     at = 6 * applied.connection[f]
     force = (reaction[at], reaction[at + 1], reaction[at + 2])
     preload, arm = applied.par[f, PRELOAD], applied.par[f, ARM]
-    if applied.kind[f] == BALL_FRICTION:
+    if applied.form[f] == BALL_FRICTION:
         return norm(force) + preload
     z = marker_axis(scene, applied.j[f], 2)
     bend = 0.0
@@ -138,7 +138,7 @@ def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
     """
     applied, rub = scene.applied, scene.work.rub
     worst, largest, row, along, change = 0.0, 0.0, 0, 0.0, 0.0
-    for f in range(len(applied.kind)):
+    for f in range(len(applied.form)):
         if applied.connection[f] < 0:
             continue
         force = ask_law(scene, t, f)
@@ -173,7 +173,7 @@ def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
             scene.work.trouble[1] = -1
             return 0
         step *= factor
-        for f in range(len(applied.kind)):
+        for f in range(len(applied.form)):
             if applied.connection[f] >= 0:
                 add_force(scene, f, step * rub[f, MISS])
         hold_again(scene, t)
@@ -184,7 +184,7 @@ def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
 def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     """Add friction to the accelerations and what it dissipates to y'; return 0 or a code."""
     applied, work, lost = scene.applied, scene.work, 0.0
-    for f in range(len(applied.kind)):
+    for f in range(len(applied.form)):
         if applied.connection[f] >= 0:
             fill_slip(scene, f)
     stresses = 0
@@ -194,7 +194,7 @@ def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     code = settle_friction(scene, t, y, stresses)
     if code != 0:
         return code
-    for f in range(len(applied.kind)):
+    for f in range(len(applied.form)):
         if applied.connection[f] < 0:
             continue
         force = work.rub[f, FORCE]

@@ -17,10 +17,8 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
-    AXIS_FORCE,
     AXIS_TORQUE,
     JOINT_FRICTION,
-    LINE_FORCE,
     LOST_POWER,
     SCALAR,
     SCALE_LENGTH,
@@ -32,12 +30,12 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, scale, sub, vector
 from mbsim.dynamics.bodies.acceleration import accelerate
-from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 from mbsim.dynamics.constraints.equations import hold_again
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.expressions.jets import value
-from mbsim.dynamics.forces.applied import along_axis, along_line, push
+from mbsim.dynamics.forces.applied import displacement, push
 from mbsim.dynamics.forces.joint_friction import (
     GOOD_ENOUGH,
     SETTLED,
@@ -63,20 +61,11 @@ TOO_LARGE = 1e9
 def fill_direction(scene: Scene, y: F1, f: int) -> None:
     """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
     applied, row = scene.applied, scene.work.rub[f]
-    i, j, kind = applied.i[f], applied.j[f], applied.kind[f]
-    n, rate = (0.0, 0.0, 0.0), 0.0
-    if kind == LINE_FORCE:
-        n, _, rate = along_line(scene, y, f)
-    elif kind == AXIS_FORCE:
-        n = marker_axis(scene, j, 2)
-        rate = dot(n, marker_velocity(scene, i))
-    else:
-        n, _, rate = along_axis(scene, f)
-        if applied.alone[f] == 1:
-            rate = dot(n, vector(scene.work.w[scene.markers.body[i]]))
+    turns = applied.form[f] == AXIS_TORQUE
+    n, _, rate = displacement(scene, y, f)
     for k in range(3):
-        row[k] = 0.0 if kind == AXIS_TORQUE else n[k]
-        row[3 + k] = n[k] if kind == AXIS_TORQUE else 0.0
+        row[k] = 0.0 if turns else n[k]
+        row[3 + k] = n[k] if turns else 0.0
     row[SPEED] = rate
 
 
@@ -176,7 +165,7 @@ def measure_misses(scene: Scene, t: float, y: F1) -> tuple[int, float, float]:
 def unit(scene: Scene, u: int) -> float:
     """Return what makes a force of unknown u: the length for torques, else 1."""
     f, c = scene.applied.by_reactions[u, 0], scene.applied.by_reactions[u, 1]
-    turns = (c >= 3 and c < SCALAR) or scene.applied.kind[f] == AXIS_TORQUE
+    turns = (c >= 3 and c < SCALAR) or scene.applied.form[f] == AXIS_TORQUE
     return scene.world.scale[SCALE_LENGTH] if turns else 1.0
 
 

@@ -1,6 +1,6 @@
-"""Marker and vector forces: force and torque at I's origin, the opposite there on J's body.
+"""Wrenches and vector forces: force and torque at I's origin, the opposite there on J's body.
 
-What a marker force is stands in `forces.catalog`. A vector force has no potential: its work counts
+What a wrench is stands in `forces.catalog`. A vector force has no potential: its work counts
 as lost, with the sign turned.
 """
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.codes import LOST_POWER, MARKER_FORCE, STORED_ENERGY
+from mbsim.arrays.codes import LOST_POWER, STORED_ENERGY, WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -155,7 +155,7 @@ def add_marker_force(scene: Scene, y: F1, f: int) -> int:
     """Add a force of a kind of `forces.catalog`, as `add_vector_force`; return 0 or a code."""
     applied, out = scene.applied, scene.work.wrench
     fill_motion(scene, y, f)
-    code = call_int(applied.law[f], (scene.work.motion, applied.law_par[f], out))
+    code = call_int(applied.formula[f], (scene.work.motion, applied.par[f], out))
     if code != 0:
         return code
     j = applied.j[f]
@@ -185,6 +185,6 @@ def apply(scene: Scene, y: F1, f: int, force: V3, torque: V3, stored: float, los
 @jitable
 def add_wrench(scene: Scene, t: float, y: F1, f: int) -> int:
     """Add a vector force or a marker force; return 0 or a code."""
-    if scene.applied.kind[f] == MARKER_FORCE:
+    if scene.applied.form[f] == WRENCH:
         return add_marker_force(scene, y, f)
     return add_vector_force(scene, t, y, f)

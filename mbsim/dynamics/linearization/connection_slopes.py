@@ -51,8 +51,8 @@ def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
 
     Of slip and wrenches there are one (slide or turn), two (screw) or three (ball) components.
     """
-    P, L, nb, kind = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.kind[f]
-    i, j, ball = scene.applied.i[f], scene.applied.j[f], kind == BALL_FRICTION
+    P, L, nb, form = T.pattern, T.linear, len(scene.bodies.mass), scene.applied.form[f]
+    i, j, ball = scene.applied.i[f], scene.applied.j[f], form == BALL_FRICTION
     bi, bj = sides_of(scene, f)
     radius, z = scene.applied.par[f, RADIUS], marker_axis(scene, j, 2)
     w = sub(vector(scene.work.w[bi]), vector(scene.work.w[bj]))
@@ -64,7 +64,7 @@ def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
         e = unit(k) if ball else z
         # of slide and turn, the slide is the second
         slides = not ball and k == 1
-        used = ball or kind == SCREW_FRICTION or slides == (kind == SLIDE_FRICTION)
+        used = ball or form == SCREW_FRICTION or slides == (form == SLIDE_FRICTION)
         size = (1.0 if slides else radius) if used else 0.0
         slip[k] = size * dot(v if slides else w, e)
         wrench = scale(size, e)
@@ -91,6 +91,6 @@ def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
 @jitable
 def add_rubs_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add what friction in joints does."""
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.connection[f] >= 0 and scene.applied.law[f] != 0:
             add_rub_slopes(scene, T, t, y, f)

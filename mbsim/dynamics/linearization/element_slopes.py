@@ -176,6 +176,6 @@ def add_residual_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> No
 @jitable
 def add_all_residual_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add what all elements do; the slopes of states have been filled."""
-    for f in range(len(scene.applied.kind)):
-        if scene.applied.kind[f] == RESIDUAL:
+    for f in range(len(scene.applied.form)):
+        if scene.applied.form[f] == RESIDUAL:
             add_residual_slopes(scene, T, t, y, f)

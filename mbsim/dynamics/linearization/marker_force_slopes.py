@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import MARKER_FORCE
+from mbsim.arrays.codes import WRENCH
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2, F3, V3
@@ -99,7 +99,7 @@ def add_marker_force_slopes(scene: Scene, T: Tangent, y: F1, f: int) -> None:
     P, L, nb, applied = T.pattern, T.linear, len(scene.bodies.mass), scene.applied
     j, both, table = applied.j[f], sides_of(scene, f), scene.work.slopes
     fill_motion(scene, y, f)
-    call_int(applied.slopes[f], (scene.work.motion, applied.law_par[f], table))
+    call_int(applied.slopes[f], (scene.work.motion, applied.par[f], table))
     fill_units(scene, T, y, f)
     K, D = table[:6], table[6:]
     for k in range(6):
@@ -122,6 +122,6 @@ def add_marker_force_slopes(scene: Scene, T: Tangent, y: F1, f: int) -> None:
 @jitable
 def add_marker_forces_slopes(scene: Scene, T: Tangent, y: F1) -> None:
     """Add all of them."""
-    for f in range(len(scene.applied.kind)):
-        if scene.applied.kind[f] == MARKER_FORCE:
+    for f in range(len(scene.applied.form)):
+        if scene.applied.form[f] == WRENCH:
             add_marker_force_slopes(scene, T, y, f)

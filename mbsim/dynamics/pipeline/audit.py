@@ -56,7 +56,9 @@ from mbsim.arrays.codes import (
     WORST_OPEN,
     WORST_TIME,
 )
+from mbsim.arrays.hooks import Contacts, Hook, answer_of
 from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
@@ -111,7 +113,10 @@ def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) ->
     audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
     fill_energy(scene, y, energy)
     total = energy[0] + energy[1] + energy[2] - energy[3]
-    contact, none = hardest(scene), len(scene.contacts.id)
+    none = contact = len(scene.contacts.id)
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        contact = answer_of(scene, call_int(contacts, (scene, Contacts.HARDEST, t, 0.0, y, y)))
     if tally[ANEW] == 1.0:
         tally[CLOSED_AT] = total - tally[OPEN_BY]
         tally[POTENTIAL_FIRST], tally[DISSIPATED_FIRST] = energy[1], energy[2]
@@ -146,6 +151,24 @@ def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) ->
 
 
 @jitable
+def mark_touched(scene: Scene) -> None:
+    """Mark the groups of bodies that ground touches."""
+    sums, hit, graphics, nb = (
+        scene.audit.sums,
+        scene.work.hit,
+        scene.graphics,
+        len(scene.bodies.mass),
+    )
+    for k in range(hit[len(hit) - 1]):
+        gi, gj = sides(scene, hit[k])
+        bi, bj = graphics.body[gi], graphics.body[gj]
+        if bi == nb and bj < nb:
+            sums[scene.scales.group[bj], SPINS + 1] = 1.0
+        elif bj == nb and bi < nb:
+            sums[scene.scales.group[bi], SPINS + 1] = 1.0
+
+
+@jitable
 def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the momentum of groups that ground does not touch with what their weight gives."""
     audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
@@ -170,14 +193,9 @@ def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) 
             row[TURN + k] += turn[k]
         row[SPEEDS] += m * norm(u)
         row[SPINS] += m * norm(d) * norm(u) + norm(spin)
-    hit, graphics = scene.work.hit, scene.graphics
-    for k in range(hit[len(hit) - 1]):
-        gi, gj = sides(scene, hit[k])
-        bi, bj = graphics.body[gi], graphics.body[gj]
-        if bi == nb and bj < nb:
-            sums[scene.scales.group[bj], SPINS + 1] = 1.0
-        elif bj == nb and bi < nb:
-            sums[scene.scales.group[bi], SPINS + 1] = 1.0
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        answer_of(scene, call_int(contacts, (scene, Contacts.TOUCHED, t, 0.0, y, y)))
     dt, gravity = t - audit.tally[TIME_THEN], vector(scene.world.gravity)
     errors = local + steps * audit.plan[AUDIT_TOL]
     for g in range(len(sums)):
@@ -292,5 +310,7 @@ def examine(scene: Scene, t: float, h: float, y: F1) -> None:
     examine_momentum(scene, t, y, steps, local)
     if tally[ANEW] == 0.0:
         examine_equations(scene, t)
-        examine_friction(scene, t)
+        if scene.world.hooks[Hook.CONTACTS] != 0:
+            contacts = scene.world.hooks[Hook.CONTACTS]
+            answer_of(scene, call_int(contacts, (scene, Contacts.CONE, t, h, y, y)))
     tally[HITS_THEN], tally[TIME_THEN], tally[ANEW] = hits, t, 0.0

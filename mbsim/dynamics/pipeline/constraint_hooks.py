@@ -26,7 +26,7 @@ from mbsim.dynamics.constraints.reactions import fill_reactions
 from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import prepare, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import carry_all, project_tree
-from mbsim.dynamics.forces.dry_friction import show_sticking
+from mbsim.dynamics.stiction.rigid_friction import show_sticking
 
 
 @jitable

@@ -7,7 +7,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import Pointer
-from mbsim.dynamics.forces.dry_friction import serve_dry
+from mbsim.dynamics.forces.applied import serve_kept
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
@@ -34,7 +34,7 @@ def keep_with_dry(context: int, what: int, t: float, y: Pointer) -> int:
     scene = view(context, Scene)
     a = vector_at(y, scene.rows.y.shape[1])
     note_failure(scene, keep_residuals(scene, what, t, a))
-    return serve_dry(scene, what, t, a)
+    return serve_kept(scene, what, t, a)
 
 
 def keep_with_rigid(context: int, what: int, t: float, y: Pointer) -> int:

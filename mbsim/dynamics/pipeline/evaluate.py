@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import NEAR_FOLD, NOW, WITHIN
-from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
+from mbsim.arrays.hooks import Contacts, Dry, Hook, Joints, Sticking, answer_of, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -14,8 +14,6 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.forces import add_contact, contact_of
 
 
 @jitable
@@ -31,20 +29,6 @@ def add_gravity(scene: Scene) -> None:
 
 
 @jitable
-def add_contacts(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
-    """Add the forces of every touching slot; return 0 or a law's code."""
-    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
-        dy[k] = 0.0
-    hit = scene.work.hit
-    for k in range(hit[len(hit) - 1]):
-        code = add_contact(scene, t, h, y, dy, hit[k])
-        if code != 0:
-            scene.work.trouble[1] = contact_of(scene, hit[k])
-            return code
-    return 0
-
-
-@jitable
 def evaluate(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     """Fill dy = f(t, y), `h` after the committed state; return 0 or why it cannot be."""
     # where things are
@@ -55,16 +39,14 @@ def evaluate(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
         if code != 0:
             return code
 
-    # who touches whom
-    code = find_contacts(scene, y)
-    if code != 0:
-        return code
-
     # what pushes
     add_gravity(scene)
-    code = add_contacts(scene, t, h, y, dy)
-    if code != 0:
-        return code
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
+        dy[k] = 0.0
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        answer = call_int(scene.world.hooks[Hook.CONTACTS], (scene, Contacts.PUSH, t, h, y, dy))
+        if answer < 0:
+            return -answer
 
     if scene.world.hooks[Hook.APPLIED] != 0:
         code = call_int(scene.world.hooks[Hook.APPLIED], (scene, t, y, dy))

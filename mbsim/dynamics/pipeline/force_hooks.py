@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import FOLD_HALT
-from mbsim.arrays.hooks import failure_or
+from mbsim.arrays.hooks import Gauges, Hook, failure_or
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import vector_at, view
+from mbsim.core.address import call_float, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
-from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.jets import fill_values
 from mbsim.dynamics.expressions.states import add_slopes
 from mbsim.dynamics.expressions.values import evaluate_program
-from mbsim.dynamics.forces.applied import add_applied
-from mbsim.dynamics.forces.dry_friction import serve_dry
+from mbsim.dynamics.forces.applied import add_applied, serve_kept
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
@@ -105,7 +103,7 @@ def commit_turns(context: int) -> int:
 def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:
     """What dry friction keeps of an accepted step, and what it holds."""
     scene = view(context, Scene)
-    return serve_dry(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
+    return serve_kept(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
 
 
 def serve_rigid_alone(context: int, what: int, t: float, y: Pointer) -> int:
@@ -123,8 +121,9 @@ def serve_sticking_contacts(context: int, what: int, t: float, y: Pointer) -> in
 def limit_turn(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step that lets nothing pass through anything and no angle lose count of its turns."""
     scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    longest = longest_turn(scene, longest_step(scene, vector_at(a, n), vector_at(b, n), h))
-    failure_or(scene, 0)  # laws are explored, not asked
+    longest = h
+    if scene.world.hooks[Hook.GAUGES] != 0:
+        longest = call_float(scene.world.hooks[Hook.GAUGES], (scene, Gauges.STEP, t, h, a, b))
+    longest = longest_turn(scene, longest)
     halt = scene.sweep.quality[FOLD_HALT]
     return min(longest, halt - t) if halt > t else longest

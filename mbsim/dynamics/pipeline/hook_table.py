@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from mbsim.arrays.codes import DRY_SLIDE, DRY_TURN, MARKER_FORCE, RESIDUAL, VECTOR_FORCE
+from mbsim.arrays.codes import RESIDUAL, VECTOR_FORCE, WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
@@ -63,6 +63,22 @@ def _no_entry(scene: Scene) -> Callable[..., Any]:
     raise ValueError("this hook has no compiled function")
 
 
+def _has_contacts(scene: Scene, method: Method) -> bool:
+    return len(scene.contacts.id) > 0
+
+
+def _contacts(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import serve_contacts
+
+    return serve_contacts
+
+
+def _gauges(scene: Scene) -> Callable[..., Any]:
+    from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts
+
+    return gauge_contacts
+
+
 def _has_programs(scene: Scene, method: Method) -> bool:
     return len(scene.programs.start) > 1
 
@@ -88,26 +104,26 @@ def _jet(scene: Scene) -> Callable[..., Any]:
 
 def _has_applied(scene: Scene, method: Method) -> bool:
     driven = len(scene.states.program) > 0 or bool((scene.world.weight >= 0).any())
-    return len(scene.applied.kind) > 0 or driven
+    return len(scene.applied.form) > 0 or driven
 
 
 def _applied(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline.force_hooks import act, drive_alone
 
-    return act if len(scene.applied.kind) > 0 else drive_alone
+    return act if len(scene.applied.form) > 0 else drive_alone
 
 
 def _has_wrenches(scene: Scene, method: Method) -> bool:
-    return bool(np.isin(scene.applied.kind, (VECTOR_FORCE, MARKER_FORCE, RESIDUAL)).any())
+    return bool(np.isin(scene.applied.form, (VECTOR_FORCE, WRENCH, RESIDUAL)).any())
 
 
 def _wrench(scene: Scene) -> Callable[..., Any]:
     """Return what adds the wrenches that there are, so that no other is compiled."""
     from mbsim.dynamics.pipeline import force_hooks as of
 
-    kind = scene.applied.kind
-    vectors = np.isin(kind, (VECTOR_FORCE, RESIDUAL)).any()
-    if (kind == MARKER_FORCE).any():
+    form = scene.applied.form
+    vectors = np.isin(form, (VECTOR_FORCE, RESIDUAL)).any()
+    if (form == WRENCH).any():
         return of.act_by_wrench if vectors else of.act_by_marker_force
     return of.act_by_vector_force
 
@@ -186,20 +202,20 @@ def _memory(scene: Scene) -> Callable[..., Any]:
 
 
 def _needs_slopes(scene: Scene, method: Method) -> bool:
-    acts = len(scene.applied.kind) > 0 or len(scene.states.program) > 0
+    acts = len(scene.applied.form) > 0 or len(scene.states.program) > 0
     return method.tangent is not None and acts
 
 
 def _slopes(scene: Scene) -> Callable[..., Any]:
-    kinds = set(scene.applied.kind.tolist())
-    if RESIDUAL in kinds:
+    forms = set(scene.applied.form.tolist())
+    if RESIDUAL in forms:
         from mbsim.dynamics.pipeline.element_hooks import residual_slopes
 
         return residual_slopes
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
     rubs = bool((scene.applied.connection >= 0).any())
-    if MARKER_FORCE in kinds:
+    if WRENCH in forms:
         return of.slopes_with_both if rubs else of.slopes_with_marker_forces
     return of.slopes_with_rubs if rubs else of.slopes
 
@@ -211,7 +227,7 @@ def _memory_pair(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_dry(scene: Scene, method: Method) -> bool:
-    keeps = np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any() or scene.contacts.rigid.any()
+    keeps = scene.applied.keeps.any() or scene.contacts.rigid.any()
     return bool(keeps) or len(scene.residuals.id) > 0
 
 
@@ -223,7 +239,7 @@ def _dry(scene: Scene) -> Callable[..., Any]:
 
         if rigid:
             return of.keep_with_rigid
-        dry = np.isin(scene.applied.kind, (DRY_SLIDE, DRY_TURN)).any()
+        dry = scene.applied.keeps.any()
         return of.keep_with_dry if dry else of.keep_elements
     from mbsim.dynamics.pipeline.force_hooks import serve_dry_alone, serve_rigid_alone
 
@@ -262,6 +278,14 @@ def _requests(scene: Scene) -> Callable[..., Any]:
 
 TABLE = (
     # evaluation
+    Row(
+        Hook.CONTACTS,
+        _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
+        _has_contacts,
+        _contacts,
+        "does what contacts are asked for: `Contacts`",
+        "an answer, or less a code",
+    ),
     Row(
         Hook.FCL,
         _INT(_INT),  # how many pairs of `Work.fcl`
@@ -364,6 +388,14 @@ TABLE = (
         "does the same in complex systems",
     ),
     # a step is taken
+    Row(
+        Hook.GAUGES,
+        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        _has_contacts,
+        _gauges,
+        "measures contacts: `Gauges`",
+        "the measure; a failure is noted",
+    ),
     Row(
         Hook.DRY,
         _KEEPS,

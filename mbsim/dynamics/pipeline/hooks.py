@@ -4,11 +4,29 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ERROR_NOW, FOLD_HALT, FOLDS, HELD_OTHERWISE, LISTINGS
-from mbsim.arrays.hooks import Dry, Hook, Joints, Sticking, answer_of, failure_or
+from mbsim.arrays.codes import (
+    ENERGY_LOST,
+    ERROR_NOW,
+    FOLD_HALT,
+    FOLDS,
+    HELD_OTHERWISE,
+    LISTINGS,
+)
+from mbsim.arrays.hooks import (
+    Contacts,
+    Dry,
+    Gauges,
+    Hook,
+    Joints,
+    Sticking,
+    answer_of,
+    failure_or,
+    note_failure,
+)
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int, vector_at, view
-from mbsim.core.arrays import Pointer
+from mbsim.core.address import call_float, call_int, vector_at, view
+from mbsim.core.arrays import F1, Pointer
+from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import (
     ALONG,
@@ -20,19 +38,52 @@ from mbsim.core.problem import (
 )
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
-from mbsim.dynamics.contact.points import commit, first_depth, reversal, watch_peaks
+from mbsim.dynamics.contact.points import first_depth, reversal
 from mbsim.dynamics.events.stability import stable_step
-from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import examine, examine_fold
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
 from mbsim.dynamics.pipeline.output import (
-    find_fault,
-    friction_left,
-    impact_left,
+    gauged,
     no_room,
     scaled_error,
     write_row,
 )
+
+
+@jitable
+def accept(scene: Scene, t: float, h: float, y: F1) -> int:
+    """Take the point evaluated last as accepted.
+
+    Returns 1 if y changed so that f did, HELD_OTHERWISE if the motion goes on otherwise.
+    """
+    state, graphics, ground = scene.state, scene.graphics, len(scene.bodies.mass)
+    contacts, changed = scene.world.hooks[Hook.CONTACTS], 0
+    if contacts != 0:
+        changed = answer_of(scene, call_int(contacts, (scene, Contacts.KEEP, t, h, y, y)))
+    if scene.world.hooks[Hook.DRY] != 0:
+        answer = call_int(scene.world.hooks[Hook.DRY], (scene, Dry.KEEP, t, y))
+        changed = max(changed, answer_of(scene, answer))
+    if contacts != 0:
+        answer_of(scene, call_int(contacts, (scene, Contacts.WATCH, t, h, y, y)))
+        count = len(scene.contacts.id)
+        for c in range(count):
+            scene.log.contacts[c, ENERGY_LOST] = y[len(y) - count + c]
+        answer_of(scene, call_int(contacts, (scene, Contacts.GAPS, t, h, y, y)))
+    for b in range(ground):
+        for k in range(4):
+            state.q[b, k] = y[BODY_SIZE * b + 3 + k]
+        for k in range(3):
+            state.w[b, k] = scene.work.w[b, k]
+    state.since[0] = t
+    for g in range(len(graphics.body)):
+        if graphics.body[g] < ground:
+            for k in range(3):
+                state.centre[g, k] = scene.work.frames[g, k]
+    if scene.world.hooks[Hook.ANGLES] != 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene,)))
+    if len(scene.broadphase.contact) > 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.NEAR], (scene, y)))
+    return changed
 
 
 def rhs(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
@@ -63,9 +114,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return impact_left(scene, t, vector_at(a, n), vector_at(b, n))
+        return gauged(scene, Gauges.IMPACT, t, t, a, b)
     if h == FRICTION_ALONE:
-        return friction_left(scene, vector_at(a, n), vector_at(b, n), False)
+        return gauged(scene, Gauges.FRICTION, t, t, a, b)
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:
         scene.audit.tally[ERROR_NOW] = error
@@ -93,7 +144,7 @@ def _commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
             return -failure_or(scene, code)
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
-    changed = commit(scene, t, h, y)
+    changed = accept(scene, t, h, y)
     examine(scene, t, h, y)
     passes = scene.sweep.quality[FOLDS] == 1.0
     left = passed and not passes
@@ -118,8 +169,9 @@ def _look(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     code = evaluate_past(scene, t, h, vector_at(a, n), vector_at(b, n))
-    if code == 0:
-        watch_peaks(scene, t)
+    if code == 0 and scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        answer_of(scene, call_int(contacts, (scene, Contacts.WATCH, t, h, a, a)))
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.HOLD_AGAIN, t, a)))
     return failure_or(scene, code)
@@ -133,9 +185,10 @@ def _inner(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
 def _limit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     """The step that lets nothing pass through anything."""
     scene = view(context, Scene)
-    n = scene.rows.y.shape[1]
-    longest = longest_step(scene, vector_at(a, n), vector_at(b, n), h)
-    failure_or(scene, 0)  # laws are explored, not asked
+    if scene.world.hooks[Hook.GAUGES] != 0:
+        longest = call_float(scene.world.hooks[Hook.GAUGES], (scene, Gauges.STEP, t, h, a, b))
+    else:
+        longest = h
     halt = scene.sweep.quality[FOLD_HALT]
     return min(longest, halt - t) if halt > t else longest
 
@@ -161,11 +214,14 @@ def _reject(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
-    contact = scene.work.trouble[1] if reason == BY_CHECK else find_fault(scene)
+    contact = scene.work.trouble[1] if reason == BY_CHECK else -1
+    if reason != BY_CHECK and scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        contact = answer_of(scene, call_int(contacts, (scene, Contacts.BLAME, t, h, a, a))) - 1
     row = contact if contact >= 0 else len(scene.contacts.id)
     scene.work.trouble[1] = contact
     scene.log.rejections[row, reason] += 1
-    return 0
+    return failure_or(scene, 0)
 
 
 def stable(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
@@ -189,11 +245,11 @@ HOOKS = {
     "rhs": rhs,
     "project": _project,
     "norm": _norm,
-    "check": _check,
     "commit": _commit,
     "look": _look,
-    "inner": _inner,
     "limit": _limit,
     "output": _output,
     "reject": _reject,
 }
+#: Of a scene with contacts.
+CONTACT_HOOKS = {"check": _check, "inner": _inner}

@@ -27,9 +27,9 @@ from mbsim.arrays.codes import (
     INC_X,
     STORED_ENERGY,
 )
-from mbsim.arrays.hooks import Hook, Joints, note_failure
+from mbsim.arrays.hooks import Contacts, Gauges, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
@@ -84,19 +84,29 @@ def fill_energy(scene: Scene, y: F1, row: F1) -> None:
         w = (y[at + 10], y[at + 11], y[at + 12])
         kinetic += 0.5 * (bodies.mass[b] * dot(v, v) + dot(w, rotate(bodies.inertia[b], w)))
         potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
-    hit = scene.work.hit
-    for k in range(hit[len(hit) - 1]):
-        potential += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], HELD]
-        dissipated -= scene.work.slot[hit[k], HELD]
-    for c in range(len(scene.contacts.id)):
-        dissipated += y[len(y) - len(scene.contacts.id) + c]
-    for f in range(len(scene.applied.kind)):
+    row[0], row[1], row[2] = kinetic, potential, dissipated
+    if scene.world.hooks[Hook.CONTACTS] != 0:
+        contacts = scene.world.hooks[Hook.CONTACTS]
+        answer_of(scene, call_int(contacts, (scene, Contacts.ENERGY, 0.0, 0.0, y, row)))
+        potential, dissipated = row[1], row[2]
+    for f in range(len(scene.applied.form)):
         potential += scene.work.applied[f, STORED_ENERGY]
     work, damped = scene.world.accumulators[0], scene.world.accumulators[1]
     if damped >= 0:
         dissipated += y[damped]
-    row[0], row[1], row[2] = kinetic, potential, dissipated
+    row[1], row[2] = potential, dissipated
     row[3] = y[work] if work >= 0 else 0.0
+
+
+@jitable
+def add_stored(scene: Scene, y: F1, row: F1) -> None:
+    """Add what contacts have stored and lost to a row of energies."""
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        row[1] += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], HELD]
+        row[2] -= scene.work.slot[hit[k], HELD]
+    for c in range(len(scene.contacts.id)):
+        row[2] += y[len(y) - len(scene.contacts.id) + c]
 
 
 @jitable
@@ -182,11 +192,13 @@ def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
         for j in range(3):
             rows.accel[k, 6 * b + j] = f[at + 7 + j]
             rows.accel[k, 6 * b + 3 + j] = alpha[j]
-    fill_contacts(scene, y, rows.contact[k])
+    contacts, incidents = scene.world.hooks[Hook.CONTACTS], 0
+    if contacts != 0:
+        answer_of(scene, call_int(contacts, (scene, Contacts.ROW, t, h, y, y)))
     if scene.world.hooks[Hook.JOINTS] != 0:
         reacts = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.REACT, t, y, f))
         note_failure(scene, reacts)
-    for j in range(len(scene.applied.kind)):
+    for j in range(len(scene.applied.form)):
         for c in range(6):
             rows.applied[k, 6 * j + c] = work.applied[j, c]
     for j in range(len(work.reaction)):
@@ -194,7 +206,10 @@ def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
     if scene.world.hooks[Hook.REQUESTS] != 0:
         note_failure(scene, call_int(scene.world.hooks[Hook.REQUESTS], (scene, t, y)))
     fill_energy(scene, y, rows.energy[k])
-    rows.incident_count[k] = fill_incidents(scene, h, y)
+    if contacts != 0:
+        answer = call_int(contacts, (scene, Contacts.INCIDENTS, t, h, y, y))
+        incidents = answer_of(scene, answer)
+    rows.incident_count[k] = incidents
     rows.used[0] = k + 1
     return k + 1 >= len(rows.time) or no_room(scene)
 
@@ -321,6 +336,31 @@ def carried_error(scene: Scene, e: F1, s: int) -> float:
 
 
 @jitable
+def carried_square(scene: Scene, e: F1) -> float:
+    """Return the largest square of |dX|/L and of what friction carries, over V."""
+    scales, squares, largest = scene.scales, scene.work.squares, 0.0
+    for side in range(2):
+        hit = scene.work.hit if side == 0 else scene.state.hit
+        for k in range(hit[len(hit) - 1]):
+            at = scene.slots.x[hit[k]]
+            if at >= 0 and scene.contacts.reads_x[contact_of(scene, hit[k])] == 1:
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                square = (e[at] ** 2 + e[at + 1] ** 2) / scales.length[g] ** 2
+                largest = max(largest, max(square, e[at + 2] ** 2))
+            if scene.slots.z[hit[k]] >= 0:
+                g = scales.of_contact[contact_of(scene, hit[k])]
+                largest = max(largest, carried_error(scene, e, hit[k]) ** 2 / squares[g])
+    return largest
+
+
+@jitable
+def gauged(scene: Scene, what: int, t: float, h: float, e: F1, y: F1) -> float:
+    """Return what is measured of contacts: `Gauges`; 0 where there are none."""
+    hook = scene.world.hooks[Hook.GAUGES]
+    return call_float(hook, (scene, what, t, h, e, y)) if hook != 0 else 0.0
+
+
+@jitable
 def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
@@ -348,17 +388,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         )
         if not square <= largest:
             largest, worst = square, b
-    for side in range(2):
-        hit = scene.work.hit if side == 0 else scene.state.hit
-        for k in range(hit[len(hit) - 1]):
-            at = scene.slots.x[hit[k]]
-            if at >= 0 and scene.contacts.reads_x[contact_of(scene, hit[k])] == 1:
-                g = scales.of_contact[contact_of(scene, hit[k])]
-                square = (e[at] ** 2 + e[at + 1] ** 2) / scales.length[g] ** 2
-                largest = max(largest, max(square, e[at + 2] ** 2))
-            if scene.slots.z[hit[k]] >= 0:
-                g = scales.of_contact[contact_of(scene, hit[k])]
-                largest = max(largest, carried_error(scene, e, hit[k]) ** 2 / squares[g])
+    largest = max(largest, gauged(scene, Gauges.ERROR, 0.0, h, e, y))
     # the energy balance closes as well as the motion
     first, most = len(e) - max(1, len(scene.contacts.id)), 0.0
     for c in range(len(scene.contacts.id)):
@@ -377,7 +407,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         # what was not integrated but put right, as after a motion that jumps
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     else:
-        largest = max(largest, friction_left(scene, e, y, True) ** 2)
+        largest = max(largest, gauged(scene, Gauges.REVERSAL, 0.0, h, e, y) ** 2)
     scene.work.trouble[0] = worst
     return math.sqrt(largest)
 

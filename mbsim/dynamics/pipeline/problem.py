@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from mbsim.arrays.codes import MARKER_FORCE
+from mbsim.arrays.codes import WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
 from mbsim.dynamics.pipeline.hook_table import Method, fill
-from mbsim.dynamics.pipeline.hooks import HOOKS, stable
+from mbsim.dynamics.pipeline.hooks import CONTACT_HOOKS, HOOKS, stable
 
 
 def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
@@ -26,6 +26,8 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
     """
     table = pack(scene)
     hooks = HOOKS | {"stable": stable} if fixed_step else dict(HOOKS)
+    if len(scene.contacts.id) > 0:
+        hooks |= CONTACT_HOOKS
     if len(scene.angles.i) > 0:
         from mbsim.dynamics.pipeline.force_hooks import limit_turn
 
@@ -41,7 +43,8 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
         from mbsim.dynamics.events.switching import switching_hook
 
         hooks["switching"] = switching_hook
-    problem = Problem(int(table.ctypes.data), **addresses(hooks))
+    found = {"check": 0, "inner": 0} | addresses(hooks)
+    problem = Problem(int(table.ctypes.data), **found)
     fill(scene)
     if "switching" in hooks:
         scene.state.frozen[0] = int(len(scene.work.idle) > 0)
@@ -49,12 +52,12 @@ def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarr
 
 
 def _find_slopes(scene: Scene) -> None:
-    """Let marker forces have their slopes."""
+    """Let wrenches have their slopes."""
     from mbsim.forces.abi import slopes_address
 
     applied = scene.applied
-    for f in np.flatnonzero(applied.kind == MARKER_FORCE):
-        applied.slopes[f] = slopes_address(int(applied.law[f]))
+    for f in np.flatnonzero(applied.form == WRENCH):
+        applied.slopes[f] = slopes_address(int(applied.formula[f]))
 
 
 def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:

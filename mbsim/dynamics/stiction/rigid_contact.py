@@ -29,8 +29,8 @@ from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
 from mbsim.dynamics.contact.forces import FORCE, sides, velocity_at
 from mbsim.dynamics.contact.points import record_event
-from mbsim.dynamics.forces.dry_friction import AT_REST, ROUNDING
 from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.stiction.rigid_friction import AT_REST, ROUNDING
 from mbsim.dynamics.stiction.rigid_shares import (
     LEAST_PART,
     SLIDING,

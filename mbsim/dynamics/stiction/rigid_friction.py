@@ -13,9 +13,13 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    AXIS_TORQUE,
     HELD_OTHERWISE,
+    SCALE_LENGTH,
+    SCALE_SPEED,
     SLIDER,
     SLIDER_BEFORE,
+    SLIDER_STATIC,
     SLIDES,
     SLIDES_BEFORE,
     SLIP,
@@ -26,17 +30,80 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.forces.dry_friction import (
-    AT_REST,
-    STATIC,
-    commit_dry,
-    dry_motion,
-    holding_force,
-    record_dry,
-    rest_of,
-    side_of_dry,
-)
-from mbsim.laws.dry import rigid_mode
+from mbsim.dynamics.bodies.markers import marker_axis
+from mbsim.dynamics.forces.applied import commit_kept, displacement, record_mode
+
+#: Part of the model's speed that is rounding.
+ROUNDING = 1e-13
+#: What something else holds counts as at rest below so many times that: assembly leaves it.
+AT_REST = 1e4
+
+
+@jitable
+def rigid_mode(force: float, rate: float, slides: float, static: float, rest: float) -> float:
+    """Return the mode that a point asks for where k is infinite.
+
+    Parameters
+    ----------
+    force : float
+        f that holds x' at 0; it counts in stick alone.
+    rate, slides, static : float
+        As of `dry_mode`.
+    rest : float
+        What x' may be the other way by rounding alone.
+
+    Returns
+    -------
+    float
+    """
+    if slides != 0.0:
+        return slides if slides * rate >= -rest else 0.0
+    return math.copysign(1.0, force) if abs(force) > static else 0.0
+
+
+@jitable
+def rest_of(scene: Scene, f: int) -> float:
+    """Return what is no velocity of rigid friction f but rounding."""
+    speed, turns = scene.world.scale[SCALE_SPEED], scene.applied.form[f] == AXIS_TORQUE
+    return ROUNDING * (speed / scene.world.scale[SCALE_LENGTH] if turns else speed)
+
+
+@jitable
+def holding_force(scene: Scene, f: int) -> float:
+    """Return the force against x that holds rigid friction f, no number where it need not."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        if active[r] == scene.applied.equation[f]:
+            return -scene.sweep.multiplier[r]
+    return math.nan
+
+
+@jitable
+def show_sticking(scene: Scene) -> None:
+    """Fill `Work.applied` of rigid frictions that are held; multipliers have been found."""
+    active = scene.equations.active
+    for r in range(active[len(active) - 1]):
+        f = scene.equations.dry[active[r]]
+        if f < 0:
+            continue
+        n, row = marker_axis(scene, scene.applied.axes[f], 2), scene.work.applied[f]
+        first = 3 if scene.applied.form[f] == AXIS_TORQUE else 0
+        for k in range(3):
+            row[first + k] = scene.sweep.multiplier[r] * n[k]
+
+
+@jitable
+def side_of_rigid(scene: Scene, y: F1, f: int) -> float:
+    """Return what rigid friction f does from here on: 0 to stick, or the sign of its slip."""
+    par, kept = scene.applied.par[f], scene.state.dry[f]
+    _, _, rate = displacement(scene, y, f)
+    if math.isnan(kept[SLIDER]):
+        return 0.0
+    force, rest = holding_force(scene, f), rest_of(scene, f)
+    if kept[SLIDES] == 0.0 and math.isnan(force):
+        # joints or motions hold it, or move it
+        return math.copysign(1.0, rate) if abs(rate) > AT_REST * rest else 0.0
+    return rigid_mode(force, rate, kept[SLIDES], par[SLIDER_STATIC], rest)
 
 
 @jitable
@@ -48,10 +115,10 @@ def begin_or_go_on(scene: Scene, y: F1, f: int) -> bool:
     kept = scene.state.dry[f]
     begins = math.isnan(kept[SLIDER])
     if begins:
-        _, _, rate = dry_motion(scene, y, f)
+        _, _, rate = displacement(scene, y, f)
         slides = math.copysign(1.0, rate) if abs(rate) > AT_REST * rest_of(scene, f) else 0.0
     else:
-        slides = side_of_dry(scene, y, f)
+        slides = side_of_rigid(scene, y, f)
     changed = begins or slides != kept[SLIDES]
     kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
     kept[SLIDER], kept[SLIDES] = 0.0, slides
@@ -83,14 +150,14 @@ def hold_sticking(scene: Scene, t: float, y: F1) -> int:
 def release(scene: Scene) -> int:
     """Let slide what has just come to rest and needs more than the limit; return how many."""
     count = 0
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0 or kept[SLIDES] != 0.0:
             continue
         force = holding_force(scene, f)
         if math.isnan(force):
             continue
-        kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, STATIC], 0.0)
+        kept[SLIDES] = rigid_mode(force, 0.0, 0.0, scene.applied.par[f, SLIDER_STATIC], 0.0)
         if kept[SLIDES] != 0.0:
             count += 1
     return count
@@ -100,7 +167,7 @@ def release(scene: Scene) -> int:
 def commit_rigid(scene: Scene, t: float, y: F1) -> int:
     """Keep what rigid frictions do at the point evaluated last; return 0 or HELD_OTHERWISE."""
     changed = ask_contacts(scene, Sticking.BEGIN, t, y) == 1
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0 and begin_or_go_on(scene, y, f):
             changed = True
     if not changed:
@@ -115,7 +182,7 @@ def commit_rigid(scene: Scene, t: float, y: F1) -> int:
         code = hold_sticking(scene, t, y)
     note_failure(scene, code)
     ask_contacts(scene, Sticking.RECORD, t, y)
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         kept = scene.state.dry[f]
         if scene.applied.equation[f] < 0:
             continue
@@ -123,7 +190,7 @@ def commit_rigid(scene: Scene, t: float, y: F1) -> int:
             # rows at the start show what holds from there on
             kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], kept[SLIDES]
         elif kept[SLIDES] != kept[SLIDES_BEFORE]:
-            record_dry(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
+            record_mode(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
     return HELD_OTHERWISE
 
 
@@ -134,7 +201,7 @@ def hold_again(scene: Scene, t: float, y: F1) -> None:
     if contacts == 1:
         ask_joints(scene, Joints.CHOOSE, t, y)
         return
-    for f in range(len(scene.applied.kind)):
+    for f in range(len(scene.applied.form)):
         if scene.applied.equation[f] >= 0 and kept[f, SLIDES] != kept[f, SLIDES_BEFORE]:
             ask_joints(scene, Joints.CHOOSE, t, y)
             return
@@ -144,7 +211,7 @@ def hold_again(scene: Scene, t: float, y: F1) -> None:
 def serve_rigid(scene: Scene, what: int, t: float, y: F1) -> int:
     """Do what dry friction is asked for (`Dry`); return 0, HELD_OTHERWISE, or less a code."""
     if what == Dry.KEEP:
-        commit_dry(scene, t, y)
+        commit_kept(scene, t, y)
         return commit_rigid(scene, t, y)
     hold_again(scene, t, y)
     return 0

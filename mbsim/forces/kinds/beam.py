@@ -27,7 +27,8 @@ import numpy as np
 from mbsim.core.arrays import F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Motion, Parameter, Values, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, Values, Wrench, force
+from mbsim.forces.formula import Motion
 from mbsim.forces.turning import turned_back
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -175,12 +176,9 @@ force(
         )
         for axis, unit in zip(_AXES, ("F", "F", "F", "F L", "F L", "F L"), strict=True)
     ),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
     check=_check,
-    function="BEAM",
+    functions="BEAM",
     about="straight massless beam of constant section between two markers",
     adams=Adams(
         "BEAM",

@@ -15,7 +15,8 @@ from collections.abc import Iterator, Sequence
 from mbsim.core.arrays import F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
-from mbsim.forces.catalog import Adams, Bounds, Finding, Motion, Parameter, Values, force
+from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, Values, Wrench, force
+from mbsim.forces.formula import Motion
 from mbsim.forces.turning import turned_back, turning_torque
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -122,12 +123,9 @@ force(
         )
         for name in _PRELOAD
     ),
-    constants=_constants,
-    wrench=_wrench,
-    slopes=_slopes,
-    bounds=_bounds,
+    form=Wrench(_constants, _wrench, _slopes, _bounds),
     check=_check,
-    function="BUSH",
+    functions="BUSH",
     about="springs and dampers along and about the axes of a marker",
     adams=Adams(
         "BUSHING",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from mbsim.forces.catalog import FORCES
 from mbsim.model import elements as el
 from mbsim.reader.adm.draft import require
 from mbsim.reader.adm.subroutine import function_or_user, routine
+from mbsim.reader.marker_forces import add_force
 from mbsim.reader.statement import Entry
 from mbsim.reader.subroutine import result
 
 COMPONENTS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
 
+_SPRING = ("stiffness", "damping", "length", "preload")
 _OF_SPRINGS = {
     "TRANSLATIONAL": ("K", "C", "LENGTH", "FORCE"),
     "ROTATIONAL": ("KT", "CT", "ANGLE", "TORQUE"),
@@ -37,18 +40,16 @@ def build_spring(entry: Entry) -> None:
             if name not in names:
                 entry.fault(f"belongs to the other type; {type} has {', '.join(names)}", name)
     stiffness, damping, length, preload = (entry.get(name, 0.0) for name in names)
-    spring = el.SpringDamper(
-        id=entry.get("id", 0),
-        type=type,
-        i_marker_id=entry.get("I", 0),
-        j_marker_id=entry.get("J", 0),
-        stiffness=stiffness,
-        damping=damping,
-        length=length,
-        preload=preload,
-        source=entry.source,
-    )
-    entry.register(entry.draft.spring_dampers, spring)
+    values = {
+        "type": type,
+        "stiffness": stiffness,
+        "damping": damping,
+        "length": length,
+        "preload": preload,
+    }
+    words = dict(zip(_SPRING, names, strict=True))
+    kind = FORCES["SPRINGDAMPER"]
+    add_force(entry, kind, values, entry.get("I", 0), entry.get("J", 0), words)
 
 
 def build_scalar(entry: Entry) -> None:

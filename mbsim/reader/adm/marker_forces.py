@@ -51,6 +51,6 @@ def _statement(kind: ForceKind, adams: Adams) -> AdmStatement:
 
 
 def marker_forces() -> list[AdmStatement]:
-    """Return the statements of all kinds that Adams has."""
+    """Return the statements of all kinds that Adams has and that have no reader of their own."""
     kinds = [FORCES[name] for name in FORCES]
-    return [_statement(kind, kind.adams) for kind in kinds if kind.adams is not None]
+    return [_statement(kind, kind.adams) for kind in kinds if kind.adams and kind.adams.words]

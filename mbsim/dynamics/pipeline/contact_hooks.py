@@ -1,0 +1,84 @@
+"""The hooks of contacts: a scene that has none compiles nothing of them."""
+
+from __future__ import annotations
+
+from mbsim.arrays.hooks import Contacts, Gauges, failure_or
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import vector_at, view
+from mbsim.core.arrays import F1, Pointer
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.contact.detection import find_contacts
+from mbsim.dynamics.contact.forces import add_contact, contact_of
+from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
+from mbsim.dynamics.events.step_limits import longest_step
+from mbsim.dynamics.pipeline.audit import examine_friction, hardest, mark_touched
+from mbsim.dynamics.pipeline.output import (
+    add_stored,
+    carried_square,
+    fill_contacts,
+    fill_incidents,
+    find_fault,
+    friction_left,
+    impact_left,
+)
+
+
+@jitable
+def push(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
+    """Find who touches whom, and add the forces of every touching slot; return 0 or a code."""
+    code = find_contacts(scene, y)
+    if code != 0:
+        return code
+    hit = scene.work.hit
+    for k in range(hit[len(hit) - 1]):
+        code = add_contact(scene, t, h, y, dy, hit[k])
+        if code != 0:
+            scene.work.trouble[1] = contact_of(scene, hit[k])
+            return code
+    return 0
+
+
+def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """What contacts are asked for; `a` is y, `b` is y' of PUSH, a row of energies of ENERGY."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    y = vector_at(a, n)
+    if what == Contacts.PUSH:
+        return -push(scene, t, h, y, vector_at(b, n))
+    if what == Contacts.KEEP:
+        return commit_incidents(scene, t, h, y)
+    if what == Contacts.INCIDENTS:
+        return fill_incidents(scene, h, y)
+    if what == Contacts.HARDEST:
+        return hardest(scene)
+    if what == Contacts.BLAME:
+        return find_fault(scene) + 1
+    if what == Contacts.WATCH:
+        watch_peaks(scene, t)
+    elif what == Contacts.GAPS:
+        commit_gaps(scene)
+    elif what == Contacts.ENERGY:
+        add_stored(scene, y, vector_at(b, scene.rows.energy.shape[1]))
+    elif what == Contacts.ROW:
+        fill_contacts(scene, y, scene.rows.contact[scene.rows.used[0]])
+    elif what == Contacts.TOUCHED:
+        mark_touched(scene)
+    else:
+        examine_friction(scene, t)
+    return 0
+
+
+def gauge_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
+    """What is measured of contacts; `a` is an error and `b` is y, of STEP they are y and y'."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    e, y = vector_at(a, n), vector_at(b, n)
+    if what == Gauges.ERROR:
+        return carried_square(scene, e)
+    if what == Gauges.IMPACT:
+        return impact_left(scene, t, e, y)
+    if what == Gauges.STEP:
+        longest = longest_step(scene, e, y, h)
+        failure_or(scene, 0)  # laws are explored, not asked
+        return longest
+    return friction_left(scene, e, y, what == Gauges.REVERSAL)
