@@ -26,7 +26,7 @@ Made = TypeVar("Made")
 _MOST_PACKED = 1100
 #: What a dataset may hold beside.
 _FEW_BYTES = 2**16
-#: Processor time for one access to a file: a base, and for each byte of the file or of the data [s].
+#: Processor time for an access: a base, and for each byte of the file and of the data [s].
 _SECONDS, _SECONDS_A_BYTE = 4.0, 2e-7
 
 

@@ -144,7 +144,7 @@ def plot_results(path: Path, chance: random.Random) -> None:
 
 
 @pytest.mark.parametrize("change", ["bytes", "objects"])
-@pytest.mark.parametrize("do", [info_of_results, read_results, draw_results])
+@pytest.mark.parametrize("do", [info_of_results, read_results, draw_results, plot_results])
 def test_result_files(tmp_path: Path, change: str, do: Do) -> None:
     seeds = result_files(tmp_path)
     (tmp_path / "try").mkdir()
@@ -158,7 +158,8 @@ def test_result_files(tmp_path: Path, change: str, do: Do) -> None:
         objects_changed(path, chance)
         return path
 
-    survey(f"results, {change}, {do.__name__}", make, do)
+    count = COUNT // 10 if do is plot_results else COUNT
+    survey(f"results, {change}, {do.__name__}", make, do, count)
 
 
 @pytest.mark.parametrize("change", ["bytes", "objects"])
