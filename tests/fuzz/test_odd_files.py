@@ -57,6 +57,7 @@ CFF = deck(
 SPLINE = '<Reference_Spline id="5" file="points.csv"/>'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", [fifo, loop, to_fifo, to_nothing, Path.mkdir])
 @pytest.mark.parametrize("name", ["deck.xml", "deck.adm", "out.h5", "out"])
 def test_in_the_place_of_what_a_command_names(
@@ -68,6 +69,7 @@ def test_in_the_place_of_what_a_command_names(
     refuses("plot", str(tmp_path / name), "time")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", [fifo, loop, to_fifo, to_nothing, Path.mkdir])
 @pytest.mark.parametrize(
     ("name", "text"),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +108,14 @@ def test_a_file_that_lost_its_beginning_or_its_middle_is_refused(tmp_path: Path,
         return
     with pytest.raises(checksums.DamagedError, match="longer or shorter"):
         CheckedFile(path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no FIFOs")
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a")
+    for place in (tmp_path / "a", tmp_path):
+        with pytest.raises(OSError, match=r"no regular file|directory"):
+            CheckedFile(place)
 
 
 def test_files_without_checksums_stay_readable(tmp_path: Path) -> None:
