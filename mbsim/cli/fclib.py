@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -266,13 +267,14 @@ def _expanded(files: Sequence[Path]) -> list[Path]:
 
 def _contents(files: Sequence[Path], faults: list[MbsimError]) -> Iterator[tuple[Path, Contents]]:
     """Yield what is in each file; one that cannot be read does not keep the others back."""
-    from mbsim.errors import ModelError
+    from mbsim.core.stored import apart
+    from mbsim.errors import ModelError, ResultsError
     from mbsim.fclib import hdf5
 
     for file in _expanded(files):
         try:
-            contents = hdf5.read(file)
-        except ModelError as error:
+            contents = apart(partial(hdf5.read, file), file)
+        except (ModelError, ResultsError) as error:
             faults.append(error)
         else:
             yield file, contents

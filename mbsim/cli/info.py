@@ -29,12 +29,17 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
     from mbsim.cli.messages import print_json, warn
 
     if _is_result(file):
+        from mbsim.results.opening import read_apart
         from mbsim.results.reading import open_results
 
-        with open_results(file) as results:
-            about = _about_results(results)
-            if not as_json:
-                _shorten(about, results)
+        def read() -> dict[str, Any]:
+            with open_results(file) as results:
+                about = _about_results(results)
+                if not as_json:
+                    _shorten(about, results)
+            return about
+
+        about = read_apart(read, file)
     else:
         from mbsim.reader.xml import read_model
 
@@ -49,10 +54,12 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
 
 def _is_result(file: Path) -> bool:
     """Return whether a file is HDF5, by what it holds; one that is not there, by its name."""
+    from mbsim.core.stored import read_regular
+
     try:
-        with file.open("rb") as opened:
-            return opened.read(len(_HDF5)) == _HDF5 or file.suffix.lower() in (".h5", ".hdf5")
-    except OSError:
+        head = read_regular(file, len(_HDF5))
+        return head == _HDF5 or file.suffix.lower() in (".h5", ".hdf5")
+    except (OSError, ValueError):
         return file.suffix.lower() in (".h5", ".hdf5")
 
 

@@ -67,6 +67,7 @@ def command(
     from mbsim.errors import ModelError
     from mbsim.results.curves import Choice, collect
     from mbsim.results.drawing import check_target, draw, need_matplotlib, save
+    from mbsim.results.opening import read_apart
     from mbsim.results.reading import open_results
 
     paths, names = _sorted_out(arguments)
@@ -74,15 +75,19 @@ def command(
         raise ModelError("--events goes with one result file over time only")
     need_matplotlib()
     choice = Choice(names, over.strip("/"), start, end, log, events)
-    with ExitStack() as stack:
-        files = [stack.enter_context(open_results(path)) for path in paths]
-        if not names:
-            raise ModelError(_no_names(files[0]))
-        other = None if minus is None else stack.enter_context(open_results(minus))
-        # before the numbers are read: a long run takes a while
-        target = output or Path(_made_up(paths, choice, minus))
-        check_target(target)
-        picture = collect(files, choice, other)
+    target = output or Path(_made_up(paths, choice, minus))
+
+    def read() -> Picture:
+        with ExitStack() as stack:
+            files = [stack.enter_context(open_results(path)) for path in paths]
+            if not names:
+                raise ModelError(_no_names(files[0]))
+            other = None if minus is None else stack.enter_context(open_results(minus))
+            # before the numbers are read: a long run takes a while
+            check_target(target)
+            return collect(files, choice, other)
+
+    picture = read_apart(read, *paths, *([] if minus is None else [minus]))
     warn(picture.warnings)
     warn(save(draw(picture), target))
     if as_json:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core.stored import claims_too_much
 from mbsim.errors import MbsimError, ModelError, ResultsError
 from mbsim.fclib.problem import (
     Contents,
@@ -40,6 +41,8 @@ GROUPS = {
     "global": "fclib_global",
     "global_rolling": "fclib_global_rolling",
 }
+#: What h5py raises where a file is damaged, and numpy where a member is not of its form.
+_DAMAGE = (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, AttributeError)
 _TEXTS = ("title", "description", "math_info")
 
 
@@ -60,7 +63,7 @@ def read(path: str | os.PathLike[str], kind: str | None = None) -> Contents:
     except ModelError as error:
         prefix = "" if str(error).startswith(str(place)) else f"{place}: "
         raise ModelError(f"{prefix}{error}") from None
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+    except (*_DAMAGE, MemoryError) as error:
         raise ModelError(f"{place}: no readable FCLIB file: {_short(error)}") from None
 
 
@@ -172,9 +175,19 @@ def _member(group: h5py.Group, name: str) -> Any:
     return group[name]
 
 
+def _values(group: h5py.Group, name: str) -> Any:
+    """Return what a data set holds, if it can be there."""
+    stored = _member(group, name)
+    if not hasattr(stored, "shape"):
+        raise ModelError(f"{group.name}/{name} is no data set")
+    if claims_too_much(stored):
+        raise ModelError(f"{group.name}/{name} is said to be larger than what is stored")
+    return stored[()]
+
+
 def _whole(group: h5py.Group, name: str) -> int:
     """Return a whole number, stored as a scalar or with length 1."""
-    value = np.asarray(_member(group, name)[()])
+    value = np.asarray(_values(group, name))
     if value.size != 1 or value.dtype.kind not in "iu":
         raise ModelError(f"{group.name}/{name} is no single whole number")
     return int(value.reshape(-1)[0])
@@ -182,7 +195,7 @@ def _whole(group: h5py.Group, name: str) -> int:
 
 def _array(group: h5py.Group, name: str, dtype: Any, kinds: str) -> Any:
     """Return a data set of rank 1 as contiguous numbers."""
-    data = _member(group, name)[()]
+    data = _values(group, name)
     if np.ndim(data) != 1 or np.asarray(data).dtype.kind not in kinds:
         raise ModelError(f"{group.name}/{name} is no list of numbers of the right kind")
     return np.ascontiguousarray(data, dtype=dtype)
@@ -216,8 +229,8 @@ def _matrix_info(group: h5py.Group) -> MatrixInfo | None:
         return None
     return MatrixInfo(
         _text(group, "comment") or "",
-        float(np.asarray(group["conditioning"][()]).reshape(-1)[0]),
-        float(np.asarray(_member(group, "determinant")[()]).reshape(-1)[0]),
+        float(np.asarray(_values(group, "conditioning")).reshape(-1)[0]),
+        float(np.asarray(_values(group, "determinant")).reshape(-1)[0]),
         _whole(group, "rank"),
     )
 
@@ -231,7 +244,9 @@ def _text(group: h5py.Group, name: str) -> str | None:
     """Return a text, whatever its bytes are."""
     if name not in group:
         return None
-    value = group[name][()]
+    value = _values(group, name)
+    if isinstance(value, str):
+        return value
     raw = value if isinstance(value, bytes) else bytes(np.asarray(value).reshape(-1)[0])
     return raw.decode("utf-8", "surrogateescape")
 

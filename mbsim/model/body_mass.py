@@ -105,6 +105,8 @@ def _solid(
         name = f"Post_Graphic[{graphic.id}]"
         if not graphic.is_material_inside:
             raise BodyMassError(f"{name} is a cavity; give mass and inertia of the body")
+        if graphic.shape == "MESH" and graphic.vertices is None:
+            raise BodyMassError(f"no mass or inertia from {name}: its mesh is not read")
         if graphic.vertices is not None and graphic.faces is not None:
             fault = solid_fault(graphic.vertices, graphic.faces)
             if fault:

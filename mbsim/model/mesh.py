@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 from mbsim.model.elements import Array
 from mbsim.model.mass_properties import polyhedron
@@ -43,7 +44,7 @@ def load_mesh(path: Path) -> tuple[Array, Faces]:
             raise ModelError(f"no such file: {path}")
         if path.stat().st_size > MAX_BYTES:
             raise ModelError(f"larger than {MAX_BYTES // 2**20} MiB: {path}")
-        data = path.read_bytes()
+        data = read_regular(path)
     except (OSError, ValueError) as error:
         raise ModelError(f"cannot be read: {error}") from None
     vertices, faces = _decode(data, kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from mbsim.expressions.tree import Expression, UserResult
@@ -38,7 +39,7 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
     if script:
         path = Path(script.replace("\\", "/"))
         path = path if path.is_absolute() else entry.draft.directory / path
-        script = str(path.resolve())
+        script = os.path.realpath(path)
         if not path.is_file():
             entry.fault("no such file (the path is relative to the deck)", named)
     # a script of its own has an interpreter of its own
@@ -73,7 +74,7 @@ def _library(entry: Entry, prefix: str) -> str:
     if found is None:
         entry.fault("no such file (the path is relative to the deck)", name)
         return ""
-    return str(found.resolve())
+    return os.path.realpath(found)
 
 
 def by_user(entry: Entry, expressions: tuple[str, ...] = ("expr",), type: str = "") -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from mbsim.core.stored import read_regular
 from mbsim.model import elements as el
 from mbsim.reader.kinds import FLAG, REALS, TEXT, BadValueError, keyword, parse_real
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
@@ -56,8 +57,8 @@ def _from_file(entry: Entry) -> Numbers | None:
     """Return the numbers of a file, separated by commas, semicolons or blanks; # is a comment."""
     path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_regular(path).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
         entry.fault(f"{path}: {reason}", "file")
         return None

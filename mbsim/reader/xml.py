@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from mbsim.core.collection import no_collection
+from mbsim.core.stored import read_regular
 from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
@@ -102,8 +103,7 @@ def _read_bytes(path: Path) -> bytes:
             raise ModelError(f"{path}: is a directory, not a deck")
         if path.exists() and not path.is_file():
             raise ModelError(f"{path}: is not a regular file")
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
+        return read_regular(path, MAX_BYTES + 1)
     except OSError as error:
         raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:

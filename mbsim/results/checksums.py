@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import struct
 import zlib
 from array import array
@@ -121,7 +122,11 @@ class CheckedFile:
 
     def __init__(self, path: Path, lock: bool = True) -> None:
         self._handle = -1
-        self._handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        # opening a FIFO waits for whoever writes into it
+        flags = getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
+        self._handle = os.open(path, os.O_RDONLY | flags)
+        if not stat.S_ISREG(os.fstat(self._handle).st_mode):
+            raise OSError(0, "is no regular file")
         if lock:
             _shared(self._handle)
         found = sums_at_end(self._handle)

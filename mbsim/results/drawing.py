@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.curves import Curve, Panel, Picture
 from mbsim.results.files import sync
@@ -378,8 +379,7 @@ def check_target(path: Path) -> None:
 def is_picture(path: Path) -> bool:
     """Return whether a file is a PNG or SVG, by what it holds; an empty one may be replaced."""
     try:
-        with path.open("rb") as file:
-            head = file.read(4096)
+        head = read_regular(path, 4096)
     except OSError as error:
         raise ResultsError(f"{path}: cannot be read: {error.strerror}") from None
     return not head or head.startswith(b"\x89PNG\r\n\x1a\n") or b"<svg" in head

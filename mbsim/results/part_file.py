@@ -198,7 +198,7 @@ class PartFile:
         self._copy_from(self.target)
 
     def _copy_from(self, path: Path) -> None:
-        """Fill the part file with another's bytes; raise `DamagedError` where they are damaged."""
+        """Fill the part file with another's bytes; `DamagedError` where they are not right."""
         with path.open("rb") as source:
             handle = source.fileno()
             found = sums_at_end(handle)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import re
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
@@ -13,19 +12,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from mbsim.errors import ResultsError, UnknownSignal
+from mbsim.errors import MbsimError, ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
-from mbsim.results.checksums import CheckedFile
+from mbsim.results.form import check_members, facts_of, plain, texts_of, values_of
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
+from mbsim.results.opening import opened_file
 
 if TYPE_CHECKING:
     import h5py
 
 
-#: How often a file that is just being published is asked for, and how long between [s].
-_TRIES, _PAUSE = 50, 0.002
-#: What h5py raises where a file is damaged.
-_DAMAGE = (OSError, RuntimeError, KeyError, ValueError, MemoryError)
+#: What h5py raises where a file is damaged, and numpy where datasets are not of their form.
+_DAMAGE = (
+    *(OSError, RuntimeError, MemoryError),
+    *(KeyError, ValueError, TypeError, IndexError, AttributeError),
+)
 #: A column of a run's .csv, and how names for `mbsim request` begin.
 _CSV_COLUMN, _OF_REQUEST = re.compile(r"(\d+)\.(F[1-8])"), re.compile(r"Force_Contact\[\d+\]\.")
 _Read = TypeVar("_Read", bound=Callable[..., Any])
@@ -38,6 +39,8 @@ def _reads(method: _Read) -> _Read:
     def reading(self: Results, *arguments: Any) -> Any:
         try:
             return method(self, *arguments)
+        except MbsimError:
+            raise
         except _DAMAGE as error:
             raise ResultsError(f"{self._where}: {_damage(error)}") from None
 
@@ -109,7 +112,12 @@ class Results:
     @_reads
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file: version, model, units, settings, status."""
-        return {name: _plain(value) for name, value in self._open().attrs.items()}
+        return facts_of(self._open())
+
+    @property
+    def checked(self) -> bool:
+        """Whether the file ends with checksums, to which all that is read of it is compared."""
+        return bool(self._open().driver == "fileobj")
 
     @property
     def status(self) -> str:
@@ -122,7 +130,7 @@ class Results:
         """Counters and times of the run; empty if it was killed."""
         if "stats" not in self._open():
             return {}
-        return {name: _plain(value) for name, value in self._open()["stats"].attrs.items()}
+        return facts_of(self._open()["stats"])
 
     @property
     @_reads
@@ -131,11 +139,11 @@ class Results:
         file = self._open()
         if "audit" not in file:
             return None
-        found = {"audit": _facts(file["audit"])}
+        found = {"audit": facts_of(file["audit"])}
 
         def note(name: str, item: Any) -> None:
             if len(item.attrs):
-                found[f"audit/{name}"] = _facts(item)
+                found[f"audit/{name}"] = facts_of(item)
 
         file["audit"].visititems(note)
         return from_attributes(found)
@@ -179,7 +187,7 @@ class Results:
         """Return the ids in order of their columns, by group."""
         if self._ids is None:
             self._ids = {
-                group: item["id"][()].tolist()
+                group: values_of(item["id"]).tolist()
                 for group, item in self._open().items()
                 if group not in _NO_ELEMENTS and hasattr(item, "keys") and "id" in item
             }
@@ -253,12 +261,12 @@ class Results:
         if ids is not None and id.isdecimal() and int(id) in ids:
             if attribute not in _FACTS or attribute not in file[group]:
                 return None
-            return _plain(file[group][attribute][ids.index(int(id))])
+            return plain(file[group][attribute][ids.index(int(id))])
         item = file.get(name)
         value: Any = item.attrs.get(attribute) if item is not None else None
         if isinstance(value, bytes):
-            return _plain(value)
-        return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+            return plain(value)
+        return texts_of(item, attribute, value) if isinstance(value, np.ndarray) else plain(value)
 
     @property
     @_reads
@@ -275,7 +283,7 @@ class Results:
 
         def note(name: str, item: Any) -> None:
             if isinstance(item, h5py.Dataset):
-                found[name] = np.asarray(item[()])
+                found[name] = np.asarray(values_of(item))
 
         self._open()[group].visititems(note)
         return found
@@ -312,7 +320,7 @@ class Results:
             index[0 if dataset.ndim == 1 else 1] = location.column
         if part not in (None, "mag"):
             index[-1] = PARTS[dataset.shape[-1]][part]
-        values = _plain(dataset[tuple(index)])
+        values = plain(values_of(dataset, tuple(index)))
         return np.linalg.norm(values, axis=1) if part == "mag" else values
 
     @_reads
@@ -359,7 +367,8 @@ class Results:
             return {id: self[name][-1] for id, name in names.items() if name in self}
         if f"{group}/{signal}" not in self._open():
             return {}
-        return dict(zip(ids, self._open()[f"{group}/{signal}"][-1], strict=True))
+        table = self._open()[f"{group}/{signal}"]
+        return dict(zip(ids, table[-1], strict=True)) if len(table) else {}
 
     @property
     def _where(self) -> str:
@@ -405,24 +414,6 @@ def _is_signal(item: Any, shape: tuple[int, ...], rows: int) -> bool:
     return (1 if len(shape) == 1 else shape[1]) in (1, *PARTS)
 
 
-def _facts(item: Any) -> dict[str, Any]:
-    """Return the attributes of a group."""
-    return {name: _plain(value) for name, value in item.attrs.items()}
-
-
-def _plain(value: Any) -> Any:
-    """Return numbers and text as Python has them; arrays and tables as numpy has them."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray) and value.dtype.names:
-        # fixed-length bytes as text, so that events["kind"] == "touch" works
-        fields = [(name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names]
-        return value.astype(fields)
-    return value
-
-
 def finite(value: Any) -> Any:
     """Return a value for JSON, which has no infinity and no NaN: null in their place."""
     if isinstance(value, float) and not math.isfinite(value):
@@ -453,12 +444,15 @@ def open_results(path: str | Path) -> Results:
         what = "is a folder" if file.is_dir() else "no such file"
         raise ResultsError(f"{file}: {what}; a result file is named <model>.h5")
     try:
-        opened = _opened(file)
+        opened = opened_file(file)
     except OSError as error:
         reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
         raise ResultsError(f"{file}: cannot be read: {reason}") from None
     try:
         ours = "mbsim_version" in opened.attrs
+        if ours:
+            check_members(opened)
+            facts_of(opened)
     except _DAMAGE as error:
         opened.close()
         raise ResultsError(f"{file}: {_damage(error)}") from None
@@ -466,25 +460,6 @@ def open_results(path: str | Path) -> Results:
         opened.close()
         raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
     return Results(opened, file)
-
-
-def _opened(path: Path) -> h5py.File:
-    """Open a file for reading, locked against being written on.
-
-    The writer holds its lock on a published file for microseconds, see `part_file`.
-    """
-    import h5py
-
-    for left in reversed(range(_TRIES)):
-        try:
-            found = CheckedFile(path, lock=left > 0)
-            if found.checked:
-                return h5py.File(found, "r")
-            found.close()
-            return h5py.File(path, "r", locking="best-effort" if left else False)
-        except BlockingIOError:
-            time.sleep(_PAUSE)
-    raise AssertionError("without a lock nobody is waited for")
 
 
 def end_state(results: Results) -> dict[str, dict[str, list[float]]]:

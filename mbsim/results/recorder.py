@@ -136,6 +136,11 @@ class Recorder:
             raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
         try:
             with open_results(self._target) as results:
+                if not results.checked:
+                    raise ModelError(
+                        f"--resume: {self._target}: has no checksums: it is of an earlier version, "
+                        "or damaged; start without --resume"
+                    )
                 check_same(self._target, results, settings, self._identity)
                 tables = results.tables("checkpoint")
                 if results.attribute("checkpoint", "sha256") != digest(tables):

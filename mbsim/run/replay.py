@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def _deck(results: Results) -> str:
     named = results.attributes
     deck = Path(str(named["model_file"]))
     try:
-        data = deck.read_bytes()
+        data = read_regular(deck)
     except OSError as error:
         raise ModelError(
             f"{results.path}: its model {deck} cannot be read: {error.strerror}; run request in "

@@ -12,6 +12,7 @@ import pytest
 
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from mbsim.errors import ModelError, ResultsError
+from mbsim.results.checksums import end_of, sums_of
 from mbsim.results.part_file import PartFile
 from mbsim.results.reading import end_state, open_results
 from mbsim.results.recorder import Recorder
@@ -52,6 +53,11 @@ def test_one_changed_number_in_a_checkpoint_is_refused(tmp_path: Path) -> None:
             raw = bytearray(np.asarray(table[()]).tobytes())
             raw[0] ^= 1
             table[...] = np.frombuffer(bytes(raw), dtype=table.dtype).reshape(table.shape)
+        # HDF5 has cut the checksums off
+        changed = (tmp_path / "deck.h5").read_bytes()
+        with pytest.raises(ModelError, match="has no checksums"):
+            Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
+        (tmp_path / "deck.h5").write_bytes(changed + end_of(sums_of(changed), len(changed)))
         with pytest.raises(ModelError, match="checkpoint is damaged"):
             Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 from mbsim.plugins.helpers import namespace
 from mbsim.plugins.permission import check
@@ -112,7 +113,7 @@ def load_script(path: Path, element: str, scripts: Scripts) -> Script:
             "language; use Python"
         )
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise ModelError(f"{element}: {path}: {error.strerror or error}") from None
     text = None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+from mbsim.core.stored import read_regular
+
 _DYNAMIC_SYMBOLS = 11  # SHT_DYNSYM
 _FUNCTION, _INDIRECT_FUNCTION = 2, 10  # STT_FUNC, STT_GNU_IFUNC
 _RUNTIME = {"_init", "_fini"}
@@ -27,7 +29,7 @@ def functions_of(path: Path) -> set[str] | None:
     OSError
         If the file cannot be read.
     """
-    found = _symbols(path.read_bytes())
+    found = _symbols(read_regular(path))
     return None if found is None else found[0]
 
 
@@ -39,7 +41,7 @@ def ends_the_process(path: Path) -> set[str]:
     OSError
         If the file cannot be read.
     """
-    found = _symbols(path.read_bytes())
+    found = _symbols(read_regular(path))
     return set() if found is None else found[1] & _ENDING
 
 
@@ -50,7 +52,7 @@ def _symbols(data: bytes) -> tuple[set[str], set[str]] | None:
     order = "<" if data[5] == 1 else ">"
     try:
         return _listed(data, order)
-    except (struct.error, IndexError, ValueError):
+    except (struct.error, IndexError, ValueError, OverflowError):
         return None
 
 

@@ -2,6 +2,7 @@ r"""``FUNCTION=USER(1, 2.5)\ROUTINE=file.py::name``: user subroutines of an Adam
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from mbsim.expressions.tree import Expression
@@ -27,7 +28,7 @@ def routine(entry: Entry, default: str) -> el.Subroutine | None:
     if file:
         path = Path(file)
         path = path if path.is_absolute() else entry.draft.directory / path
-        script = str(path.resolve())
+        script = os.path.realpath(path)
         if not path.is_file():
             entry.fault("no such file (the path is relative to the deck)", "ROUTINE")
     return el.Subroutine(par, name or default, script_name=script, interpreter="PYTHON")

@@ -1,0 +1,306 @@
+"""Damaged files of every kind are read or refused: no traceback, no hang, no dead process.
+
+``MBSIM_FUZZ=20000 python -m pytest -s tests/fuzz`` reads so many of each kind.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
+from helpers.folders import DATA, MODELS
+from helpers.forked import finds
+from helpers.mutations import bytes_changed, objects_changed, text_changed
+from mbsim.cli.main import main
+from mbsim.errors import MbsimError, ModelError
+from mbsim.results.audit import Audit, Entry, Share
+from mbsim.results.reading import open_results
+from mbsim.results.recorder import Recorder
+
+COUNT = int(os.environ.get("MBSIM_FUZZ", "5"))
+SEED = int(os.environ.get("MBSIM_FUZZ_SEED", "1"))
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="forks")
+
+Do = Callable[[Path, random.Random], None]
+
+
+def command(*line: str) -> None:
+    """Run a command line; what it raises that is no message and exit code is raised here."""
+    found = CliRunner().invoke(main, line)
+    if found.exception is not None and not isinstance(found.exception, SystemExit):
+        raise found.exception
+
+
+def survey(kind: str, make: Callable[[random.Random], Path], do: Do, count: int = COUNT) -> None:
+    """Make and read so many files; fail with what went wrong, each kind of find once."""
+
+    def one(case: int) -> None:
+        chance = random.Random(f"{SEED} {kind} {case}")
+        path = make(chance)
+        try:
+            do(path, chance)
+        except (MbsimError, click.UsageError):
+            pass
+
+    # users of h5py in one process share its one lock: nothing else runs here
+    found = finds(one, range(count))
+    by_place = Counter("\n".join(find.what.strip().splitlines()[-3:]) for find in found)
+    first = {"\n".join(find.what.strip().splitlines()[-3:]): find for find in reversed(found)}
+    told = [f"{by_place[place]} times, first {first[place].case}:\n{place}" for place in by_place]
+    print(f"{kind}: {count} files, {len(found)} finds", *told, sep="\n\n")
+    assert not found
+
+
+def changed(folder: Path, seeds: list[Path], change: Callable[[bytes, random.Random], bytes]):
+    """Return how to make a damaged copy of one of some files, under its own name."""
+    texts = {path: path.read_bytes() for path in seeds}
+
+    def make(chance: random.Random) -> Path:
+        path = chance.choice(seeds)
+        target = folder / path.name
+        target.write_bytes(change(texts[path], chance))
+        return target
+
+    return make
+
+
+JOINTS = (
+    '<Post_Request id="7" type="MARKER_DISPLACEMENT" i_marker_id="20" label="ball"/>'
+    '<Post_Request id="8" type="EXPRESSION" expr2="TIME" expr3="DZ(20)"/>'
+    '<Constraint_Joint id="3" type="REVOLUTE" i_marker_id="20" j_marker_id="10"/>'
+)
+AUDIT = Audit(
+    *(0.1, 2.0, 0.5, "J"),
+    {"stages": Entry(1.0, 2.0, 0.5, "Body_Rigid[2]")},
+    {301: Share(0.1, 0.0, 0.2), None: Share(0.0, 0.0, 0.0)},
+    ("a warning",),
+)
+
+
+def result_files(folder: Path) -> list[Path]:
+    """Return result files: of a run that goes on, of one that has finished, a long one."""
+    found = []
+    for name, statement, rows in (("on", JOINTS, 10), ("done", JOINTS, 10), ("long", "", 300)):
+        system = fake_system(folder / f"{name}_deck", statement)
+        recorder = Recorder(system, SETTINGS, folder / name)
+        for first in range(0, rows, 10):
+            add_rows(system, first, 10)
+            recorder.take()
+        recorder.flush(checkpoint(rows))
+        if name == "on":
+            recorder.abandon()
+        else:
+            recorder.close("finished", {"steps": 4}, system.scene.log.contacts, AUDIT).close()
+        found.append(folder / name / "deck.h5")
+        found[-1] = found[-1].rename(folder / f"{name}.h5")
+    return found
+
+
+def info_of_results(path: Path, chance: random.Random) -> None:
+    """Show a result file; the command reads it apart, so that nothing in it may end or hang."""
+    command("info", str(path), *(["--json"] if chance.random() < 0.5 else []))
+
+
+def read_results(path: Path, chance: random.Random) -> None:
+    """Read all of a result file as its users do."""
+    with open_results(path) as results:
+        repr(results)
+        for name in results.keys()[:40]:
+            try:
+                np.asarray(results[name])
+            except MbsimError:
+                continue
+        assert "nothing" not in results
+        for part in ("bodies/2/position/x", "bodies/*/velocity/mag", "requests/7/F2", "a/b"):
+            try:
+                results.find(part)
+            except MbsimError:
+                pass
+
+
+def draw_results(path: Path, chance: random.Random) -> None:
+    from mbsim.results.curves import Choice, collect
+
+    names = ("bodies/*/position", "requests/7/F2", "contacts/301/force/mag", "energy/kinetic")
+    with open_results(path) as results:
+        chosen = tuple(chance.sample(names, 2))
+        collect([results], Choice(chosen, "time", None, None, False, chance.random() < 0.5), None)
+
+
+def plot_results(path: Path, chance: random.Random) -> None:
+    """Draw a result file: the picture itself is slow."""
+    command("plot", str(path), "bodies/*/position", "-o", str(path.with_suffix(".png")))
+
+
+@pytest.mark.parametrize("change", ["bytes", "objects"])
+@pytest.mark.parametrize("do", [info_of_results, read_results, draw_results, plot_results])
+def test_result_files(tmp_path: Path, change: str, do: Do) -> None:
+    seeds = result_files(tmp_path)
+    (tmp_path / "try").mkdir()
+    copy = changed(tmp_path / "try", seeds, bytes_changed)
+    whole = changed(tmp_path / "try", seeds, lambda data, chance: data)
+
+    def make(chance: random.Random) -> Path:
+        if change == "bytes":
+            return copy(chance)
+        path = whole(chance)
+        objects_changed(path, chance)
+        return path
+
+    count = 1 + COUNT // 10 if do is plot_results else COUNT
+    survey(f"results, {change}, {do.__name__}", make, do, count)
+
+
+@pytest.mark.parametrize("change", ["bytes", "objects"])
+def test_resume(tmp_path: Path, change: str) -> None:
+    data = result_files(tmp_path)[0].read_bytes()
+    system = fake_system(tmp_path / "deck", JOINTS)
+    target = tmp_path / "out" / "deck.h5"
+    target.parent.mkdir()
+
+    def make(chance: random.Random) -> Path:
+        target.write_bytes(bytes_changed(data, chance) if change == "bytes" else data)
+        if change == "objects":
+            objects_changed(target, chance)
+        return target
+
+    def resume(path: Path, chance: random.Random) -> None:
+        settings = SETTINGS | ({"tol": 1e-6} if chance.random() < 0.3 else {})
+        system.scene.rows.used[:] = 0
+        recorder = Recorder(system, settings, path.parent, resume=True)
+        try:
+            add_rows(system, 10, 2)
+            recorder.take()
+            recorder.close("finished", {}, system.scene.log.contacts).close()
+        finally:
+            recorder.abandon()
+
+    survey(f"resume, {change}", make, resume)
+
+
+@pytest.mark.parametrize("change", ["bytes", "objects"])
+def test_fclib(tmp_path: Path, change: str) -> None:
+    seeds = small("*.hdf5", DATA / "fclib")[:8]
+    copy = changed(tmp_path, seeds, bytes_changed)
+    whole = changed(tmp_path, seeds, lambda data, chance: data)
+
+    def make(chance: random.Random) -> Path:
+        path = copy(chance) if change == "bytes" else whole(chance)
+        if change == "objects":
+            objects_changed(path, chance)
+        return path
+
+    def read(path: Path, chance: random.Random) -> None:
+        command("fclib", "info", str(path), *(["--json"] if chance.random() < 0.5 else []))
+
+    survey(f"fclib, {change}", make, read)
+
+
+def check_deck(path: Path, chance: random.Random) -> None:
+    command(chance.choice(("check", "info")), str(path))
+
+
+def small(pattern: str, folder: Path) -> list[Path]:
+    """Return the smallest files of a folder: they are read in milliseconds."""
+    return sorted(folder.rglob(pattern), key=lambda path: path.stat().st_size)[:30]
+
+
+def test_xml_decks(tmp_path: Path) -> None:
+    survey("XML", changed(tmp_path, small("*.xml", MODELS), text_changed), check_deck)
+
+
+def test_adams_decks(tmp_path: Path) -> None:
+    seeds = small("*.adm", DATA / "adams") + small("*.adm", MODELS)
+    survey("ADM", changed(tmp_path, seeds, text_changed), check_deck)
+
+
+def meshes(folder: Path) -> list[Path]:
+    """Return a small solid in every format of a mesh file."""
+    import trimesh
+
+    solid = trimesh.creation.box()
+    found = []
+    for name in ("a.stl", "b.obj", "c.off", "d.ply"):
+        solid.export(folder / name)
+        found.append(folder / name)
+    for name, kind in (("e.stl", "stl_ascii"), ("f.ply", "ply")):
+        more = {"encoding": "ascii"} if kind == "ply" else {}
+        data = solid.export(file_type=kind, **more)
+        (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+        found.append(folder / name)
+    return found
+
+
+def test_meshes(tmp_path: Path) -> None:
+    from mbsim.model.mesh import load_mesh, solid_fault
+
+    seeds = meshes(tmp_path)
+    (tmp_path / "try").mkdir()
+    makes = [changed(tmp_path / "try", seeds, way) for way in (bytes_changed, text_changed)]
+
+    def read(path: Path, chance: random.Random) -> None:
+        assert isinstance(solid_fault(*load_mesh(path)), str)
+
+    survey("meshes", lambda chance: chance.choice(makes)(chance), read)
+
+
+def test_scripts(tmp_path: Path) -> None:
+    from mbsim.plugins.source.script import load_script, user_function
+
+    seeds = sorted((MODELS.parent / "userfuncs").glob("*.py"))
+    makes = [changed(tmp_path, seeds, way) for way in (bytes_changed, text_changed)]
+
+    def read(path: Path, chance: random.Random) -> None:
+        script = load_script(path, "Force_Contact[1]", {})
+        for name in ("CFFSUB", "CNFSUB"):
+            if script.defines(name):
+                user_function(script, name, "Force_Contact[1]")
+
+    survey("scripts", lambda chance: chance.choice(makes)(chance), read)
+
+
+def elf_changed(data: bytes, chance: random.Random) -> bytes:
+    """Return a library with something wrong in its header or its table of sections."""
+    head = bytes_changed(data[:64], chance) if chance.random() < 0.5 else data[:64]
+    at = int.from_bytes(data[40:48], "little")
+    return head + data[64:at] + bytes_changed(data[at:], chance)
+
+
+def test_libraries(tmp_path: Path) -> None:
+    """Libraries are only looked at: their tables of symbols."""
+    import lxml.etree
+
+    from mbsim.plugins.source.shared_library import choose, read_library
+    from mbsim.plugins.source.symbols import ends_the_process
+
+    source = Path(lxml.etree.__file__)
+    if source.suffix != ".so":
+        pytest.skip("no shared library")
+    data = source.read_bytes()
+    target = tmp_path / "law.so"
+
+    def make(chance: random.Random) -> Path:
+        target.write_bytes(elf_changed(data, chance))
+        return target
+
+    def read(path: Path, chance: random.Random) -> None:
+        ends_the_process(path)
+        library = read_library(path, "Force_Contact[1]")
+        if library.functions is not None:
+            try:
+                choose(library, "CFFSUB", "cff", "")
+            except ModelError:
+                pass
+
+    survey("libraries", make, read, min(COUNT, 5000))
