@@ -107,7 +107,8 @@ def local_sweeps(
     small problem takes: so both are plain tuples, since named ones cost 1 us to hand over, and the
     blocks are returned only where the goal was not reached, since an array costs 0.4 us. `check`
     gets the figures of the verdict, with the stored W: |F| / max(|q|, |r|, |u|), |F| / |q|, and
-    those of `own_errors`; `u` the velocities. Returns what `gauss_seidel` does, and the blocks.
+    those of `own_errors`; `u` the velocities. Many arguments because a record of them would cost
+    more to hand over. Returns what `gauss_seidel` does, and the blocks.
     """
     d = 1 + len(tangent)
     m, nz, p, i, x = stored
