@@ -477,7 +477,6 @@ MECHANISMS = (
             + BRANCHES,
         ),
         ("bowling_ball", "AUTO", MECHANISMS + BRANCHES + "mbsim.dynamics.linearization"),
-        ("bowling_ball", "RADAU5", MECHANISMS + BRANCHES + "linearization.memory_slopes"),
     ],
 )
 @pytest.mark.slow

@@ -390,7 +390,7 @@ TABLE = (
         lambda scene, method: _has_contacts(scene, method) and scene.world.fixed_step[0] == 1,
         _of("pipeline.contact_hooks", "bound_contacts"),
         "bounds steps of a method without error estimate: `Stability`",
-        "a step or 0; a failure is noted",
+        "a step or 0; laws are explored, so that it does not fail",
     ),
     Row(
         Hook.DRY,
