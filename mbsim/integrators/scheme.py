@@ -35,10 +35,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.core import tags
-from mbsim.core.address import call_int, pack, view
+from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import HOOK, STATE, Problem
+from mbsim.core.problem import STATE, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
@@ -201,28 +201,6 @@ def both(one: Scheme, other: Scheme) -> Scheme:
         dense=max(one.dense, other.dense),
         carried=max(one.carried, other.carried),
     )
-
-
-def bind(
-    scheme: Scheme, problem: Problem, method: Method, probe: Scheme | None = None
-) -> tuple[Steps, Any]:
-    """Return the method bound to a problem, and what must live as long as it is used."""
-    from mbsim.core import jit
-    from mbsim.integrators import branches, changing, events
-
-    if scheme.implicit and problem.linearise == 0:
-        raise ValueError("this problem has no linearisation, which an implicit method needs")
-    workspace = Workspace(np.array(problem, dtype=np.int64), method)
-    table = pack(workspace)
-    attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
-    context = int(table.ctypes.data)
-    numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
-    looks = jit.address(branches.serve, branches.ASKED) if problem.switching != 0 else 0
-    locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
-    probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
-    calm = jit.address(changing.serve, changing.ASKED) if probe is not None else 0
-    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm)
-    return steps, (table, workspace)
 
 
 @jitable

@@ -15,6 +15,7 @@ from mbsim.core import jit
 from mbsim.dynamics.bodies import configuration
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
+from mbsim.integrators.binding import bind
 from mbsim.integrators.changing import (
     EVALUATIONS_A_STEP,
     FIRST_PATIENCE,
@@ -116,7 +117,7 @@ class Methods:
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
-        return problem, linearised, scheme.bind(running, problem, self.arrays, probe)
+        return problem, linearised, bind(running, problem, self.arrays, probe)
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""

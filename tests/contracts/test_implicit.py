@@ -38,6 +38,7 @@ from mbsim.integrators import (
     radau5,
     scheme,
 )
+from mbsim.integrators.binding import bind
 
 RELAX, VAN_DER_POL, ROBERTSON, OSCILLATOR, DECAY, BLOWS_UP, HALF_LINE = range(7)
 #: A body of mass 1 on a spring and a damper, driven, with a state z that follows it; a top whose
@@ -379,7 +380,7 @@ class Run:
         method = catalog.load(name)
         self.state = scheme.make(method, np.array(y0), 0.0, configuration.kinds(bodies, n))
         self.state.memory[scheme.STEP] = step
-        self.steps, self._kept = scheme.bind(method, self.problem, self.state)
+        self.steps, self._kept = bind(method, self.problem, self.state)
 
     def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
         advance = jit.function(driver.advance)
@@ -573,7 +574,7 @@ def test_a_system_that_cannot_be_solved_is_tried_shorter_to_the_end(name):
 def test_a_problem_without_linearisation_is_refused():
     run = Run(DECAY, (1.0,))
     with pytest.raises(ValueError, match="no linearisation"):
-        scheme.bind(catalog.load("RADAU5"), run.problem._replace(linearise=0), run.state)
+        bind(catalog.load("RADAU5"), run.problem._replace(linearise=0), run.state)
 
 
 # GALPHA: bodies
@@ -674,7 +675,7 @@ def test_radau5_agrees_with_an_explicit_method(exact_motions, motion):
     run = Run(kind, y0, given=given)
     other = catalog.load("DOP853")
     state = scheme.make(other, y0, 0.0)
-    steps, _kept = scheme.bind(other, run.problem, state)
+    steps, _kept = bind(other, run.problem, state)
     advance = jit.function(driver.advance)
     assert advance(steps, 2.0, 1e-13, math.inf, 0.0, np.zeros(0), 10**8) == DONE
     np.testing.assert_allclose(exact_motions[motion][0], state.y, rtol=0, atol=1e-10)

@@ -20,6 +20,7 @@ from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.problem import DONE, FAILED, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
 from mbsim.integrators import catalog, dop853, driver, scheme
+from mbsim.integrators.binding import bind
 
 
 def is_explicit(method):
@@ -194,7 +195,7 @@ class Run:
         method = catalog.load(name)
         self.problem, self.state = problem, scheme.make(method, np.array(y0), 0.0)
         self.state.memory[scheme.STEP] = step
-        self.steps, self._kept = scheme.bind(method, problem, self.state)
+        self.steps, self._kept = bind(method, problem, self.state)
 
     def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
         advance = jit.function(driver.advance)
@@ -459,7 +460,7 @@ def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
         run = Run("DOPRI5", oscillator)
         method = scheme.Scheme(_verlet, _cubic, stages=2, last=1, dense=4, order=0.0)
         run.state = scheme.make(method, np.array([1.0, 0.0]), 0.0)
-        bound, run.kept = scheme.bind(catalog.load("DOPRI5"), oscillator, run.state)
+        bound, run.kept = bind(catalog.load("DOPRI5"), oscillator, run.state)
         run.steps = bound._replace(
             attempt=attempt.address, fit_dense=cubic.address, last=1, order=0.0
         )

@@ -1,0 +1,32 @@
+"""A method bound to a problem: its functions and what they ask, behind addresses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbsim.core import jit
+from mbsim.core.address import pack
+from mbsim.core.problem import HOOK, Problem
+from mbsim.integrators import branches, changing, events
+from mbsim.integrators.scheme import Method, Scheme, Steps, Workspace
+
+
+def bind(
+    scheme: Scheme, problem: Problem, method: Method, probe: Scheme | None = None
+) -> tuple[Steps, Any]:
+    """Return the method bound to a problem, and what must live as long as it is used."""
+    if scheme.implicit and problem.linearise == 0:
+        raise ValueError("this problem has no linearisation, which an implicit method needs")
+    workspace = Workspace(np.array(problem, dtype=np.int64), method)
+    table = pack(workspace)
+    attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
+    context = int(table.ctypes.data)
+    numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
+    looks = jit.address(branches.serve, branches.ASKED) if problem.switching != 0 else 0
+    locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
+    probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
+    calm = jit.address(changing.serve, changing.ASKED) if probe is not None else 0
+    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm)
+    return steps, (table, workspace)
