@@ -1,4 +1,4 @@
-"""A method bound to a problem: the hooks by which compiled code tries and shows its steps."""
+"""A method bound to a problem: its functions and what they ask, behind addresses."""
 
 from __future__ import annotations
 

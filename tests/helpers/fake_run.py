@@ -106,7 +106,7 @@ def fake_system_of(model: Model) -> Any:
         # all bodies hang on the first by some tree of 4 free directions, and 3 equations hold
         tree=SimpleNamespace(of_body=np.arange(nb + 1), free=np.array([4])),
         equations=SimpleNamespace(active=np.array([0, 1, 2, 3])),
-        states=SimpleNamespace(place=np.zeros(0, dtype=np.int64)),
+        states=SimpleNamespace(offset=np.zeros(0, dtype=np.int64)),
         log=Log(log, np.zeros(codes.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 4), np.int64)),
         rows=rows,
     )
