@@ -91,7 +91,9 @@ BOUNDED = 53
 # of DOP853: where its last step tried began, that step's error of order 3 over h^4, and those of
 # the two steps taken before
 THIRD_AT, THIRD, THIRD_BEFORE, THIRD_FIRST = range(54, 58)
-MEMORY = 58
+# of AUTO: when the run began, and how much of it was stiff
+RUN_BEGAN, STIFF_TIME = range(58, 60)
+MEMORY = 60
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -164,7 +166,7 @@ def make(scheme: Scheme, y0: Any, t0: float, bodies: int = 0, rows: int = 1) -> 
     """
     n = len(y0)
     memory = np.zeros(MEMORY)
-    memory[TIME] = t0
+    memory[TIME] = memory[RUN_BEGAN] = t0
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
