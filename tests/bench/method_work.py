@@ -91,7 +91,7 @@ def reference(path, folder, limit):
     """Return the positions that runs are compared with, None for none, and how far it is known."""
     ends = []
     for method, tol in REFERENCES:
-        kept = folder / f"{path.stem}__{method}__{tol:g}.npy"
+        kept = folder / f"{name_of(path).replace('/', '_')}__{method}__{tol:g}.npy"
         if not kept.exists():
             places, _ = once(path, method, tol, limit)
             np.save(kept, np.zeros(0) if places is None else places)
@@ -114,10 +114,10 @@ def run(options):
         for method in options.methods.split(","):
             failed = 0
             for tol in map(float, options.tols.split(",")):
-                if (path.stem, method, tol) in done or failed == 2:
+                if (name_of(path), method, tol) in done or failed == 2:
                     continue
                 places, stats = measured(path, method, tol, options.limit)
-                row = {"deck": path.stem, "method": method, "tol": tol, "known": known}
+                row = {"deck": name_of(path), "method": method, "tol": tol, "known": known}
                 if places is None:
                     failed += 1
                     row["why"] = stats
@@ -129,8 +129,14 @@ def run(options):
 
 
 def named(deck):
-    """Return the file of a deck of `models/`."""
-    return next((ROOT / "models").rglob(f"{deck}.xml"))
+    """Return the file of a deck of `models/`, as `sdnd100` or `stiff/lugre`."""
+    return ROOT / "models" / f"{deck}.xml"
+
+
+def name_of(path):
+    """Return what `named` knows a deck by, of others its stem: two have the same stem."""
+    inside = path.is_relative_to(ROOT / "models")
+    return path.relative_to(ROOT / "models").with_suffix("").as_posix() if inside else path.stem
 
 
 def rows(out):
