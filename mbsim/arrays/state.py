@@ -112,6 +112,7 @@ class Audit(NamedTuple):
     energy: F1  # (4,) as of `Rows.energy`
     friction_at: tags.Constant[I1]  # (nc,) where in y work of friction stands, -1 where is none
     keeps: tags.Constant[I1]  # (nc,) 1 where friction can give back what it took: by memory or X
+    resists: tags.Constant[I1]  # (nf,) 1 of friction in a joint and dry friction
     friction: F2  # (nc, 3) see codes
     given: F1  # (nf,) energy that friction in a joint, or dry friction, gave
     found: F2  # (AUDITS, 4)

@@ -14,6 +14,13 @@ from mbsim.laws.catalog import friction_law_of
 from mbsim.model.elements import Contact
 
 Rows = np.ndarray[Any, Any]
+#: Forms of forces that are friction in a joint.
+FRICTIONS = (
+    codes.SLIDE_FRICTION,
+    codes.TURN_FRICTION,
+    codes.SCREW_FRICTION,
+    codes.BALL_FRICTION,
+)
 
 
 def _cone(contact: Contact, with_user: bool) -> float:
@@ -101,6 +108,7 @@ def audit(
         friction_at,
         # of built-in laws none but those with memory looks at X
         ((laws.memory > 0) | (laws.reads_x == 1) & _in(contacts, with_user)).astype(np.int64),
+        (np.isin(applied.form, FRICTIONS) | (applied.keeps == 1)).astype(np.int64),
         np.zeros((nc, 3)),
         np.zeros(len(applied.form)),
         found,

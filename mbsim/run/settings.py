@@ -183,8 +183,19 @@ def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
     return next(iter(methods)), notes
 
 
+#: Why VERLET refuses friction that remembers.
+KEPT_BACK = "friction without memory, for it holds friction back; {} remembers"
+
+
 def _refuse_verlet(model: Model) -> None:
-    """Raise where VERLET cannot run a model: its step is found from stiffness on free bodies."""
+    """Raise where VERLET cannot run a model: its step is found from stiffness on free bodies.
+
+    It holds friction back to a part of what would stop the slip in a step, so that friction with
+    memory is not what its law says, whatever the step.
+    """
+    from mbsim.laws.catalog import FRICTION_LAWS
+
+    keeping = {name for name in FRICTION_LAWS if FRICTION_LAWS[name].memory > 0}
     unknown = "forces of known stiffness, which {} does not say"
     held = "free bodies and this model has joints or other constraints"
     whys: dict[type[Form], str] = {
@@ -211,6 +222,11 @@ def _refuse_verlet(model: Model) -> None:
             model.differentials,
             "bodies alone, and this model has states of its own",
         ),
+        *(
+            ("Force_Contact", {id: contact}, KEPT_BACK.format(contact.cff_type))
+            for id, contact in model.contacts.items()
+            if contact.cff_type in keeping
+        ),
     ]
     for statement, elements, why in refused:
         for element in elements.values():
@@ -220,19 +236,6 @@ def _refuse_verlet(model: Model) -> None:
                 f"{model.file}:{element.source.line}: {name}: integrator VERLET is for {why}; "
                 "take DOPRI5 or DOP853"
             )
-
-
-def _creeps(model: Model) -> list[str]:
-    """Return notes on friction that holds, but not in steps of VERLET."""
-    from mbsim.laws.catalog import FRICTION_LAWS
-
-    laws = {id: contact.cff_type for id, contact in model.contacts.items()}
-    return [
-        f"Force_Contact[{id}]: {law} creeps with integrator VERLET, which holds friction back to a "
-        "quarter of what would stop the slip in a step; others hold it"
-        for id, law in laws.items()
-        if law in FRICTION_LAWS and FRICTION_LAWS[law].memory > 0
-    ]
 
 
 def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
@@ -302,11 +305,10 @@ def settle(
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
     method, said_of_names = _method(asked)
-    if method == "VERLET":
-        _refuse_verlet(model)
-        notes += _creeps(model)
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
+    if method == "VERLET":
+        _refuse_verlet(model)
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 

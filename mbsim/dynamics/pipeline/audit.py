@@ -26,7 +26,6 @@ from mbsim.arrays.codes import (
     AUDIT_EVERY,
     AUDIT_TOL,
     AUDIT_UNTIL,
-    BALL_FRICTION,
     CLOSED_AT,
     CONE,
     CONTACT_THEN,
@@ -52,7 +51,6 @@ from mbsim.arrays.codes import (
     OPEN_BY,
     POSITION,
     POTENTIAL_FIRST,
-    SLIDE_FRICTION,
     SPIN,
     STEPS_ALL,
     STEPS_SINCE,
@@ -336,10 +334,9 @@ def examine_work(scene: Scene, t: float, y: F1) -> None:
 @jitable
 def examine_applied(scene: Scene, t: float) -> None:
     """Look whether friction in a joint gives, or dry friction beyond what its spring stores."""
-    applied, given = scene.applied, scene.audit.given
+    given = scene.audit.given
     for f in range(len(given)):
-        form = applied.form[f]
-        if applied.keeps[f] == 1 or SLIDE_FRICTION <= form <= BALL_FRICTION:
+        if scene.audit.resists[f] == 1:
             power = -scene.work.applied[f, LOST_POWER]
             given[f] += max(0.0, power) * (t - scene.audit.tally[TIME_THEN])
             note_given(scene, given[f], t, len(scene.contacts.id) + f)

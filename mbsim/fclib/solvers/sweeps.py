@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -240,6 +241,38 @@ def gauss_seidel(  # noqa: C901
 
 
 @jitable
+def sweep_onward(
+    system: DelassusSystem, r: Vector, some: Indices, part: float, work: Vector
+) -> None:
+    """Solve contacts `some`, and again and again those beside one that changed by more than a part.
+
+    So what presses lightly comes to the end of a chain, each contact by the one before it. That
+    takes no more than one sweep over all contacts.
+    """
+    ptr, col, n = system.ptr, system.col, len(system.mu)
+    d = len(system.q) // n
+    queue, waits = np.empty(n, np.int64), np.zeros(n, np.int64)
+    count, first = len(some), 0
+    for k in range(count):
+        queue[k], waits[some[k]] = some[k], 1
+    for _ in range(n):
+        if count == 0:
+            return
+        a, here = queue[first], first
+        waits[a] = 0
+        change, size = sweep(system, r, queue[here : here + 1], work), 0.0
+        first, count = (first + 1) % n, count - 1
+        for k in range(d * a, d * a + d):
+            size += r[k] ** 2
+        if math.sqrt(change) <= part * math.sqrt(size):
+            continue
+        for j in range(ptr[a], ptr[a + 1]):
+            if col[j] != a and waits[col[j]] == 0:
+                queue[(first + count) % n], waits[col[j]] = col[j], 1
+                count += 1
+
+
+@jitable
 def mend_weak(system: DelassusSystem, r: Vector, tol: float, most: int) -> bool:
     """Sweep over weak contacts, whose share (`own_share`) is above a third of the `tol` for it.
 
@@ -267,8 +300,7 @@ def mend_weak(system: DelassusSystem, r: Vector, tol: float, most: int) -> bool:
                 found += 1
         if above == 0:
             return True
-        for _ in range(3):
-            sweep(system, r, some[:found], work)
+        sweep_onward(system, r, some[:found], 0.1 * tol, work)
     return False
 
 
