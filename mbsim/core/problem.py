@@ -23,9 +23,9 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | what it changes of friction over normal forces; h =        |
 |         |                        | FRICTION_ALONE: only that; h = IMPACTS_ALONE: what it      |
 |         |                        | changes of speeds in impacts, over what these changed by   |
-|         |                        | in the step, t being its length; h = EACH: of t            |
-|         |                        | differences, one behind the other, each left in its first  |
-|         |                        | number, of bodies alone. Asked for AUTO alone              |
+|         |                        | in the step, t being its length; h = EACH: of RATES such   |
+|         |                        | differences, one behind the other, each as with h = 0 and  |
+|         |                        | left in its first number. Asked for AUTO alone             |
 | check   | y new, -               | 1, or the part of the step to take instead                 |
 | inner   | -, -                   | part of the step (0..1) worth a look, or < 0               |
 | switch- | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
@@ -159,8 +159,9 @@ FULL = 1
 STABLE_EVERY = 16
 
 #: What `norm` is given for h where only friction counts, where only impacts do, and where it takes
-#: several vectors at once.
+#: RATES vectors at once.
 FRICTION_ALONE, IMPACTS_ALONE, EACH = -1.0, -2.0, -3.0
+RATES = 7
 
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0

@@ -9,17 +9,16 @@ The implicit method tries an explicit step now and then. What its own last steps
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
 wrong, the explicit method goes on. `Methods.change_over` learns from what came of a change.
 
-A model that was stiff for a good part of the run so far will be so. Else a change is worth it where
-steps are so many a time that the problem's own time takes very many: by the pace of the run so far,
-and of the last WINDOW steps once there are so many. An impact after a flight takes little of the
-run, and is over before there are. How long the run lasts has no say: a longer one takes the same
-steps. Steps are counted by their evaluations: those that are rejected or shortened count more.
+How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
+there are so many: an impact after a flight takes little of the run, and is over before there are.
+Steps are counted by their evaluations: those that are rejected or shortened count more.
 Friction that turns sign from step to step within the tolerance hides its rate. That is mostly seen
 all the same (`dopri5.stiffness`), and counts twice: such steps are far beyond the bound, and what
 else they shake leaves the state that the implicit method would begin from. What trembles so leaves
 and touches, and steps are short behind that: as calm they count by their length. Else a run that
-takes as many steps a time as when it was found stiff before, or very many, tries the implicit
-method now and then.
+takes as many steps a time as when it was found stiff before, or has very many steps ahead, tries
+the implicit method now and then.
+Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
 
@@ -43,16 +42,13 @@ from mbsim.integrators.scheme import (
     JACOBIANS,
     LAST_ERROR,
     LAST_STEP,
-    OWN_TIME,
     PACE,
     PATIENCE,
     RELUCTANCE,
-    RUN_BEGAN,
     STEP,
     STEPS,
     STIFF_STEP,
     STIFF_STEPS,
-    STIFF_TIME,
     STIFFNESS,
     TIME,
     WAS_CUT,
@@ -76,14 +72,10 @@ FIRST_PATIENCE, FORGET = 15, 6
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
 EVALUATIONS_A_STEP = 6.0
-#: What was stiff for so much of the run so far will be so, if that is so much of the problem's own
-#: time: a run may begin with an impact.
-SHARE, LEAST = 0.4, 0.15
-#: Else steps are counted over so many of the problem's own time: how long a run lasts says nothing
-#: of the motion. A change is worth it for so many; once the implicit method has run, for fewer.
-OWN_TIMES = 5.0
+#: A change is worth it for so many steps that are still to be taken; once the implicit method has
+#: run, and nothing is to be loaded for it, for fewer.
 WORTH, WORTH_AGAIN = 2000, 200
-#: With so many the implicit method is tried after as many steps as there is patience for.
+#: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: For fewer steps that stability does not bound it was not worth it to leave the implicit method.
 SHORT_STAY = 60
@@ -112,19 +104,16 @@ def stay_within(m: Method, h: float, error: float) -> None:
 
 
 @jitable
-def is_stiff(m: Method, h: float) -> bool:
+def is_stiff(m: Method, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
-        m.memory[STIFF_TIME] += m.memory[LAST_STEP]
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
-        # what trembles leaves and touches: the short steps behind that are not what bounds it. Nor
-        # is one calm that is near the bound: of a vibration some steps show less than its rate
-        calm = 1.0 - m.memory[STIFFNESS] / BOUND
-        m.memory[CALM_STEPS] += calm * min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
+        # what trembles leaves and touches: the short steps behind that are not what bounds it
+        m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
             m.memory[STIFF_STEPS] = 0.0
     if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
@@ -137,15 +126,16 @@ def is_stiff(m: Method, h: float) -> bool:
         m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
     if steps % WINDOW == 0.0:
         m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
-    # steps that grow, as from a start, are not yet those to come; until there is a window, they are
-    # as many a time as when it was found stiff before
-    span, known = OWN_TIMES * m.memory[OWN_TIME], m.memory[COSTLY] < math.inf
-    pace = m.memory[COSTLY] if known and m.memory[PACE] == 0.0 else m.memory[PACE]
-    most = span / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
-    ahead = min(span * pace, most)
-    least = max(SHARE * (t - m.memory[RUN_BEGAN]), LEAST * m.memory[OWN_TIME])
-    often = m.memory[STIFF_TIME] > least
-    enough = often or ahead > (WORTH_AGAIN if known else WORTH)
+    # steps that grow, as from a start, are not yet those to come
+    most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
+    ahead = min((t_end - t) * m.memory[PACE], most)
+    if m.memory[COSTLY] == math.inf:
+        enough = ahead > WORTH
+    elif m.memory[PACE] == 0.0:
+        # until there is a window, as many a time as when it was found stiff before
+        enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
+    else:
+        enough = ahead > WORTH_AGAIN
     if enough and m.memory[STIFF_STEPS] > 1.0:
         m.memory[BOUNDED] = 1.0
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
@@ -202,4 +192,4 @@ def changes_over(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return call_int(steps.calm, (steps.context, steps.probe, t_end)) == 1
-    return is_stiff(m, h)
+    return is_stiff(m, h, t_end)

@@ -13,7 +13,7 @@ import math
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import EACH, POSITION, STATE, Problem
+from mbsim.core.problem import EACH, POSITION, RATES, STATE, Problem
 from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -47,8 +47,8 @@ E1, E3, E4, E5, E6, E7 = (
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 
-#: Of k, for AUTO: the first row behind the stages, and how many there hold differences.
-DIFFERENCES, RATES = 7, 7
+#: Of k, for AUTO: the first row behind the stages, which hold differences between them.
+DIFFERENCES = 7
 #: From so many times the change of f over a step, between its last two stages, a rate is hidden,
 #: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
 HIDES, SHOWN, BOUNDS = 4.0, 1.5, 0.01
@@ -163,7 +163,7 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     fill_differences(m, h)
     # in the norm of the error, which has no units
     size = m.k[DIFFERENCES:]
-    call_float(p.norm, (p.context, float(RATES), EACH, size[0], m.y))
+    call_float(p.norm, (p.context, t, EACH, size[0], m.y))
     rate, own = 0.0, m.memory[OWN_TIME]
     for j in (0, 3):
         rate = max(rate, rate_of(own * size[j, 0], size[j + 1, 0], size[j + 2, 0]))

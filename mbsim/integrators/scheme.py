@@ -94,9 +94,7 @@ THIRD_AT = 54
 # its begin (`branches`); a part of it at which a force is on another branch, 0 for none, and how
 # much of it the load of what holds is known for
 LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
-# of AUTO: when the run began, and how much of it was stiff
-RUN_BEGAN, STIFF_TIME = range(59, 61)
-MEMORY = 61
+MEMORY = 59
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -173,7 +171,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     """
     n = len(y0)
     memory = np.zeros(MEMORY)
-    memory[TIME] = memory[RUN_BEGAN] = t0
+    memory[TIME] = t0
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0

@@ -176,8 +176,6 @@ class Methods:
             took = IMPLICIT_START + IMPLICIT_WORK * (work - self._since[1])
             pays = took < EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
             factor = 1.0 / 1.5 if pays else 1.5
-            if pays:
-                memory[scheme.STIFF_TIME] += now - self._since[0]
             memory[scheme.PATIENCE] = max(FIRST_PATIENCE, factor * memory[scheme.PATIENCE])
         elif self.changes > 0:
             free = memory[scheme.EXPLICIT_STEPS] - memory[scheme.STIFF_STEPS]

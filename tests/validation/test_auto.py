@@ -40,41 +40,10 @@ def test_a_run_that_is_stiff_from_its_begin_changes_over_within_some_steps(name)
     assert auto.stats["steps"] < implicit.stats["steps"] + 60
 
 
-@pytest.mark.parametrize("name", ["drop_m", "bouncing_sphere"])
-def test_an_impact_changes_nothing(name):
+@pytest.mark.parametrize("name", ["drop_m", "bowling_ball", "incline_slip"])
+def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "ends", "until"),
-    [("incline_slip", (2, 20), 0.25), ("sliding_block", (0.5, 3), 0.2), ("drop_m", (0.6, 40), 0.3)],
-)
-def test_how_long_a_run_lasts_has_no_say_in_its_steps(name, ends, until):
-    """Steps ahead until the end decided: a run ten times as long was of another method."""
-    model = mbsim.read_model(MODELS / f"{name}.xml")
-    short, long = (mbsim.simulate(model, end_time=end) for end in ends)
-    # the last steps of the shorter one end with it
-    rows = short["time"] <= until
-    assert rows.sum() > 10
-    for signal in ("bodies/2/position", "bodies/2/velocity"):
-        here, there = short[signal][rows], long[signal][: len(rows)][rows]
-        np.testing.assert_array_equal(here, there)
-
-
-@pytest.mark.parametrize("name", ["incline_slip", "sliding_block", "cam"])
-@pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
-def test_a_short_run_that_is_stiff_is_not_explicit(name, tol):
-    """They were, with 10, 7 and 4 times the evaluations: fewer than 2000 steps were ahead.
-
-    On the slope the block vibrates at the bound of stability: of each few steps one shows less than
-    the rate, and 15 that were found stiff were 115 at 1e-3.
-    """
-    model = mbsim.read_model(MODELS / f"{name}.xml")
-    auto, explicit = (mbsim.simulate(model, integrator=m, tol=tol) for m in ("AUTO", "DOPRI5"))
-    assert auto.stats["method_changes"] == 1
-    part = 0.13 if name == "incline_slip" else 0.5
-    assert auto.stats["rhs_evaluations"] < part * explicit.stats["rhs_evaluations"]
 
 
 @pytest.mark.parametrize(("name", "part"), [("torsion_top", 0.05), ("bushing_chain", 0.4)])

@@ -93,7 +93,9 @@ def test_energy_of_an_undamped_vibration_stays_bounded(tmp_path):
 @pytest.mark.parametrize("law", [n for n in FRICTION_LAWS if FRICTION_LAWS[n].memory > 0])
 def test_friction_that_remembers_is_refused(tmp_path, law):
     """It would be held back to a part of what stops the slip in a step: off whatever the tol."""
-    rubs = contact(cff_type=law, mu_static=0.4, mu_dynamic=0.3, tangential_stiffness=1e5)
+    more = {"DAHL": {"bristle_stiffness": 1e5}, "STICTION": {"tangential_stiffness": 1e5}}
+    more["LUGRE"] = more["DAHL"] | {"stribeck_vel": 0.01}
+    rubs = contact(cff_type=law, mu_static=0.4, mu_dynamic=0.3, **more.get(law, {}))
     model = GROUND + sphere(0.1) + rubs + GRAVITY
     with pytest.raises(ModelError, match=rf"deck.xml:\d+: Force_Contact\[301\]: .*; {law} remem"):
         run_deck(tmp_path, model, end_time=0.01, integrator="VERLET")

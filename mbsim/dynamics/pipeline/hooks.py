@@ -36,6 +36,7 @@ from mbsim.core.problem import (
     FRICTION_ALONE,
     FULL,
     IMPACTS_ALONE,
+    RATES,
     Taken,
 )
 from mbsim.dynamics.bodies.configuration import differ, move_on
@@ -122,7 +123,7 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     if h == FRICTION_ALONE:
         return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
     if h == EACH:
-        fill_sizes(scene, vector_at(a, int(t) * n), vector_at(b, n))
+        fill_sizes(scene, vector_at(a, RATES * n), vector_at(b, n))
         return 0.0
     error = scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
     if h > 0.0:

@@ -418,7 +418,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
 def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
     """Leave in the first number of each of the states' differences in d what it is in the norm.
 
-    Of bodies alone, where there are some.
+    As `scaled_error` has it with h = 0. Of bodies alone, where there are some.
     """
     scales, squares, n = scene.scales, scene.work.squares, len(y)
     count = len(scene.bodies.mass)
@@ -439,7 +439,8 @@ def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
             square = max(max(dx / area, 4.0 * dq), max(dv / fast, dw * area / fast))
             if not square <= largest:
                 largest = square
-        e[0] = math.sqrt(largest)
+        change = gauged(scene, Hook.EFFECTS, Effects.REVERSAL, 0.0, 0.0, e, y)
+        e[0] = math.sqrt(max(largest, change**2))
 
 
 @jitable
