@@ -21,7 +21,7 @@ FORMULAS = {
     # of Python, in which a row is what its own file says
     *("made", "pairs", "grid", "jumps"),
     # rows of scratch that are vectors themselves
-    *("work", "keep"),
+    *("work", "keep", "size", "each"),
 }
 
 

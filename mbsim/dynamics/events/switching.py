@@ -54,7 +54,7 @@ from mbsim.dynamics.forces.applied import side_of
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
-from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, MU_STATIC
 
 #: Each change of side adds 1 to chattering, each step takes a tenth of it.
 COOLING = 0.9
@@ -272,7 +272,7 @@ def may_turn(scene: Scene, s: int, h: float) -> bool:
     kept, row = scene.state.memory[s], scene.work.slot[s]
     if kept[KEPT_MODE] != SLIPS or scene.work.touching[s] == 0:
         return False
-    most = scene.contacts.friction_par[contact_of(scene, s), 0] * row[NORMAL]
+    most = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC] * row[NORMAL]
     return slipping_mass(scene, s) * min(kept[KEPT_SPEED], row[SLIP]) <= h * most
 
 

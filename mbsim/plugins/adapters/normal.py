@@ -110,8 +110,12 @@ def only_one(result: Any) -> float:
 
 @overload(only_one)
 def _only_one(result: Any) -> Callable[[Any], float]:
+    # Numba compares annotations too: a lambda, which has none, is not taken
+    def from_number(result: Any) -> float:
+        return float(result)
+
     if isinstance(result, (types.Number, types.Boolean)):
-        return lambda result: float(result)
+        return from_number
 
     def from_list(result: Any) -> float:
         if len(result) != 1:
