@@ -6,6 +6,7 @@ Reading is done apart where the reader is a library that loops over damage, see 
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import os
 import pickle
 import signal
@@ -95,6 +96,8 @@ def apart(do: Callable[[], Made], *paths: Path) -> Made:
         code = 1
         with contextlib.suppress(BaseException):
             os.close(reading)
+            # the parent tells of a crash
+            faulthandler.disable()
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             used, (_, most) = time.process_time(), resource.getrlimit(resource.RLIMIT_CPU)
