@@ -79,6 +79,7 @@ class Runner:
                 Methods(system, settings.integrator, start, timed),
             )
         )
+        self._warn_of_states()
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem, self.detector)
@@ -94,6 +95,16 @@ class Runner:
         self._begun = False  # whether the current Simulate has
         self._before: dict[str, Any] | None = None  # checkpoint to go on from while it begins
         self.dump: ContactProblems | None = None
+
+    def _warn_of_states(self) -> None:
+        """Say of subroutines with states that VERLET holds their friction back."""
+        contacts = self.system.scene.contacts
+        for id, numbers in zip(self.system.contact_ids, contacts.memory, strict=True):
+            if numbers > 0 and self.methods.explicit.order == 0.0:
+                self._say(
+                    f"Force_Contact[{id}]: VERLET holds friction back to a quarter of what would "
+                    "stop the slip in a step: what its subroutine holds by states creeps"
+                )
 
     def _make_detector(self) -> Any:
         """Put FCL behind its hook where a pair may need it."""

@@ -23,8 +23,6 @@ from mbsim.integrators.changing import (
     IMPLICIT_WORK,
     SHORT_STAY,
 )
-from mbsim.model.names import element_name
-from mbsim.run.settings import KEPT_BACK
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -40,18 +38,6 @@ FEW = 16
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
 LEFT_OF_STICKING = 3e-4
-
-
-def _refuse_memory(system: System) -> None:
-    """Raise where a subroutine's friction has states, as `settings` does for laws with memory."""
-    for id, numbers in zip(system.contact_ids, system.scene.contacts.memory, strict=True):
-        if numbers > 0:
-            line = system.model.contacts[id].source.line
-            name = element_name(system.model.file, "Force_Contact", id)
-            raise ModelError(
-                f"{system.model.file}:{line}: {name}: integrator VERLET is for "
-                f"{KEPT_BACK.format('its subroutine')}; take DOPRI5 or DOP853"
-            )
 
 
 class Methods:
@@ -82,8 +68,6 @@ class Methods:
             self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_STICKING
         fixed = self.explicit.order == 0.0
         system.scene.world.fixed_step[0] = int(fixed)
-        if fixed:
-            _refuse_memory(system)
         self.problem: Problem
         self.problem, self._table = mechanism(system.scene, fixed)
         self._tangent: Any = None

@@ -183,10 +183,6 @@ def _method(asked: dict[str, str]) -> tuple[str, list[str]]:
     return next(iter(methods)), notes
 
 
-#: Why VERLET refuses friction that remembers.
-KEPT_BACK = "friction without memory, for it holds friction back; {} remembers"
-
-
 def _refuse_verlet(model: Model) -> None:
     """Raise where VERLET cannot run a model: its step is found from stiffness on free bodies.
 
@@ -197,6 +193,7 @@ def _refuse_verlet(model: Model) -> None:
 
     keeping = {name for name in FRICTION_LAWS if FRICTION_LAWS[name].memory > 0}
     unknown = "forces of known stiffness, which {} does not say"
+    forgets = "friction without memory, for it holds friction back; {} remembers"
     held = "free bodies and this model has joints or other constraints"
     whys: dict[type[Form], str] = {
         Expressed: unknown.format("an expression"),
@@ -223,9 +220,13 @@ def _refuse_verlet(model: Model) -> None:
             "bodies alone, and this model has states of its own",
         ),
         *(
-            ("Force_Contact", {id: contact}, KEPT_BACK.format(contact.cff_type))
+            (
+                "Force_Contact",
+                {id: contact},
+                forgets.format(contact.cff_type),
+            )
             for id, contact in model.contacts.items()
-            if contact.cff_type in keeping
+            if contact.cff_type in keeping and not contact.rigid
         ),
     ]
     for statement, elements, why in refused:
@@ -305,10 +306,10 @@ def settle(
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
     method, said_of_names = _method(asked)
-    method, said_of_friction = _for_rigid_friction(model, method)
-    notes += said_of_friction
     if method == "VERLET":
         _refuse_verlet(model)
+    method, said_of_friction = _for_rigid_friction(model, method)
+    notes += said_of_friction
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 
