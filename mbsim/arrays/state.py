@@ -22,7 +22,8 @@ class Pairs(NamedTuple):
     left: F1  # (np,) what the motion since has left of it for certain
     active: I1  # (np,) rows in use, ascending; those of large contacts behind all others
     free: I1  # (np,) rows not in use, the next one last
-    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, rows that a listing lacked
+    # named as a method of tuples, which nobody asks of arrays
+    count: I1  # type: ignore[assignment]  # (4,) live, free, live for good, rows a listing lacked
 
 
 @tags.state
