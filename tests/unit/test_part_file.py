@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
+from helpers.dying import Killed, dying
 from mbsim.errors import ResultsError
 from mbsim.results import part_file
 from mbsim.results.files import RunLock, locked
 from mbsim.results.part_file import PartFile
 from mbsim.results.reading import open_results
-
-
-class Killed(BaseException):
-    """What a kill at a system call is to the caller."""
 
 
 def grow(target: Path, flushes: int, rows: int = 50) -> tuple[PartFile, h5py.File]:
@@ -116,17 +112,8 @@ def test_a_kill_at_any_call_leaves_an_old_or_a_new_state(
         target = tmp_path / f"{call}.h5"
         part, file = grow(target, 3)
         add(file, 50)
-        left, plain = call, getattr(os, name)
-
-        def dying(*given: Any, **named: Any) -> Any:
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise Killed
-            return plain(*given, **named)  # noqa: B023
-
         with monkeypatch.context() as patch:
-            patch.setattr(os, name, dying)
+            patch.setattr(os, name, dying(getattr(os, name), call))
             try:
                 part.publish()
                 ended = True

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
+from helpers.dying import Killed, dying
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.checksums import end_of, sums_of
@@ -314,10 +315,6 @@ def test_a_disk_without_room_leaves_the_earlier_run(
     assert {path.name: path.read_bytes() for path in tmp_path.glob("deck.*")} == before
 
 
-class Killed(BaseException):
-    """What a kill at a system call is to the caller."""
-
-
 @pytest.mark.parametrize("flushes", [0, 1])
 @pytest.mark.parametrize("name", ["fsync", "replace", "unlink", "open"])
 def test_a_killed_rerun_never_mixes_two_runs(
@@ -330,17 +327,8 @@ def test_a_killed_rerun_never_mixes_two_runs(
         log = folder / "deck.log"
         close(recording(folder), write_log=lambda log=log: log.write_text("10") and None)
         recorder = recording(folder, 20)
-        left, plain = call, getattr(os, name)
-
-        def dying(*given: Any, **named: Any) -> Any:
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise Killed
-            return plain(*given, **named)  # noqa: B023
-
         with monkeypatch.context() as patch:
-            patch.setattr(os, name, dying)
+            patch.setattr(os, name, dying(getattr(os, name), call))
             try:
                 for _ in range(flushes):
                     recorder.flush(checkpoint(20))
