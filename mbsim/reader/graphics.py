@@ -295,14 +295,14 @@ POST_GRAPHIC = Statement(
         },
         "ends_type": Spec(keyword(ENDS_TYPES), "contact takes ends as closed", "", "CLOSED"),
         "file": Spec(
-            TEXT, "file of a TriaMesh: STL, OBJ, OFF, PLY, GLB, glTF or 3MF, relative to the deck"
+            TEXT, "a TriaMesh's STL, OBJ, OFF, PLY, GLB, glTF or 3MF, relative to the deck"
         ),
         # ours
         "length_unit": Spec(
             keyword(units.names(units.LENGTH)),
             "unit of the file's numbers",
             "",
-            "the file's own (METER in GLB and glTF), else the deck's",
+            "the file's own, else the deck's",
         ),
     },
     _build_graphic,
