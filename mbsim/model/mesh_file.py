@@ -68,7 +68,10 @@ def load_mesh(path: Path) -> MeshFile:
         raise ModelError(f"holds vertices that are not finite numbers below {_LARGEST:g}")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ModelError("holds faces that name vertices it does not have")
-    return MeshFile(*merge_vertices(vertices, faces), unit)
+    vertices, faces = merge_vertices(vertices, faces)
+    if len(faces) == 0:
+        raise ModelError("holds no triangle with three different corners")
+    return MeshFile(vertices, faces, unit)
 
 
 def _decode(data: bytes, kind: str) -> MeshFile:

@@ -91,6 +91,8 @@ def mend(vertices: Array, faces: Faces) -> Mended:
     done: list[str] = []
     vertices, faces = vertices.copy(), faces.copy()
     faces = _merge(vertices, faces, done)
+    if len(faces) == 0:
+        raise ModelError("cannot be mended: no triangle is left where near vertices become one")
     again = doubles(faces)
     if again.any():
         done.append(f"removed {int(again.sum())} triangles that were there twice")

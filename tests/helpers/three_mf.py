@@ -22,9 +22,15 @@ def mesh_text(vertices: np.ndarray, faces: np.ndarray) -> str:
     return f"<mesh><vertices>{points}</vertices><triangles>{corners}</triangles></mesh>"
 
 
-def write_3mf(path: Path, resources: str, build: str, unit: str = "millimeter") -> None:
+def write_3mf(
+    path: Path,
+    resources: str,
+    build: str,
+    unit: str = "millimeter",
+    compression: int = zipfile.ZIP_DEFLATED,
+) -> None:
     """Write an archive with one model part."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", compression) as archive:
         archive.writestr("_rels/.rels", RELS)
         archive.writestr(
             "3D/part.model",
