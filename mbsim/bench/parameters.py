@@ -144,6 +144,20 @@ class SliderCrank(NamedTuple):
     end_time: float  # s
 
 
+class FallingTorus(NamedTuple):
+    """S9: a mesh torus falls on the plane z = 0, tilted about x, or upright onto a fixed one."""
+
+    ring: float  # m, radius of the centre circle
+    tube: float  # m
+    sections: tuple[int, int]  # of the mesh, around the ring and around the tube
+    mass: float  # kg
+    mu: float
+    height: float  # m, of its centre at t = 0
+    tilt: float  # rad, of its axis where it falls on the plane
+    fixed: tuple[float, float, float]  # m, centre of the fixed torus, whose axis is z
+    end_time: float  # s
+
+
 S1 = FreeBody(
     mass=1.0,
     inertia=(0.010, 0.020, 0.025),
@@ -264,6 +278,40 @@ S8B = SliderCrank(
     speed=10.0,
     end_time=2.0,
 )
+
+
+S9 = FallingTorus(
+    ring=0.1,
+    tube=0.03,
+    sections=(72, 36),
+    mass=1.0,
+    mu=0.3,
+    height=0.23,
+    tilt=math.radians(60.0),
+    fixed=(0.1, 0.0, 0.03),
+    end_time=1.0,
+)
+
+
+def torus_mesh(torus: FallingTorus) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) (m) and faces (2n, 3) of a torus about z, its vertices on the surface."""
+    around, across = torus.sections
+    i, j = (each.ravel() for each in np.indices((around, across)))
+    u, v = 2.0 * np.pi * i / around, 2.0 * np.pi * j / across
+    reach = torus.ring + torus.tube * np.cos(v)
+    vertices = np.column_stack([reach * np.cos(u), reach * np.sin(u), torus.tube * np.sin(v)])
+    a, b = across * i + j, across * ((i + 1) % around) + j
+    c, d = across * ((i + 1) % around) + (j + 1) % across, across * i + (j + 1) % across
+    return vertices, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def torus_inertia(torus: FallingTorus) -> tuple[float, float, float]:
+    """Principal inertia of the solid inside the mesh of a torus about z (kg m^2)."""
+    from mbsim.model.mass_properties import polyhedron
+
+    solid = polyhedron(*torus_mesh(torus))
+    x, y, z = np.diag(solid.inertia / solid.volume * torus.mass).tolist()
+    return (x, y, z)
 
 
 def s5_positions() -> np.ndarray:

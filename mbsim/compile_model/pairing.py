@@ -264,6 +264,29 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
     return Plans(tuple(pairs), tuple(broadphase))
 
 
+def why_costly(model: Model, plan: PairPlan) -> str:
+    """Return why a pair of listed graphics is costly to detect, an empty string if it is not."""
+    kind = plan.kind
+    meshes = [
+        graphic
+        for graphic in (model.graphics[plan.graphic_i], model.graphics[plan.graphic_j])
+        if graphic.faces is not None
+    ]
+    if kind.closed_form or not meshes:
+        return ""
+    reasons = []
+    for mesh in meshes:
+        assert mesh.faces is not None
+        about = "is convex" if mesh.hull is not None else "is not convex"
+        if mesh.hull is None and len(mesh.faces) > hull.MOST_FACES:
+            about = f"is taken as not convex (over {hull.MOST_FACES} triangles)"
+        elif mesh.hull is not None:
+            about += f" with {int(mesh.hull[hull.EDGES])} edges"
+        reasons.append(f"Post_Graphic[{mesh.id}] of {len(mesh.faces)} triangles {about}")
+    points = "1 point" if kind.slots == 1 else f"up to {kind.slots} points"
+    return f"{' and '.join(reasons)}: FCL looks at triangles at every evaluation, {points}"
+
+
 def thinnest(graphic: Graphic) -> float:
     """Return half of the thinnest side; inf for a plane."""
     return min(half_extent(graphic))

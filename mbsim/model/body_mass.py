@@ -9,7 +9,7 @@ import numpy as np
 
 from mbsim.model import mass_properties
 from mbsim.model.elements import Array, Body, Graphic, Model
-from mbsim.model.frames import Frame
+from mbsim.model.frames import GLOBAL, Frame
 from mbsim.model.mass_properties import MassProperties
 from mbsim.model.mesh import solid_fault
 
@@ -22,10 +22,14 @@ class BodyMassError(ValueError):
 
 
 class BodyMass(NamedTuple):
-    """`mass` and `inertia` (3, 3) about the cg origin in cg axes, in the deck's units."""
+    """`mass` and `inertia` (3, 3) about the origin of `cg` in its axes, in the deck's units.
+
+    `cg` is the global frame of the cg marker; without one, of the centre of the graphics.
+    """
 
     mass: float
     inertia: Array
+    cg: Frame
 
 
 def body_mass(model: Model, frames: Mapping[int, Frame], body: Body) -> BodyMass:
@@ -54,14 +58,16 @@ def body_mass(model: Model, frames: Mapping[int, Frame], body: Body) -> BodyMass
     -----
     A given mass goes before `density`. Inertia that is not given is that of the body's
     solid graphics, summed without regard to overlap and scaled to the mass; their centre
-    must then be the cg marker's origin.
+    must then be the cg marker's origin. A body of given `density` needs no cg marker: that is then
+    at the centre of its graphics, along the axes of `lprf_id` (without it, the global ones).
     """
-    if body.cg_id is None:
-        raise BodyMassError("cg_id: missing; a moving body needs the id of its cg marker")
-    cg = frames[body.cg_id]
     solid: MassProperties | None = None
-    if body.mass is None or body.inertia is None:
-        solid = _solid(model, frames, body, cg)
+    if body.cg_id is not None:
+        cg = frames[body.cg_id]
+        if body.mass is None or body.inertia is None:
+            solid = _solid(model, frames, body, cg)
+    else:
+        solid, cg = _own_centre(model, frames, body)
 
     mass = body.mass
     if mass is None:
@@ -82,7 +88,7 @@ def body_mass(model: Model, frames: Mapping[int, Frame], body: Body) -> BodyMass
             "inertia_xx, inertia_yy, inertia_zz: missing, and the body has no solid graphics"
         )
     _check_inertia(inertia, body)
-    return BodyMass(mass, inertia)
+    return BodyMass(mass, inertia, cg)
 
 
 def solids_of(model: Model, body: Body) -> list[Graphic]:
@@ -94,6 +100,28 @@ def solids_of(model: Model, body: Body) -> list[Graphic]:
         and (marker := model.markers.get(graphic.marker_id)) is not None
         and marker.body_id == body.id
     ]
+
+
+def _own_centre(
+    model: Model, frames: Mapping[int, Frame], body: Body
+) -> tuple[MassProperties, Frame]:
+    """Return the solid of a body without a cg marker and the frame at its centre."""
+    if body.density is None:
+        raise BodyMassError(
+            "cg_id: missing; a moving body needs the id of its cg marker, or density and "
+            "solid graphics"
+        )
+    lprf = frames[body.lprf_id] if body.lprf_id is not None else GLOBAL
+    # from a place on the body: far from the origin of all, sums would lose digits
+    markers = (frames[graphic.marker_id] for graphic in solids_of(model, body))
+    near = Frame(next((frame.p for frame in markers), lprf.p), lprf.R)
+    solid = _solid(model, frames, body, near)
+    if solid is None:
+        raise BodyMassError(f"density={body.density:g}: the body has no solid graphics")
+    if not solid.volume > 0.0:
+        raise BodyMassError("cg_id: missing, and the graphics enclose no volume")
+    centre = Frame(near.p + near.R @ solid.centre, near.R)
+    return solid._replace(centre=np.zeros(3)), centre
 
 
 def _solid(

@@ -17,6 +17,7 @@ from mbsim.model.frames import marker_frames, marker_loops
 from mbsim.model.mechanism_checks import check_mechanism, wanted
 from mbsim.model.mechanism_checks import tables as mechanism_tables
 from mbsim.model.mesh import solid_fault
+from mbsim.model.mesh_findings import crossing_findings, mesh_findings
 
 _MOST_LISTED = 10
 # the attribute that names the marker of a graphic, where it is not center_marker_id
@@ -164,7 +165,8 @@ def _bodies(model: Model, known: Known) -> Iterator[Fault]:
         if marker.id not in frames or known.exists("Reference_Marker", marker.id):
             unsound.add(marker.body_id)
     for body in model.bodies.values():
-        dangling = any(id is not None and id not in frames for id in (body.cg_id, body.im_id))
+        ids = (body.cg_id, body.im_id, body.lprf_id)
+        dangling = any(id is not None and id not in frames for id in ids)
         if body.is_ground or dangling or body.id in unsound:
             continue
         try:
@@ -215,10 +217,22 @@ def _contacts(model: Model) -> Iterator[Fault]:
             message = 'is_material_inside="FALSE": cavities in a contact are not built yet'
             yield _fault(graphic.source, element, message)
         if graphic.vertices is not None and graphic.faces is not None:
-            message = solid_fault(graphic.vertices, graphic.faces)
-            if message:
-                file = f'file="{graphic.mesh_file}": ' if graphic.mesh_file else ""
-                yield _fault(graphic.source, element, file + message)
+            yield from _mesh_faults(graphic, element)
+
+
+def _mesh_faults(graphic: Graphic, element: str) -> Iterator[Fault]:
+    """Yield all that keeps a mesh from being a solid, each kind once."""
+    if graphic.vertices is None or graphic.faces is None:
+        return
+    if not solid_fault(graphic.vertices, graphic.faces):
+        return
+    file = f'file="{graphic.mesh_file}": ' if graphic.mesh_file else ""
+    found = mesh_findings(graphic.vertices, graphic.faces)
+    for finding in (*found, *crossing_findings(graphic.vertices, graphic.faces)):
+        yield _fault(graphic.source, element, f"{file}{finding}")
+    yield _fault(
+        graphic.source, element, f"{file}mbsim check --repair writes a mended copy if it can"
+    )
 
 
 def _radii(model: Model, contact: Contact) -> Iterator[Fault]:

@@ -35,7 +35,8 @@ class MarkerPlace:
 class BodyPlace:
     """A moving body at t = 0.
 
-    `p` (3,) [L], `R` (3, 3) and unit quaternion `q` (w, x, y, z) of its cg marker, global;
+    `p` (3,) [L], `R` (3, 3) and unit quaternion `q` (w, x, y, z) of its cg marker (without one, of
+    the centre of its graphics), global;
     `mass` and `inertia` (3, 3) about the cg origin in cg axes, both times `mass_scale`,
     so that F = m a in the model's units; `v` [L/T] of the cg origin and `w` [1/T], global.
     `given` (n, 7): for each component of them that the deck gives its axis, three numbers for v
@@ -132,9 +133,8 @@ def _body_frame(body: BodyPlace | None) -> Frame:
 
 def _place_body(model: Model, frames: Mapping[int, Frame], body: Body) -> BodyPlace:
     """Return one moving body; velocities are turned from vm_id and wm_id to the global frame."""
-    mass, inertia = body_mass(model, frames, body)
+    mass, inertia, cg = body_mass(model, frames, body)
     scale = model.units.mass_scale
-    cg = frames[body.cg_id] if body.cg_id is not None else GLOBAL
     axes_v = frames[body.vm_id].R if body.vm_id is not None else GLOBAL.R
     axes_w = frames[body.wm_id].R if body.wm_id is not None else GLOBAL.R
     return BodyPlace(

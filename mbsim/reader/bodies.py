@@ -96,7 +96,8 @@ def _build_body(entry: Entry) -> None:
         source=entry.source,
     )
     if body.density is not None and body.mass is not None:
-        entry.note("has no effect where mass is given", "density")
+        what = "" if body.cg_id is not None else ", but lets the graphics give the centre of mass"
+        entry.note(f"has no effect on the mass where mass is given{what}", "density")
     entry.register(entry.draft.bodies, body)
 
 
@@ -196,7 +197,9 @@ BODY_RIGID = Statement(
         "id": NAMED["id"],
         "label": NAMED["label"],
         "isground": Spec(FLAG, "TRUE: the body that does not move", "", "FALSE"),
-        "cg_id": Spec(ID, "marker of the body at its centre of mass; moving bodies need one"),
+        "cg_id": Spec(
+            ID, "marker of the body at its centre of mass", "", "with density, that of its graphics"
+        ),
         "im_id": Spec(ID, "marker of the body along whose axes inertias are", "", "cg_id"),
         "lprf_id": Spec(ID, "marker in which the body's markers are given", "", "global frame"),
         "mass": Spec(POSITIVE, "mass; moving bodies need it or density", "M"),

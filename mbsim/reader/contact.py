@@ -10,7 +10,7 @@ from mbsim.reader.keywords import (
     CFF_TYPES,
     CNF_NOT_BUILT,
     CNF_TYPES,
-    MASTER_SURFACES,
+    MASTERS_NOT_BUILT,
     spellings,
 )
 from mbsim.reader.kinds import (
@@ -225,7 +225,6 @@ LANGUAGE = keyword(spellings(C="", FORTRAN=""))
 _POST = ("cpost_param_string", "cpost_fnc_name", "cpost_script_name", "cpost_interpreter")
 _POST_IN_PYTHON = "CONTACTPOST is called in Python alone: name a script by cpost_script_name"
 _NOT_BUILT = "is documented but not built yet"
-_SEARCH = "steers MotionSolve's own contact search and has no effect here"
 FORCE_CONTACT = Statement(
     "Force_Contact",
     {
@@ -239,9 +238,24 @@ FORCE_CONTACT = Statement(
         "j_flexbody_id": Spec(ID, refused=_NOT_BUILT),
         "j_flip_flex": Spec(FLAG, refused=_NOT_BUILT, harmless="FALSE"),
         "ignore_penetration_larger_than": Spec(POSITIVE, "no force above this depth", "L", "never"),
-        "master_surface": Spec(keyword(MASTER_SURFACES), note=_SEARCH, harmless="AUTO"),
-        "enable_node_mode": Spec(FLAG, note=_SEARCH, harmless="FALSE"),
-        "enable_analytical": Spec(FLAG, note=_SEARCH),
+        "master_surface": Spec(
+            keyword(spellings(AUTO=""), MASTERS_NOT_BUILT, "no side is the master"),
+            "both sides count alike",
+            "",
+            "AUTO",
+        ),
+        "enable_node_mode": Spec(
+            keyword(spellings(FALSE="", AUTO=""), spellings(TRUE=""), "surfaces touch, not nodes"),
+            "surfaces touch, not their nodes",
+            "",
+            "AUTO",
+        ),
+        "enable_analytical": Spec(
+            keyword(spellings(TRUE="", AUTO=""), spellings(FALSE=""), "shapes are not tessellated"),
+            "closed forms where there are some",
+            "",
+            "AUTO",
+        ),
         "contact_stability_2d": Spec(REAL, refused=_NOT_BUILT),
         # ours: an incident a contact point, or one for all that two graphics touch with
         "contact_points": Spec(

@@ -11,7 +11,9 @@ import numpy.typing as npt
 from mbsim.errors import ModelError
 from mbsim.model import elements as el
 from mbsim.model.hull import polyhedron_of
-from mbsim.model.mesh import load_mesh, merge_vertices
+from mbsim.model.mesh import merge_vertices
+from mbsim.model.mesh_file import load_mesh
+from mbsim.reader import units
 from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
 from mbsim.reader.kinds import (
     FLAG,
@@ -76,7 +78,7 @@ SHAPES = (
         ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)),
     ),
     Shape("Plane", "PLANE", ("rm_id", "center_marker_id"), (), _BOUNDS),
-    Shape("TriaMesh", "MESH", ("rm_id",), (), ("file",)),
+    Shape("TriaMesh", "MESH", ("rm_id",), (), ("file", "length_unit")),
 )
 _BY_TYPE = {fold(shape.type): shape for shape in SHAPES}
 
@@ -193,11 +195,16 @@ def _mesh(entry: Entry) -> tuple[el.Array | None, npt.NDArray[np.int64] | None, 
     if not children:
         path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
         try:
-            vertices, faces = load_mesh(path)
+            vertices, faces, unit = load_mesh(path)
         except ModelError as error:
             entry.fault(str(error), "file")
             return None, None, ""
-        return vertices, faces, str(path)
+        scale = _scale(entry, unit)
+        # an inch in metres is no round number: the factor is rounded once
+        return vertices if scale == 1.0 else vertices * scale, faces, str(path)
+
+    if entry.given("length_unit"):
+        entry.fault("is for a file; <Nodes> are in the deck's unit of length", "length_unit")
 
     if set(children) != {"nodes", "faces"} or len(entry.node.children) != 2:
         entry.fault("TriaMesh: needs one <Nodes> and one <Faces>")
@@ -213,6 +220,21 @@ def _mesh(entry: Entry) -> tuple[el.Array | None, npt.NDArray[np.int64] | None, 
         return None, None, ""
     vertices, faces = merge_vertices(nodes, indices.astype(np.int64))
     return vertices, faces, ""
+
+
+def _scale(entry: Entry, unit: str) -> float:
+    """Return the factor from a mesh file's numbers to the deck's unit of length.
+
+    The attribute goes first, then the `unit` that the file's format tells, then the deck's.
+    """
+    ours = (entry.draft.units or el.Units()).length
+    theirs = entry.get("length_unit") or unit or ours
+    factor = units.LENGTH[theirs] / units.LENGTH[ours]
+    if unit and unit != ours and not entry.given("length_unit"):
+        entry.note(f"is in {unit} by its format, taken times {float(factor):g} to {ours}", "file")
+    elif unit and theirs != unit:
+        entry.note(f"goes before {unit}, which the file's format says", "length_unit")
+    return float(factor)
 
 
 def _numbers(entry: Entry, node: Node, what: str) -> el.Array | None:
@@ -272,7 +294,16 @@ POST_GRAPHIC = Statement(
             for name in _BOUNDS
         },
         "ends_type": Spec(keyword(ENDS_TYPES), "contact takes ends as closed", "", "CLOSED"),
-        "file": Spec(TEXT, "file of a TriaMesh: STL, OBJ, PLY or OFF, relative to the deck"),
+        "file": Spec(
+            TEXT, "a TriaMesh's STL, OBJ, OFF, PLY, GLB, glTF or 3MF, relative to the deck"
+        ),
+        # ours
+        "length_unit": Spec(
+            keyword(units.names(units.LENGTH)),
+            "unit of the file's numbers",
+            "",
+            "the file's own, else the deck's",
+        ),
     },
     _build_graphic,
     children=("Nodes", "Faces"),

@@ -182,8 +182,13 @@ def _parse_reals(text: str) -> tuple[float, ...]:
     return tuple(parse_real(word) for word in words)
 
 
-def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = None) -> Kind:
-    """Return the kind of keywords; both tables are folded spelling -> canonical keyword."""
+def keyword(
+    allowed: Mapping[str, str], not_built: Mapping[str, str] | None = None, why: str = ""
+) -> Kind:
+    """Return the kind of keywords; both tables are folded spelling -> canonical keyword.
+
+    `why` says for what reason those of the second table are not built.
+    """
     canonical = list(dict.fromkeys(allowed.values()))
     choice = ("one of " if len(canonical) > 1 else "") + ", ".join(canonical)
 
@@ -193,7 +198,8 @@ def keyword(allowed: Mapping[str, str], not_built: Mapping[str, str] | None = No
             return allowed[word]
         if not_built and word in not_built:
             built = ", ".join(canonical)
-            raise BadValueError(f"{not_built[word]} is not built yet; built: {built}")
+            reason = f": {why}" if why else ""
+            raise BadValueError(f"{not_built[word]} is not built yet{reason}; built: {built}")
         close = nearest(text, (*canonical, *(not_built or {}).values()))
         raise BadValueError(f"must be {choice}{close}")
 

@@ -52,18 +52,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     """
     deck = Path(path)
     data = _read_bytes(deck)
-    draft: Draft
-    said_so: Callable[[Fault], Fault] = _as_it_is
-    if is_adams(deck.name):
-        from mbsim.reader.adm.draft import AdmDraft
-        from mbsim.reader.adm.read import fill, in_words
-
-        draft, said_so = AdmDraft(str(path), deck.absolute().parent), in_words
-        fill(data, draft, overrides)
-    else:
-        draft = Draft(str(path), deck.absolute().parent)
-        _fill(data, draft, overrides)
-
+    draft, said_so = _read_draft(path, data, overrides)
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
@@ -76,6 +65,47 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
         raise DeckError([*draft.faults, *map(said_so, faults)])
     draft.warnings.extend(warnings)
     return replace(_to_model(draft, deck, model.sha256), overrides=tuple(overrides))
+
+
+def _read_draft(
+    path: str | PathLike[str], data: bytes, overrides: Sequence[str]
+) -> tuple[Draft, Callable[[Fault], Fault]]:
+    """Return what the deck's statements say, and how its faults are worded."""
+    deck = Path(path)
+    if is_adams(deck.name):
+        from mbsim.reader.adm.draft import AdmDraft
+        from mbsim.reader.adm.read import fill, in_words
+
+        adams = AdmDraft(str(path), deck.absolute().parent)
+        fill(data, adams, overrides)
+        return adams, in_words
+    draft = Draft(str(path), deck.absolute().parent)
+    _fill(data, draft, overrides)
+    return draft, _as_it_is
+
+
+def read_graphics(path: str | PathLike[str], overrides: Sequence[str] = ()) -> list[el.Graphic]:
+    """Return the graphics of a deck, whether or not the rest of it makes sense.
+
+    Parameters
+    ----------
+    path : path-like
+        The deck.
+    overrides : sequence of str, optional
+        As of `read_model`.
+
+    Raises
+    ------
+    DeckError
+        Faults of the graphics themselves, or that the file is no deck.
+    ModelError
+        If the file cannot be read, or an override names what is not there.
+    """
+    draft, _ = _read_draft(path, _read_bytes(Path(path)), overrides)
+    faults = [fault for fault in draft.faults if fault.element.startswith("Post_Graphic")]
+    if faults:
+        raise DeckError(faults)
+    return list(draft.graphics.values())
 
 
 def _as_it_is(fault: Fault) -> Fault:

@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import random
 import sys
+import zipfile
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +23,7 @@ from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from helpers.folders import DATA, MODELS
 from helpers.forked import finds
 from helpers.mutations import bytes_changed, objects_changed, text_changed
+from helpers.three_mf import mesh_text, write_3mf
 from mbsim.cli.main import main
 from mbsim.errors import MbsimError, ModelError
 from mbsim.results.audit import Audit, Entry, Share
@@ -239,18 +242,52 @@ def meshes(folder: Path) -> list[Path]:
         data = solid.export(file_type=kind, **more)
         (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
         found.append(folder / name)
+    glb = solid.scene().export(file_type="glb")
+    gltf = trimesh.exchange.gltf.export_gltf(solid.scene(), embed_buffers=True)["model.gltf"]
+    for name, data in (("g.glb", glb), ("h.gltf", gltf)):
+        (folder / name).write_bytes(data)
+        found.append(folder / name)
+    mesh = mesh_text(solid.vertices, solid.faces)
+    parts = '<object id="2"><components><component objectid="1"/></components></object>'
+    # one as it is, in which damage reaches the XML, and one compressed
+    for name, how in (("i.3mf", zipfile.ZIP_STORED), ("j.3mf", zipfile.ZIP_DEFLATED)):
+        text = f'<object id="1">{mesh}</object>{parts}'
+        write_3mf(folder / name, text, '<item objectid="2"/>', compression=how)
+        found.append(folder / name)
     return found
 
 
+def archive_changed(data: bytes, chance: random.Random) -> bytes:
+    """Return a 3MF archive, whole as such, with something wrong in the XML of its parts."""
+    source, target = io.BytesIO(data), io.BytesIO()
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            part = old.read(name)
+            new.writestr(name, text_changed(part, chance) if chance.random() < 0.7 else part)
+    return target.getvalue()
+
+
 def test_meshes(tmp_path: Path) -> None:
-    from mbsim.model.mesh import load_mesh, solid_fault
+    from mbsim.model.mesh import solid_fault
+    from mbsim.model.mesh_file import load_mesh
+    from mbsim.model.mesh_findings import crossing_findings, mesh_findings
+    from mbsim.model.mesh_repair import mend
 
     seeds = meshes(tmp_path)
     (tmp_path / "try").mkdir()
     makes = [changed(tmp_path / "try", seeds, way) for way in (bytes_changed, text_changed)]
+    archives = [path for path in seeds if path.suffix == ".3mf"]
+    makes.append(changed(tmp_path / "try", archives, archive_changed))
 
     def read(path: Path, chance: random.Random) -> None:
-        assert isinstance(solid_fault(*load_mesh(path)), str)
+        vertices, faces, _ = load_mesh(path)
+        found = [*mesh_findings(vertices, faces), *crossing_findings(vertices, faces)]
+        fault = solid_fault(vertices, faces)
+        assert isinstance(fault, str)
+        if fault:
+            assert found
+            mended = mend(vertices, faces)
+            assert solid_fault(mended.vertices, mended.faces) == ""
 
     survey("meshes", lambda chance: chance.choice(makes)(chance), read)
 

@@ -299,6 +299,21 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         FRICTION_LINE,
         ('contact_points="PATCH"', "must be one of POINTS, REGION"),
     ),
+    "node mode": (
+        deck(('id="301"', 'id="301" enable_node_mode="TRUE"')),
+        CONTACT_LINE,
+        ('enable_node_mode="TRUE"', "TRUE is not built yet: surfaces touch", "FALSE, AUTO"),
+    ),
+    "tessellated shapes": (
+        deck(('id="301"', 'id="301" enable_analytical="false"')),
+        CONTACT_LINE,
+        ('enable_analytical="false"', "FALSE is not built yet: shapes are not tess", "TRUE, AUTO"),
+    ),
+    "master surface": (
+        deck(('id="301"', 'id="301" master_surface="I_and_J"')),
+        CONTACT_LINE,
+        ('master_surface="I_and_J"', "I_AND_J is not built yet: no side is the master", "AUTO"),
+    ),
     "flexible side": (
         deck(('id="301"', 'id="301" i_flexbody_id="5"')),
         CONTACT_LINE,

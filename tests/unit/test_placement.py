@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from helpers.minimal_deck import BODY_LINE, MINIMAL, TETRAHEDRON, added, deck, read
 from mbsim.errors import DeckError
 from mbsim.model.elements import Body, Marker, Model, Units
-from mbsim.model.frames import quaternion, rotation_313
+from mbsim.model.frames import marker_frames, quaternion, rotation_313
 from mbsim.model.placement import place
 
 INERTIA = 'inertia_xx="0.02" inertia_yy="0.02" inertia_zz="0.02"'
@@ -220,3 +220,73 @@ def test_quaternion_gives_the_matrix_back(angles: list[float]) -> None:
     assert w >= 0.0
     v = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     np.testing.assert_allclose(np.eye(3) + 2.0 * w * v + 2.0 * v @ v, R, rtol=0, atol=3e-15)
+
+
+def without_cg(more: str = "", body: str = 'density="1000"') -> str:
+    """Return a deck whose body 2 has no cg marker, and more statements."""
+    text = deck((f'cg_id="20" mass="5" {INERTIA}', body))
+    return text.replace("</Model>", f"{more}</Model>", 1)
+
+
+def test_centre_of_mass_from_density_and_graphics(tmp_path: Path) -> None:
+    """Two balls and a mesh, against a cg marker typed in at their centre."""
+    more = (
+        '<Reference_Marker id="21" body_id="2" pos_x="2" pos_y="-1" psi="0.3" theta="0.4"/>'
+        '<Post_Graphic id="8" type="Sphere" center_marker_id="21" radius="0.2"/>'
+        f'<Post_Graphic id="9" type="TriaMesh" rm_id="21">{TETRAHEDRON}</Post_Graphic>'
+    )
+    found = place(read(tmp_path, without_cg(more))).bodies[2]
+    x, y, z = (float(value) for value in found.p)
+    marker = f'<Reference_Marker id="22" body_id="2" pos_x="{x!r}" pos_y="{y!r}" pos_z="{z!r}"/>'
+    typed = place(read(tmp_path, without_cg(more + marker, 'cg_id="22" density="1000"'))).bodies[2]
+    assert found.mass == pytest.approx(typed.mass, rel=1e-14)
+    np.testing.assert_allclose(found.inertia, typed.inertia, rtol=1e-13, atol=1e-12)
+    np.testing.assert_array_equal(found.R, np.eye(3))
+    # the mean of the parts' centres, weighted by volume
+    balls = [4.0 / 3.0 * math.pi * r**3 for r in (0.108, 0.2)]
+    R = marker_frames(read(tmp_path, without_cg(more)))[21].R
+    centres = np.array([[0, 0, 0.108], [2, -1, 0], [2, -1, 0] + R @ np.full(3, 0.25)])
+    volumes = np.array([*balls, 1.0 / 6.0])
+    np.testing.assert_allclose(found.p, volumes @ centres / volumes.sum(), rtol=1e-14)
+
+
+def test_markers_of_a_body_without_a_cg_marker_move_with_it(tmp_path: Path) -> None:
+    placed = place(read(tmp_path, without_cg('<Reference_Marker id="21" body_id="2" pos_x="1"/>')))
+    np.testing.assert_allclose(placed.markers[21].p_B, (1.0, 0.0, -0.108), rtol=0, atol=1e-15)
+
+
+def test_axes_of_a_body_without_a_cg_marker_are_those_of_lprf_id(tmp_path: Path) -> None:
+    more = f'<Reference_Marker id="21" body_id="2" pos_x="4" {QUARTER}/>'
+    found = place(read(tmp_path, without_cg(more, 'density="1000" lprf_id="21"'))).bodies[2]
+    np.testing.assert_allclose(found.p, (4.0, 0.0, 0.108), rtol=1e-14)
+    np.testing.assert_allclose(found.R[:, 0], (0.0, 1.0, 0.0), rtol=0, atol=1e-15)
+
+
+def test_a_mesh_far_away_keeps_its_digits(tmp_path: Path) -> None:
+    ball = 'type="Sphere" center_marker_id="20" radius="0.108"/>'
+    mesh = f'type="TriaMesh" rm_id="21">{TETRAHEDRON}</Post_Graphic>'
+    marker = '<Reference_Marker id="21" body_id="2" pos_x="1e6"/>'
+    text = without_cg(marker).replace(ball, mesh)
+    found = place(read(tmp_path, text)).bodies[2]
+    np.testing.assert_allclose(np.diag(found.inertia), np.full(3, 1000.0 / 80.0), rtol=1e-13)
+
+
+def test_given_mass_with_the_centre_of_the_graphics(tmp_path: Path) -> None:
+    found = place(read(tmp_path, without_cg(body='density="1" mass="5"'))).bodies[2]
+    assert found.mass == 5.0
+    np.testing.assert_allclose(found.p, (0.0, 0.0, 0.108), rtol=1e-15)
+    np.testing.assert_allclose(found.inertia, 0.4 * 5.0 * 0.108**2 * np.eye(3), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (f'mass="5" {INERTIA}', "cg_id: missing; a moving body needs .* or density and solid"),
+        ('density="1"', "density=1: the body has no solid graphics"),
+        ('density="1" lprf_id="77"', 'lprf_id="77": no Reference_Marker has this id'),
+    ],
+)
+def test_a_centre_of_mass_that_cannot_be_known(tmp_path: Path, body: str, words: str) -> None:
+    text = without_cg(body=body).replace('center_marker_id="20"', 'center_marker_id="10"')
+    with pytest.raises(DeckError, match=words):
+        read(tmp_path, text)

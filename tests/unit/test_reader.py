@@ -400,6 +400,19 @@ def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
     assert any(":7 and 1 more: Post_Graphic color" in note for note in notes)
 
 
+@pytest.mark.parametrize(
+    "attribute",
+    [
+        *(f'enable_node_mode="{value}"' for value in ("FALSE", "AUTO", "auto")),
+        *(f'enable_analytical="{value}"' for value in ("TRUE", "AUTO", "true")),
+        'master_surface="AUTO"',
+    ],
+)
+def test_attributes_that_ask_for_what_is_done_anyway(tmp_path: Path, attribute: str) -> None:
+    plain = read(tmp_path, deck()).notes
+    assert read(tmp_path, deck(('id="301"', f'id="301" {attribute}'))).notes == plain
+
+
 def test_requests(tmp_path: Path) -> None:
     text = added(
         '<Post_Request id="1" type="Displacement" i_marker_id="20" comment="c"/>'

@@ -1,7 +1,7 @@
 """Drake: joints in minimal coordinates, continuous with Runge-Kutta steps, or discrete.
 
-Only S8_n and S8b: its contact laws are held against the other scenes' nowhere else. A loop can be
-closed in discrete time only.
+Only S8_n, S8b and S9, by hydroelastic contact: its contact laws are held against the other scenes'
+nowhere else. A loop can be closed in discrete time only.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from mbsim.bench import linkages
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.peers import common
+from mbsim.bench.peers import common, drake_tori
 
 NAME = "drake"
 
@@ -52,6 +52,9 @@ class Case(NamedTuple):
     note: str = ""
 
 
+#: Scenes of S9, and whether the torus falls onto another.
+_TORI = {"S9plane": False, "S9torus": True}
+
 Cases = Iterator[tuple[str, Callable[[], Case]]]
 
 
@@ -71,11 +74,14 @@ def version() -> str:
 
 def settings(scene: str) -> list[str]:
     """Settings of one scene, coarse to fine; empty if the scene is not known."""
-    return list(_cases(scene))
+    return list(drake_tori.settings() if scene in _TORI else _cases(scene))
 
 
 def run(scene: str, setting: str, repeats: int) -> Outcome:
     """Run `scene` under `setting`; the wall time is the median of `repeats` loops."""
+    if scene in _TORI:
+        with common.silence():
+            return drake_tori.run(_engine(), _TORI[scene], drake_tori.settings()[setting], repeats)
     case = _cases(scene)[setting]()
     with common.silence():
         return _run(case, repeats)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -163,6 +164,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (1e-2, 2e-3, 5e-4, 1e-4)),
         "S5": _row,
         "S8b": _slider_crank,
+        "S9plane": _torus,
         "S10a": _stiff_drop,
         "S10c": lambda: _free(p.S10C),
     }
@@ -295,6 +297,32 @@ def _rolling() -> Iterator[tuple[str, Callable[[], Case]]]:
         for dt in (1e-2, 2e-3, 1e-3, 5e-4, 1e-4):
             name = f"{cone} impratio={impratio} dt={dt:g}"
             yield name, functools.partial(case, cone, impratio, dt)
+
+
+def _torus() -> Iterator[tuple[str, Callable[[], Case]]]:
+    vertices, faces = p.torus_mesh(p.S9)
+    points = " ".join(map(repr, vertices.ravel().tolist()))
+    corners = " ".join(map(str, faces.ravel().tolist()))
+    inertia = " ".join(map(repr, p.torus_inertia(p.S9)))
+    turn = f"{math.cos(p.S9.tilt / 2)!r} {math.sin(p.S9.tilt / 2)!r} 0 0"
+
+    def case(dt: float) -> Case:
+        friction = f'friction="{p.S9.mu} 0 0" condim="3"'
+        world = (
+            f'<geom type="plane" size="0 0 1" {friction}/>'
+            f'<body pos="0 0 {p.S9.height!r}" quat="{turn}"><freejoint/>'
+            f'<inertial pos="0 0 0" mass="{p.S9.mass!r}" diaginertia="{inertia}"/>'
+            f'<geom type="mesh" mesh="torus" {friction}/></body>'
+        )
+        # the file's axes are kept: the mesh is symmetric, its principal axes are its own
+        head = f'<asset><mesh name="torus" vertex="{points}" face="{corners}"/></asset>'
+        option = f'timestep="{dt!r}" cone="elliptic" gravity="0 0 {-p.GRAVITY}"'
+        note = "mujoco; a mesh is its convex hull, which cannot meet another torus"
+        xml = _xml(option, world, head=head)
+        return Case(xml, dt, p.S9.end_time, _still(1), note)
+
+    for dt in (5e-3, 2e-3, 1e-3):
+        yield f"convex hull dt={dt:g}", functools.partial(case, dt)
 
 
 def _box(

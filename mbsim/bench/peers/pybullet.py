@@ -189,6 +189,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (TICK, 2e-3, 1e-3, 2.5e-4)),
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (TICK, 2e-3, 1e-3, 2.5e-4, 1e-4)),
         "S5": _row,
+        "S9plane": _torus,
         "S10a": _stiff_drop,
         "S10c": lambda: _free(p.S10C, (1e-3, 1e-4, 1e-5)),
     }
@@ -225,6 +226,25 @@ def _law_drop(law: Law, variant: str) -> Cases:
             f"applyExternalForce dt={dt:g}",
             functools.partial(Case, build, dt, p.S2.end_time, note, law, p.S2.radius),
         )
+
+
+def _torus() -> Cases:
+    vertices, _ = p.torus_mesh(p.S9)
+    x, y, z = p.torus_inertia(p.S9)
+
+    def build(bullet: Any) -> list[int]:
+        bullet.setGravity(0.0, 0.0, -p.GRAVITY)
+        bullet.changeDynamics(_plane(bullet), -1, lateralFriction=1.0)
+        shape = bullet.createCollisionShape(bullet.GEOM_MESH, vertices=vertices.tolist())
+        body = _body(bullet, p.S9.mass, shape, (0.0, 0.0, p.S9.height), maximal=False)
+        bullet.changeDynamics(body, -1, lateralFriction=p.S9.mu, localInertiaDiagonal=[x, y, z])
+        turn = bullet.getQuaternionFromAxisAngle([1.0, 0.0, 0.0], p.S9.tilt)
+        bullet.resetBasePositionAndOrientation(body, [0.0, 0.0, p.S9.height], turn)
+        return [body]
+
+    note = "rigid; a moving mesh is its convex hull, which cannot meet another torus"
+    for dt in (TICK, 1e-3):
+        yield f"convex hull dt={dt:g}", functools.partial(Case, build, dt, p.S9.end_time, note)
 
 
 def _rolling() -> Cases:

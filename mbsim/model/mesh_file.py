@@ -1,0 +1,108 @@
+"""Mesh files: STL, OBJ, OFF, PLY, GLB, glTF and 3MF, read without opening any other file.
+
+The one file that imports trimesh, and only when a deck names a mesh file.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mbsim.core.stored import read_regular
+from mbsim.errors import ModelError
+from mbsim.model.elements import Array
+from mbsim.model.mesh import Faces, merge_vertices
+
+FORMATS = ("stl", "obj", "off", "ply", "glb", "gltf", "3mf")
+MAX_BYTES = 512 * 2**20
+_LARGEST = 1e40
+
+
+class MeshFile(NamedTuple):
+    """A mesh as its file has it.
+
+    `vertices` (n, 3) in the file's unit of length, `faces` (m, 3), equal vertices merged;
+    `length_unit` is that unit where the format says it, else empty.
+    """
+
+    vertices: Array
+    faces: Faces
+    length_unit: str
+
+
+def load_mesh(path: Path) -> MeshFile:
+    """Return the triangles of a mesh file; several parts of one file become one mesh.
+
+    Parameters
+    ----------
+    path : Path
+        A file of one of `FORMATS`.
+
+    Raises
+    ------
+    ModelError
+        If the file is missing, too large, of another format, damaged or empty.
+
+    Notes
+    -----
+    glTF is in metres (glTF 2.0 specification, 3.4). 3MF names its unit. The others have none.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        raise ModelError(f"must be a file of type {', '.join(FORMATS)}")
+    try:
+        if not path.is_file():
+            raise ModelError(f"no such file: {path}")
+        if path.stat().st_size > MAX_BYTES:
+            raise ModelError(f"larger than {MAX_BYTES // 2**20} MiB: {path}")
+        data = read_regular(path)
+    except (OSError, ValueError) as error:
+        raise ModelError(f"cannot be read: {error}") from None
+    vertices, faces, unit = _decode(data, kind)
+    if len(faces) == 0:
+        raise ModelError("holds no triangles")
+    if not (np.abs(vertices) < _LARGEST).all():
+        raise ModelError(f"holds vertices that are not finite numbers below {_LARGEST:g}")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ModelError("holds faces that name vertices it does not have")
+    vertices, faces = merge_vertices(vertices, faces)
+    if len(faces) == 0:
+        raise ModelError("holds no triangle with three different corners")
+    return MeshFile(vertices, faces, unit)
+
+
+def _decode(data: bytes, kind: str) -> MeshFile:
+    """Return what a file's bytes hold; whatever a parser raises becomes one line."""
+    try:
+        if kind == "3mf":
+            from mbsim.model.mesh_3mf import read_3mf
+
+            return MeshFile(*read_3mf(data, MAX_BYTES))
+        return _by_trimesh(data, kind)
+    except Exception as error:  # a damaged file makes its parser raise anything
+        reason = " ".join(str(error).split())[:100] or type(error).__name__
+        raise ModelError(f"is no readable {kind.upper()} file: {reason}") from None
+
+
+def _by_trimesh(data: bytes, kind: str) -> MeshFile:
+    """Return the triangles of a file's bytes as trimesh reads them."""
+    import trimesh
+
+    if kind == "gltf" and _names_files(data):
+        raise ValueError("its buffers are in other files; save it as one .glb file")
+    # from memory and without a resolver, so that no file named in `data` is opened
+    mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
+    vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    return MeshFile(vertices, faces, "METER" if kind in ("glb", "gltf") else "")
+
+
+def _names_files(data: bytes) -> bool:
+    """Return whether a glTF has numbers in files beside it."""
+    import json
+
+    buffers = json.loads(data).get("buffers", ())
+    return any(not str(each.get("uri", "data:")).startswith("data:") for each in buffers)
