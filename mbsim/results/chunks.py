@@ -1,8 +1,8 @@
 """Rows in chunks of HDF5 datasets, each made once, outside HDF5, which is told where they belong.
 
 How a chunk is stored follows from its numbers alone: not from the rows that came before it, nor
-from when they were written. Where no more than half of its numbers differ from those of the row
-before it is shuffled and deflated, as HDF5's filters do; else it is stored as it is: zlib makes
+from when they were written. Where no more than a quarter of its numbers differ from those of the
+row before, it is shuffled and deflated, as HDF5's filters do; else it is stored as it is: zlib makes
 little of numbers that all change, and takes longer for it than a disk for all of them.
 """
 
@@ -30,6 +30,10 @@ _ELEMENTS = 64
 _SMALL = 512
 #: Of the filters that a dataset has, none.
 _AS_IT_IS = 0b11
+#: It is deflated where one of so many numbers differs from that of the row before.
+_CHANGED = 4
+#: So long a chunk has one column.
+_LONG = 2048
 #: How many deflated chunks of one number, or row of numbers, are remembered.
 _REMEMBERED = 256
 
@@ -41,7 +45,7 @@ def chunk_shape(shape: tuple[int, ...], itemsize: int, rows: int) -> tuple[int, 
     does not change takes no room beside others that do.
     """
     rows = max(1, min(rows, CHUNK_ROWS, CHUNK_BYTES // itemsize))
-    room = max(1, CHUNK_BYTES // (rows * itemsize))
+    room = CHUNK_BYTES // (rows * itemsize) if rows < _LONG else 1
     columns: list[int] = []
     for size in reversed(shape[1:]):
         # the last axis has the components of a vector, which are read together
@@ -142,7 +146,7 @@ class ChunkWriter:
                     self._alike.clear()
                 self._alike[row] = _deflated(whole)
             return self._alike[row]
-        if 2 * changed > bits.size:
+        if _CHANGED * changed > bits.size:
             return None
         made = _deflated(whole)
         return made if 2 * len(made) <= whole.nbytes else None

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
 #: Rows are kept in memory up to about this size [bytes], then written to the part file.
-BUFFER_BYTES = 16 << 20
+BUFFER_BYTES = 32 << 20
 #: At least so many output rows are written at once: chunks of fewer are read slowly.
 FEWEST_ROWS = 16
 #: Memory that an output time takes while its rows are not there yet [bytes].
