@@ -2,8 +2,8 @@
 
 How a chunk is stored follows from its numbers alone: not from the rows that came before it, nor
 from when they were written. Where no more than a quarter of its numbers differ from those of the
-row before, it is shuffled and deflated, as HDF5's filters do; else it is stored as it is: zlib makes
-little of numbers that all change, and takes longer for it than a disk for all of them.
+row before, it is shuffled and deflated, as HDF5's filters do; else it is stored as it is: zlib
+makes little of numbers that all change, and takes longer for it than a disk for all of them.
 """
 
 from __future__ import annotations
