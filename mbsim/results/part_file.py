@@ -50,6 +50,10 @@ class PartFile:
         #: Checksums of the blocks of what was published last, and its size without them.
         self._sums, self._summed = array("I"), 0
         self._published: tuple[int, int] | None = None  # device and inode of the other file
+        #: Since the mark: the size there, bytes that were written over, and where was written.
+        self._marked: int | None = None
+        self._undo: list[tuple[int, bytes]] = []
+        self._passing: list[list[int]] = []
         self._fd = create(self.path)
         locked(self._fd)
         if resume:
@@ -88,22 +92,32 @@ class PartFile:
         first, size = self._at, len(data)
         view = memoryview(data)
         try:
+            self._remember(first, first + size)
             while self.failure is None and len(view):
                 done = os.pwrite(self._fd, view, self._at)
                 view = view[done:]
                 self._at += done
         except OSError as error:
             self.failure = error
-        if self._new and self._new[-1][0] <= first <= self._new[-1][1]:
-            self._new[-1][1] = max(self._new[-1][1], first + size)
-        else:
-            self._new.append([first, first + size])
+        _note(self._new, first, first + size)
         return size
+
+    def mark(self) -> None:
+        """Let what is written from here on be in the next publication alone."""
+        self._marked, self._undo, self._passing = self._size(), [], []
+
+    def _remember(self, first: int, end: int) -> None:
+        """Keep bytes before the mark that are about to be written over."""
+        if self._marked is not None and first < self._marked:
+            end = min(end, self._marked)
+            self._undo.append((first, os.pread(self._fd, end - first, first)))
+            _note(self._passing, first, end)
 
     def truncate(self, size: int) -> None:
         """Set the file's size."""
         if self.failure is None:
             try:
+                self._remember(size, self._size())
                 os.ftruncate(self._fd, size)
             except OSError as error:
                 self.failure = error
@@ -179,16 +193,18 @@ class PartFile:
 
         `older` is the size of the older one without its checksums.
         """
+        size = self._summed if self._marked is None else self._marked
         if kept:
             self._fd = os.open(self._older, os.O_RDWR)
             # somebody who reads it has it locked; where no lock can be had nobody knows
             if locked(self._fd):
                 os.ftruncate(self._fd, older)
                 for first, end in _merged(self._new):
-                    _copy(done, self._fd, first, end)
-                os.ftruncate(self._fd, self._summed)
+                    _copy(done, self._fd, first, min(end, size))
+                os.ftruncate(self._fd, size)
                 os.replace(self._older, self.path)
                 self._new = []
+                self._go_back()
                 return
             os.close(self._fd)
             self._fd = -1
@@ -196,6 +212,18 @@ class PartFile:
         self._fd = create(self.path)
         locked(self._fd)
         self._copy_from(self.target)
+        self._go_back()
+
+    def _go_back(self) -> None:
+        """Let the part file be as it was at the mark, if there is one."""
+        if self._marked is None:
+            return
+        os.ftruncate(self._fd, self._marked)
+        for first, data in reversed(self._undo):
+            _write(self._fd, data, first)
+        # of these the published file and the checksums have others
+        self._new, self._summed = self._passing, self._marked
+        self._marked, self._undo, self._passing = None, [], []
 
     def _copy_from(self, path: Path) -> None:
         """Fill the part file with another's bytes; `DamagedError` where they are not right."""
@@ -224,6 +252,14 @@ class PartFile:
             self._fd = -1
         self.discard(self.path)
         self.discard(self._older)
+
+
+def _note(ranges: list[list[int]], first: int, end: int) -> None:
+    """Add a range, to the last one where it begins in it or behind it."""
+    if ranges and ranges[-1][0] <= first <= ranges[-1][1]:
+        ranges[-1][1] = max(ranges[-1][1], end)
+    else:
+        ranges.append([first, end])
 
 
 def _merged(ranges: list[list[int]]) -> list[list[int]]:

@@ -14,7 +14,15 @@ import numpy as np
 
 from mbsim.errors import MbsimError, ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
-from mbsim.results.form import check_members, facts_of, plain, texts_of, values_of
+from mbsim.results.form import (
+    check_members,
+    facts_of,
+    last_row,
+    plain,
+    text_of,
+    texts_of,
+    values_of,
+)
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 from mbsim.results.opening import opened_file
 
@@ -62,6 +70,8 @@ class Location(NamedTuple):
 
 #: What a group says of its elements, beside their signals.
 _FACTS = ("id", "label", "type")
+#: Attributes that have a text for each column.
+_LISTS = ("columns", "measures")
 #: Groups of other things than elements.
 _NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests")
 
@@ -261,12 +271,14 @@ class Results:
         if ids is not None and id.isdecimal() and int(id) in ids:
             if attribute not in _FACTS or attribute not in file[group]:
                 return None
-            return plain(file[group][attribute][ids.index(int(id))])
+            return text_of(file[group], attribute, file[group][attribute][ids.index(int(id))])
         item = file.get(name)
         value: Any = item.attrs.get(attribute) if item is not None else None
-        if isinstance(value, bytes):
-            return plain(value)
-        return texts_of(item, attribute, value) if isinstance(value, np.ndarray) else plain(value)
+        if value is None:
+            return None
+        if attribute in _LISTS:
+            return texts_of(item, attribute, value)
+        return text_of(item, attribute, value) if attribute in _FACTS else plain(value)
 
     @property
     @_reads
@@ -364,11 +376,11 @@ class Results:
         ids = self._columns().get(group)
         if ids is None:
             names = {id: f"{group}/{id}/{signal}" for id in self.ids(group)}
-            return {id: self[name][-1] for id, name in names.items() if name in self}
+            return {id: last_row(self[name]) for id, name in names.items() if name in self}
         if f"{group}/{signal}" not in self._open():
             return {}
         table = self._open()[f"{group}/{signal}"]
-        return dict(zip(ids, table[-1], strict=True)) if len(table) else {}
+        return dict(zip(ids, last_row(table), strict=True)) if len(table) else {}
 
     @property
     def _where(self) -> str:
@@ -469,5 +481,5 @@ def end_state(results: Results) -> dict[str, dict[str, list[float]]]:
     found: dict[str, dict[str, list[float]]] = {str(id): {} for id in results.ids("bodies")}
     for name in ("position", "quaternion", "velocity", "angular_velocity"):
         for id, values in results.last("bodies", name).items():
-            found[str(id)][name] = values.tolist()
+            found[str(id)][name] = np.atleast_1d(values).tolist()
     return found

@@ -43,8 +43,10 @@ if TYPE_CHECKING:
 
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
-#: Rows are kept in memory up to this size [bytes], then written to the part file.
-BUFFER_BYTES = 16 << 20
+#: Rows are kept in memory up to about this size [bytes], then written to the part file.
+BUFFER_BYTES = 32 << 20
+#: At least so many output rows are written at once: chunks of fewer are read slowly.
+FEWEST_ROWS = 16
 #: Memory that an output time takes while its rows are not there yet [bytes].
 TIME_BYTES = 32
 #: Time between two publications: at least this [s], and so many times what one costs.
@@ -97,11 +99,17 @@ class Recorder:
         self._watch = Watch(acting(system))
         self._watched = 0  # of the rows gathered, how many it has looked at
         self._gathered = Gathered(system)
+        #: How many output rows are written at once, a power of two: chunks end where they do.
+        self._block = FEWEST_ROWS
+        while 4 * self._block * self._gathered.row_bytes <= BUFFER_BYTES:
+            self._block *= 2
+        self._most = max(BUFFER_BYTES, 4 * self._block * self._gathered.row_bytes)
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._target: Path | None = None
-        self._saved: set[str] = set()  # tables of the last checkpoint
+        self._saved: set[str] = set()  # tables of the checkpoint in the part file
+        self._last: dict[str, Table] = {}  # those of the last published one
         self._posts = ContactPosts(system, system.posts) if system.posts else None
         check_requests(system.model)
         if asked:
@@ -116,6 +124,7 @@ class Recorder:
         if resume:
             self.checkpoint = self._resumed(settings)
         self._store = Store(self._target, resume)
+        self._store.rows_at_once = self._block
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
@@ -149,7 +158,7 @@ class Recorder:
                         "those that were written; start without --resume"
                     )
                 self._started = self.shown = True
-                self._saved = set(tables)
+                self._saved, self._last = set(tables), dict(tables)
                 tables.pop(MADE_OF, None)
                 self._written = tables.pop(WRITTEN).tolist()
                 self.watch.restore(tables)
@@ -191,7 +200,10 @@ class Recorder:
         rows.used[:] = 0
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
-        if self._gathered.bytes > BUFFER_BYTES:
+        # the same rows at once, however often the loop comes back
+        while self._gathered.rows >= (wanted := self._block - self._written[0] % self._block):
+            self._write(wanted)
+        if self._gathered.bytes > self._most:  # points of contact
             self._write()
 
     def end(self) -> None:
@@ -219,16 +231,23 @@ class Recorder:
         """
         if self._target is None:
             return
-        self._write()
-        self._save(checkpoint)
+        before = self._written, self._saved, self._started
+        self._store.mark()
+        self._put(self._gathered.block)
+        self._save(self._state(checkpoint))
         self._show()
         self._store.publish()
+        self._written, self._saved, self._started = before
         self._published_at = time.monotonic()
 
-    def _save(self, checkpoint: Mapping[str, Table]) -> None:
-        """Write a checkpoint in the place of the last one."""
+    def _state(self, checkpoint: Mapping[str, Table]) -> dict[str, Table]:
+        """Return all tables of a checkpoint made behind the last row written."""
         facts = {MADE_OF: self._identity.packed, WRITTEN: np.array(self._written)}
-        tables = {**checkpoint, **self.watch.saved(), **facts}
+        return {**checkpoint, **self.watch.saved(), **facts}
+
+    def _save(self, tables: dict[str, Table]) -> None:
+        """Write a checkpoint in the place of the last one."""
+        self._last = tables
         self._store.update(
             values={f"checkpoint/{name}": table for name, table in tables.items()},
             attributes={"checkpoint": {"sha256": digest(tables)}},
@@ -297,25 +316,30 @@ class Recorder:
         ResultsError
             If the files cannot be written, or could not be before.
         """
-        self._write(last=True)
+        self._write(last=status == "finished")
         contacts = self._asked.elements("contacts", self.system.contact_ids)
         peaks = {
             f"contacts/peak_{name}": contact_log[contacts, column]
             for name, column in _PEAKS.items()
             if contacts
         }
+        self._store.complete()
         judged = to_attributes(audit) if audit is not None else {}
         self._store.update(values=peaks, attributes={"stats": stats, **judged})
         if self.earlier and not self.shown:
             # else a kill would leave this run's .csv and log beside the earlier one's file
+            saved = self._saved
+            self._store.mark()
             if checkpoint is not None:
-                self._save(checkpoint())
+                self._save(self._state(checkpoint()))
             self._show()
             self._store.publish()
+            self._saved = saved
         failure = self._beside(write_log)
-        if failure is not None and checkpoint is not None:
-            self._save(checkpoint())
+        if failure is not None:
             status = "interrupted"
+        if status != "finished" and (checkpoint is not None or self._last):
+            self._save(self._state(checkpoint()) if checkpoint is not None else self._last)
         over = ["checkpoint"] if status == "finished" else []
         self._store.update(attributes={"/": {"status": status}}, remove=over)
         in_memory = self._store.finish()
@@ -342,20 +366,28 @@ class Recorder:
             return error
         return None
 
-    def _write(self, last: bool = False) -> None:
-        """Hand the buffered rows to the store."""
-        if self._started and not self._gathered.bytes:
-            return
+    def _write(self, rows: int | None = None, last: bool = False) -> None:
+        """Hand the first rows gathered to the store, all of them where no number is given."""
         block = self._gathered.block
         self._look(block)
-        self._gathered.clear()
-        self._watched = 0
+        if rows is not None:
+            block = first_rows(block, rows)
+        self._put(block, last)
+        self._gathered.drop(block)
+        self._watched -= len(block.time)
+
+    def _put(self, block: Block, last: bool = False) -> None:
+        """Write rows behind those that are in the file."""
+        if self._started and not any(map(len, (block.time, block.incidents, block.events))):
+            return
         rows = dict(self._signals(block))
         room, size = self._store.room(), sum(table.nbytes for table in rows.values())
         # with the first rows, so that a run that dies has them too
         columns = {} if self._started else request_columns(self.system)
         if room is not None and size > room:
-            self._fill(first_rows(block, max(0, len(block.time) * room // size)), columns)
+            # and of the checkpoint, with which it goes on
+            room = max(0, room - sum(table.nbytes for table in self._last.values()))
+            self._fill(first_rows(block, len(block.time) * room // size), columns)
         self._store.update(rows=rows, attributes=columns, last=last)
         self._started = True
         sizes = (len(block.time), len(block.incidents), len(block.events))
@@ -371,7 +403,8 @@ class Recorder:
             self._store.fail(said)
         self._started = True
         self._store.update(attributes={"/": {"status": "failed"}})
-        if self._saved:
+        if self._last:
+            self._save(self._last)
             said += "; with more room, --resume goes on"
         self._show()
         self._store.stop(said)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import time
 import uuid
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from mbsim.errors import ResultsError
+from mbsim.results.chunks import CHUNK_ROWS, ChunkWriter, chunk_shape
 from mbsim.results.files import RunLock, problem
 from mbsim.results.part_file import PartFile
 
@@ -25,17 +25,12 @@ if TYPE_CHECKING:
 
 Table = np.ndarray[Any, Any]
 Value = str | float | int
-#: Most bytes of a chunk: small enough for many signals, large enough for long runs.
-_CHUNK = 1 << 16
 #: Rows of a chunk where nobody knows how many there will be: events, points of contact.
 _FEW = 256
 #: Datasets that do not have a row an output time.
 _UNKNOWN = ("events", "state/incidents")
-#: Most elements in a chunk, so that one of thousands is read without all the others.
-_ELEMENTS = 64
-#: A signal is compressed where its first rows, up to so many bytes of them, shrink to this share:
-#: zlib is fast on constants and zeros, and slow on noise, of which it makes little.
-_SAMPLE, _SHARE = 1 << 16, 0.25
+#: All rows of a run that take no more than this [bytes] are stored without chunks.
+_SMALL = 1 << 12
 #: Room that stays free beside rows for tables, the log and HDF5's own.
 _SPARE = 1 << 18
 
@@ -55,9 +50,13 @@ class Store:
         self.broken = False
         self.failure: ResultsError | None = None
         self.publish_seconds = 0.0
-        #: How many rows signals will have; chunks are not longer.
-        self.rows = _FEW
+        #: How many rows signals will have, and how many come at once; chunks are not longer.
+        self.rows, self.rows_at_once = _FEW, CHUNK_ROWS
         self._growing = resume
+        self._writers: dict[str, ChunkWriter] = {}
+        #: Where a passing state is written: what is restored behind it.
+        self._changed = resume  # since the file was opened
+        self._before: tuple[bool, dict[str, Table | None]] | None = None
         self._part: PartFile | None = None
         self._lock: RunLock | None = None
         self.file: h5py.File | None = None
@@ -75,7 +74,7 @@ class Store:
             raise problem(target, error) from None
         with self._writing():
             self._part = PartFile(target, resume)
-            self.file = h5py.File(self._part, "r+" if resume else "w")
+            self.file = _opened(self._part, "r+" if resume else "w")
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[h5py.File]:
@@ -124,6 +123,7 @@ class Store:
             if getattr(item, "maxshape", ())[:1] == (None,) and len(item) > length(name):
                 item.resize(length(name), axis=0)
 
+        self._writers.clear()
         with self._writing() as file:
             file.visititems(shortened)
 
@@ -164,6 +164,11 @@ class Store:
         if self.broken:
             return
         rows, attributes = rows or {}, attributes or {}
+        if attributes and self._changed and self._part is not None and self._before is None:
+            # HDF5 puts texts where it remembers room: only while the file is open
+            with self._writing():
+                self._open_again({name: writer.rest for name, writer in self._writers.items()})
+        self._changed = True
         with self._writing() as file:
             for name in remove:
                 if name in file:
@@ -180,35 +185,41 @@ class Store:
                 file[name].attrs.update({key: _text(value) for key, value in facts.items()})
             file.flush()
 
+    def complete(self) -> None:
+        """Write all rows that are held back; none follow, but behind a publication."""
+        if not self.broken:
+            with self._writing() as file:
+                for writer in self._writers.values():
+                    writer.complete()
+                file.flush()
+
     def _append(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
         """Add rows to one dataset."""
-        if self._growing and name in file:
-            if len(rows):
-                dataset = file[name]
-                count = dataset.shape[0]
-                dataset.resize(count + len(rows), axis=0)
-                if _holds(rows):
-                    dataset[count:] = rows
-            return
-        if not growing and (self.target is None or not rows.size):
-            file.create_dataset(name, data=rows)
-            return
-        elements = tuple(max(1, size) for size in rows.shape[1:])
-        if len(elements) > 1:
-            elements = (min(elements[0], _ELEMENTS), *elements[1:])
-        width = rows.itemsize * int(np.prod(elements))
-        likely = self.rows if name not in _UNKNOWN else max(_FEW, len(rows))
-        count = max(1, min(likely, _CHUNK // max(1, width)))
-        dataset = file.create_dataset(
+        if name not in self._writers:
+            found = self._growing and name in file
+            if not found and not growing and (self.target is None or rows.nbytes <= _SMALL):
+                file.create_dataset(name, data=rows)
+                return
+            if not found:
+                self._make(file, name, rows, growing)
+            self._writers[name] = ChunkWriter(file, name)
+        self._writers[name].add(rows)
+
+    def _make(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
+        """Make a dataset for rows like these, without any."""
+        likely = min(self.rows, self.rows_at_once) if name not in _UNKNOWN else _FEW
+        file.create_dataset(
             name,
-            rows.shape,
+            (0, *rows.shape[1:]),
             rows.dtype,
-            maxshape=(None, *rows.shape[1:]) if growing else None,
-            chunks=(count if growing else max(1, min(count, len(rows))), *elements),
-            **_compression(rows),
+            maxshape=(None, *rows.shape[1:]),
+            chunks=chunk_shape(
+                rows.shape, rows.itemsize, likely if growing else min(likely, len(rows))
+            ),
+            compression="gzip",
+            compression_opts=1,
+            shuffle=True,
         )
-        if _holds(rows):
-            dataset[...] = rows
 
     def _put(self, file: h5py.File, name: str, array: Table) -> None:
         """Write one dataset whole."""
@@ -220,22 +231,56 @@ class Store:
             del file[name]
         file.create_dataset(name, data=array)
 
+    def mark(self) -> None:
+        """Let what is written from here to the next publication be in that one alone.
+
+        The file goes on from here after it, byte by byte: when it was published changes nothing.
+        """
+        if self.broken or self._part is None:
+            return
+        with self._writing() as file:
+            file.flush()
+            self._part.mark()
+        rests = {name: writer.rest for name, writer in self._writers.items()}
+        self._before = self._growing, rests
+
     def publish(self) -> None:
         """Put what is written in the target's place; does nothing in memory."""
         if self.broken or self._part is None:
             return
         began = time.perf_counter()
-        with self._writing():
+        if self._before is None:
+            self.mark()
+        assert self._before is not None
+        self.complete()
+        with self._writing() as file:
+            file.close()
             self._part.publish()
+            # what HDF5 knew of the file is wrong now
+            self._growing, rests = self._before
+            self._before = None
+            self._open_again(rests)
         self.publish_seconds = time.perf_counter() - began
+
+    def _open_again(self, rests: dict[str, Table | None]) -> None:
+        """Open the part file anew, with rows that wait for a whole chunk."""
+        assert self.file is not None
+        assert self._part is not None
+        self._writers.clear()
+        self.file.close()
+        file = self.file = _opened(self._part, "r+")
+        self._writers = {name: ChunkWriter(file, name, rests[name]) for name in rests}
+        self._changed = False
 
     def finish(self) -> h5py.File | None:
         """Make the part file the target; return the file where it is kept in memory."""
         if self.broken:
             return None
+        self.complete()
         if self._part is None:
             return self.file
         with self._writing() as file:
+            self._writers.clear()
             file.close()
             self._part.publish(last=True)
         self.broken = True  # there is nothing left to write to
@@ -243,30 +288,15 @@ class Store:
         return None
 
 
+def _opened(part: PartFile, mode: str) -> h5py.File:
+    """Open a part file."""
+    import h5py
+
+    return h5py.File(part, mode)
+
+
 def _text(value: Any) -> Any:
     """Return a text as HDF5 takes it: bytes of file names that are no text as escapes."""
     if isinstance(value, str):
         return value.encode("utf-8", "backslashreplace").decode("utf-8")
     return value
-
-
-def _holds(rows: Table) -> bool:
-    """Return whether anything is not the zero that HDF5 reads where nothing was written."""
-    if not rows.size or rows.dtype.kind not in "fiu":
-        return bool(rows.size)
-    # by its bits: a negative zero is one that must be written
-    bits = rows.view(f"u{rows.itemsize}")
-    return bool(bits.flat[-1]) or bool(bits.any())
-
-
-def _compression(rows: Table) -> dict[str, Any]:
-    """Return how a signal that begins with these rows is compressed, if at all."""
-    wanted = max(1, _SAMPLE // max(1, rows[:1].nbytes))
-    sample = np.ascontiguousarray(rows[:: max(1, len(rows) // wanted)][:wanted])
-    if sample.nbytes < 4096 or not _holds(sample):
-        return {}
-    # as HDF5's filter does: first bytes of all numbers, then second ones
-    shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T.tobytes()
-    if len(zlib.compress(shuffled, 1)) > _SHARE * len(shuffled):
-        return {}
-    return {"compression": "gzip", "compression_opts": 1, "shuffle": True}

@@ -105,6 +105,7 @@ def test_angular_velocity_is_global(tmp_path: Path) -> None:
 def test_many_writes_give_the_file_of_one(tmp_path: Path, monkeypatch: Any) -> None:
     with recorded(tmp_path / "one", 60) as whole:
         monkeypatch.setattr(recorder_module, "BUFFER_BYTES", 2000)
+        monkeypatch.setattr(recorder_module, "FEWEST_ROWS", 1)
         system = fake_system(tmp_path / "deck")
         recorder = Recorder(system, SETTINGS, tmp_path / "many")
         for first in range(0, 60, 10):

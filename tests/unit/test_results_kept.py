@@ -64,16 +64,23 @@ def test_one_changed_number_in_a_checkpoint_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_damaged_signal_is_told(tmp_path: Path) -> None:
-    close(recording(tmp_path))
+    system = fake_system(tmp_path / "deck")
+    recorder = Recorder(system, SETTINGS, tmp_path)
+    recorder.check_room(600)
+    for k in range(10):
+        add_rows(system, 60 * k, 60)
+        recorder.take()
+    close(recorder)
     with h5py.File(tmp_path / "deck.h5", "r") as file:
-        chunk = file["bodies/position"].id.get_chunk_info(0)
+        chunk = file["contacts/force"].id.get_chunk_info(0)
+    assert chunk.size > 3 * 4096
     with (tmp_path / "deck.h5").open("r+b") as raw:
-        raw.seek(chunk.byte_offset + 5)
+        raw.seek(chunk.byte_offset + chunk.size // 2)
         raw.write(b"\x42")
     with open_results(tmp_path / "deck.h5") as results:
-        assert len(results["bodies/2/velocity"]) == 10
+        assert len(results["bodies/2/velocity"]) == 600
         with pytest.raises(ResultsError, match="damaged"):
-            results["bodies/2/position"]
+            results["contacts/301/force"]
 
 
 def test_a_rerun_leaves_nothing_of_the_old_one(tmp_path: Path) -> None:
@@ -180,6 +187,35 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"--signals bodies/3/position: .* bodies/2/position"):
         recording(tmp_path, asked=["bodies/3/position", "time"])
     assert not (tmp_path / "deck.h5").exists()
+
+
+def bytes_of(folder: Path, monkeypatch: pytest.MonkeyPatch, flushes: set[int]) -> bytes:
+    """Return the file of a run whose rows come in pieces, published after some of them."""
+    with monkeypatch.context() as patch:
+        # two rows at once
+        patch.setattr("mbsim.results.recorder.BUFFER_BYTES", 8000)
+        patch.setattr("mbsim.results.recorder.FEWEST_ROWS", 2)
+        system = fake_system(folder / "deck")
+        recorder = Recorder(system, SETTINGS, folder)
+        recorder.check_room(61)
+    for k in range(20):
+        add_rows(system, 3 * k, 3)
+        recorder.take()
+        if k in flushes:
+            recorder.flush(checkpoint(3 * k + 3))
+            assert numbers(folder) == list(range(3 * k + 3))
+    close(recorder)
+    return (folder / "deck.h5").read_bytes()
+
+
+def test_when_a_run_was_published_changes_no_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    straight = bytes_of(tmp_path / "straight", monkeypatch, set())
+    assert numbers(tmp_path / "straight") == list(range(60))
+    for name, flushes in {"first": {0}, "some": {1, 2, 9}, "all": set(range(20))}.items():
+        found = bytes_of(tmp_path / name, monkeypatch, flushes)
+        assert (len(found), found) == (len(straight), straight)
 
 
 def test_files_with_a_dataset_a_body_stay_readable(tmp_path: Path) -> None:
