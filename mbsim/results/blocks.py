@@ -84,6 +84,15 @@ class Gathered:
         """Memory that the rows take."""
         return sum(end * self._widths[name] for name, end in self._ends.items())
 
+    @property
+    def ends(self) -> dict[str, int]:
+        """How many rows each table has."""
+        return dict(self._ends)
+
+    def shorten(self, ends: dict[str, int]) -> None:
+        """Let go of the rows behind those ends."""
+        self._ends = dict(ends)
+
     def clear(self) -> None:
         """Let go of all rows."""
         self._ends = dict.fromkeys(self._ends, 0)

@@ -25,6 +25,8 @@ COUNTED = (
 #: an impact, a loop, joints.
 RUNS = {
     ("AUTO", "stiff/incline_creep", 1.0): {},
+    # begins anew with RADAU5
+    ("AUTO", "stiff/rolling_sphere", 0.02): {},
     ("AUTO", "stiff/four_bar_stop", 0.3): {},
     ("AUTO", "slider_crank_clearance", 0.02): {"tol": 1e-7},
     ("AUTO", "sdnd100", 0.2): {},
