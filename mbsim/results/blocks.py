@@ -103,6 +103,15 @@ class Gathered:
             table[: end - gone] = table[gone:end]
             self._ends[name] = end - gone
 
+    @property
+    def ends(self) -> dict[str, int]:
+        """How many rows each table has."""
+        return dict(self._ends)
+
+    def shorten(self, ends: dict[str, int]) -> None:
+        """Let go of the rows behind those ends."""
+        self._ends = dict(ends)
+
 
 def first_rows(block: Block, rows: int) -> Block:
     """Return the first rows of a block, with the incidents and events up to them.

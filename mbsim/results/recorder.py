@@ -104,6 +104,7 @@ class Recorder:
         while 4 * self._block * self._gathered.row_bytes <= BUFFER_BYTES:
             self._block *= 2
         self._most = max(BUFFER_BYTES, 4 * self._block * self._gathered.row_bytes)
+        self._mark: dict[str, int] | None = None  # where rows end that are the run's for sure
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
@@ -200,11 +201,28 @@ class Recorder:
         rows.used[:] = 0
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
+        if self._mark is not None:
+            return
         # the same rows at once, however often the loop comes back
         while self._gathered.rows >= (wanted := self._block - self._written[0] % self._block):
             self._write(wanted)
         if self._gathered.bytes > self._most:  # points of contact
             self._write()
+
+    def mark(self) -> None:
+        """Write no rows taken from here on until `settle`: `go_back` may drop them."""
+        self._mark = self._gathered.ends
+
+    def settle(self) -> None:
+        """Let the rows taken since `mark` be those of the run."""
+        self._mark = None
+
+    def go_back(self) -> None:
+        """Drop the rows taken since `mark`, and those that wait to be taken."""
+        if self._mark is not None:
+            self._gathered.shorten(self._mark)
+        self._mark = None
+        self.system.scene.rows.used[:] = 0
 
     def end(self) -> None:
         """Tell the users' CONTACTPOSTs that the run has reached its end."""

@@ -60,6 +60,7 @@ class ContactProblems:
         self.system, self.every, self.folder = system, every, folder
         self._evaluate, self._accelerate = evaluate, accelerate
         self.written, self.next = 0, every
+        self._files: list[Path] = []
         if every < 1:
             raise ModelError(f"dump_fclib={every}: must be a whole number > 0")
         for contact in system.model.contacts.values():
@@ -92,7 +93,14 @@ class ContactProblems:
         problem, guess = made
         name = f"{self.system.model.name}-i{step}-{problem.contacts}.hdf5"
         hdf5.write(self.folder / name, problem, guesses=[guess])
+        self._files.append(self.folder / name)
         self.written += 1
+
+    def begin_anew(self) -> None:
+        """Take back all problems: the run begins anew."""
+        for file in self._files:
+            file.unlink(missing_ok=True)
+        self.written, self.next, self._files = 0, self.every, []
 
     def _problem(self, t: float, h: float, y: Array) -> Any:
         """Return the problem of a step h from a state, and what contacts do there as a guess."""

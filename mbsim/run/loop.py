@@ -94,6 +94,7 @@ class Runner:
         self.torn = False  # a second signal came in the midst of something: no checkpoint of that
         self._begun = False  # whether the current Simulate has
         self._before: dict[str, Any] | None = None  # checkpoint to go on from while it begins
+        self._first: dict[str, Any] | None = None  # that of the run's begin, while AUTO goes back
         self.dump: ContactProblems | None = None
 
     def _warn_of_states(self) -> None:
@@ -209,6 +210,9 @@ class Runner:
         """Return everything a run needs to go on: state, log, method, and where it is."""
         if self._before is not None:
             return self._before
+        if self._first is not None:
+            # a run that goes on from there decides as this one would have
+            self._go_back()
         arrays = checkpoint.save(self.system.scene, self.method)
         arrays["stage"] = np.array(self.stage)
         arrays["begun"] = np.array(int(self._begun))
@@ -382,6 +386,9 @@ class Runner:
             last = self.stage == len(self.settings.stages) - 1
             self.sensing.begin(output_times(simulation, last), stage.h_max)
         self._look_ahead(stage, fresh)
+        if fresh and self.stage == 0 and self.methods.may_begin_anew:
+            self._first = self.checkpoint()
+            self.recorder.mark()
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
@@ -397,6 +404,7 @@ class Runner:
             self.loop_seconds += elapsed
             done = int(method.counts[scheme.EVALUATIONS]) - before
             budget = next_budget(budget, done, elapsed)
+            self._settle(outcome)
             self._take()
             if self.dump is not None and outcome != problem.FAILED:
                 # after every step
@@ -409,13 +417,37 @@ class Runner:
                 return
             self._answer(outcome, simulation.end_time)
             self._stop_if_asked()
-            if self.recorder.due():
+            if self._first is None and self.recorder.due():
                 with self._undisturbed():
                     self.recorder.flush(self.checkpoint())
                 self.log.show()
             if progress is not None:
                 h = float(method.memory[scheme.STEP])
                 progress(float(method.memory[scheme.TIME]), h, self.settings.end_time)
+
+    def _settle(self, outcome: int) -> None:
+        """Let the begin be as it was, once AUTO does not go back there any more."""
+        from mbsim.core import problem
+
+        may_go_back = outcome in (
+            problem.PAUSED,
+            problem.WATCH_DUE,
+            problem.TABLE_OVER,
+            problem.ROWS_FULL,
+            problem.CHANGES_OVER,
+        )
+        if self._first is not None and not (may_go_back and self.methods.may_begin_anew):
+            self._first = None
+            self.recorder.settle()
+
+    def _go_back(self) -> None:
+        """Go back to the begin of the run."""
+        assert self._first is not None
+        first, self._first = self._first, None
+        self.restore(first)
+        self.recorder.go_back()
+        if self.dump is not None:
+            self.dump.begin_anew()
 
     def _answer(self, outcome: int, end: float) -> None:
         """Do what a return from compiled code asks for, or raise why the run cannot go on."""
@@ -436,7 +468,9 @@ class Runner:
         if outcome == problem.TABLE_OVER:
             self.timetable.write(self.method.timetable, now, end)
             counts[scheme.ROW] = 0
-        if outcome == problem.CHANGES_OVER:
+        if outcome == problem.CHANGES_OVER and self._first is not None:
+            self.log.line(self.methods.begin_anew(self._go_back))
+        elif outcome == problem.CHANGES_OVER:
             self.log.line(self.methods.change_over())
         if outcome == problem.STEP_TOO_SMALL and self.methods.retreat():
             self.log.line(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,9 @@ MOST_BODIES = 300
 #: FEW bodies, and implicit ones: what samples cost is then about 1 % of the steps, or less.
 EVERY, EVERY_OF_MANY, EVERY_IMPLICIT = 8.0, 16.0, 1.0
 FEW = 16
+#: A run that changes over within so many steps has been stiff from its begin: going back there
+#: costs about what the implicit method takes until it runs well from anywhere else.
+BEGIN_STEPS = 4 * FIRST_PATIENCE
 #: The part of a step's error that Newton's iteration may leave where friction holds without give.
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
@@ -172,7 +175,11 @@ class Methods:
         memory, counts = self.arrays.memory, self.arrays.counts
         stiff = not self.is_stiff
         self._spent = (self.implicit_evaluations, int(counts[scheme.EVALUATIONS]))
-        bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
+        if stiff:
+            said = self._why("here")
+        else:
+            now = memory[scheme.TIME]
+            said = f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
         memory[scheme.STIFF] = float(stiff)
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0
@@ -193,11 +200,46 @@ class Methods:
         self._forget()
         self.changes += 1
         self.bind()
+        return said
+
+    def _why(self, since: str) -> str:
+        """Return what is to be said where AUTO leaves its explicit method."""
+        memory = self.arrays.memory
+        bound = memory[scheme.STIFF_STEPS] >= memory[scheme.PATIENCE]
+        why = "stability bounds the step of" if bound else "too many steps are ahead, of"
         now, h = memory[scheme.TIME], memory[scheme.STEP]
-        if stiff:
-            why = "stability bounds the step of" if bound else "too many steps are ahead, of"
-            return f"time {now:.9g}: {why} {h:.3g}: {catalog.IMPLICIT} from here on"
-        return f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
+        return f"time {now:.9g}: {why} {h:.3g}: {catalog.IMPLICIT} from {since} on"
+
+    @property
+    def may_begin_anew(self) -> bool:
+        """Whether a run of AUTO has not gone farther than `begin_anew` goes back.
+
+        What users' code remembers would not go back.
+        """
+        system = self.system
+        if self.other is None or system.user_laws or system.subroutines or system.posts:
+            return False
+        short = self.arrays.counts[scheme.STEPS] <= BEGIN_STEPS
+        return bool(self.arrays.memory[scheme.WATCH] == 1.0 and self.changes == 0 and short)
+
+    def begin_anew(self, restore: Callable[[], None]) -> str:
+        """Let AUTO's implicit method run from the begin, to which `restore` goes back.
+
+        Explicit steps at the bound of stability shake what rests, within the tolerance; from there
+        the implicit method takes more, and finds a motion that is not the model's.
+        """
+        memory, counts = self.arrays.memory, self.arrays.counts
+        said = self._why("the begin")
+        kept = {k: float(memory[k]) for k in (scheme.PACE, scheme.STEP)}
+        spent = int(counts[scheme.EVALUATIONS])
+        restore()
+        for k, value in kept.items():
+            memory[k] = value
+        # what was tried is work all the same
+        counts[scheme.EVALUATIONS] = spent
+        self.change_over()
+        memory[scheme.STEP] = 0.0
+        return said
 
     def retreat(self) -> bool:
         """Let AUTO's explicit method try where the implicit one cannot; return whether it can."""

@@ -25,6 +25,8 @@ COUNTED = (
 #: an impact, a loop, joints.
 RUNS = {
     ("AUTO", "stiff/incline_creep", 1.0): {},
+    # begins anew with RADAU5
+    ("AUTO", "stiff/rolling_sphere", 0.02): {},
     ("AUTO", "stiff/four_bar_stop", 0.3): {},
     ("AUTO", "slider_crank_clearance", 0.02): {"tol": 1e-7},
     ("AUTO", "sdnd100", 0.2): {},
@@ -142,3 +144,24 @@ def test_a_resumed_run_gives_up_where_the_straight_one_does(tmp_path, monkeypatc
     with pytest.raises(Interrupted):
         mbsim.simulate(model, integrator="DOPRI5", output=tmp_path / "b", progress=stop)
     assert given_up(model, tmp_path / "b", resume=True) == straight
+
+
+@pytest.mark.parametrize("calls", [3, 12, 40])
+def test_a_run_that_ends_while_auto_may_go_back_goes_on_as_if_it_had_not(
+    calls, tmp_path, monkeypatch
+):
+    """It is found stiff behind some 100 evaluations; rows of what was tried are dropped."""
+    model = mbsim.read_model(MODELS / "stiff" / "rolling_sphere.xml")
+    settings = {"end_time": 0.02, "print_interval": 1e-4, "output": tmp_path}
+    one = mbsim.simulate(model, **{**settings, "output": None})
+    returning(monkeypatch, 1, 256)
+    times = []
+
+    def progress(t, h, end):
+        times.append(t)
+        if len(times) == calls:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted):
+        mbsim.simulate(model, progress=progress, **settings)
+    same(mbsim.simulate(model, resume=True, **settings), one, ("steps", "method_changes"))

@@ -220,3 +220,24 @@ def test_short_impacts_converge(name):
     scale = np.abs(ends[-1]).max()
     for tol, end in zip((1e-5, 1e-7), ends, strict=False):
         assert np.abs(end - ends[-1]).max() < 30.0 * tol * scale
+
+
+# --- energy ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("method", "most"), [("RADAU5", 600), ("GALPHA", 1200)])
+def test_a_slow_body_between_strong_forces_is_not_judged_by_its_own_energy(method, most):
+    """Spring and damper exchange 5000 J, the body has 5e-3 J: 3387 and 32,823 evaluations."""
+    taken = {}
+    for strength in (1e3, 1e6, 1e9):
+        names = ("stiffness", "damping")
+        changes = [f"Force_SpringDamper[1].{name}={strength!r}" for name in names]
+        model = mbsim.read_model(MODELS / "stiff/overdamped.xml", changes)
+        run = mbsim.simulate(model, integrator=method, tol=1e-5)
+        taken[strength] = run.stats["rhs_evaluations"]
+        # x' = -x once the begin, of 1/c, is over
+        left = run["bodies/2/position"][-1, 0] - 1.0
+        assert left == pytest.approx(0.1 * math.exp(-1.0), rel=5e-3)
+        assert run.audit.balance < 1e-4 * run.audit.of
+        assert not run.audit.warnings
+    assert max(taken.values()) < most
