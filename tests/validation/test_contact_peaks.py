@@ -75,7 +75,7 @@ def test_peaks_of_an_impact(tmp_path, name, method):
     model = (
         GROUND + GRAVITY + sphere(RADIUS + GAP, w=(0.0, 100.0, 0.0)) + contact(**law, **FRICTION)
     )
-    for tol, allowed in ((1e-3, 3e-3), (1e-5, 5e-5)):
+    for tol, allowed in ((1e-3, 5e-3), (1e-5, 5e-5)):
         # the order of the method that only keeps energy is 2
         results = run_deck(tmp_path, model, 0.15, 0.15, tol=tol, integrator=method)
         found = [results[f"contacts/301/peak_{q}"] for q in ("force", "penetration", "slip_speed")]
@@ -86,7 +86,8 @@ def test_peaks_of_an_impact(tmp_path, name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_slip_that_is_largest_where_a_contact_ends(tmp_path, method):
-    # one slides off the other without friction, faster and faster
+    # one slides off the other without friction, faster and faster; the force fades until it leaves,
+    # so that the time of that is known less well than the motion
     model = (
         GROUND.replace('type="Plane"', 'type="Sphere" radius="0.5"').replace(
             "rm_id", "center_marker_id"
@@ -97,11 +98,11 @@ def test_slip_that_is_largest_where_a_contact_ends(tmp_path, method):
     )
     best, found = (
         run_deck(tmp_path, model, 1.0, 0.1, tol=tol, integrator=given)
-        for tol, given in ((1e-11, "DOP853"), (1e-5, method))
+        for tol, given in ((1e-11, "DOP853"), (1e-7, method))
     )
     assert [event["kind"] for event in best["events"]][-1] == "leave"
     assert found["contacts/301/peak_slip_speed"] == pytest.approx(
-        best["contacts/301/peak_slip_speed"], rel=1e-4
+        best["contacts/301/peak_slip_speed"], rel=1e-5
     )
 
 
