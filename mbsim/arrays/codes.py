@@ -16,6 +16,12 @@ from __future__ import annotations
 ) = range(9)
 LOG_COLUMNS = 9
 
+# the last column of `Log.samples`, whose first ones are those of PEAK_FORCE, PEAK_DEPTH, PEAK_SLIP
+SAMPLE_RATE = 3
+SAMPLE_COLUMNS = 4
+# rows of it: what is known of a step from its ends, and looks into it
+SAMPLES = 3 + 12
+
 # entries of `Log.counters`
 NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS, LISTINGS = range(7)
 COUNTERS = 7

@@ -95,6 +95,12 @@ class Log(NamedTuple):
     contacts: F2  # (nc, LOG_COLUMNS)
     counters: I1  # (COUNTERS,)
     rejections: I2  # (nc + 1, 4)
+    ends: F3  # (2, nc, 4) force, depth, slip and closing rate at the last two ends of steps
+    end_times: F1  # (2,) when that was
+    samples: tags.Scratch[F3]  # (looks, nc, 4) the same within the last step
+    parts: tags.Scratch[F1]  # (looks,) at which part of it: see contact.peaks
+    sampled: tags.Scratch[I1]  # (1,) number of samples
+    span: tags.Scratch[F1]  # (1,) length of the step
 
 
 @tags.state

@@ -94,6 +94,12 @@ def empty_log(nc: int) -> Log:
         contacts,
         np.zeros(codes.COUNTERS, dtype=np.int64),
         np.zeros((nc + 1, 4), dtype=np.int64),
+        ends=np.zeros((2, nc, codes.SAMPLE_COLUMNS)),
+        end_times=np.full(2, np.nan),
+        samples=np.zeros((codes.SAMPLES, nc, codes.SAMPLE_COLUMNS)),
+        parts=np.zeros(codes.SAMPLES),
+        sampled=np.zeros(1, dtype=np.int64),
+        span=np.zeros(1),
     )
 
 

@@ -27,7 +27,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | differences, one behind the other, each as with h = 0 and  |
 |         |                        | left in its first number. Asked for AUTO alone             |
 | check   | y new, -               | 1, or the part of the step to take instead                 |
-| inner   | -, -                   | part of the step (0..1) worth a look, or < 0               |
+| inner   | -, tolerance           | part of the step (0..1) worth a look, or < 0; h = 0, after |
+|         |                        | a look: the next one                                       |
 | switch- | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
 | ing     |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
 |         |                        | a step that was taken: 1 if one changed in it; LOAD: 1 if  |

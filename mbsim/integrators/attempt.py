@@ -20,6 +20,7 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     SWITCH_CUT,
     SWITCHED,
+    TOL,
     Method,
     Steps,
     failure_or,
@@ -67,6 +68,7 @@ def attempt(
             if part < 1.0:
                 return 0, part, -1.0
         if p.inner != 0:
+            m.error[0] = m.memory[TOL]
             asked = call_float(p.inner, (p.context, t, h, m.y, m.error))
     if steps.branches != 0:
         looks = call_float(steps.branches, (steps.context, TRIED, t, h, 0.0)) == 1.0

@@ -268,15 +268,16 @@ def outputs(p: Problem, m: Method, steps: Steps, times: F1) -> int:
 @jitable
 def look_inside(p: Problem, m: Method, asked: float) -> int:
     """Let the problem look at inner points of the last step; return 0 or its code."""
-    t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
-    # the force of a damped contact peaks before its depth does
-    for part in (asked, 0.8 * asked, 0.5 * asked):
+    t, h, part = m.memory[LAST_TIME], m.memory[LAST_STEP], asked
+    while part >= 0.0:
         interpolate(m, part, m.trial)
         project(p, m, t + part * h, 0.0, m.trial)
         m.counts[OUTPUTS] += 1
         code = call_int(p.look, (p.context, t + part * h, part * h, m.trial, m.error))
         if code != 0:
             return code
+        m.error[0] = m.memory[TOL]
+        part = call_float(p.inner, (p.context, t, 0.0, m.y, m.error))
     return 0
 
 

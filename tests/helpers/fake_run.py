@@ -18,9 +18,9 @@ from helpers.minimal_deck import added, read
 from mbsim.arrays import codes
 from mbsim.arrays.model import Graphics
 from mbsim.arrays.scratch import Rows
-from mbsim.arrays.state import Log
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.pairing import plan_pairs
+from mbsim.compile_model.scratch import empty_log
 from mbsim.core.layout import BODY_SIZE
 from mbsim.model.elements import Model
 from mbsim.model.placement import place
@@ -107,7 +107,7 @@ def fake_system_of(model: Model) -> Any:
         tree=SimpleNamespace(of_body=np.arange(nb + 1), free=np.array([4])),
         equations=SimpleNamespace(active=np.array([0, 1, 2, 3])),
         states=SimpleNamespace(offset=np.zeros(0, dtype=np.int64)),
-        log=Log(log, np.zeros(codes.COUNTERS, dtype=np.int64), np.zeros((nc + 1, 4), np.int64)),
+        log=empty_log(nc)._replace(contacts=log),
         rows=rows,
     )
     return SimpleNamespace(

@@ -1,7 +1,7 @@
 """What happens to incidents when a step is tried, accepted, and watched.
 
 `first_depth` guards the beginning of an impact, `commit_incidents` writes the incident table after
-an accepted step, `reversal` says where in a step a contact force may have peaked.
+an accepted step.
 """
 
 from __future__ import annotations
@@ -18,10 +18,6 @@ from mbsim.arrays.codes import (
     EVENT_TIME,
     FIRST_TOUCH,
     LEAVE,
-    PEAK_DEPTH,
-    PEAK_FORCE,
-    PEAK_FORCE_TIME,
-    PEAK_SLIP,
     REBOUND,
     SCALE_LENGTH,
     TOUCH,
@@ -38,10 +34,8 @@ from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import (
     DEPTH,
-    FORCE,
     NORMAL,
     RATE,
-    SLIP,
     STORED,
     contact_of,
     sides,
@@ -194,45 +188,6 @@ def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
         )
         log[REBOUND] = max(dot(v, vector(state.n[s])), 0.0) / log[APPROACH]
     record_event(scene, t - (1.0 - part) * h, LEAVE, s)
-
-
-@jitable
-def watch_peaks(scene: Scene, t: float) -> None:
-    """Keep the largest force, depth and slip of every contact at the point just evaluated."""
-    work, net, hit = scene.work, scene.work.net, scene.work.hit
-    if hit[len(hit) - 1] == 0:
-        return
-    for c in range(len(net)):
-        net[c, 0] = net[c, 1] = net[c, 2] = 0.0
-    for k in range(hit[len(hit) - 1]):
-        row, c = work.slot[hit[k]], contact_of(scene, hit[k])
-        log = scene.log.contacts[c]
-        for j in range(3):
-            net[c, j] += row[FORCE + j]
-        log[PEAK_DEPTH] = max(log[PEAK_DEPTH], row[DEPTH])
-        if row[NORMAL] > 0.0:
-            log[PEAK_SLIP] = max(log[PEAK_SLIP], row[SLIP])
-    for c in range(len(net)):
-        force = norm(vector(net[c]))
-        if force > scene.log.contacts[c, PEAK_FORCE]:
-            scene.log.contacts[c, PEAK_FORCE] = force
-            scene.log.contacts[c, PEAK_FORCE_TIME] = t
-
-
-@jitable
-def reversal(scene: Scene, h: float) -> float:
-    """Return where in the step (0..1) a contact was deepest, or -1: closing before, opening after.
-
-    Called before `commit`: the committed table holds the begin of the step, `work` its end.
-    """
-    work, state, hit = scene.work, scene.state, scene.state.hit
-    for k in range(hit[len(hit) - 1]):
-        s = hit[k]
-        if work.touching[s] == 1:
-            before, after = state.rate[s], work.slot[s, RATE]
-            if before > 0.0 and after <= 0.0:
-                return before / (before - after)
-    return -1.0
 
 
 @jitable

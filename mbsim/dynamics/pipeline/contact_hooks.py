@@ -10,7 +10,8 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
-from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
+from mbsim.dynamics.contact.peaks import watch_end, watch_inside
+from mbsim.dynamics.contact.points import commit_gaps, commit_incidents
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
 from mbsim.dynamics.events.step_limits import longest_step
@@ -62,7 +63,9 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     if what == Contacts.BLAME:
         return find_fault(scene) + 1
     if what == Contacts.WATCH:
-        watch_peaks(scene, t)
+        watch_end(scene, t)
+    elif what == Contacts.LOOK:
+        watch_inside(scene, t)
     elif what == Contacts.GAPS:
         commit_gaps(scene)
     elif what == Contacts.ENERGY:

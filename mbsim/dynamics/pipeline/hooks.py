@@ -42,7 +42,8 @@ from mbsim.core.problem import (
 from mbsim.dynamics.bodies.configuration import differ, move_on
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
-from mbsim.dynamics.contact.points import first_depth, reversal
+from mbsim.dynamics.contact.peaks import first_look, next_look
+from mbsim.dynamics.contact.points import first_depth
 from mbsim.dynamics.events.stability import stable_step
 from mbsim.dynamics.pipeline.audit import examine
 from mbsim.dynamics.pipeline.evaluate import evaluate, evaluate_past
@@ -177,15 +178,16 @@ def _look(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     code = evaluate_past(scene, t, h, vector_at(a, n), vector_at(b, n))
     if code == 0 and scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
-        answer_of(scene, call_int(contacts, (scene, Contacts.WATCH, t, h, a, a)))
+        answer_of(scene, call_int(contacts, (scene, Contacts.LOOK, t, h, a, a)))
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.RESTICK, t, a)))
     return failure_or(scene, code)
 
 
 def _inner(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
-    """Where in the step a contact turned from closing to opening."""
-    return reversal(view(context, Scene), h)
+    """Where in the step a contact may do most."""
+    scene, tol = view(context, Scene), vector_at(b, 1)[0]
+    return first_look(scene, h, tol) if h > 0.0 else next_look(scene, tol)
 
 
 def _limit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
