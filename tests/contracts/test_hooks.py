@@ -36,8 +36,12 @@ SIGNATURES = {row.hook: row.signature for row in hook_table.TABLE}
 #: Those that answer, so that a code is negative.
 ANSWERS = {row.hook for row in hook_table.TABLE if "answer" in row.result}
 
-#: No hook, and one that explores laws: what they say then is nothing that they are asked.
-NEVER_FAIL = {Hook.TANGENT, Hook.STABILITY}
+#: No hook, one that explores laws (what they say then is nothing that they are asked), and those
+#: that only calculate.
+NEVER_FAIL = {row.hook for row in hook_table.TABLE if "cannot fail" in row.result} | {
+    Hook.TANGENT,
+    Hook.STABILITY,
+}
 
 #: What one method alone measures.
 METHOD_OF = {Effects.FRICTION: "GALPHA", Effects.IMPACT: "GALPHA"}

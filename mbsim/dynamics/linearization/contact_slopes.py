@@ -10,9 +10,9 @@ import math
 from typing import TYPE_CHECKING
 
 from mbsim.arrays.codes import PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
-from mbsim.arrays.hooks import Hook, Memory
+from mbsim.arrays.hooks import FaceSlopes, Hook, Memory
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -290,7 +290,8 @@ def add_contact_slopes(  # noqa: C901
     normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
         slope = by_depth / weight
-        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)
+        given = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
+        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
@@ -349,7 +350,8 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        add_moves_of_centre(scene, T, y, s, by_rate)
+        given = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]

@@ -119,9 +119,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, vector_at(a, n), vector_at(b, n))
     if h == FRICTION_ALONE:
-        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, vector_at(a, n), vector_at(b, n))
     if h == EACH:
         fill_sizes(scene, vector_at(a, RATES * n), vector_at(b, n))
         return 0.0

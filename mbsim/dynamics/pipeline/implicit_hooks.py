@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import FORM
-from mbsim.arrays.hooks import ContactSlopes, Hook, failure_or
+from mbsim.arrays.hooks import ContactSlopes, FaceSlopes, Hook, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
@@ -11,7 +11,12 @@ from mbsim.core.arrays import Pointer
 from mbsim.core.codes import Code
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
-from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
+from mbsim.dynamics.linearization.contact_slopes import (
+    add_contacts_slopes,
+    add_moves_of_centre,
+    add_region_stiffness,
+    couple_contacts,
+)
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
@@ -120,6 +125,17 @@ def slopes_of_contacts(context: int, what: int, t: float, h: float, y: Pointer) 
     if what == ContactSlopes.COUPLE:
         return 0 if couple_contacts(scene, T.pattern) else Code.NO_ROOM
     return add_contacts_slopes(scene, T, t, h, vector_at(y, scene.rows.y.shape[1]))
+
+
+def slopes_of_faces(context: int, what: int, s: int, a: float, b: float, y: Pointer) -> float:
+    """The derivatives of a flat face that is one incident; a, b are as its functions say."""
+    scene = view(context, Scene)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
+    state = vector_at(y, scene.rows.y.shape[1])
+    if what == FaceSlopes.STIFFNESS:
+        return add_region_stiffness(scene, T, state, s, a, b)
+    add_moves_of_centre(scene, T, state, s, a)
+    return 0.0
 
 
 def bend(context: int, t: float, y: Pointer) -> int:
