@@ -66,7 +66,7 @@ class Contacts(IntEnum):
     HARDEST = 7  # which presses hardest, their number for none
     TOUCHED = 8  # mark groups of bodies that ground touches
     CONE = 9  # look whether friction is within its cone, and takes energy
-    BLAME = 10  # which presses hardest on the body with the worst error, and 1; 0 for none
+    AT_FAULT = 10  # which presses hardest on the body with the worst error, and 1; 0 for none
 
 
 class Gauges(IntEnum):

@@ -11,6 +11,7 @@ import math
 from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
+    AT_FAULT,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -121,7 +122,7 @@ def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
             wanted = 1.0 - earlier if earlier < 0.98 else 0.5
             if wanted < part:
                 part = wanted
-                work.trouble[1] = c
+                work.diagnostics[AT_FAULT] = c
     return part
 
 
@@ -269,7 +270,7 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         log_leave(scene, t, h, y, s)
         for k in range(4):
             # what it was linearised at tells nothing of another touch
-            work.grip[s, k] = 0.0
+            work.friction_slope[s, k] = 0.0
     # X and memory of an incident that ended, or that is another than before, begin again at 0;
     # at touch they have gathered since the touch within the step and stay
     x, z, begins = scene.slots.x[s], scene.slots.z[s], now == 1 and before == 0

@@ -214,7 +214,7 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
     point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
     p, n, tx = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), vector(work.t[s])
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
-    rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
+    tangential = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
     one, moved, first = L.basis[:, POINT], L.basis[:, MOVED], s + REGION_ROWS
     last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
@@ -226,7 +226,7 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
         q = sub(vector(row[AT_POINT:]), p)
         faster = cross(w_rel, q)
         slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
-        torque = cross(q, rub)
+        torque = cross(q, tangential)
         for side in range(2):
             b = i if side == 0 else j
             lever(scene, L, y, b, vector(row[AT_POINT:]), vector(row[AT_NORMAL:]), none, one[side])
@@ -328,7 +328,8 @@ def add_contact_slopes(  # noqa: C901
     force = vector(work.slot[s, FORCE : FORCE + 3])
     pressed = max(given[PRESSED], math.hypot(dot(force, tx), dot(force, ty)))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[PRESSED] > 0.0 else 0.0
+        slope = counts * L.law[k // 2, k % 2] / pressed if given[PRESSED] > 0.0 else 0.0
+        work.friction_slope[s, k] = slope
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import AT_FAULT
 from mbsim.arrays.hooks import Contacts, Effects, FclPoints, Gauges, Recall, Stability, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
@@ -43,7 +44,7 @@ def push(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     for k in range(hit[len(hit) - 1]):
         code = add_contact(scene, t, h, y, dy, hit[k])
         if code != 0:
-            scene.work.trouble[1] = contact_of(scene, hit[k])
+            scene.work.diagnostics[AT_FAULT] = contact_of(scene, hit[k])
             return code
     return 0
 
@@ -61,7 +62,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
         return fill_incidents(scene, h, y)
     if what == Contacts.HARDEST:
         return hardest(scene)
-    if what == Contacts.BLAME:
+    if what == Contacts.AT_FAULT:
         return find_fault(scene) + 1
     if what == Contacts.WATCH:
         watch_peaks(scene, t)

@@ -171,10 +171,10 @@ def _has_reaction_forces(scene: Scene, method: Method) -> bool:
 
 
 def _reaction_forces(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import rub, settle
+    from mbsim.dynamics.pipeline.force_hooks import add_joint_friction, settle
 
     # forces by reactions are compiled with all that they need
-    return settle if len(scene.applied.by_reactions) > 0 else rub
+    return settle if len(scene.applied.by_reactions) > 0 else add_joint_friction
 
 
 def _always(scene: Scene, method: Method) -> bool:
@@ -208,10 +208,10 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
         return residual_slopes
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
-    rubs = bool((scene.applied.connection >= 0).any())
+    has_friction = bool((scene.applied.connection >= 0).any())
     if WRENCH in forms:
-        return of.slopes_with_both if rubs else of.slopes_with_marker_forces
-    return of.slopes_with_rubs if rubs else of.slopes
+        return of.slopes_with_both if has_friction else of.slopes_with_marker_forces
+    return of.slopes_with_joint_friction if has_friction else of.slopes
 
 
 def _has_dry(scene: Scene, method: Method) -> bool:

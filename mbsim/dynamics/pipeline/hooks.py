@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    AT_FAULT,
     CONSTRAINTS_CHANGED,
     ENERGY_LOST,
     ERROR_NOW,
@@ -220,12 +221,12 @@ def _reject(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
-    contact = scene.work.trouble[1] if reason == BY_CHECK else -1
+    contact = scene.work.diagnostics[AT_FAULT] if reason == BY_CHECK else -1
     if reason != BY_CHECK and scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
-        contact = answer_of(scene, call_int(contacts, (scene, Contacts.BLAME, t, h, a, a))) - 1
+        contact = answer_of(scene, call_int(contacts, (scene, Contacts.AT_FAULT, t, h, a, a))) - 1
     row = contact if contact >= 0 else len(scene.contacts.id)
-    scene.work.trouble[1] = contact
+    scene.work.diagnostics[AT_FAULT] = contact
     scene.log.rejections[row, reason] += 1
     return failure_or(scene, 0)
 

@@ -10,7 +10,7 @@ from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import Pointer
 from mbsim.core.codes import Code
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
-from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.connection_slopes import add_joint_frictions_slopes
 from mbsim.dynamics.linearization.contact_slopes import (
     add_contacts_slopes,
     add_moves_of_centre,
@@ -95,13 +95,13 @@ def slopes_with_marker_forces(context: int, t: float, y: Pointer) -> int:
     return code
 
 
-def slopes_with_rubs(context: int, t: float, y: Pointer) -> int:
+def slopes_with_joint_friction(context: int, t: float, y: Pointer) -> int:
     """The same, of friction in joints instead."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
-    add_rubs_slopes(scene, T, t, a)
+    add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
@@ -113,7 +113,7 @@ def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     add_marker_forces_slopes(scene, T, a)
-    add_rubs_slopes(scene, T, t, a)
+    add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
