@@ -220,7 +220,13 @@ SIDE, CHATTERING = range(2)
 CHATTERS = 4.0
 
 # entries of `World.past`
-NOW, WITHIN, AGAIN = range(3)
+NOW, WITHIN, REPLAYED = range(3)
+
+# of `Work.diagnostics`: the worst body of the error norm; what is at fault, a contact or a row of
+# `Applied`
+WORST_BODY, AT_FAULT = range(2)
+# columns of `Work.friction_slope`: how friction along x or y changes with slip along x or y
+X_BY_X, X_BY_Y, Y_BY_X, Y_BY_Y = range(4)
 
 # columns of `Rows.incidents`: what was found, and what the force on it followed from besides y
 INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10, 13

@@ -25,28 +25,31 @@ class Hook(IntEnum):
     FCL = 1  # distances of pairs without a closed form
     TILTING = 2  # damping of what tilts on a flat face that is one incident
     RECALL = 3  # friction of contacts that keeps something: `Recall`
-    VALUE = 4  # value of an expression
-    JET = 5  # its value and rates
-    APPLIED = 6  # forces between markers, states of the user's own
-    WRENCH = 7  # a bushing or a vector force
-    ELEMENT = 8  # a Force_Element by its residual
-    JOINTS = 9  # what joints are asked for: `Joints`
-    STICKING = 10  # contacts whose friction holds without give: `Sticking`
-    REACTION_FORCES = 11  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 12  # the whole rhs
-    TANGENT = 13  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 14  # how forces of equations turn with the bodies
-    CONTACT_SLOPES = 15  # derivatives of contacts: `ContactSlopes`
-    MEMORY = 16  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 17  # derivatives of forces between markers
-    MEMORY_PAIR = 18  # as MEMORY in complex systems
-    GAUGES = 19  # what is measured of contacts: `Gauges`
-    EFFECTS = 20  # what an error does to contacts, as implicit methods ask: `Effects`
-    STABILITY = 21  # what contacts bound steps of fixed length by: `Stability`
-    DRY = 22  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 23  # turns of followed angles
-    NEAR = 24  # the lists of near pairs
-    REQUESTS = 25  # expressions of requests
+    HOLD_BACK = 4  # friction that steps of fixed length can follow
+    VALUE = 5  # value of an expression
+    JET = 6  # its value and rates
+    APPLIED = 7  # forces between markers, states of the user's own
+    WRENCH = 8  # a bushing or a vector force
+    ELEMENT = 9  # a Force_Element by its residual
+    JOINTS = 10  # what joints are asked for: `Joints`
+    STICKING = 11  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 12  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 13  # the whole rhs
+    TANGENT = 14  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 15  # how forces of equations turn with the bodies
+    CONTACT_SLOPES = 16  # derivatives of contacts: `ContactSlopes`
+    FACE_SLOPES = 17  # of flat faces that are one incident: `FaceSlopes`
+    MEMORY = 18  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 19  # derivatives of forces between markers
+    MEMORY_PAIR = 20  # as MEMORY in complex systems
+    GAUGES = 21  # what is measured of contacts: `Gauges`
+    EFFECTS = 22  # what an error does to contacts, as implicit methods ask: `Effects`
+    STABILITY = 23  # what contacts bound steps of fixed length by: `Stability`
+    FCL_POINTS = 24  # what follows from points that FCL found: `FclPoints`
+    DRY = 25  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 26  # turns of followed angles
+    NEAR = 27  # the lists of near pairs
+    REQUESTS = 28  # expressions of requests
 
 
 class Contacts(IntEnum):
@@ -63,8 +66,8 @@ class Contacts(IntEnum):
     HARDEST = 7  # which presses hardest, their number for none
     TOUCHED = 8  # mark groups of bodies that ground touches
     CONE = 9  # look whether friction is within its cone, and takes energy
+    AT_FAULT = 10  # which presses hardest on the body with the worst error, and 1; 0 for none
     LOOK = 11  # the same as WATCH at an inner point of a step
-    BLAME = 10  # which presses hardest on the body with the worst error, and 1; 0 for none
 
 
 class Gauges(IntEnum):
@@ -95,6 +98,20 @@ class Recall(IntEnum):
     GIVE = 0  # give the law what it kept
     TAKE = 1  # keep what the law made of it
     COMMIT = 2  # keep it of a step: 0, 1 if f changed, CONSTRAINTS_CHANGED
+
+
+class FclPoints(IntEnum):
+    """What is asked of pairs without a closed form."""
+
+    MOVED = 0  # whether the point of a slot is another than before: 1, else 0
+    GAP = 1  # a lower bound of a pair's distance
+
+
+class FaceSlopes(IntEnum):
+    """What derivatives of flat faces are asked for that are one incident: contact_slopes."""
+
+    STIFFNESS = 0  # add how the force changes with depth and tilt: its change where all get deeper
+    CENTRE = 1  # add that friction acts elsewhere as tilting moves the centre: 0
 
 
 class ContactSlopes(IntEnum):

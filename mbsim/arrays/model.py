@@ -195,7 +195,7 @@ class Residuals(NamedTuple):
     swap: tags.Scratch[I1]
     rise: tags.Scratch[F1]
     slopes: tags.Scratch[F3]  # (3, unknowns, wide) unknowns by x, x' and states
-    trouble: tags.Scratch[I1]  # (1,) row of the element that was not solved, -1 for none
+    unsolved: tags.Scratch[I1]  # (1,) row of the element that was not solved, -1 for none
 
 
 @tags.constant
@@ -296,7 +296,7 @@ class World(NamedTuple):
     # what is rounding, and the tolerance; errors are judged by `Scales`
     hooks: I1  # (hooks,) addresses of what only some scenes need: `arrays.hooks`
     fixed_step: I1  # (1,) 1 for a method without error estimate
-    # (1,) WITHIN while a point of the last step is evaluated, AGAIN while a row is
+    # (1,) WITHIN while a point of the last step is evaluated, REPLAYED while a row is
     past: tags.Scratch[I1]
     accumulators: (
         I1  # (2,) where in y the work of motions and the damped energy stand, -1 for nowhere

@@ -29,7 +29,7 @@ class Work(NamedTuple):
     memory: F2  # (ns, most) of friction laws at the trial point
     kept: F2  # (ns, 3 + most) while a step is followed in two halves: friction along x and y of the
     # whole step and what an error of it counts as, what is committed
-    grip: tags.State[F2]  # (ns, 4) friction over N by slip, 2 x 2 by rows, as linearised last
+    friction_slope: tags.State[F2]  # (ns, 4) friction over N by slip, as linearised last
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
     block: F2  # (nb, 20) stiffness that acts on a body (3 x 3) and its turning part, damping
@@ -43,12 +43,12 @@ class Work(NamedTuple):
     motion: F1  # (12,) of a marker force: see forces.abi, as the next two
     wrench: F1  # (8,)
     slopes: F2  # (12, 6)
-    rub: F2  # (nf, 9) of friction: see forces.joint_friction
+    joint_friction: F2  # (nf, 9) of friction: see forces.joint_friction
     by_reactions: F2  # (nu, 5) of what is settled with the reactions, see forces.reaction_forces
     secant: F2  # (nu, nu) how that follows from what it misses
     reaction: F1  # (6 nj,) force, torque on I's body at the I marker of each connection
     squares: tags.State[F1]  # (n,) V^2 of each group of bodies where an error was judged last
-    trouble: I1  # (2,) worst body of the error norm, contact at fault
+    diagnostics: I1  # (2,) worst body of the error norm, contact or row of `Applied` at fault
     sticking_point: F2  # (ns, 15) of slots that stick: point, n, x-axis, rates of point and n
     sticking_force: F2  # (ns, 2) forces that hold these, along x and y
     look: F3  # (3, points, POINT) candidates of a pair now, a moment later and before; no rows

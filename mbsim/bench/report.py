@@ -134,8 +134,8 @@ def markdown(
     parts += ["## Our time with the number of rods", long] if long else []
     for scene in scenes:
         parts += [f"## {scene.name}: {scene.title}", front_table(scene, rows)]
-    troubles = _troubles(scenes, rows)
-    parts += ["## Runs that are not compared", troubles] if troubles else []
+    failures = _failures(scenes, rows)
+    parts += ["## Runs that are not compared", failures] if failures else []
     return "\n\n".join(parts) + "\n"
 
 
@@ -294,7 +294,7 @@ def _growth_line(
     return [setting, *shown, f"{growth:.2f}", f"{largest:g}", verdict]
 
 
-def _troubles(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
+def _failures(scenes: Sequence[Scene], rows: Sequence[Measurement]) -> str:
     """Return what failed or is not compared, each reason once."""
     known = {scene.name: scene for scene in scenes}
     reasons: dict[tuple[str, str, str], int] = {}

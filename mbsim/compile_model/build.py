@@ -195,13 +195,13 @@ def _start(
 
     Behind the bodies are the numbers carried by laws of contacts, the states, the accumulators.
     """
-    carried, rubs = contacts.carried, contacts.laws.friction_law != 0
+    carried, has_friction = contacts.carried, contacts.laws.friction_law != 0
     states, first_state = acts.states, BODY_SIZE * len(placement.bodies) + carried
     nz, damps = len(states.program), len(acts.applied_ids) > 0 or _varies(acts.pulls)
     accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
     kept = int(np.count_nonzero(accumulators >= 0))
-    friction_at = np.where(rubs, first_state + nz + kept + np.cumsum(rubs) - 1, -1)
-    kept += int(rubs.sum()) + max(1, len(model.contacts))
+    friction_at = np.where(has_friction, first_state + nz + kept + np.cumsum(has_friction) - 1, -1)
+    kept += int(has_friction.sum()) + max(1, len(model.contacts))
     y0 = _initial_y(placement, carried + nz + kept)
     y0[states.offset[: len(model.differentials)]] = [s.ic for s in model.differentials.values()]
     residuals = acts.residuals

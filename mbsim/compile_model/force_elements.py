@@ -104,7 +104,7 @@ def residuals_table(
         swap=np.zeros(most, dtype=np.int64),
         rise=np.zeros(most),
         slopes=np.zeros((3, most, max(most, most_axes))),
-        trouble=np.full(1, -1, dtype=np.int64),
+        unsolved=np.full(1, -1, dtype=np.int64),
     )
     made = [
         _program(programs, id, len(element.directions) + k)

@@ -28,7 +28,7 @@ _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 #: Contacts with more pairs than this are large contacts. Every pair listed for good costs some 5 ns
 #: an evaluation: in a heap a large contact is cheaper from 30 pairs on, by a sixth at 300. But
 #: steps end where its list does: bodies in free flight take twice as long at 300 pairs
-#: (tests/bench/test_crowd.py).
+#: (tests/bench/test_broadphase.py).
 MOST_LISTED = 300
 
 

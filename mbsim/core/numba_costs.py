@@ -36,7 +36,7 @@ from numba.core.registry import cpu_target
 from numba.core.rewrites.registry import rewrite_registry
 from numba.core.runtime.context import NRTContext
 from numba.core.types.functions import BaseFunction
-from numba.core.typing import npydecl
+from numba.core.typing import npydecl, templates
 from numba.np.ufunc import array_exprs
 from numba.stencils.stencil import StencilFunc
 
@@ -263,6 +263,30 @@ def _references(self: Any, builder: Any, ty: Any, val: Any) -> list[Any]:
     return found
 
 
+def _inherited() -> Any:
+    """Return the caller's options that what it calls inherits, None outside of any function.
+
+    As `CPUTargetOptions.finalize` has it.
+    """
+    caller: Any = targetconfig.ConfigStack.top_or_none()
+    if caller is None:
+        return None
+    return caller.nrt, frozenset(caller.fastmath.flags), caller.error_model, caller.forceinline
+
+
+def _form_for(self: Any, args: Any, kws: Any) -> Any:
+    """Return the form of a function for these arguments, one for all callers that want the same.
+
+    Numba's key has all options of the caller, so that what a C function and an inner function call
+    is compiled twice alike.
+    """
+    key = self.context, tuple(args), tuple(kws.items()), _inherited()
+    found = self._impl_cache.get(key)
+    if found is None:
+        found = self._build_impl(key, args, kws)
+    return found
+
+
 _call_type: Any = BaseFunction.get_call_type
 
 
@@ -272,8 +296,7 @@ def _call_type_once(self: Any, context: Any, args: Any, kws: Any) -> Any:
     Numba asks a dozen templates in turn, for each operation twice. A function type that gets
     another template is another function type.
     """
-    flags = targetconfig.ConfigStack.top_or_none()
-    key = context, tuple(args), tuple(kws.items()), flags
+    key = context, tuple(args), tuple(kws.items()), _inherited()
     try:
         return self._found[key]
     except AttributeError:
@@ -407,6 +430,7 @@ _REPLACED: tuple[tuple[Any, str, Any], ...] = (
     (NRTContext, "get_meminfos", _references),
     (typed_passes.NopythonRewrites, "run_pass", _rewrite_with_deletions_where_asked),
     (BaseFunction, "get_call_type", _call_type_once),
+    (templates._OverloadFunctionTemplate, "_get_impl", _form_for),
     (errors, "new_error_context", _ErrorContext),
     (lowering, "new_error_context", _ErrorContext),
     (typeinfer, "new_error_context", _ErrorContext),

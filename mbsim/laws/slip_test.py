@@ -78,7 +78,7 @@ def sample_of(law: FrictionLaw, values: dict[str, float], at: Conditions) -> Sam
     return Sample(law.name, ask, law.memory, law.carried, way)
 
 
-class Rub:
+class Slider:
     """A surface on its way: slip, and what the law keeps of it."""
 
     def __init__(self, sample: Sample, at: Conditions) -> None:
@@ -140,28 +140,28 @@ def steady(sample: Sample, at: Conditions, speeds: Sequence[float]) -> list[floa
     """Return friction against the slip, over the normal force, after a long slide at each speed."""
     found = []
     for v in speeds:
-        rub, force = Rub(sample, at), 0.0
+        slider, force = Slider(sample, at), 0.0
         if v == 0.0 or sample.memory == 0:
-            found.append(-rub.go(0.0, v, 0.0) / at.nforce)
+            found.append(-slider.go(0.0, v, 0.0) / at.nforce)
             continue
         step = FINE * (sample.way or at.amplitude)
         for _ in range(round(LONG / FINE)):
-            force = rub.go(step / v, v, step)
+            force = slider.go(step / v, v, step)
         found.append(-force / at.nforce)
     return found
 
 
 def cycle(sample: Sample, at: Conditions) -> tuple[list[float], list[float]]:
     """Return slip and force over normal force along x = A sin(w t), one cycle and a quarter."""
-    rub = Rub(sample, at)
+    slider = Slider(sample, at)
     w = at.speed / at.amplitude
     dt = 0.5 * math.pi / w / QUARTER
-    x, force = [0.0], [rub.go(0.0, at.speed, 0.0) / at.nforce]
+    x, force = [0.0], [slider.go(0.0, at.speed, 0.0) / at.nforce]
     for k in range(1, 5 * QUARTER + 1):
         there = at.amplitude * math.sin(w * k * dt)
         # the velocity of its middle, as integrated memory takes it
         v = at.speed * math.cos(w * (k - 0.5 if sample.carried else k) * dt)
-        force.append(rub.go(dt, v, there - rub.x) / at.nforce)
+        force.append(slider.go(dt, v, there - slider.x) / at.nforce)
         x.append(there)
     return x, force
 

@@ -195,9 +195,9 @@ def check_coulomb(entry: Entry, cff_type: str) -> None:
     for name in _SPEEDS:
         if name in CFF_USES[cff_type]:
             warn_default_speed(entry, name)
-    rubs = sorted({"mu_static", "mu_dynamic"} & CFF_USES[cff_type])
-    if rubs and not any(map(entry.given, rubs)):
-        entry.warn(f"not given: 0, so that {cff_type} rubs nothing", rubs[0])
+    coefficients = sorted({"mu_static", "mu_dynamic"} & CFF_USES[cff_type])
+    if coefficients and not any(map(entry.given, coefficients)):
+        entry.warn(f"not given: 0, so that {cff_type} gives no friction", coefficients[0])
     if "mu_static" not in CFF_USES[cff_type] or "mu_dynamic" not in CFF_USES[cff_type]:
         return
     check_coefficients(entry)

@@ -213,13 +213,13 @@ def _look(picture: Picture, panel: Panel, curve: Curve) -> tuple[str, Any]:
     names = list(dict.fromkeys(other.name for other in panel.curves))
     signal = names.index(curve.name)
     if len(picture.files) == 1:
-        colour, dash = signal, signal
+        colour, style = signal, signal
     elif len(names) == 1:
-        colour, dash = curve.file, curve.file
+        colour, style = curve.file, curve.file
     else:
         colour = signal + len(names) * (curve.file // len(_DASHES))
-        dash = curve.file
-    return _COLOURS[colour % len(_COLOURS)], _DASHES[dash % len(_DASHES)]
+        style = curve.file
+    return _COLOURS[colour % len(_COLOURS)], _DASHES[style % len(_DASHES)]
 
 
 def _widen(axis: Axes, panel: Panel) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from mbsim.arrays.codes import AT_FAULT, WORST_BODY
 from mbsim.core.codes import Code
 from mbsim.errors import PluginError, SolverError
 from mbsim.model.names import element_name
@@ -20,10 +21,10 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
     from mbsim.core import problem
     from mbsim.integrators import scheme
 
-    memory, counts, trouble = (
+    memory, counts, diagnostics = (
         method.memory,
         method.counts,
-        system.scene.work.trouble,
+        system.scene.work.diagnostics,
     )
     reason = {
         problem.BY_ERROR: f"its error stays {memory[scheme.LAST_ERROR]:.3g} times too large",
@@ -34,7 +35,7 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
     unsolved = counts[scheme.LAST_REASON] == problem.BY_NEWTON
     if unsolved:
         reason += _corrections(memory[scheme.CORRECTION_BEFORE], memory[scheme.CORRECTION])
-    body, contact = int(trouble[0]), int(trouble[1])
+    body, contact = int(diagnostics[WORST_BODY]), int(diagnostics[AT_FAULT])
     where = []
     by_body = unsolved or counts[scheme.LAST_REASON] == problem.BY_ERROR
     if by_body and 0 <= body < len(system.body_ids):
@@ -108,7 +109,7 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
         from mbsim.plugins import raise_failure
 
         raise_failure()
-    contact = int(system.scene.work.trouble[1])
+    contact = int(system.scene.work.diagnostics[AT_FAULT])
     if code == Code.CONTRADICTION:
         from mbsim.dynamics.initial.assembly import equation_name
 
@@ -181,7 +182,7 @@ def _unsolved(system: System, t: float) -> str:
     from mbsim.plugins.residual import title_of
 
     residuals = system.scene.residuals
-    id = int(residuals.id[residuals.trouble[0]])
+    id = int(residuals.id[residuals.unsolved[0]])
     user = system.residuals[id]
     return (
         f"{title_of(system.model.force_elements[id])}: no unknowns ({', '.join(user.about())}) "

@@ -145,7 +145,7 @@ class Methods:
     def _forget(self) -> None:
         """Leave nothing of a linearisation to what comes later: only a running one is saved."""
         self.arrays.memory[scheme.HAVE_JACOBIAN] = 0.0
-        self.system.scene.work.grip[...] = 0.0
+        self.system.scene.work.friction_slope[...] = 0.0
         if self._tangent is not None:
             # no couplings: they are found anew
             self._tangent[0].pattern.count[...] = (0, 0, 1)

@@ -153,7 +153,7 @@ class Replay:
 
         scene = self.system.scene
         # laws may ask for expressions, and for what they kept
-        fill(scene, only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL))
+        fill(scene, only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL, Hook.HOLD_BACK))
         if self.system.reader is not None:
             self.system.reader.open(scene)
         self._table = pack(scene)
@@ -218,9 +218,9 @@ class Replay:
 
         contacts, id = self.system.scene.contacts, self.system.contact_ids[c]
         kind = self.system.model.contacts[id].cff_type
-        rubs = contacts.friction_law[c] != 0
+        has_friction = contacts.friction_law[c] != 0
         nforce = float(slot[at.NORMAL])
-        friction = out[[FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT]] if rubs else np.zeros(3)
+        friction = out[[FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT]] if has_friction else np.zeros(3)
         sticks = kind in FRICTION_LAWS and FRICTION_LAWS[kind].modes
         signals: dict[str, Any] = {
             "mu": math.hypot(friction[0], friction[1]) / nforce if nforce != 0.0 else math.nan,
@@ -228,7 +228,7 @@ class Replay:
             "torque": slot[at.TORQUE : at.TORQUE + 3],
             "mode": _MODES.get(float(slot[at.MODE]), "") if sticks else "",
             "slip": float(slot[at.SLIP]),
-            "xdot": given[5:8] if rubs else np.full(3, math.nan),
+            "xdot": given[5:8] if has_friction else np.full(3, math.nan),
             "x": row[codes.INC_X : codes.INC_X + 3],
             "depth": float(slot[at.DEPTH]),
             "rate": float(slot[at.RATE]),
@@ -242,7 +242,7 @@ class Replay:
         kept = int(contacts.memory[c])
         for k in range(kept if contacts.carried[c] < kept else 0):
             signals[f"state{k}"] = float(given[FRICTION_INPUTS + k])
-        if rubs and id in self.system.user_friction:
+        if has_friction and id in self.system.user_friction:
             signals |= self._espied(id, given)
         return signals
 

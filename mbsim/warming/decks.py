@@ -17,7 +17,7 @@ def _body(id: int, x: float = 0.0, z: float = 1.0) -> str:
 <Post_Graphic id="{id}00" type="Sphere" center_marker_id="{id}0" radius="0.1"/>"""
 
 
-def _crowd() -> str:
+def _broadphase() -> str:
     """Return a set of spheres in contact with itself, too many to list its pairs for good."""
     count = 26
     ids = " ".join(f"{id}00" for id in range(2, 2 + count))
@@ -35,7 +35,7 @@ _SENSORS = "".join(
 )
 _STATE = '<Control_Diff id="1" type="EXPRESSION" expr="-2*DIF(1)" ic="1" is_implicit="FALSE"/>'
 _SLIDER = '<Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>'
-_RUBS = (
+_JOINT_FRICTION = (
     '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY" mu_dynamic="0.3" '
     'friction_trans_vel="0.01"/>'
 )
@@ -59,10 +59,10 @@ DECKS = {
     for name, model in {
         "sensors": _body(2) + _SENSORS,
         "states": _body(2) + _STATE,
-        "joint friction": _body(2) + _SLIDER + _RUBS,
+        "joint friction": _body(2) + _SLIDER + _JOINT_FRICTION,
         "forces of reactions": _body(2) + _SLIDER + _LATE,
         "dry friction": _body(2) + _dry('dx="0.01"'),
         "rigid dry friction": _body(2) + _dry(""),
-        "crowd": _crowd(),
+        "broadphase": _broadphase(),
     }.items()
 }

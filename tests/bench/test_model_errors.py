@@ -49,9 +49,9 @@ def cam(results):
 
 
 def cam_roller(results):
-    t, law, rub = results["time"], (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    t, law, friction = results["time"], (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
     sizes = (20 * np.pi, 0.01, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23))
-    height, spin, forces = roller_follower(t, *sizes, law, rub, 0.0299757)
+    height, spin, forces = roller_follower(t, *sizes, law, friction, 0.0299757)
     found = results["contacts/301/force/z"]
     return {
         "height": far(results["bodies/4/position/z"], height),

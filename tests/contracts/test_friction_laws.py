@@ -55,7 +55,7 @@ def flat(inputs):
     return np.array(values)
 
 
-class Rub:
+class Slider:
     """A law that is rubbed along a given way under a given load, and the work that it takes."""
 
     def __init__(self, law, *par):
@@ -122,20 +122,20 @@ def test_plain_friction_opposes_slip_and_is_isotropic(plain):
 
 
 def test_friction_is_zero_at_rest_from_the_start(friction):
-    force = Rub(friction, *parameters(friction)).go(1.0, ZERO, 10.0)
+    force = Slider(friction, *parameters(friction)).go(1.0, ZERO, 10.0)
     assert not force.any()
 
 
 def test_friction_stays_within_the_cone(friction):
     rng = np.random.default_rng(3)
-    rub = Rub(friction, *parameters(friction))
+    slider = Slider(friction, *parameters(friction))
     for vx, vy, vr in rng.normal(scale=0.05, size=(300, 3)):
-        force = rub.go(1e-4, (vx, vy, vr), 7.0)
+        force = slider.go(1e-4, (vx, vy, vr), 7.0)
         assert math.hypot(force[0], force[1]) <= 0.5 * 7.0 * (1 + 1e-12)
 
 
 def test_friction_is_nothing_without_a_normal_force(friction):
-    assert not Rub(friction, *parameters(friction)).go(1e-3, (0.3, -0.2, 0.1), 0.0).any()
+    assert not Slider(friction, *parameters(friction)).go(1e-3, (0.3, -0.2, 0.1), 0.0).any()
 
 
 def test_compiled_friction_equals_plain_python(friction):
@@ -179,13 +179,13 @@ def energy_taken(friction, seed, ways, **own):
     own = {"bristle_damping": 1.0, "damping_trans_vel": 0.01, **own}
     found = []
     for _ in range(ways):
-        rub = Rub(friction, *parameters(friction, **own))
+        slider = Slider(friction, *parameters(friction, **own))
         v, load = closed_way(rng, steps)
         work = 0.0
         for each, nforce in zip(v, load, strict=True):
-            force = rub.go(span / steps, each, nforce)
+            force = slider.go(span / steps, each, nforce)
             work += span / steps * abs(force[[0, 1, 4]] @ each)
-        found.append(rub.taken / work)
+        found.append(slider.taken / work)
     return np.array(found)
 
 
@@ -312,59 +312,59 @@ def test_rolling_resistance_is_a_lever_arm():
 def test_dahl_follows_its_closed_form_and_its_loop():
     # one way: F = -Fc + (F0 + Fc) exp(-k x/Fc)
     law, k, limit = FRICTION_LAWS["DAHL"], 1e4, 0.3 * 10.0
-    rub, n = Rub(law, *parameters(law)), 2000
+    slider, n = Slider(law, *parameters(law)), 2000
     length = 5.0 * limit / k
     for j in range(1, n + 1):
-        force = rub.go(1.0 / n, (length, 0.0, 0.0), 10.0)[0]
+        force = slider.go(1.0 / n, (length, 0.0, 0.0), 10.0)[0]
         assert force == pytest.approx(limit * (math.exp(-k * length * j / n / limit) - 1), rel=1e-9)
     # a settled loop of +- a: the force at its ends is Fc tanh(k a/Fc) (from the closed form both
     # ways), and it takes 4 Fc a - 4 Fc^2/k tanh(k a/Fc)
     a = 2.0 * limit / k
     for _ in range(8):
-        taken = rub.taken
+        taken = slider.taken
         for sign in (-1, 1):
             for _ in range(n):
-                end = rub.go(1.0 / n, (sign * 2 * a, 0.0, 0.0), 10.0)[0]
+                end = slider.go(1.0 / n, (sign * 2 * a, 0.0, 0.0), 10.0)[0]
                 # the trapezoid rule would take the jump at the turn for a slope
     assert -end == pytest.approx(limit * math.tanh(k * a / limit), rel=1e-9)
     loop = 4 * limit * a - 4 * limit**2 / k * math.tanh(k * a / limit)
-    assert rub.taken - taken == pytest.approx(loop, rel=1e-6)
+    assert slider.taken - taken == pytest.approx(loop, rel=1e-6)
 
 
 def test_stiction_loop_takes_what_a_jenkins_element_does():
     # 4 Fc (X - Fc/k) a cycle of amplitude X
     law, k, limit = FRICTION_LAWS["STICTION"], 1e4, 0.3 * 10.0
-    rub = Rub(law, *parameters(law, mu_static=0.3, tangential_damping=0.0))
+    slider = Slider(law, *parameters(law, mu_static=0.3, tangential_damping=0.0))
     X, n = 4.0 * limit / k, 400
     for _ in range(n):
-        rub.go(1.0, (X / n, 0.0, 0.0), 10.0)
+        slider.go(1.0, (X / n, 0.0, 0.0), 10.0)
     for _ in range(3):
-        taken = rub.taken
+        taken = slider.taken
         for sign in (-1, 1):
             for _ in range(n):
-                rub.go(1.0, (sign * 2 * X / n, 0.0, 0.0), 10.0)
-    assert rub.taken - taken == pytest.approx(4 * limit * (X - limit / k), rel=1e-12)
+                slider.go(1.0, (sign * 2 * X / n, 0.0, 0.0), 10.0)
+    assert slider.taken - taken == pytest.approx(4 * limit * (X - limit / k), rel=1e-12)
 
 
 def test_stiction_holds_up_to_its_static_limit_and_then_slips():
     law, k = FRICTION_LAWS["STICTION"], 1e4
-    rub = Rub(law, *parameters(law, tangential_damping=0.0))
+    slider = Slider(law, *parameters(law, tangential_damping=0.0))
     step = 0.05 * 5.0 / k
     for j in range(1, 30):
-        force = rub.go(1.0, (0.6 * step, 0.8 * step, 0.0), 10.0)
+        force = slider.go(1.0, (0.6 * step, 0.8 * step, 0.0), 10.0)
         pull = math.hypot(force[0], force[1])
         if j == 20:
             # at the limit itself rounding decides
             continue
         if j < 20:
             assert pull == pytest.approx(0.25 * j, rel=1e-12)
-            assert rub.mode == STICK
+            assert slider.mode == STICK
         else:
             assert pull == pytest.approx(3.0, rel=1e-12)
-            assert rub.mode == SLIP
+            assert slider.mode == SLIP
     # back a little: it holds again, with the spring at its dynamic limit
-    force = rub.go(1.0, (-0.6 * step, -0.8 * step, 0.0), 10.0)
-    assert rub.mode == STICK
+    force = slider.go(1.0, (-0.6 * step, -0.8 * step, 0.0), 10.0)
+    assert slider.mode == STICK
     assert math.hypot(force[0], force[1]) == pytest.approx(3.0 - 0.25, rel=1e-12)
 
 
@@ -397,11 +397,11 @@ def test_stiction_keeps_its_mode_within_a_step():
 def test_a_twist_is_held_up_to_its_limit():
     law = FRICTION_LAWS["STICTION"]
     par = parameters(law, tangential_damping=0.0, rotational_stiffness=100.0, torsion_radius=0.1)
-    rub = Rub(law, *par)
+    slider = Slider(law, *par)
     # limit mu_s N r = 0.5
-    assert rub.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.4)
-    assert rub.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.5)
-    assert rub.go(1.0, (0.0, 0.0, -0.004), 10.0)[4] == pytest.approx(-0.1)
+    assert slider.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.4)
+    assert slider.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.5)
+    assert slider.go(1.0, (0.0, 0.0, -0.004), 10.0)[4] == pytest.approx(-0.1)
 
 
 def test_springs_lose_and_never_win_where_the_normal_stiffness_changes():
@@ -425,9 +425,9 @@ def test_lugre_slides_at_its_steady_curve():
     law = FRICTION_LAWS["LUGRE"]
     par = parameters(law, bristle_damping=10.0, viscous_coef=0.4)
     for v in (1e-3, 0.02, 0.1):
-        rub = Rub(law, *par)
+        slider = Slider(law, *par)
         for _ in range(4000):
-            force = rub.go(5e-6 / v, (v, 0.0, 0.0), 10.0)
+            force = slider.go(5e-6 / v, (v, 0.0, 0.0), 10.0)
         g = 10.0 * (0.3 + 0.2 * math.exp(-((v / 0.02) ** 2)))
         assert -force[0] == pytest.approx(g + 0.4 * v, rel=1e-6)
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from helpers.crowd_decks import block, pile, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere
 from helpers.folders import MODELS, USERFUNCS
 from helpers.libraries import example
+from helpers.pile_decks import block, pile, shape_graphic, solid
 
 Case = tuple[str, list[str]]
 
@@ -122,7 +122,7 @@ def sensors(folder: Path) -> Case:
     return written(folder, model, both), ["--tol", "1e-9"]
 
 
-def crowd(folder: Path, method: str, end: float) -> Case:
+def broadphase(folder: Path, method: str, end: float) -> Case:
     """Return a pile of 64 balls, whose near pairs are looked for, as it falls apart."""
     places = block(4, 0.201, z=0.101, jitter=0.02, seed=3)
     text = pile(places, stiffness=1e5, exponent=1.5, damping=100.0, dmax=1e-4, **COULOMB)
@@ -144,7 +144,7 @@ def meshes(folder: Path) -> Case:
 
 def some_signals(folder: Path) -> Case:
     """Return a run of which few signals are recorded."""
-    deck, options = crowd(folder, "VERLET", 1.5)
+    deck, options = broadphase(folder, "VERLET", 1.5)
     return deck, [*options, "--signals", "bodies/*/position", "--signals", "contacts"]
 
 
@@ -179,8 +179,8 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "a law in C, DOP853": library,
     "many Simulates": stages,
     "sensors": sensors,
-    "crowd": partial(crowd, method="AUTO", end=0.2),
-    "crowd, VERLET": partial(crowd, method="VERLET", end=1.5),
+    "broadphase": partial(broadphase, method="AUTO", end=0.2),
+    "broadphase, VERLET": partial(broadphase, method="VERLET", end=1.5),
     "meshes": meshes,
     "some signals": some_signals,
 }

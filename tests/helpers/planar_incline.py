@@ -148,7 +148,7 @@ class Incline:
         held, most = self.friction(u)
         return 0 if abs(held) <= most else (-1 if held > 0.0 else 1)
 
-    def rubs(self, u):
+    def displacement(self, u):
         """Return by how much the middle of the lower face has moved along the fall line [m]."""
         return float(u[X] - self.height * math.sin(u[TILT]))
 

@@ -165,23 +165,23 @@ def contact(rng, writer, i, j, implicit_only=True):
         normal["ref_velocity"] = 1.0 * T / L
     mu = float(rng.uniform(0.1, 0.7))
     vs = 10.0 ** rng.uniform(-2.5, -1.0) * T / L
-    rub = str(
+    name = str(
         rng.choice(["COULOMB_OFF", "COULOMB_ON", "TANH", "STRIBECK", "LUGRE", "DAHL", "STICTION"])
     )
-    friction = {"cff_type": rub}
-    if rub != "COULOMB_OFF":
+    friction = {"cff_type": name}
+    if name != "COULOMB_OFF":
         friction["mu_dynamic"] = mu
-    if rub in ("COULOMB_ON", "STRIBECK", "LUGRE", "STICTION"):
+    if name in ("COULOMB_ON", "STRIBECK", "LUGRE", "STICTION"):
         friction["mu_static"] = mu * float(rng.uniform(1.0, 1.3))
-    if rub in ("COULOMB_ON", "STRIBECK"):
+    if name in ("COULOMB_ON", "STRIBECK"):
         friction["stiction_trans_vel"] = vs
-    if rub in ("COULOMB_ON", "TANH"):
+    if name in ("COULOMB_ON", "TANH"):
         friction["friction_trans_vel"] = 1.5 * vs
-    if rub in ("STRIBECK", "LUGRE"):
+    if name in ("STRIBECK", "LUGRE"):
         friction["stribeck_vel"] = 3.0 * vs
-    if rub in ("LUGRE", "DAHL"):
+    if name in ("LUGRE", "DAHL"):
         friction["bristle_stiffness"] = 1e4 * L / F
-    if rub == "LUGRE":
+    if name == "LUGRE":
         friction["bristle_damping"] = 10.0 * L / (F * T)
     writer.add(
         "Force_Contact",
@@ -194,7 +194,7 @@ def contact(rng, writer, i, j, implicit_only=True):
         **normal,
         **friction,
     )
-    return law, rub
+    return law, name
 
 
 def inertia_of(rng, mass):

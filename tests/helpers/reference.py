@@ -464,15 +464,15 @@ class Governor:
 
 
 def roller_follower(
-    times, speed, e, R, roller, mass, inertia, spring, preload, law, rub, z0, g=9.81
+    times, speed, e, R, roller, mass, inertia, spring, preload, law, friction, z0, g=9.81
 ):
     """Return height and spin (about y) of a follower's roller above an eccentric cam, and forces.
 
-    The cam's centre is at -e (sin, cos)(w t) in x and z. `law` is that of IMPACT, `rub` friction
+    The cam's centre is at -e (sin, cos)(w t) in x and z. `law` is that of IMPACT, `friction` the
     coefficient and the slip at which it is full; forces act half the depth below both surfaces.
     Forces are the normal force, along x and along z.
     """
-    mu, full = rub
+    mu, full = friction
 
     def push(t, z, dz, spin):
         x0, z0 = -e * math.sin(speed * t), -e * math.cos(speed * t)

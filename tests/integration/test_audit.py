@@ -161,10 +161,10 @@ def test_energy_that_a_contact_makes_is_told(tmp_path, monkeypatch):
 
 
 def test_friction_above_its_cone_is_told(tmp_path, monkeypatch):
-    def rub(runner):
+    def give_friction(runner):
         runner.system.scene.contacts.friction_par[0, :2] *= 1.1
 
-    with_fault(monkeypatch, 0.05, rub)
+    with_fault(monkeypatch, 0.05, give_friction)
     friction = {
         "cff_type": "COULOMB_ON",
         "mu_static": 0.3,

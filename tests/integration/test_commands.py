@@ -125,12 +125,12 @@ LAWS = {
     "HUNT": """cnf_type="HUNT_CROSSLEY" stiffness="1e4" exponent="1.5" damping="10"
  restitution_coef="0.5" """,
 }
-RUBS = """cff_type="COULOMB_ON" mu_static="0.5" mu_dynamic="0.3" stiction_trans_vel="0.01"
+FRICTION = """cff_type="COULOMB_ON" mu_static="0.5" mu_dynamic="0.3" stiction_trans_vel="0.01"
  friction_trans_vel="0.02" """
 SLIDER = """<Reference_Marker id="22" body_id="2" pos_z="-1"/>
 <Reference_Marker id="12" body_id="1" pos_z="-1"/>
 <Constraint_Joint id="4" type="CYLINDRICAL" i_marker_id="22" j_marker_id="12"/>"""
-RUB = """<Force_JointFriction id="5" joint_id="4" cff_type="COULOMB_ON" mu_static="0.5"
+JOINT_FRICTION = """<Force_JointFriction id="5" joint_id="4" cff_type="COULOMB_ON" mu_static="0.5"
  mu_dynamic="0.3" stiction_trans_vel="0.01" friction_trans_vel="0.02" pin_radius="0.1"
  preload="20"/>"""
 STOP = """<Force_JointLimit id="6" joint_id="4" motion_type="T" lower="-0.02" upper="0.02"
@@ -139,14 +139,14 @@ DRIVE = """<Motion_Joint id="7" joint_id="4" motion_type="R" val_type="D" expr="
 FALL = '<Force_Gravity grav_x="0.3" grav_z="-9.81"/>'
 
 
-def touch(law, more=RUBS):
+def touch(law, more=FRICTION):
     """Return a ball over a plane."""
     return f"""{EARTH}{BALL}{FALL}<Force_Contact id="1" num_i_graphics="1" i_graphics_id="300"
  num_j_graphics="1" j_graphics_id="100" {LAWS[law]} {more}/>"""
 
 
 MOVING = BODY.replace("/>", ' v_ic_z="0.5" v_ic_z_flag="TRUE" w_ic_z="2" w_ic_z_flag="TRUE"/>', 1)
-SLIDES = EARTH + MOVING + SPRING + PUSH + SLIDER + RUB + STOP + FALL
+SLIDES = EARTH + MOVING + SPRING + PUSH + SLIDER + JOINT_FRICTION + STOP + FALL
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from mbsim.compile_model import scratch
 from mbsim.core import problem
 from mbsim.errors import Interrupted, SolverError
 from mbsim.integrators import scheme
-from mbsim.run import divergence as runaway
+from mbsim.run import divergence as divergence
 from mbsim.run import loop
 from mbsim.run.methods import Methods
 
@@ -108,8 +108,8 @@ def test_contact_problems_on_the_way_change_nothing(method, tmp_path):
 @pytest.fixture
 def impatient(monkeypatch):
     """Give up where steps are on average shorter than a thousandth of the time, over 10,000."""
-    monkeypatch.setattr(runaway, "STALLED", 10_000)
-    monkeypatch.setattr(runaway, "SLIVER", 1e-3)
+    monkeypatch.setattr(divergence, "STALLED", 10_000)
+    monkeypatch.setattr(divergence, "SLIVER", 1e-3)
 
 
 def given_up(model, folder, **settings):

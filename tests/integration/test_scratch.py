@@ -10,11 +10,11 @@ import pytest
 
 import mbsim
 from helpers import mechanics as mech
-from helpers.crowd_decks import pile
 from helpers.decks import COULOMB, GRAVITY, write_deck
 from helpers.folders import MODELS
 from helpers.forgetful import forgetful
 from helpers.mechanism_decks import Joint, Scene
+from helpers.pile_decks import pile
 
 COUNTED = (
     *("steps", "rejected", "rhs_evaluations", "output_evaluations", "jacobians"),

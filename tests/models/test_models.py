@@ -454,9 +454,20 @@ def test_cam(tol, allowed):
 def test_cam_roller(tol, allowed):
     results = run_model("cam_roller.xml", tol=tol)
     t, w, e, S = results["time"], 20 * np.pi, 0.01, 0.04
-    law, rub = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    law, friction = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
     height, spin, forces = roller_follower(
-        t, w, e, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23), law, rub, 0.0299757
+        t,
+        w,
+        e,
+        0.03,
+        0.01,
+        0.5,
+        5e-6,
+        2000.0,
+        2000 * (0.03 + 0.25 - 0.23),
+        law,
+        friction,
+        0.0299757,
     )
     z, turning = results["bodies/4/position/z"], results["bodies/4/angular_velocity/y"]
     assert np.abs(z - height).max() < allowed * 2.5e-5  # of the depth

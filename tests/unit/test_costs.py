@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from helpers.crowd_decks import LAW, block, pile
 from helpers.decks import GRAVITY, write_deck
+from helpers.pile_decks import LAW, block, pile
 from mbsim import read_model
 from mbsim.results.identity import of_elements
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from numba import boolean, float64, int64, njit
 from numba.core import ir, targetconfig
-from numba.core.compiler import Flags, run_frontend
+from numba.core.compiler import CompilerBase, Flags, run_frontend
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
@@ -135,6 +136,50 @@ def test_only_roots_are_emitted_and_an_inner_function_is_shared():
         jit.address(function, float64(float64))
     new = linking.emitted[len(before) :]
     assert [name.rsplit(".", 1)[-1] for name in new] == ["first", "second"]
+
+
+@jitable
+def leaf(x):
+    return x * x
+
+
+@jitable
+def branch(x):
+    return leaf(x) + 1.0
+
+
+def test_what_a_root_and_an_inner_function_call_is_compiled_once(monkeypatch):
+    jit._register()
+    seen = []
+    compile_extra = CompilerBase.compile_extra
+
+    def noted(self, function):
+        seen.append(function.__name__)
+        return compile_extra(self, function)
+
+    monkeypatch.setattr(CompilerBase, "compile_extra", noted)
+
+    def root(x):
+        return leaf(x) + branch(x)
+
+    jit.address(root, float64(float64))
+    assert seen.count("leaf") == seen.count("branch") == seen.count("root") == 1
+
+
+def test_callers_with_other_options_get_forms_of_their_own():
+    jit._register()
+
+    @jitable
+    def quotient(x):
+        return 1.0 / x
+
+    jit._register()
+    inherits = njit(error_model="numpy")(lambda x: quotient(x))
+    assert inherits(0.0) == math.inf
+    strict, loose = (njit(error_model=model)(lambda x: 1.0 / x) for model in ("python", "numpy"))
+    with pytest.raises(ZeroDivisionError):
+        njit(error_model="python")(lambda x: strict(x))(0.0)
+    assert njit(error_model="numpy")(lambda x: loose(x))(0.0) == math.inf
 
 
 def test_an_inner_function_is_emitted_when_python_calls_it():
@@ -437,7 +482,8 @@ jit._register()
 lower, names = Lower.lower, set()
 
 def noted(self):
-    names.add(self.func_ir.func_id.func.__module__)
+    function = self.func_ir.func_id.func
+    names.add(f"{function.__module__}.{function.__qualname__}")
     lower(self)
 
 Lower.lower = noted
@@ -454,10 +500,16 @@ CONTACTS = (
     "mbsim.dynamics.linearization.memory_slopes"
 )
 BRANCHES = "mbsim.integrators.branches mbsim.integrators.events mbsim.dynamics.events.switching "
+#: Of contacts that a scene may lack: friction in steps of fixed length, pairs without a closed
+#: form, flat faces that are one incident.
+OF_SOME_CONTACTS = (
+    "contact.fixed_step contact.fcl_points add_region_stiffness add_moves_of_centre "
+    "contact.tilting "
+)
 #: Of joints, forces, expressions; of friction with memory, and faces that are one incident.
 MECHANISMS = (
     "mbsim.dynamics.stiction mbsim.dynamics.constraints mbsim.dynamics.forces. "
-    "mbsim.dynamics.expressions mbsim.dynamics.contact.memory mbsim.dynamics.contact.tilting "
+    "mbsim.dynamics.expressions mbsim.dynamics.contact.memory "
 )
 
 
@@ -476,7 +528,12 @@ MECHANISMS = (
             + MECHANISMS
             + BRANCHES,
         ),
-        ("bowling_ball", "AUTO", MECHANISMS + BRANCHES + "mbsim.dynamics.linearization"),
+        (
+            "bowling_ball",
+            "AUTO",
+            MECHANISMS + BRANCHES + OF_SOME_CONTACTS + "mbsim.dynamics.linearization",
+        ),
+        ("bowling_ball", "RADAU5", MECHANISMS + BRANCHES + OF_SOME_CONTACTS),
     ],
 )
 @pytest.mark.slow
@@ -489,5 +546,5 @@ def test_a_deck_compiles_nothing_of_what_it_lacks(deck, method, lacks, tmp_path)
     )
     assert done.returncode == 0, done.stderr
     modules = [name for name in done.stdout.split() if name.startswith("mbsim.")]
-    assert "mbsim.dynamics.pipeline.evaluate" in modules
+    assert "mbsim.dynamics.pipeline.evaluate.evaluate" in modules
     assert not [name for name in modules if any(part in name for part in lacks.split())]

@@ -148,7 +148,7 @@ JOINT = 'Constraint_Joint id="1" type='
 MOTION = f'{REVOLUTE}<Motion_Joint id="1" joint_id="1"'
 SLIDER = f'<Constraint_Joint id="2" type="TRANSLATIONAL" {ON}/>'
 COUPLED = REVOLUTE + SLIDER + '<Constraint_Coupler id="1" joint_ids='
-RUBS = '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY"'
+PIN_FRICTION = '<Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_DYNAMICONLY"'
 STOPS = '<Force_JointLimit id="1" joint_id="1" cnf_type="IMPACT" stiffness="100"'
 BAD = {
     "no such joint": (f'<{JOINT}"HINGE" {ON}/>', ("Constraint_Joint[1]", '"HINGE"', "REVOLUTE")),
@@ -258,41 +258,41 @@ BAD = {
         ("Reference_Variable[2]", "2 -> 3 -> 2"),
     ),
     "friction of a plane": (
-        f'<{JOINT}"PLANAR" {ON}/>{RUBS} mu_dynamic="0.1"/>',
+        f'<{JOINT}"PLANAR" {ON}/>{PIN_FRICTION} mu_dynamic="0.1"/>',
         ("Force_JointFriction[1]", 'joint_id="1"', "PLANAR", "REVOLUTE, TRANSLATIONAL"),
     ),
     "friction of no joint": (
-        f'{RUBS} mu_dynamic="0.1"/>',
+        f'{PIN_FRICTION} mu_dynamic="0.1"/>',
         ("Force_JointFriction[1]", 'joint_id="1"', "no Constraint_Joint has this id"),
     ),
     "friction without a pin": (
-        f'{REVOLUTE}{RUBS} mu_dynamic="0.1"/>',
+        f'{REVOLUTE}{PIN_FRICTION} mu_dynamic="0.1"/>',
         ("Force_JointFriction[1]", "pin_radius: missing", "number > 0"),
     ),
     "pin of a ball": (
-        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" pin_radius="2"/>',
+        f'<{JOINT}"SPHERICAL" {ON}/>{PIN_FRICTION} ball_radius="1" pin_radius="2"/>',
         ('pin_radius="2"', "belongs to REVOLUTE or CYLINDRICAL"),
     ),
     "arm of a ball": (
-        f'<{JOINT}"SPHERICAL" {ON}/>{RUBS} ball_radius="1" bending_reaction_arm="2"/>',
+        f'<{JOINT}"SPHERICAL" {ON}/>{PIN_FRICTION} ball_radius="1" bending_reaction_arm="2"/>',
         ('bending_reaction_arm="2"', "bears no torque"),
     ),
     "pulling preload": (
-        f'{REVOLUTE}{RUBS} pin_radius="1" preload="-2"/>',
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" preload="-2"/>',
         ('preload="-2"', "number >= 0"),
     ),
     "collar": (
-        f'{REVOLUTE}{RUBS} pin_radius="1" friction_arm="2"/>',
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" friction_arm="2"/>',
         ('friction_arm="2"', "documented but not built yet"),
     ),
     "friction twice": (
-        f'{REVOLUTE}{RUBS} pin_radius="1"/>{RUBS} pin_radius="1"/>'.replace(
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1"/>{PIN_FRICTION} pin_radius="1"/>'.replace(
             'Friction id="1" j', 'Friction id="2" j', 1
         ),
         ("friction 2 is in joint 1 already",),
     ),
     "user friction": (
-        f'{REVOLUTE}{RUBS} pin_radius="1"/>'.replace("COULOMB_DYNAMICONLY", "USERCFF"),
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1"/>'.replace("COULOMB_DYNAMICONLY", "USERCFF"),
         ('cff_type="USERCFF"', "COULOMB_ON"),
     ),
     "limit of what does not slide": (
@@ -375,7 +375,7 @@ def test_attributes_of_another_law_are_noted(tmp_path: Path) -> None:
     model = read(
         tmp_path,
         added(
-            f'{REVOLUTE}{RUBS} pin_radius="1" mu_dynamic="0.1" mu_static="0.2" '
+            f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" mu_dynamic="0.1" mu_static="0.2" '
             f'friction_trans_vel="1"/>{STOPS} motion_type="R" upper="1" penalty="3"/>'
         ),
     )

@@ -181,7 +181,9 @@ def test_larger_dynamic_friction_warns(tmp_path: Path) -> None:
 def test_friction_without_a_coefficient_warns(tmp_path: Path) -> None:
     bare = deck(('mu_static="0.3" ', ""), ('mu_dynamic="0.2"', ""))
     warnings = read(tmp_path, bare).warnings
-    assert any("mu_dynamic: not given: 0, so that COULOMB_ON rubs nothing" in w for w in warnings)
+    assert any(
+        "mu_dynamic: not given: 0, so that COULOMB_ON gives no friction" in w for w in warnings
+    )
 
 
 def test_friction_is_off_where_no_type_is_given(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ class Scene:
         most = np.zeros(n)
         self.residuals = SimpleNamespace(
             first=np.array([0, 1]), begin=np.array([0, n]), kind=np.array(kinds),
-            scale=np.full(n, scale), interpreted=np.array([1]), trouble=np.array([-1]),
+            scale=np.full(n, scale), interpreted=np.array([1]), unsolved=np.array([-1]),
             given=np.zeros(3 + 2 * n), out=most.copy(), base=most.copy(), start=most.copy(),
             z=most.copy(), step=most.copy(), size=most.copy(), rows=most.copy(),
             by=np.zeros((2, n, n)), A=np.zeros((n, n)), swap=np.zeros(n, dtype=int),
@@ -149,4 +149,4 @@ def test_what_has_no_root_is_said(residual):
 
     scene = Scene(residual, [ALGEBRAIC])
     assert scene.solve(1.0, 0.0)[0] == Code.UNSOLVED_ELEMENT
-    assert scene.residuals.trouble[0] == 0
+    assert scene.residuals.unsolved[0] == 0

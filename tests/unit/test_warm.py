@@ -177,7 +177,7 @@ class Nowhere(jit.CodeCache):
 def test_all_that_is_registered_is_warmed():
     names = {task.name for task in tasks.tasks(True, [])}
     assert {*NORMAL_LAWS, *FRICTION_LAWS, *PAIRS, *(f"{name} region" for name in REGIONS)} <= names
-    assert {"FCLIB AUTO rolling", "FCLIB NSN 2D", "crowd RADAU5"} <= names
+    assert {"FCLIB AUTO rolling", "FCLIB NSN 2D", "broadphase RADAU5"} <= names
     assert {f"bowling_ball.xml {name}" for name in tasks.METHODS} <= names
     usual = {task.name for task in tasks.tasks(False, [])}
     assert usual <= names

@@ -157,7 +157,7 @@ def test_stick_and_slip_in_turn_are_stiff_again_at_once(name):
 
 
 @pytest.mark.parametrize(("method", "rejected"), [("DOPRI5", 0.5), ("RADAU5", 1.0)])
-def test_steps_that_are_cut_at_kinks_do_not_outgrow_their_error(method, rejected):
+def test_steps_that_are_cut_at_branches_do_not_outgrow_their_error(method, rejected):
     """Whole steps doubled behind each cut and were rejected 1.7 times a step."""
     stats = mbsim.simulate(mbsim.read_model(MODELS / "sdnd100.xml"), integrator=method, tol=1e-3)
     stats = stats.stats

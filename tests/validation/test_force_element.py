@@ -496,7 +496,7 @@ def test_a_force_that_jumps_with_the_rate_is_refused(tmp_path, line):
     ],
 )
 @pytest.mark.parametrize("values", ["0.1,3", "2e4,1e-6", "1e-3,1"])
-def test_kinks_and_steep_residuals_are_taken(tmp_path, line, values):
+def test_branches_and_steep_residuals_are_taken(tmp_path, line, values):
     from mbsim.plugins.residual import load_residual
 
     (tmp_path / "modes.py").write_text(MODES.format(body=line))

@@ -23,7 +23,7 @@ def planar(angle, margin, shape, end):
     """Return how far a body put down flat has slipped by a time."""
     body = Incline(math.radians(angle), margin, shape)
     found, _ = body.integrate(body.flat(), end)
-    return body.rubs(found)
+    return body.displacement(found)
 
 
 def slipped(folder, body, start, end, **settings):

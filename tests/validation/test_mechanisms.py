@@ -500,9 +500,9 @@ def test_ball_joint_of_a_body_on_a_fixed_stand_in_millimetres(tmp_path):
 
 def test_redundant_holds_share_the_load(tmp_path):
     # a door on two hinges: 2 x 5 equations, 5 of them needed; forces of least norm are equal
-    door = mech.Body(20.0, (1.0, 1.5, 0.6), (0.4, 0, 0))
+    panel = mech.Body(20.0, (1.0, 1.5, 0.6), (0.4, 0, 0))
     joints = [Joint("REVOLUTE", 1, 0, (0, 0, z)) for z in (-0.5, 0.5)]
-    scene = Scene([door], joints)
+    scene = Scene([panel], joints)
     results = scene.run(tmp_path, 0.5, 0.05)
     lower, upper = results["joints/1/force"], results["joints/2/force"]
     np.testing.assert_allclose((lower + upper)[:, 2], 20.0 * 9.81, rtol=1e-8)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import mbsim
-from helpers.crowd_decks import (
+from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
+from helpers.pile_decks import (
     LAW,
     SHAPES,
     balls,
@@ -18,7 +19,6 @@ from helpers.crowd_decks import (
     solid,
     surface,
 )
-from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
 from mbsim.arrays.codes import ACTIVE, FREE, LISTINGS, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
@@ -33,8 +33,8 @@ MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" in
 
 
 @pytest.fixture
-def all_crowds(monkeypatch):
-    """Treat every contact as a crowd."""
+def all_by_broadphase(monkeypatch):
+    """Give every contact to the broadphase."""
     monkeypatch.setattr(pairing, "MOST_LISTED", 0)
 
 
@@ -115,7 +115,7 @@ def check_against_brute_force(system, random, wanted):
 
 
 @pytest.mark.parametrize("shapes", [(s,) for s in SHAPES] + [SHAPES], ids=[*SHAPES, "all"])
-def test_a_set_with_itself_lists_every_near_pair_once(tmp_path, all_crowds, shapes):
+def test_a_set_with_itself_lists_every_near_pair_once(tmp_path, all_by_broadphase, shapes):
     random = np.random.default_rng(len(shapes) + SHAPES.index(shapes[0]))
     text, ids = mixed(random, shapes, 40, 0.4)
     system = listed(tmp_path, GROUND + text + sets(ids, ids, **LAW))
@@ -125,7 +125,9 @@ def test_a_set_with_itself_lists_every_near_pair_once(tmp_path, all_crowds, shap
 
 @pytest.mark.parametrize("giants", [0, 3])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_two_sets_and_several_crowds_list_every_near_pair(tmp_path, all_crowds, seed, giants):
+def test_two_sets_and_several_contacts_list_every_near_pair(
+    tmp_path, all_by_broadphase, seed, giants
+):
     random = np.random.default_rng(seed)
     one, i = mixed(random, SHAPES, 30, 0.8, giants)
     two, j = mixed(random, SHAPES, 25, 0.8, giants, first=100)
@@ -145,7 +147,7 @@ def test_two_sets_and_several_crowds_list_every_near_pair(tmp_path, all_crowds, 
     assert {pair for pair in wanted if pair[0] == 304} <= set(listed_pairs(system))
 
 
-def test_graphics_of_one_body_are_no_pair_of_a_set(tmp_path, all_crowds):
+def test_graphics_of_one_body_are_no_pair_of_a_set(tmp_path, all_by_broadphase):
     random = np.random.default_rng(0)
     text, ids = mixed(random, ("SPHERE",), 12, 0.4)
     text += '<Post_Graphic id="201" type="Sphere" center_marker_id="20" radius="0.3"/>'
@@ -155,7 +157,7 @@ def test_graphics_of_one_body_are_no_pair_of_a_set(tmp_path, all_crowds):
     assert any(201 in pair for pair in found)
 
 
-def test_near_pairs_stay_right_while_shapes_wander(tmp_path, all_crowds):
+def test_near_pairs_stay_right_while_shapes_wander(tmp_path, all_by_broadphase):
     random = np.random.default_rng(3)
     text, ids = mixed(random, SHAPES, 30, 0.4)
     system = listed(tmp_path, GROUND + text + sets(ids, ids, **LAW))
@@ -179,7 +181,7 @@ def test_near_pairs_stay_right_while_shapes_wander(tmp_path, all_crowds):
     assert scene.log.counters[LISTINGS] == 7
 
 
-def test_too_few_places_halve_the_skin(tmp_path, all_crowds, monkeypatch):
+def test_too_few_places_halve_the_skin(tmp_path, all_by_broadphase, monkeypatch):
     random = np.random.default_rng(5)
     text, ids = mixed(random, ("SPHERE",), 40, 0.6)
     model = GROUND + text + sets(ids, ids, **LAW)
@@ -224,7 +226,7 @@ def places(results, count=8):
 
 @pytest.mark.parametrize("method", ["DOPRI5", "VERLET"])
 @pytest.mark.parametrize("shape", ["SPHERE", "BOX"])
-def test_a_crowd_runs_as_listed_pairs_do(tmp_path, monkeypatch, method, shape):
+def test_a_set_runs_as_listed_pairs_do(tmp_path, monkeypatch, method, shape):
     # steps that all are h_max are the same steps: only the order of sums may differ
     random = np.random.default_rng(2)
     text = "".join(
@@ -247,7 +249,7 @@ def test_a_crowd_runs_as_listed_pairs_do(tmp_path, monkeypatch, method, shape):
         assert runs[1].stats["h_largest"] <= 2e-5
 
 
-def test_falling_apart_needs_no_narrowphase(tmp_path, all_crowds):
+def test_falling_apart_needs_no_narrowphase(tmp_path, all_by_broadphase):
     # 27 balls 0.5 apart: no pair is near, but for the ground at the end of the fall
     heights = block(3, 0.5, z=3.0)
     results = run_deck(tmp_path, pile(heights, **LAW) + GRAVITY, end_time=0.4)
@@ -260,7 +262,7 @@ def test_falling_apart_needs_no_narrowphase(tmp_path, all_crowds):
 
 
 @pytest.mark.parametrize("method", ["DOPRI5", "VERLET"])
-def test_resume_in_a_crowd_is_bit_identical(tmp_path, all_crowds, monkeypatch, method):
+def test_resume_of_a_set_is_bit_identical(tmp_path, all_by_broadphase, monkeypatch, method):
     monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-4)
     path = write_deck(tmp_path, pile(HEAP, v=VELOCITY, **LAW, **COULOMB) + GRAVITY, end_time=0.3)
     model = mbsim.read_model(path)
@@ -282,7 +284,7 @@ def test_resume_in_a_crowd_is_bit_identical(tmp_path, all_crowds, monkeypatch, m
     resumed.close()
 
 
-def test_a_subroutine_that_uses_x_works_in_a_crowd(tmp_path, monkeypatch):
+def test_a_subroutine_that_uses_x_works_in_a_set(tmp_path, monkeypatch):
     (tmp_path / "bristle.py").write_text(
         "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
         "    return [-500.0 * x[0] - 5.0 * xdot[0], -500.0 * x[1] - 5.0 * xdot[1], 0.0]\n",
@@ -301,7 +303,7 @@ def test_a_subroutine_that_uses_x_works_in_a_crowd(tmp_path, monkeypatch):
 # --- decks -----------------------------------------------------------------------------------
 
 
-def test_check_names_a_crowd_by_its_numbers(tmp_path, all_crowds):
+def test_check_names_a_set_by_its_numbers(tmp_path, all_by_broadphase):
     from click.testing import CliRunner
 
     from mbsim.cli.main import main
@@ -331,7 +333,7 @@ def test_a_set_on_one_body_is_refused(tmp_path, i, j, message):
     assert "Force_Contact[301]" in str(caught.value)
 
 
-def test_a_set_with_two_planes_is_refused(tmp_path, all_crowds):
+def test_a_set_with_two_planes_is_refused(tmp_path, all_by_broadphase):
     text, ids = balls(HEAP[:3]), [200, 300, 400]
     planes = [*ids, 100, 900000]
     path = write_deck(tmp_path, GROUND + text + MOVING_PLANE + sets(planes, planes, **LAW))

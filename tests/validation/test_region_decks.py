@@ -250,7 +250,7 @@ def test_resumed_it_is_the_same_run(tmp_path):
 
 
 def test_many_boxes_are_found_as_they_come_near(tmp_path):
-    # a crowd: more pairs than are listed one by one
+    # a set: more pairs than are listed one by one
     boxes, many = [], 310
     for k in range(many):
         x, y = 0.2 * (k % 20), 0.2 * (k // 20)

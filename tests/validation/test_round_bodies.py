@@ -206,7 +206,11 @@ def test_points_of_a_patch_that_leave_take_no_short_steps(tmp_path, tip):
     # their depth goes on otherwise than their rate has it: steps that ended where they would leave
     # fell to 1.6e-12 s, where RADAU5 sees nothing but rounding, and gave up beside a pendulum
     law = {"cnf_type": "HUNT_CROSSLEY", "stiffness": 3.4e5, "restitution_coef": 0.9}
-    rub = {"cff_type": "COULOMB_DYNAMICONLY", "mu_dynamic": 0.135, "friction_trans_vel": 0.0023}
+    friction = {
+        "cff_type": "COULOMB_DYNAMICONLY",
+        "mu_dynamic": 0.135,
+        "friction_trans_vel": 0.0023,
+    }
     deck = f"""{GROUND}{GRAVITY}
 <Body_Rigid id="2" cg_id="20" mass="0.25" inertia_xx="4.6e-4" inertia_yy="4.6e-4"
   inertia_zz="5.9e-4" v_ic_x="0.3" v_ic_x_flag="TRUE" w_ic_x="0.4" w_ic_x_flag="TRUE"
@@ -214,6 +218,6 @@ def test_points_of_a_patch_that_leave_take_no_short_steps(tmp_path, tip):
 <Reference_Marker id="20" body_id="2" pos_z="0.077"/>
 <Reference_Marker id="21" body_id="2" pos_z="1e-5"/>
 <Post_Graphic id="200" type="Cylinder" center_marker_id="21" radius="0.068" length="0.154"/>
-{contact(**law, ref_velocity=1.0, exponent=1.5, **rub)}"""
+{contact(**law, ref_velocity=1.0, exponent=1.5, **friction)}"""
     results = run_deck(tmp_path, deck, 0.25, 0.05, integrator="RADAU5", tol=1e-8)
     assert results.stats["h_smallest"] > 1e-10

@@ -49,7 +49,7 @@ def block(v=(0.0, 0.0), tilt=0.0, low=False, height=0.1):
   length_x="0.2" length_y="0.2" length_z="{height!r}"/>"""
 
 
-def rub(static=0.5, dynamic=0.4, **more):
+def stiction(static=0.5, dynamic=0.4, **more):
     """Return a contact that holds without give."""
     given = {"cnf_type": "IMPACT", "stiffness": 1e6, "exponent": 1, "damping": 1e3, "dmax": 1e-6}
     given |= {"cff_type": "STICTION", "mu_static": static, "mu_dynamic": dynamic}
@@ -86,7 +86,7 @@ def test_sdnd100_turns_and_stops_where_it_must():
 
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_block_stays_on_an_incline_at_four_points(method, tmp_path):
-    model = plane(20.0) + block(tilt=20.0) + rub()
+    model = plane(20.0) + block(tilt=20.0) + stiction()
     results = run_deck(tmp_path, model, 110.0, 1.0, integrator=method, tol=1e-8)
     slope = G * math.sin(math.radians(20.0))
     assert events(results, "slip").size == 0
@@ -108,7 +108,7 @@ def test_what_is_pushed_slips_when_its_static_friction_is_passed(method, close, 
     # 2 t = mu_s m g; then m x'' = 2 t - mu_d m g
     static, dynamic, end = 0.5, 0.3, 4.0
     begins = 0.5 * static * G
-    model = plane() + block(low=True) + rub(static, dynamic) + push("2*TIME")
+    model = plane() + block(low=True) + stiction(static, dynamic) + push("2*TIME")
     results = run_deck(tmp_path, model, end, 0.1, integrator=method, tol=1e-8)
     np.testing.assert_allclose(events(results, "slip"), begins, rtol=0, atol=1e-8)
     assert len(results["events"]) == 8  # four points
@@ -133,7 +133,7 @@ def test_a_block_thrown_across_an_incline_stops_where_it_must(method, close, tmp
     stops.terminal = True
     by = {"method": "Radau", "rtol": 1e-11, "atol": 1e-13, "events": stops}
     found = solve_ivp(slides, (0.0, 1.0), [0.0, 0.0, *v], **by)
-    model = plane(10.0) + block(v=v, tilt=10.0, low=True) + rub(0.5, mu)
+    model = plane(10.0) + block(v=v, tilt=10.0, low=True) + stiction(0.5, mu)
     results = run_deck(tmp_path, model, 1.0, 0.05, integrator=method, tol=1e-8)
     np.testing.assert_allclose(
         results["bodies/2/position"][-1, :2], found.y[:2, -1], rtol=0, atol=close
@@ -150,7 +150,7 @@ def test_a_sphere_rolls_down_an_incline_without_slip(method, tmp_path):
     depth = (mass * G * math.cos(tilt) / 1e5) ** (2.0 / 3.0)
     r = radius - 0.5 * depth
     ball = sphere(radius - depth, mass=mass, radius=radius, inertia=0.4 * mass * r * r)
-    model = plane(20.0) + ball + rub(stiffness=1e5, exponent=1.5, damping=100, dmax=1e-3)
+    model = plane(20.0) + ball + stiction(stiffness=1e5, exponent=1.5, damping=100, dmax=1e-3)
     results = run_deck(tmp_path, model, 2.0, 0.1, integrator=method, tol=1e-8)
     fall = -5.0 / 7.0 * G * math.sin(tilt)
     np.testing.assert_allclose(
@@ -187,12 +187,12 @@ def test_a_block_put_down_near_its_limit_slips_a_little_and_holds(
 <Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
   length_x="0.3" length_y="0.3" length_z="0.1"/>"""
     mu = math.tan(tilt) * (1.0 + margin)
-    model = plane(angle) + body + rub(mu, mu, damping=2e3, dmax=1e-5)
+    model = plane(angle) + body + stiction(mu, mu, damping=2e3, dmax=1e-5)
     results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5", tol=tol)
     place, turn = results["bodies/2/position"], results["bodies/2/quaternion"]
-    rubs = place[:, 0] - 0.05 * 2.0 * turn[:, 2]  # the middle of its lower face
-    assert -rubs[-1] == pytest.approx(slip, rel=0.05)
-    assert np.ptp(rubs[6:]) < 1e-12
+    text = place[:, 0] - 0.05 * 2.0 * turn[:, 2]  # the middle of its lower face
+    assert -text[-1] == pytest.approx(slip, rel=0.05)
+    assert np.ptp(text[6:]) < 1e-12
     assert len(events(results, "slip")) == len(events(results, "stick")) == 1
 
 
@@ -213,7 +213,7 @@ def turned_block(scale, tilt, margin, down, psi):
 <Reference_Marker id="20" body_id="2" pos_z="{z!r}" psi="{psi!r}"/>
 <Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20"
   length_x="{0.3 * scale!r}" length_y="{0.3 * scale!r}" length_z="{0.1 * scale!r}"/>"""
-    return block + rub(mu, mu, **given)
+    return block + stiction(mu, mu, **given)
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7, 1e-9])
@@ -227,11 +227,11 @@ def test_and_a_block_that_is_turned_on_its_incline(scale, turned, tol, tmp_path)
     results = run_deck(tmp_path, model, 3.0, 0.1, integrator="RADAU5", tol=tol)
     w, x, y, v = results["bodies/2/quaternion"].T
     up = np.array([2.0 * (x * v + w * y), 2.0 * (y * v - w * x)]).T
-    rubs = results["bodies/2/position"][:, :2] / scale - 0.05 * up  # the middle of its lower face
-    way = rubs[-1] @ [math.cos(down), math.sin(down)]
+    text = results["bodies/2/position"][:, :2] / scale - 0.05 * up  # the middle of its lower face
+    way = text[-1] @ [math.cos(down), math.sin(down)]
     # that of a planar integration
     assert way == pytest.approx(3.161e-6, rel=0.05)
-    assert np.ptp(rubs[-8:], axis=0).max() < 1e-11
+    assert np.ptp(text[-8:], axis=0).max() < 1e-11
     assert results.stats["steps"] < 1000
 
 
@@ -278,8 +278,8 @@ def test_blocks_on_each_other_part_where_the_weaker_friction_gives_way(tmp_path)
         for b, turn in ((2, 'theta="1.5707963267948966"'), (3, 'theta="1.5707963267948966"'))
     )
     guide += '<Reference_Marker id="12" body_id="1" theta="1.5707963267948966"/>'
-    model = plane() + lower + upper + guide + rub(0.3, 0.3)
-    model += rub(0.2, 0.2, i=300, j=200, id=302) + push("4*TIME")
+    model = plane() + lower + upper + guide + stiction(0.3, 0.3)
+    model += stiction(0.2, 0.2, i=300, j=200, id=302) + push("4*TIME")
     results = run_deck(tmp_path, model, t2 + 0.3, 0.05, integrator="RADAU5", tol=1e-7)
     slips = results["events"][results["events"]["kind"] == "slip"]
     first = {id: slips["time"][slips["element"] == id].min() for id in (301, 302)}
@@ -291,7 +291,7 @@ def test_blocks_on_each_other_part_where_the_weaker_friction_gives_way(tmp_path)
 
 def test_incidents_show_what_holds_them(tmp_path):
     # pushed where it rubs all points hold alike
-    model = plane(20.0) + block(tilt=20.0, low=True) + rub()
+    model = plane(20.0) + block(tilt=20.0, low=True) + stiction()
     results = run_deck(tmp_path, model, 0.1, 0.05, integrator="RADAU5")
     first = "Force_Contact[301].incident"
     names = [f"{first}[{k}].{what}" for k in range(4) for what in ("friction", "mode", "slip")]
@@ -304,7 +304,7 @@ def test_incidents_show_what_holds_them(tmp_path):
 
 
 def test_explicit_methods_refuse_it_by_name(tmp_path):
-    model = mbsim.read_model(write_deck(tmp_path, plane() + block() + rub()))
+    model = mbsim.read_model(write_deck(tmp_path, plane() + block() + stiction()))
     said = r"deck.xml:\d+: Force_Contact\[301\]: tangential_stiffness=INFINITE: rigid .* RADAU5"
     for method in ("DOPRI5", "DOP853", "VERLET"):
         with pytest.raises(ModelError, match=said):
@@ -330,18 +330,18 @@ def test_explicit_methods_refuse_it_by_name(tmp_path):
 )
 def test_what_means_nothing_with_it_is_said(more, said, tmp_path):
     with pytest.raises(DeckError, match=said):
-        mbsim.read_model(write_deck(tmp_path, plane() + block() + rub(**more)))
+        mbsim.read_model(write_deck(tmp_path, plane() + block() + stiction(**more)))
 
 
 def test_pairs_that_fcl_finds_are_refused(tmp_path):
-    model = mbsim.read_model(write_deck(tmp_path, plane() + block() + rub()))
+    model = mbsim.read_model(write_deck(tmp_path, plane() + block() + stiction()))
     with pytest.raises(DeckError, match=r"Force_Contact\[301\]: .*INFINITE: .* found by FCL"):
         mbsim.simulate(model, detector="fcl")
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_resumed_it_is_the_same_run(method, tmp_path, monkeypatch):
-    text = plane() + block() + rub(0.5, 0.3) + push("6*SIN(9*TIME)", "0.1*TIME")
+    text = plane() + block() + stiction(0.5, 0.3) + push("6*SIN(9*TIME)", "0.1*TIME")
     model = mbsim.read_model(write_deck(tmp_path, text, 1.5, 0.05))
     settings = {"integrator": method, "tol": 1e-5}
     straight = mbsim.simulate(model, **settings)
@@ -356,7 +356,10 @@ def test_resumed_it_is_the_same_run(method, tmp_path, monkeypatch):
 def test_what_rests_under_a_load_that_comes_and_goes_slips_in_time(method, tmp_path):
     # nothing moves, so that no error shortens a step: it is not to miss the load's peak
     model = (
-        plane() + block(low=True) + rub(0.5, 0.3) + push("4.95*SIN(9*(TIME-2))*STEP(TIME,1,0,2,1)")
+        plane()
+        + block(low=True)
+        + stiction(0.5, 0.3)
+        + push("4.95*SIN(9*(TIME-2))*STEP(TIME,1,0,2,1)")
     )
     results = run_deck(tmp_path, model, 2.2, 0.1, integrator=method)
     begins = 2.0 + math.asin(0.5 * G / 4.95) / 9.0
@@ -374,10 +377,10 @@ def test_beside_an_element_of_the_users_own_both_remember(tmp_path):
     own = f"""
 <Force_Element id="7" i_marker_id="30" j_marker_id="10" direction="TX" script_name="{script}"
   usrsub_fnc_name="dry_friction" usrsub_param_string="USER(0.4, 0.02)"/>"""
-    rubs = plane() + block(low=True) + rub(0.5, 0.3) + push("6*SIN(9*TIME)")
+    text = plane() + block(low=True) + stiction(0.5, 0.3) + push("6*SIN(9*TIME)")
     settings = {"integrator": "RADAU5", "tol": 1e-7}
-    both = run_deck(tmp_path, rubs + other + own, 1.5, 0.05, **settings)
-    block_alone = run_deck(tmp_path, rubs, 1.5, 0.05, **settings)
+    both = run_deck(tmp_path, text + other + own, 1.5, 0.05, **settings)
+    block_alone = run_deck(tmp_path, text, 1.5, 0.05, **settings)
     other_alone = run_deck(tmp_path, plane() + other + own, 1.5, 0.05, **settings)
     for id, alone in ((2, block_alone), (3, other_alone)):
         name = f"bodies/{id}/position"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import mbsim
-from helpers.crowd_decks import balls, block, sets, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
 from helpers.folders import MODELS
+from helpers.pile_decks import balls, block, sets, shape_graphic, solid
 from mbsim.errors import ModelError
 from mbsim.laws.catalog import FRICTION_LAWS
 
@@ -95,8 +95,8 @@ def test_friction_that_remembers_is_refused(tmp_path, law):
     """It would be held back to a part of what stops the slip in a step: off whatever the tol."""
     more = {"DAHL": {"bristle_stiffness": 1e5}, "STICTION": {"tangential_stiffness": 1e5}}
     more["LUGRE"] = more["DAHL"] | {"stribeck_vel": 0.01}
-    rubs = contact(cff_type=law, mu_static=0.4, mu_dynamic=0.3, **more.get(law, {}))
-    model = GROUND + sphere(0.1) + rubs + GRAVITY
+    rough = contact(cff_type=law, mu_static=0.4, mu_dynamic=0.3, **more.get(law, {}))
+    model = GROUND + sphere(0.1) + rough + GRAVITY
     with pytest.raises(ModelError, match=rf"deck.xml:\d+: Force_Contact\[301\]: .*; {law} remem"):
         run_deck(tmp_path, model, end_time=0.01, integrator="VERLET")
 

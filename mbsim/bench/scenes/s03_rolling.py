@@ -56,8 +56,8 @@ def law_solution(lever: float) -> float:
 
     start = [0.0, p.S3.speed, p.S3.speed]
     # the law has a kink in its second derivative at u = TRANSITION: the step ends there
-    kink = (p.S3.speed - TRANSITION) / (p.S3.mu * p.GRAVITY * gain)
-    for t0, t1 in ((0.0, kink), (kink, p.S3.end_time)):
+    transition = (p.S3.speed - TRANSITION) / (p.S3.mu * p.GRAVITY * gain)
+    for t0, t1 in ((0.0, transition), (transition, p.S3.end_time)):
         done = solve_ivp(rate, (t0, t1), start, method="DOP853", rtol=1e-13, atol=1e-15)
         start = list(done.y[:, -1])
     return float(start[0])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    AT_FAULT,
     CHOSEN,
     FOLDS,
     KEPT,
@@ -259,6 +260,6 @@ def keep_selection(scene: Scene, t: float, y: F1) -> int:
     if apart > _DOUBT or least < _WORN * sweep.quality[CHOSEN]:
         choose_better(scene, t, y, least)
     if not apart <= _APART and active_count(scene) <= count:
-        scene.work.trouble[1] = worst
+        scene.work.diagnostics[AT_FAULT] = worst
         return Code.CONTRADICTION
     return 0

@@ -94,9 +94,6 @@ NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN = range(23, 28)
 # part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
 CHANGES = 1e-9
 
-# part of the friction that would stop a slip in one step, which a fixed-step method may use
-HELD_BACK = 0.25
-
 
 @jitable
 def velocity_at(scene: Scene, y: F1, b: int, p: V3) -> V3:
@@ -255,35 +252,6 @@ def ask_normal(
 
 
 @jitable
-def yielding(scene: Scene, y: F1, b: int, p: V3, n: V3) -> float:
-    """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
-    bodies = scene.bodies
-    if b == len(bodies.mass):
-        return 0.0
-    arm = sub(p, position(scene, y, b))
-    inverse, square = bodies.inverse[b], dot(arm, arm)
-    return 1.0 / bodies.mass[b] + square * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
-
-
-@jitable
-def hold_back(
-    scene: Scene, y: F1, bi: int, bj: int, p: V3, n: V3, h: float, slip: V2, out: F1
-) -> None:
-    """Reduce a friction force to a quarter of what would stop the slip within the step.
-
-    Friction that turns sign from step to step would shake what rests; a quarter, since some
-    eight contacts share a body. Explicit methods of fixed step need this, as their step does not
-    follow the slope of friction; it fades as the step goes to 0.
-    """
-    force = math.hypot(out[0], out[1])
-    inverse = yielding(scene, y, bi, p, n) + yielding(scene, y, bj, p, n)
-    most = HELD_BACK * math.hypot(slip[0], slip[1]) / (h * inverse)
-    if force > most:
-        for k in range(2):
-            out[k] *= most / force
-
-
-@jitable
 def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:  # noqa: C901
     """Add the wrench of the touching slot s; return 0 or the code of the law that failed.
 
@@ -354,8 +322,9 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         finite = math.isfinite(out[0] + out[1] + out[4])
         if not finite and contacts.framed[c] == 1 and math.isfinite(normal + slip[0] + slip[1]):
             return Code.USER_NOT_FINITE
-        if scene.world.fixed_step[0] == 1 and h > 0.0:
-            hold_back(scene, y, bi, bj, p, n, h, slip, out)
+        held_back = scene.world.hooks[Hook.HOLD_BACK]
+        if held_back != 0 and h > 0.0:
+            call_int(held_back, (scene, s, h, slip[0], slip[1], y))
         if contacts.memory[c] > 0:
             answer = call_int(scene.world.hooks[Hook.RECALL], (scene, Recall.TAKE, s, t, dy, 0))
             if answer < 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AGAIN
+from mbsim.arrays.codes import REPLAYED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -60,7 +60,7 @@ def tangent(
     if scene.contacts.framed[c] == 0:
         # the law is the same in every tangent frame
         return any_tangent(n)
-    if scene.world.past[0] == AGAIN:
+    if scene.world.past[0] == REPLAYED:
         return vector(state.t[s])
     if state.touching[s] == 0:
         return birth_tangent(scene, graphic_i, n)

@@ -11,6 +11,7 @@ import math
 from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
+    AT_FAULT,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -24,12 +25,12 @@ from mbsim.arrays.codes import (
     TOUCHES,
     USED_EVENTS,
 )
-from mbsim.arrays.hooks import Hook, Recall, answer_of
+from mbsim.arrays.hooks import FclPoints, Hook, Recall, answer_of
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
+from mbsim.core.rotation import cross, dot, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import (
@@ -41,7 +42,7 @@ from mbsim.dynamics.contact.forces import (
     sides,
     velocity_at,
 )
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.laws.abi import ELASTIC, ENERGY
 
 
@@ -115,7 +116,7 @@ def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
             wanted = 1.0 - earlier if earlier < 0.98 else 0.5
             if wanted < part:
                 part = wanted
-                work.trouble[1] = c
+                work.diagnostics[AT_FAULT] = c
     return part
 
 
@@ -191,28 +192,7 @@ def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
 
 
 @jitable
-def bounding_gap(scene: Scene, pair: int) -> float:
-    """Return a lower bound of two shapes' distance: ball of one to box or plane of the other."""
-    pairs, graphics, work = scene.pairs, scene.graphics, scene.work
-    best = -math.inf
-    for side in range(2):
-        g = pairs.graphic_i[pair] if side == 0 else pairs.graphic_j[pair]
-        other = pairs.graphic_j[pair] if side == 0 else pairs.graphic_i[pair]
-        frame, half = work.frames[other], graphics.half[other]
-        d = sub(vector(work.frames[g]), vector(frame))
-        if math.isinf(half[2]):
-            best = max(best, dot(d, axis(frame, 2)) - graphics.radius[g])
-            continue
-        square = 0.0
-        for k in range(3):
-            out = max(0.0, abs(dot(d, axis(frame, k))) - half[k])
-            square += out * out
-        best = max(best, math.sqrt(square) - graphics.radius[g])
-    return best
-
-
-@jitable
-def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
+def measure_gap(scene: Scene, y: F1, pair: int, measured: bool) -> None:
     """Store how far apart the pair is at the accepted point, where it may be `measured` already."""
     pairs, work = scene.pairs, scene.work
     closed_form = scene.kinds.kernel[pairs.kind[pair]] != 0
@@ -222,22 +202,9 @@ def measure_gap(scene: Scene, pair: int, measured: bool) -> None:
             deepest = max(deepest, work.points[s, AT_DEPTH])
         gap = -deepest
     else:
-        gap = bounding_gap(scene, pair)
+        points = scene.world.hooks[Hook.FCL_POINTS]
+        gap = call_float(points, (scene, FclPoints.GAP, pair, 0.0, y))
     pairs.gap[pair] = pairs.left[pair] = gap
-
-
-@jitable
-def another_point(scene: Scene, y: F1, h: float, s: int) -> bool:
-    """Return whether the point that FCL gives for slot s is too far to be the one before."""
-    point, before = scene.work.points[s], scene.state.p[s]
-    p = vector(point[AT_POINT:])
-    gi, gj = sides(scene, s)
-    graphics = scene.graphics
-    speed = norm(velocity_at(scene, y, graphics.body[gi], p))
-    speed += norm(velocity_at(scene, y, graphics.body[gj], p))
-    size = min(graphics.radius[gi], graphics.radius[gj])
-    # the point of touch may run ahead of both surfaces; a hundredth of the shape is near
-    return norm(sub(p, vector(before))) > 2.0 * h * speed + 0.01 * size
 
 
 @jitable
@@ -249,7 +216,8 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
     fresh = now != before
     kind = scene.pairs.kind[scene.slots.pair[s]]
     if now == 1 and before == 1 and scene.kinds.kernel[kind] == 0:
-        fresh = another_point(scene, y, h, s)
+        points = scene.world.hooks[Hook.FCL_POINTS]
+        fresh = call_float(points, (scene, FclPoints.MOVED, s, h, y)) != 0.0
         changed = 1 if fresh else 0
     if now == 1 and before == 0:
         log_touch(scene, t, h, y, s)
@@ -257,7 +225,7 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         log_leave(scene, t, h, y, s)
         for k in range(4):
             # what it was linearised at tells nothing of another touch
-            work.grip[s, k] = 0.0
+            work.friction_slope[s, k] = 0.0
     # X and memory of an incident that ended, or that is another than before, begin again at 0;
     # at touch they have gathered since the touch within the step and stay
     x, z, begins = scene.slots.x[s], scene.slots.z[s], now == 1 and before == 0
@@ -332,7 +300,7 @@ def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
 
 
 @jitable
-def commit_gaps(scene: Scene) -> None:
+def commit_gaps(scene: Scene, y: F1) -> None:
     """Take what the shapes moved from the distance of every pair; measure where half is gone."""
     pairs, work = scene.pairs, scene.work
     for k in range(pairs.count[ACTIVE]):
@@ -342,8 +310,8 @@ def commit_gaps(scene: Scene) -> None:
             continue
         travel = work.travel[pairs.graphic_i[pair]] + work.travel[pairs.graphic_j[pair]]
         if not travel < pairs.left[pair]:
-            measure_gap(scene, pair, True)
+            measure_gap(scene, y, pair, True)
         elif travel > 0.0:
             pairs.left[pair] -= travel
             if pairs.left[pair] <= 0.5 * pairs.gap[pair]:
-                measure_gap(scene, pair, False)
+                measure_gap(scene, y, pair, False)

@@ -204,7 +204,7 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
 
     # the limit of the method is (h w)^2 / 4 + h c = 1 (w frequency, c rate of damping), so h =
     # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance. Friction is held back
-    # instead (`contact.hold_back`)
+    # instead (`contact.fixed_step`)
     part = min(LARGEST_PART, math.sqrt(tol / COARSE))
     fastest = bound[1] + math.sqrt(bound[1] * bound[1] + bound[0])
     return min(longest, part / fastest) if fastest > 0.0 else longest

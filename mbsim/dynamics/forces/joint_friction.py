@@ -25,6 +25,7 @@ import math
 
 from mbsim.arrays.codes import (
     APPLIED_FORCE,
+    AT_FAULT,
     BALL_FRICTION,
     FRICTION_CALLS,
     LOST_POWER,
@@ -44,7 +45,7 @@ from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, t
 from mbsim.dynamics.forces.applied import push
 from mbsim.laws.abi import NFORCE_IN, TIME_IN, XDOT_IN
 
-# columns of `Work.rub`: wrench on I of a unit force (force 3, torque 3), then
+# columns of `Work.joint_friction`: wrench on I of a unit force (force 3, torque 3), then
 SPEED, FORCE, MISS = 6, 7, 8
 # entries of `Applied.par`
 RADIUS, PRELOAD, ARM = range(3)
@@ -60,7 +61,7 @@ MOST_ROUNDS = 60
 @jitable
 def fill_slip(scene: Scene, f: int) -> None:
     """Fill the wrench of a unit force along the slip of friction f, and its speed."""
-    applied, row = scene.applied, scene.work.rub[f]
+    applied, row = scene.applied, scene.work.joint_friction[f]
     i, j, form, radius = applied.i[f], applied.j[f], applied.form[f], applied.par[f, RADIUS]
     w = scene.work.w
     spin = sub(vector(w[scene.markers.body[i]]), vector(w[scene.markers.body[j]]))
@@ -111,7 +112,7 @@ def ask_law(scene: Scene, t: float, f: int) -> float:
     for k in range(len(given)):
         given[k] = 0.0
     given[TIME_IN] = t
-    given[XDOT_IN] = scene.work.rub[f, SPEED]
+    given[XDOT_IN] = scene.work.joint_friction[f, SPEED]
     given[NFORCE_IN] = press(scene, f)
     scene.log.counters[FRICTION_CALLS] += 1
     if call_int(applied.law[f], (applied.id[f], given, applied.law_par[f], out)) != 0:
@@ -122,7 +123,7 @@ def ask_law(scene: Scene, t: float, f: int) -> float:
 @jitable
 def add_force(scene: Scene, f: int, size: float) -> None:
     """Add a force along the slip to what friction f does to both bodies."""
-    applied, row = scene.applied, scene.work.rub[f]
+    applied, row = scene.applied, scene.work.joint_friction[f]
     row[FORCE] += size
     force = scale(size, (row[0], row[1], row[2]))
     torque = scale(size, (row[3], row[4], row[5]))
@@ -137,7 +138,7 @@ def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
     Returns the largest miss (no number if a force is none), the largest force, the row that
     misses most, and the factor by which the last step was too short, 1 if that is not known.
     """
-    applied, rub = scene.applied, scene.work.rub
+    applied, joint_friction = scene.applied, scene.work.joint_friction
     worst, largest, row, along, change = 0.0, 0.0, 0, 0.0, 0.0
     for f in range(len(applied.form)):
         if applied.connection[f] < 0:
@@ -145,10 +146,10 @@ def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
         force = ask_law(scene, t, f)
         if not math.isfinite(force):
             return force, largest, f, 1.0
-        miss = force - rub[f, FORCE]
-        along -= rub[f, MISS] * (miss - rub[f, MISS])
-        change += (miss - rub[f, MISS]) ** 2
-        rub[f, MISS] = miss
+        miss = force - joint_friction[f, FORCE]
+        along -= joint_friction[f, MISS] * (miss - joint_friction[f, MISS])
+        change += (miss - joint_friction[f, MISS]) ** 2
+        joint_friction[f, MISS] = miss
         largest = max(largest, abs(force))
         if abs(miss) > worst:
             worst, row = abs(miss), f
@@ -158,25 +159,25 @@ def compare(scene: Scene, t: float) -> tuple[float, float, int, float]:
 @jitable
 def settle_friction(scene: Scene, t: float, y: F1, stresses: int) -> int:
     """Find the friction forces and the accelerations under them; return 0 or a code."""
-    applied, rub, step = scene.applied, scene.work.rub, 1.0
+    applied, joint_friction, step = scene.applied, scene.work.joint_friction, 1.0
     for k in range(MOST_ROUNDS):
         sum_reactions(scene, y)
         take_stresses(scene, stresses)
         worst, largest, row, factor = compare(scene, t)
-        scene.work.trouble[1] = row
+        scene.work.diagnostics[AT_FAULT] = row
         if not math.isfinite(worst):
             # this tells which it is, and no contact is at fault
             scene.work.applied[row, APPLIED_FORCE] = worst
-            scene.work.trouble[1] = -1
+            scene.work.diagnostics[AT_FAULT] = -1
             return Code.NOT_FINITE
         enough = SETTLED if k < MOST_ROUNDS - 1 else GOOD_ENOUGH
         if worst <= enough * largest:
-            scene.work.trouble[1] = -1
+            scene.work.diagnostics[AT_FAULT] = -1
             return 0
         step *= factor
         for f in range(len(applied.form)):
             if applied.connection[f] >= 0:
-                add_force(scene, f, step * rub[f, MISS])
+                add_force(scene, f, step * joint_friction[f, MISS])
         restick(scene, t)
     return Code.JAMMED
 
@@ -198,10 +199,10 @@ def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
     for f in range(len(applied.form)):
         if applied.connection[f] < 0:
             continue
-        force = work.rub[f, FORCE]
+        force = work.joint_friction[f, FORCE]
         for k in range(6):
-            work.applied[f, k] = force * work.rub[f, k]
-        work.applied[f, LOST_POWER] = -force * work.rub[f, SPEED]
+            work.applied[f, k] = force * work.joint_friction[f, k]
+        work.applied[f, LOST_POWER] = -force * work.joint_friction[f, SPEED]
         lost += work.applied[f, LOST_POWER]
     dy[scene.world.accumulators[1]] += lost
     return 0

@@ -18,6 +18,7 @@ import math
 
 from mbsim.arrays.codes import (
     APPLIED_FORCE,
+    AT_FAULT,
     AXIS_TORQUE,
     COMPONENT,
     JOINT_FRICTION,
@@ -64,7 +65,7 @@ TOO_LARGE = 1e9
 @jitable
 def fill_direction(scene: Scene, y: F1, f: int) -> None:
     """Fill the wrench of a unit of scalar force f, and the rate at which it works."""
-    applied, row = scene.applied, scene.work.rub[f]
+    applied, row = scene.applied, scene.work.joint_friction[f]
     turns = applied.form[f] == AXIS_TORQUE
     n, _, rate = displacement(scene, y, f)
     for k in range(3):
@@ -76,7 +77,7 @@ def fill_direction(scene: Scene, y: F1, f: int) -> None:
 @jitable
 def push_scalar(scene: Scene, f: int, size: float) -> None:
     """Add `size` of scalar force f to its bodies."""
-    applied, row = scene.applied, scene.work.rub[f]
+    applied, row = scene.applied, scene.work.joint_friction[f]
     force = scale(size, (row[0], row[1], row[2]))
     torque = scale(size, (row[3], row[4], row[5]))
     push(scene, applied.i[f], force, torque)
@@ -118,7 +119,7 @@ def add_to_row(scene: Scene, f: int, c: int, size: float) -> None:
     row = scene.work.applied[f]
     if c >= SCALAR:
         for k in range(6):
-            row[k] += size * scene.work.rub[f, k]
+            row[k] += size * scene.work.joint_friction[f, k]
         return
     e = marker_axis(scene, scene.applied.axes[f], c % 3)
     at = 0 if c < 3 else 3
@@ -247,16 +248,16 @@ def settle(scene: Scene, t: float, y: F1, stresses: int) -> int:
         broken, largest, reaction = measure_misses(scene, t, y)
         if broken >= 0:
             # the row of `Work.applied` tells which it is, and no contact is at fault
-            work.trouble[1] = -1
+            work.diagnostics[AT_FAULT] = -1
             return Code.NOT_FINITE
         if k == 0:
             bound = TOO_LARGE * max(largest, reaction)
         at, worst = worst_unknown(scene)
         part = SETTLED if k < most - 1 else GOOD_ENOUGH
         if largest <= bound and worst <= max(part * largest, ROUNDING * reaction):
-            work.trouble[1] = -1
+            work.diagnostics[AT_FAULT] = -1
             return 0
-        work.trouble[1] = by_reactions[at, ROW_OF]
+        work.diagnostics[AT_FAULT] = by_reactions[at, ROW_OF]
         if k > 0:
             update_secant(scene)
         next_step(scene)
@@ -279,7 +280,7 @@ def lost_power(scene: Scene, y: F1, u: int) -> float:
     )
     size = scene.work.by_reactions[u, SIZE]
     if c >= SCALAR:
-        return -size * scene.work.rub[f, SPEED]
+        return -size * scene.work.joint_friction[f, SPEED]
     i, j = applied.i[f], applied.j[f]
     b = scene.markers.body[i]
     other = len(scene.bodies.mass) if applied.alone[f] == 1 else scene.markers.body[j]

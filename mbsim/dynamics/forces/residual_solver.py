@@ -394,7 +394,7 @@ def solve(scene: Scene, e: int, h: float) -> int:
             R.z[0] = found
         code = 0
     if code == -1:
-        R.trouble[0] = e
+        R.unsolved[0] = e
         return Code.UNSOLVED_ELEMENT
     if code == 0:
         put_unknowns(scene, e, h)

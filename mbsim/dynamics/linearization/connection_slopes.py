@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 
 @jitable
-def rub_slopes(scene: Scene, t: float, f: int) -> V3:
+def joint_friction_slopes(scene: Scene, t: float, f: int) -> V3:
     """Return slip speed s, dF/ds and F/s of friction f in a joint, its normal force as it is."""
-    row = scene.work.rub[f]
+    row = scene.work.joint_friction[f]
     s, kept = row[SPEED], PART * row[SPEED] + PART_OF_SPEED * scene.world.scale[SCALE_SPEED]
     low, high = max(s - kept, 0.0), s + kept
     row[SPEED] = low
@@ -46,7 +46,7 @@ def rub_slopes(scene: Scene, t: float, f: int) -> V3:
 
 
 @jitable
-def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
+def add_joint_friction_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
     """Add friction in a joint: dF/ds along the slip s, F/s across it.
 
     Of slip and wrenches there are one (slide or turn), two (screw) or three (ball) components.
@@ -57,7 +57,7 @@ def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
     radius, z = scene.applied.par[f, RADIUS], marker_axis(scene, j, 2)
     w = sub(vector(scene.work.w[bi]), vector(scene.work.w[bj]))
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
-    s, along, over = rub_slopes(scene, t, f)
+    s, along, over = joint_friction_slopes(scene, t, f)
     none, count = (0.0, 0.0, 0.0), 3 if ball else 2
     slip = L.rates
     for k in range(count):
@@ -89,8 +89,8 @@ def add_rub_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None:
 
 
 @jitable
-def add_rubs_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
+def add_joint_frictions_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add what friction in joints does."""
     for f in range(len(scene.applied.form)):
         if scene.applied.connection[f] >= 0 and scene.applied.law[f] != 0:
-            add_rub_slopes(scene, T, t, y, f)
+            add_joint_friction_slopes(scene, T, t, y, f)

@@ -10,9 +10,9 @@ import math
 from typing import TYPE_CHECKING
 
 from mbsim.arrays.codes import PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
-from mbsim.arrays.hooks import Hook, Memory
+from mbsim.arrays.hooks import FaceSlopes, Hook, Memory
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
@@ -214,7 +214,7 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
     point, none, weight = work.points[s], (0.0, 0.0, 0.0), 0.0
     p, n, tx = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), vector(work.t[s])
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
-    rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
+    tangential = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
     one, moved, first = L.basis[:, POINT], L.basis[:, MOVED], s + REGION_ROWS
     last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
@@ -226,7 +226,7 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
         q = sub(vector(row[AT_POINT:]), p)
         faster = cross(w_rel, q)
         slip_x, slip_y, rate = dot(faster, tx), dot(faster, ty), -dot(faster, n)
-        torque = cross(q, rub)
+        torque = cross(q, tangential)
         for side in range(2):
             b = i if side == 0 else j
             lever(scene, L, y, b, vector(row[AT_POINT:]), vector(row[AT_NORMAL:]), none, one[side])
@@ -290,7 +290,8 @@ def add_contact_slopes(  # noqa: C901
     normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
         slope = by_depth / weight
-        by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)
+        given = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
+        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
@@ -327,7 +328,8 @@ def add_contact_slopes(  # noqa: C901
     force = vector(work.slot[s, FORCE : FORCE + 3])
     pressed = max(given[PRESSED], math.hypot(dot(force, tx), dot(force, ty)))
     for k in range(4):
-        work.grip[s, k] = counts * L.law[k // 2, k % 2] / pressed if given[PRESSED] > 0.0 else 0.0
+        slope = counts * L.law[k // 2, k % 2] / pressed if given[PRESSED] > 0.0 else 0.0
+        work.friction_slope[s, k] = slope
     for side in range(2):
         b = i if side == 0 else j
         rows = L.basis[side]
@@ -349,7 +351,8 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        add_moves_of_centre(scene, T, y, s, by_rate)
+        given = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]

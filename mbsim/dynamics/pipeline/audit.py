@@ -305,12 +305,13 @@ def examine_friction(scene: Scene, t: float) -> None:
             continue
         force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, AT_NORMAL:])
         normal = dot(force, n)
-        rubs = norm(sub(force, scale(normal, n)))
+        tangential = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
         row = audit.contact[c]
         row[3] = max(row[3], most)
-        if rubs > most + CONE_ROUNDING * abs(normal):
-            note(scene, CONE, (rubs - most) / max(row[3], rubs), audit.plan[AUDIT_TOL], t, c)
+        if tangential > most + CONE_ROUNDING * abs(normal):
+            beyond = (tangential - most) / max(row[3], tangential)
+            note(scene, CONE, beyond, audit.plan[AUDIT_TOL], t, c)
 
 
 @jitable

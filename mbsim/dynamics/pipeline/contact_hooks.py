@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.hooks import Contacts, Effects, Gauges, Recall, Stability, failure_or
+from mbsim.arrays.codes import AT_FAULT
+from mbsim.arrays.hooks import Contacts, Effects, FclPoints, Gauges, Recall, Stability, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
+from mbsim.dynamics.contact.fcl_points import another_point, bounding_gap
+from mbsim.dynamics.contact.fixed_step import hold_back
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
 from mbsim.dynamics.contact.peaks import watch_end, watch_inside
@@ -42,7 +45,7 @@ def push(scene: Scene, t: float, h: float, y: F1, dy: F1) -> int:
     for k in range(hit[len(hit) - 1]):
         code = add_contact(scene, t, h, y, dy, hit[k])
         if code != 0:
-            scene.work.trouble[1] = contact_of(scene, hit[k])
+            scene.work.diagnostics[AT_FAULT] = contact_of(scene, hit[k])
             return code
     return 0
 
@@ -60,14 +63,14 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
         return fill_incidents(scene, h, y)
     if what == Contacts.HARDEST:
         return hardest(scene)
-    if what == Contacts.BLAME:
+    if what == Contacts.AT_FAULT:
         return find_fault(scene) + 1
     if what == Contacts.WATCH:
         watch_end(scene, t)
     elif what == Contacts.LOOK:
         watch_inside(scene, t)
     elif what == Contacts.GAPS:
-        commit_gaps(scene)
+        commit_gaps(scene, y)
     elif what == Contacts.ENERGY:
         add_stored(scene, y, vector_at(b, scene.rows.energy.shape[1]))
     elif what == Contacts.ROW:
@@ -97,6 +100,22 @@ def recall_friction(context: int, what: int, s: int, t: float, a: Pointer, anew:
     else:
         keep(scene, y, s)
     return 0
+
+
+def hold_friction_back(context: int, s: int, h: float, u: float, v: float, a: Pointer) -> int:
+    """Friction of slot s in a step of fixed length; (u, v) is its slip."""
+    scene = view(context, Scene)
+    hold_back(scene, vector_at(a, scene.rows.y.shape[1]), s, h, (u, v))
+    return 0
+
+
+def serve_fcl_points(context: int, what: int, index: int, h: float, a: Pointer) -> float:
+    """What follows from points of FCL; `index` is a slot, of GAP a pair."""
+    scene = view(context, Scene)
+    if what == FclPoints.GAP:
+        return bounding_gap(scene, index)
+    moved = another_point(scene, vector_at(a, scene.rows.y.shape[1]), h, index)
+    return 1.0 if moved else 0.0
 
 
 def gauge_steps(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:

@@ -10,7 +10,7 @@ from mbsim.core.arrays import Pointer
 from mbsim.dynamics.forces.applied import serve_kept
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
-from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
+from mbsim.dynamics.linearization.connection_slopes import add_joint_frictions_slopes
 from mbsim.dynamics.linearization.element_slopes import add_all_residual_slopes
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
@@ -52,7 +52,7 @@ def residual_slopes(context: int, t: float, y: Pointer) -> int:
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     add_marker_forces_slopes(scene, T, a)
-    add_rubs_slopes(scene, T, t, a)
+    add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     add_all_residual_slopes(scene, T, t, a)
     return code

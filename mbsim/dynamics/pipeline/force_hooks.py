@@ -63,7 +63,7 @@ def act_by_wrench(context: int, t: float, y: Pointer, f: int) -> int:
     return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
 
-def rub(context: int, t: float, y: Pointer, dy: Pointer) -> int:
+def add_joint_friction(context: int, t: float, y: Pointer, dy: Pointer) -> int:
     """Friction in joints, and the accelerations with it."""
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]

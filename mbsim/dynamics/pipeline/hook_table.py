@@ -97,6 +97,18 @@ def _has_contact_slopes(scene: Scene, method: Method) -> bool:
     return method.tangent is not None and _has_contacts(scene, method)
 
 
+def _has_face_slopes(scene: Scene, method: Method) -> bool:
+    return method.tangent is not None and _has_faces(scene, method)
+
+
+def _fixes_steps(scene: Scene, method: Method) -> bool:
+    return _has_contacts(scene, method) and scene.world.fixed_step[0] == 1
+
+
+def _has_fcl_pairs(scene: Scene, method: Method) -> bool:
+    return bool((scene.kinds.kernel == 0).any())
+
+
 def _has_programs(scene: Scene, method: Method) -> bool:
     return len(scene.programs.start) > 1
 
@@ -159,10 +171,10 @@ def _has_reaction_forces(scene: Scene, method: Method) -> bool:
 
 
 def _reaction_forces(scene: Scene) -> Callable[..., Any]:
-    from mbsim.dynamics.pipeline.force_hooks import rub, settle
+    from mbsim.dynamics.pipeline.force_hooks import add_joint_friction, settle
 
     # forces by reactions are compiled with all that they need
-    return settle if len(scene.applied.by_reactions) > 0 else rub
+    return settle if len(scene.applied.by_reactions) > 0 else add_joint_friction
 
 
 def _always(scene: Scene, method: Method) -> bool:
@@ -196,10 +208,10 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
         return residual_slopes
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
-    rubs = bool((scene.applied.connection >= 0).any())
+    has_friction = bool((scene.applied.connection >= 0).any())
     if WRENCH in forms:
-        return of.slopes_with_both if rubs else of.slopes_with_marker_forces
-    return of.slopes_with_rubs if rubs else of.slopes
+        return of.slopes_with_both if has_friction else of.slopes_with_marker_forces
+    return of.slopes_with_joint_friction if has_friction else of.slopes
 
 
 def _has_dry(scene: Scene, method: Method) -> bool:
@@ -265,6 +277,14 @@ TABLE = (
         _of("pipeline.contact_hooks", "recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
         "an answer, or less a code",
+    ),
+    Row(
+        Hook.HOLD_BACK,
+        _INT(_INT, _INT, _T, _T, _T, _PTR),  # context, slot, h, slip along x and y, y
+        _fixes_steps,
+        _of("pipeline.contact_hooks", "hold_friction_back"),
+        "reduces friction to what a step of fixed length can follow",
+        "0; it cannot fail",
     ),
     Row(
         Hook.VALUE,
@@ -347,6 +367,14 @@ TABLE = (
         "does what derivatives of contacts are asked for: `ContactSlopes`",
     ),
     Row(
+        Hook.FACE_SLOPES,
+        _T(_INT, _INT, _INT, _T, _T, _PTR),  # context, request, slot, two numbers, y
+        _has_face_slopes,
+        _of("pipeline.implicit_hooks", "slopes_of_faces"),
+        "does what derivatives of flat faces are asked for that are one incident: `FaceSlopes`",
+        "a number; it cannot fail",
+    ),
+    Row(
         Hook.MEMORY,
         _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
         _has_memory,
@@ -387,10 +415,18 @@ TABLE = (
     Row(
         Hook.STABILITY,
         _T(_INT, _INT, _PTR, _PTR),  # context, request, y, y'
-        lambda scene, method: _has_contacts(scene, method) and scene.world.fixed_step[0] == 1,
+        _fixes_steps,
         _of("pipeline.contact_hooks", "bound_contacts"),
         "bounds steps of a method without error estimate: `Stability`",
         "a step or 0; laws are explored, so that it does not fail",
+    ),
+    Row(
+        Hook.FCL_POINTS,
+        _T(_INT, _INT, _INT, _T, _PTR),  # context, request, slot or pair, h, y
+        _has_fcl_pairs,
+        _of("pipeline.contact_hooks", "serve_fcl_points"),
+        "looks at points of pairs without a closed form: `FclPoints`",
+        "a number; it cannot fail",
     ),
     Row(
         Hook.DRY,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    AT_FAULT,
     CONSTRAINTS_CHANGED,
     ENERGY_LOST,
     ERROR_NOW,
@@ -120,9 +121,9 @@ def _norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     if h == IMPACTS_ALONE:
-        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.IMPACT, t, t, vector_at(a, n), vector_at(b, n))
     if h == FRICTION_ALONE:
-        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, a, b)
+        return gauged(scene, Hook.EFFECTS, Effects.FRICTION, t, t, vector_at(a, n), vector_at(b, n))
     if h == EACH:
         fill_sizes(scene, vector_at(a, RATES * n), vector_at(b, n))
         return 0.0
@@ -222,12 +223,12 @@ def _reject(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Count a rejected step by reason and contact."""
     scene = view(context, Scene)
     reason = int(h)
-    contact = scene.work.trouble[1] if reason == BY_CHECK else -1
+    contact = scene.work.diagnostics[AT_FAULT] if reason == BY_CHECK else -1
     if reason != BY_CHECK and scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
-        contact = answer_of(scene, call_int(contacts, (scene, Contacts.BLAME, t, h, a, a))) - 1
+        contact = answer_of(scene, call_int(contacts, (scene, Contacts.AT_FAULT, t, h, a, a))) - 1
     row = contact if contact >= 0 else len(scene.contacts.id)
-    scene.work.trouble[1] = contact
+    scene.work.diagnostics[AT_FAULT] = contact
     scene.log.rejections[row, reason] += 1
     return failure_or(scene, 0)
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import FORM
-from mbsim.arrays.hooks import ContactSlopes, Hook, failure_or
+from mbsim.arrays.hooks import ContactSlopes, FaceSlopes, Hook, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import Pointer
 from mbsim.core.codes import Code
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
-from mbsim.dynamics.linearization.connection_slopes import add_rubs_slopes
-from mbsim.dynamics.linearization.contact_slopes import add_contacts_slopes, couple_contacts
+from mbsim.dynamics.linearization.connection_slopes import add_joint_frictions_slopes
+from mbsim.dynamics.linearization.contact_slopes import (
+    add_contacts_slopes,
+    add_moves_of_centre,
+    add_region_stiffness,
+    couple_contacts,
+)
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
@@ -90,13 +95,13 @@ def slopes_with_marker_forces(context: int, t: float, y: Pointer) -> int:
     return code
 
 
-def slopes_with_rubs(context: int, t: float, y: Pointer) -> int:
+def slopes_with_joint_friction(context: int, t: float, y: Pointer) -> int:
     """The same, of friction in joints instead."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
-    add_rubs_slopes(scene, T, t, a)
+    add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
@@ -108,7 +113,7 @@ def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     a = vector_at(y, scene.rows.y.shape[1])
     code = add_applied_slopes(scene, T, t, a)
     add_marker_forces_slopes(scene, T, a)
-    add_rubs_slopes(scene, T, t, a)
+    add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
 
@@ -120,6 +125,17 @@ def slopes_of_contacts(context: int, what: int, t: float, h: float, y: Pointer) 
     if what == ContactSlopes.COUPLE:
         return 0 if couple_contacts(scene, T.pattern) else Code.NO_ROOM
     return add_contacts_slopes(scene, T, t, h, vector_at(y, scene.rows.y.shape[1]))
+
+
+def slopes_of_faces(context: int, what: int, s: int, a: float, b: float, y: Pointer) -> float:
+    """The derivatives of a flat face that is one incident; a, b are as its functions say."""
+    scene = view(context, Scene)
+    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
+    state = vector_at(y, scene.rows.y.shape[1])
+    if what == FaceSlopes.STIFFNESS:
+        return add_region_stiffness(scene, T, state, s, a, b)
+    add_moves_of_centre(scene, T, state, s, a)
+    return 0.0
 
 
 def bend(context: int, t: float, y: Pointer) -> int:

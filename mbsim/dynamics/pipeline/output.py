@@ -28,6 +28,11 @@ from mbsim.arrays.codes import (
     NOISE_FORCE,
     NOISE_TORQUE,
     STORED_ENERGY,
+    WORST_BODY,
+    X_BY_X,
+    X_BY_Y,
+    Y_BY_X,
+    Y_BY_Y,
 )
 from mbsim.arrays.hooks import Contacts, Effects, Gauges, Hook, Joints, answer_of, note_failure
 from mbsim.arrays.scene import Scene
@@ -260,8 +265,8 @@ def friction_left(scene: Scene, e: F1, y: F1, turns: bool) -> float:
     work, contacts, largest = scene.work, scene.contacts, 0.0
     for k in range(work.hit[len(work.hit) - 1]):
         s = work.hit[k]
-        grip, point = work.grip[s], work.points[s]
-        if work.slot[s, NORMAL] <= 0.0 or (grip[0] == 0.0 and grip[3] == 0.0):
+        slope, point = work.friction_slope[s], work.points[s]
+        if work.slot[s, NORMAL] <= 0.0 or (slope[X_BY_X] == 0.0 and slope[Y_BY_Y] == 0.0):
             continue
         gi, gj = sides(scene, s)
         p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
@@ -271,15 +276,17 @@ def friction_left(scene: Scene, e: F1, y: F1, turns: bool) -> float:
             speed_change(scene, e, y, scene.graphics.body[gj], p),
         )
         u, w = dot(v, tx), dot(v, cross(n, tx))
-        change = max(abs(grip[0] * u + grip[1] * w), abs(grip[2] * u + grip[3] * w))
+        change = max(
+            abs(slope[X_BY_X] * u + slope[X_BY_Y] * w), abs(slope[Y_BY_X] * u + slope[Y_BY_Y] * w)
+        )
         c = contact_of(scene, s)
         if turns and contacts.memory[c] == 0 and contacts.rigid[c] == 0:
             # what turns the slip round turns friction round, whose slope along it knows of no such
             row, force = work.slot[s], vector(work.slot[s, FORCE : FORCE + 3])
             fx, fy = dot(force, tx), dot(force, cross(n, tx))
-            rubs = math.hypot(fx, fy)
-            if fx * u + fy * w > rubs * row[SLIP]:
-                change = max(change, 2.0 * rubs / row[NORMAL])
+            tangential = math.hypot(fx, fy)
+            if fx * u + fy * w > tangential * row[SLIP]:
+                change = max(change, 2.0 * tangential / row[NORMAL])
         if not change <= largest:
             largest = change
     return largest
@@ -371,7 +378,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     takes far more than bodies so slow ever have. Detection that is exact only to a given noise makes forces uncertain;
     what the noise of a step can do to a velocity is not chased. With h = 0, `e` is no step's error,
     and what it does to friction, over the normal force, counts as well. The worst body
-    is left in `trouble[0]`.
+    is left in `diagnostics`.
     """
     scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
     fill_squares(scene, y)
@@ -412,7 +419,7 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
         largest = max(largest, scene.sweep.quality[DRIFT] ** 2)
     else:
         largest = max(largest, gauged(scene, Hook.EFFECTS, Effects.REVERSAL, 0.0, h, e, y) ** 2)
-    scene.work.trouble[0] = worst
+    scene.work.diagnostics[WORST_BODY] = worst
     return math.sqrt(largest)
 
 
@@ -448,7 +455,7 @@ def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
 @jitable
 def find_fault(scene: Scene) -> int:
     """Return the contact that presses hardest on the body with the worst error, -1 for none."""
-    worst, hardest, contact = scene.work.trouble[0], 0.0, -1
+    worst, hardest, contact = scene.work.diagnostics[WORST_BODY], 0.0, -1
     hit = scene.work.hit
     for k in range(hit[len(hit) - 1]):
         s = hit[k]

@@ -8,7 +8,6 @@ same code gives the same numbers to the last bit.
 from __future__ import annotations
 
 from mbsim.arrays.codes import (
-    AGAIN,
     CONTACT_COLUMNS,
     INC_COUPLE,
     INC_DEPTH,
@@ -26,6 +25,7 @@ from mbsim.arrays.codes import (
     INC_TOUCHES,
     INC_WEIGHT,
     NOW,
+    REPLAYED,
     SLOT_COLUMNS,
 )
 from mbsim.arrays.hooks import failure_or
@@ -80,7 +80,7 @@ def evaluate_replay(scene: Scene, t: float, y: F1, dy: F1, contacts: F1, table: 
     """
     work, rows = scene.work, scene.rows
     place_bodies(scene, y)
-    scene.world.past[0], scene.state.frozen[0] = AGAIN, 1
+    scene.world.past[0], scene.state.frozen[0] = REPLAYED, 1
     count, code = rows.used[1], 0
     work.hit[len(work.hit) - 1] = count
     for k in range(count):

@@ -270,8 +270,8 @@ def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
         s = scene.equations.slot[int(cone[WHICH, k])]
         point, force = scene.work.points[s], vector(scene.work.slot[s, FORCE : FORCE + 3])
         n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
-        rubs = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
-        cone[SLIDING, k] = rubs if scene.work.touching[s] == 1 else 0.0
+        tangential = math.hypot(dot(force, tx), dot(force, cross(n, tx)))
+        cone[SLIDING, k] = tangential if scene.work.touching[s] == 1 else 0.0
         let_stick(scene, s)
 
 

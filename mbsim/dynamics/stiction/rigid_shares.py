@@ -162,7 +162,7 @@ def show_sticking(scene: Scene, s: int) -> None:
     row, sticking = scene.work.slot[s], scene.work.sticking_force[s]
     point = scene.work.points[s]
     n, tx = vector(point[AT_NORMAL:]), vector(scene.work.t[s])
-    rubs = add(scale(sticking[0], tx), scale(sticking[1], cross(n, tx)))
-    force = add(scale(row[NORMAL], n), rubs)
+    tangential = add(scale(sticking[0], tx), scale(sticking[1], cross(n, tx)))
+    force = add(scale(row[NORMAL], n), tangential)
     for k in range(3):
         row[FORCE + k] = force[k]

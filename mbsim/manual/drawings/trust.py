@@ -210,9 +210,9 @@ def others(figure: Figure) -> None:
     _compare(panels[5], "free_top: w of the attitude", run, q[:, 0], exact)
 
     run = runs.of_model("cam_roller.xml", end_time=0.05)
-    law, rub = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
+    law, friction = (1e9, 1.5, 900.0, 1e-7), (0.1, 0.01)
     sizes = (20 * np.pi, 0.01, 0.03, 0.01, 0.5, 5e-6, 2000.0, 2000 * (0.03 + 0.25 - 0.23))
-    exact = known.roller_follower(run["time"], *sizes, law, rub, 0.0299757)[0]
+    exact = known.roller_follower(run["time"], *sizes, law, friction, 0.0299757)[0]
     _compare(panels[6], "cam_roller: height [m]", run, run["bodies/4/position/z"], exact)
 
     farthest = {"belt_stick_slip": 1.0385164807, "belt_weakening": 1.133943658}

@@ -57,7 +57,7 @@ def sort_unknowns(
     count = len(unknowns)
     first = 1 + 2 * axes + count
     seen = [[0, 0] for _ in unknowns]
-    trouble: BaseException | None = None
+    first_error: BaseException | None = None
     log, host.log = host.log, lambda line: None  # what a probe says is no news
     try:
         for given in points(sizes, axes, count):
@@ -66,14 +66,14 @@ def sort_unknowns(
             except KeyboardInterrupt:
                 raise
             except (Exception, StopRun) as error:
-                trouble = trouble or error
+                first_error = first_error or error
                 continue
             for k, found in enumerate(moved):
                 seen[k][found] += 1
     finally:
         host.log = log
     if count and not any(seen[0]):
-        raise ModelError(f"{who}: fails wherever it is asked: {trouble}")
+        raise ModelError(f"{who}: fails wherever it is asked: {first_error}")
     kinds = [
         SWITCHING if never and always else DIFFERENTIAL if always else ALGEBRAIC
         for never, always in seen

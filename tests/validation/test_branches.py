@@ -111,7 +111,7 @@ def test_a_limit_of_an_angle_ends_steps(tmp_path):
         "-ABS(DY(20, 10)) - ABS(DZ(20, 10)) - 100*DX(20, 10)",
     ],
 )
-def test_kinks_without_end_do_not_stall(expr, tmp_path):
+def test_branches_without_end_do_not_stall(expr, tmp_path):
     results = slide(tmp_path, expr, tol=1e-5)
     assert results.stats["steps"] + results.stats["rejected"] < 2000
     energy = results["energy/kinetic"] + results["energy/dissipated"]

@@ -1,6 +1,6 @@
 """Finding near pairs, printed and never judged.
 
-python -m pytest -m bench -s tests/bench/test_crowd.py
+python -m pytest -m bench -s tests/bench/test_broadphase.py
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import pytest
 from numba import njit
 
 import mbsim
-from helpers.crowd_decks import LAW, block, pile, random_axes, sets, shape_graphic, solid
 from helpers.decks import COULOMB, GRAVITY, GROUND, write_deck
+from helpers.pile_decks import LAW, block, pile, random_axes, sets, shape_graphic, solid
 from mbsim.arrays.codes import ACTIVE
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model import pairing
@@ -143,7 +143,7 @@ def test_pairs_to_list_for_good(tmp_path, monkeypatch, pitch, z):
             times.append(1e3 * stats["loop_s"])
         print(
             f"{count} spheres, {count * (count - 1) // 2} pairs: listed {costs[0]:.0f} ns an "
-            f"evaluation, {times[0]:.2f} ms; crowd {costs[1]:.0f} ns, {times[1]:.2f} ms"
+            f"evaluation, {times[0]:.2f} ms; broadphase {costs[1]:.0f} ns, {times[1]:.2f} ms"
         )
         assert math.isfinite(sum(costs))
 

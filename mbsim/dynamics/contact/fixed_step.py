@@ -1,0 +1,45 @@
+"""What friction may do within a step of fixed length."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V2, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import dot, sub, vector
+from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.contact.forces import sides
+from mbsim.geometry.catalog import AT_POINT
+
+# part of the friction that would stop a slip in one step, which a fixed-step method may use
+HELD_BACK = 0.25
+
+
+@jitable
+def yielding(scene: Scene, y: F1, b: int, p: V3) -> float:
+    """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
+    bodies = scene.bodies
+    if b == len(bodies.mass):
+        return 0.0
+    arm = sub(p, position(scene, y, b))
+    inverse, square = bodies.inverse[b], dot(arm, arm)
+    return 1.0 / bodies.mass[b] + square * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+
+
+@jitable
+def hold_back(scene: Scene, y: F1, s: int, h: float, slip: V2) -> None:
+    """Reduce friction of slot s in `law_out` to a quarter of what would stop the slip in the step.
+
+    Friction that turns sign from step to step would shake what rests; a quarter, since some
+    eight contacts share a body. Explicit methods of fixed step need this, as their step does not
+    follow the slope of friction; it fades as the step goes to 0.
+    """
+    out, p, body = scene.work.law_out, vector(scene.work.points[s, AT_POINT:]), scene.graphics.body
+    gi, gj = sides(scene, s)
+    force = math.hypot(out[0], out[1])
+    inverse = yielding(scene, y, body[gi], p) + yielding(scene, y, body[gj], p)
+    most = HELD_BACK * math.hypot(slip[0], slip[1]) / (h * inverse)
+    if force > most:
+        for k in range(2):
+            out[k] *= most / force
