@@ -32,6 +32,10 @@ _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 MOST_LISTED = 300
 
 
+#: Shapes that have patches as triangles do.
+AS_SURFACE = {"MESH": "SURFACE"}
+
+
 @dataclass(frozen=True)
 class Kind:
     """How two shapes of a contact are tested, in the order that their detector wants."""
@@ -126,6 +130,17 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
     return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
 
 
+def _patches(contact: int, i: Graphic, j: Graphic) -> Kind | None:
+    """Return the pair of surfaces for graphics of which one is a mesh, None for others."""
+    if "MESH" not in (i.shape, j.shape):
+        return None
+    for a, b, swapped in ((i, j, False), (j, i, True)):
+        name = f"{AS_SURFACE.get(a.shape, a.shape)}-{AS_SURFACE.get(b.shape, b.shape)}"
+        if name in PAIRS:
+            return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
+    return None
+
+
 def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
     """Return how graphics like these two are tested."""
     flat = i.shape in _FLAT and j.shape in _FLAT
@@ -139,7 +154,8 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
                     break
                 return Kind(contact, a.shape, b.shape, swapped, name, slots)
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
-    return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
+    patches = _patches(contact, i, j) if detector != "fcl" else None
+    return patches or Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
 def _region_fault(model: Model, contact: Contact, i: Graphic, j: Graphic, why: str) -> Fault:

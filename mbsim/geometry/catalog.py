@@ -4,9 +4,10 @@ A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count
 arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
-* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | bottom radius, top
+* `size` (4,): radius | semi-axes | half edge lengths | radius and half length | bottom radius, top
   radius, half length of a frustum | nothing | of a convex mesh the address and length of its
-  polyhedron (`model.hull`);
+  polyhedron (`model.hull`); last the address of its surface as triangles (`model.surface`) where
+  a pair needs that, then it is a SURFACE;
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   its weight of the law's force (1 unless a manifold splits the force of one corner over
@@ -36,6 +37,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
 
+#: Numbers of a shape's size.
+SIZE = 4
 #: Numbers of one candidate: depth, point, normal, weight, couple.
 POINT = 11
 #: Where they begin.

@@ -1,0 +1,50 @@
+"""Meshes that need not be convex: contact patches on a plane.
+
+`size` of a mesh has the address of its packed surface (`model.surface`) as its fourth number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.arrays import F1, F2
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.geometry.catalog import AT_POINT, axis, pair, put_point
+from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
+from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
+from mbsim.geometry.polyhedron import to_global
+from mbsim.model.surface import HEADER, LENGTH, TRIANGLES
+
+
+@jitable
+def surface_of(size: F1) -> F1:
+    """Return the packed surface of a shape."""
+    return floats_at(size[3], floats_at(size[3], float(HEADER))[LENGTH])
+
+
+@pair("SURFACE", "PLANE", slots=MOST_PEAKS, regroups=True)
+def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The peaks of the patches below the plane; apart, the lowest corner."""
+    mesh, up = surface_of(size_i), axis(frame_j, 2)
+    n = (dot(axis(frame_i, 0), up), dot(axis(frame_i, 1), up), dot(axis(frame_i, 2), up))
+    height = dot(sub(vector(frame_j), vector(frame_i)), up)
+    low, corner = lowest_corner(mesh, n)
+    at = add(vector(frame_i), to_global(frame_i, corner))
+    if low >= height:
+        for k in range(len(points)):
+            put_point(points[k], height - low, add(at, scale(0.5 * (height - low), up)), up)
+        return len(points)
+    found = np.empty(int(mesh[TRIANGLES]), np.int64)
+    count = triangles_below(mesh, n, height, found)
+    nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
+    peaks = np.empty((count, PEAK_NUMBERS))
+    count = strongest(peaks, merge(nodes, links, partners, peaks), len(points))
+    write_points(peaks, count, frame_i, at, points)
+    for k in range(count):
+        # half way between the surface of the mesh and the plane
+        p, depth = vector(points[k, AT_POINT:]), points[k, 0]
+        p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
+        put_point(points[k], depth, p, up, points[k, 7])
+    return len(points)
