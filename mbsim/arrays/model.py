@@ -44,7 +44,8 @@ class Kinds(NamedTuple):
     slots: I1  # (nk,) points it gives at most
     swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
     regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
-    whole: F1  # (nk,) shares of a flat face, where a pair is one incident with its area; else 0
+    whole: F1  # (nk,) shares of a flat face, where incidents have an area; else 0
+    step: I1  # (nk,) rows from one incident to the next: 1 for points, all where a pair is one
     noise: F1  # (nk,) scatter of the normals that its detector gives
 
 

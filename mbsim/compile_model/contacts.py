@@ -121,6 +121,13 @@ def graphics_table(
     return made
 
 
+def _face_weight(kind: Kind) -> float:
+    """Return the shares of a flat face where incidents of a kind have an area, else 0."""
+    if kind.region:
+        return REGIONS[kind.closed_form].whole
+    return 1.0 if kind.has_area else 0.0
+
+
 def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
     return Kinds(
@@ -129,7 +136,8 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         slots=np.array([k.slots for k in kinds], dtype=np.int64),
         swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
         regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
-        whole=np.array([REGIONS[k.closed_form].whole if k.region else 0.0 for k in kinds]),
+        whole=np.array([_face_weight(k) for k in kinds]),
+        step=np.array([k.step for k in kinds], dtype=np.int64),
         noise=np.array(
             [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),

@@ -49,6 +49,18 @@ class Kind:
     region: bool = False  # whether its points are summed up to one incident
 
     @property
+    def has_area(self) -> bool:
+        """Whether its incidents have an area."""
+        return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
+
+    @property
+    def step(self) -> int:
+        """Return the rows from one incident to the next."""
+        if self.region:
+            return self.slots
+        return REGION_ROWS if self.has_area else 1
+
+    @property
     def regroups(self) -> bool:
         """Whether a contact that goes on may begin another slot, which is then no impact."""
         if self.region:
@@ -59,6 +71,8 @@ class Kind:
     def detector(self) -> str:
         """How `mbsim check` names it."""
         one = ", one region" if self.region else ""
+        if self.has_area and not self.region:
+            return "patches of triangles"
         if self.closed_form:
             return f"closed form {self.closed_form}{one}"
         shapes = {self.shape_i, self.shape_j}
@@ -176,7 +190,7 @@ def _one_region(
 
     A pair of shapes that touch in one point only is one incident without area as it is.
     """
-    if contact.contact_points != "REGION":
+    if contact.contact_points != "REGION" or kind.has_area:
         return kind
     if kind.closed_form in REGIONS:
         return replace(kind, slots=kind.slots + REGION_ROWS, region=True)

@@ -48,6 +48,8 @@ AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
 #: points' part of the force about the incident, in `plane_axes`.
 REGION_ROWS = 2
 AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY = 1, 2, 3, 7
+#: A pair of patches has as many rows for each of them; the second one has the mean depth too.
+MEAN_DEPTH = 4
 
 
 class Pair(NamedTuple):
@@ -58,6 +60,8 @@ class Pair(NamedTuple):
     slots: int
     #: Whether a contact that goes on may begin another row (a corner that passes over an edge).
     regroups: bool = False
+    #: Whether its rows are patches: `REGION_ROWS` each, without points.
+    patches: bool = False
 
 
 class Region(NamedTuple):
@@ -74,13 +78,13 @@ REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
 def pair(
-    shape_i: str, shape_j: str, slots: int, regroups: bool = False
+    shape_i: str, shape_j: str, slots: int, regroups: bool = False, patches: bool = False
 ) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
     def register(points: Kernel) -> Kernel:
         name = f"{shape_i}-{shape_j}"
-        PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
+        PAIRS.put(name, Pair(name, jitable(points), slots, regroups, patches))
         return points
 
     return register

@@ -20,18 +20,37 @@ import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, put_point
-from mbsim.geometry.mesh.record import MOMENT, PEAK, PRESSURE, PUSH, add_patch
+from mbsim.core.rotation import add, dot, norm, scale, sub, vector
+from mbsim.geometry.catalog import (
+    AREA,
+    MEAN_DEPTH,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    REGION_ROWS,
+    axis,
+    plane_axes,
+    put_point,
+)
+from mbsim.geometry.mesh.record import (
+    AREA_VECTOR,
+    MOMENT,
+    PEAK,
+    PRESSURE,
+    PUSH,
+    SPREAD,
+    add_patch,
+)
 from mbsim.geometry.polyhedron import to_global
 
 #: A link this near (as a part) to a node's own peak leads up.
 LEADS = 1.0 - 1e-9
-#: Rows of a pair: peaks beyond that count lose their own point to the higher one.
-MOST_PEAKS = 12
-#: Numbers of a peak that has a row: depth, weight, point (3), normal (3), its node.
-PEAK_NUMBERS = 9
-AT_NODE = 8
+#: Incidents of a pair: what peaks beyond that count press, the nearest of those does.
+MOST_PEAKS = 8
+#: Numbers of a peak: depth, weight, then point (3), direction (3), area, mean depth and the moments
+#: of the pressure over itself (xx, yy, zz, xy, yz, zx; about the origin of sums); its node.
+PEAK_NUMBERS = 17
+PLACE, NORMAL, SURFACE, MEAN, MOMENTS, AT_NODE = 2, 5, 8, 9, 10, 16
 #: A peak that presses less than this part of the strongest one is none.
 LEAST = 1e-9
 
@@ -96,27 +115,32 @@ def saddles(above: I1, links: F2, partners: I2) -> tuple[F1, I2]:
 
 
 @jitable
-def centre(patch: F1) -> V3:
-    """Return the centre of pressure of a patch from the origin of its sums."""
-    over = 1.0 / patch[PRESSURE] if patch[PRESSURE] > 0.0 else 0.0
-    return scale(over, vector(patch[MOMENT:]))
-
-
-@jitable
-def direction(patch: F1) -> V3:
-    """Return the direction of the field's force on I; 0 where there is none."""
+def blend(peak: F1, patch: F1, part: float) -> None:
+    """Let what a peak has but depth and weight be a part of what it is and the rest of a patch."""
     push = vector(patch[PUSH:])
-    size = norm(push)
-    return scale(1.0 / size, push) if size > 0.0 else (0.0, 0.0, 0.0)
+    size, pressure = norm(push), patch[PRESSURE]
+    rest = 1.0 - part
+    by_push = rest / size if size > 0.0 else 0.0
+    by_pressure = rest / pressure if pressure > 0.0 else 0.0
+    for k in range(PLACE, AT_NODE):
+        peak[k] *= part
+    for k in range(3):
+        peak[PLACE + k] += by_pressure * patch[MOMENT + k]
+        peak[NORMAL + k] += by_push * push[k]
+    for k in range(6):
+        peak[MOMENTS + k] += by_pressure * patch[SPREAD + k]
+    area = norm(vector(patch[AREA_VECTOR:]))
+    peak[SURFACE] += rest * area
+    peak[MEAN] += rest * size / area if area > 0.0 else 0.0
 
 
 @jitable
 def begin_peak(peak: F1, patch: F1) -> None:
     """Write a peak that stands alone."""
-    x, n = centre(patch), direction(patch)
+    for k in range(PLACE, AT_NODE):
+        peak[k] = 0.0
     peak[0], peak[1] = patch[PEAK], 1.0
-    for k in range(3):
-        peak[2 + k], peak[5 + k] = x[k], n[k]
+    blend(peak, patch, 0.0)
 
 
 @jitable
@@ -124,10 +148,7 @@ def join(high: F1, low: F1, whole: F1, saddle: float) -> None:
     """Let the lower peak stand out above the saddle only; `whole` is the patch of both."""
     u = max(0.0, 1.0 - saddle / low[0])
     low[1] = u
-    x, n = centre(whole), direction(whole)
-    for k in range(3):
-        high[2 + k] = u * high[2 + k] + (1.0 - u) * x[k]
-        high[5 + k] = u * high[5 + k] + (1.0 - u) * n[k]
+    blend(high, whole, u)
 
 
 @jitable
@@ -175,7 +196,7 @@ def strongest(peaks: F2, count: int, most: int) -> int:
     """
     for k in range(count):
         # in no direction there is no force
-        if norm(vector(peaks[k, 5:])) == 0.0:
+        if norm(vector(peaks[k, NORMAL:])) == 0.0:
             peaks[k, 1] = 0.0
     kept = 0
     while kept < min(most, count):
@@ -192,9 +213,9 @@ def strongest(peaks: F2, count: int, most: int) -> int:
         if kept < most or peaks[k, 1] <= 0.0:
             continue
         nearest, least = 0, math.inf
-        x = vector(peaks[k, 2:])
+        x = vector(peaks[k, PLACE:])
         for j in range(kept):
-            away = norm(sub(vector(peaks[j, 2:]), x))
+            away = norm(sub(vector(peaks[j, PLACE:]), x))
             if away < least:
                 nearest, least = j, away
         add_weight(peaks[nearest], peaks[k])
@@ -207,8 +228,25 @@ def add_weight(kept: F1, lost: F1) -> None:
     more = lost[1] * lost[0] / kept[0]
     part = more / (kept[1] + more)
     kept[1] += more
-    for k in range(2, 8):
+    for k in range(PLACE, AT_NODE):
         kept[k] += part * (lost[k] - kept[k])
+
+
+@jitable
+def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
+    """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
+    m = vector(peak[MOMENTS:])
+    xy, yz, zx = peak[MOMENTS + 3], peak[MOMENTS + 4], peak[MOMENTS + 5]
+    total = m[0] * x[0] * y[0] + m[1] * x[1] * y[1] + m[2] * x[2] * y[2]
+    total += xy * (x[0] * y[1] + x[1] * y[0]) + yz * (x[1] * y[2] + x[2] * y[1])
+    total += zx * (x[2] * y[0] + x[0] * y[2])
+    return total - dot(p, x) * dot(p, y)
+
+
+@jitable
+def to_local(frame: F1, d: V3) -> V3:
+    """Return a vector of global axes in a frame's axes."""
+    return (dot(d, axis(frame, 0)), dot(d, axis(frame, 1)), dot(d, axis(frame, 2)))
 
 
 @jitable
@@ -220,7 +258,14 @@ def write_points(peaks: F2, count: int, frame: F1, origin: V3, points: F2) -> No
     for k in range(len(points)):
         put_point(points[k], -0.0, origin, axis(frame, 2))
     for k in range(count):
-        n = vector(peaks[k, 5:])
+        peak, row, numbers = peaks[k], points[REGION_ROWS * k], points[REGION_ROWS * k + 1]
+        n = vector(peak[NORMAL:])
         n = to_global(frame, scale(1.0 / norm(n), n))
-        p = add(origin, to_global(frame, vector(peaks[k, 2:])))
-        put_point(points[k], peaks[k, 0], p, n, peaks[k, 1])
+        p = vector(peak[PLACE:])
+        x, y = plane_axes(n)
+        put_point(row, peak[0], add(origin, to_global(frame, p)), n, peak[1])
+        numbers[AREA], numbers[MEAN_DEPTH] = peak[SURFACE], peak[MEAN]
+        x, y = to_local(frame, x), to_local(frame, y)
+        numbers[MOMENT_XX] = peak[1] * moment(peak, p, x, x)
+        numbers[MOMENT_XY] = peak[1] * moment(peak, p, x, y)
+        numbers[MOMENT_YY] = peak[1] * moment(peak, p, y, y)

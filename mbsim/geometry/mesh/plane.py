@@ -16,6 +16,7 @@ from mbsim.geometry.mesh.record import (
     PATCH_NUMBERS,
     PRESSURE,
     PUSH,
+    SPREAD,
     SUMS,
     TWIST,
     VOLUME,
@@ -119,6 +120,8 @@ def measure_below(
     pressure = dot(vector(node[PUSH:]), n)
     part = pressure / node[PRESSURE] if node[PRESSURE] > 0.0 else 0.0
     node[PRESSURE] = node[VOLUME] = pressure
+    for k in range(6):
+        node[SPREAD + k] *= part
     for k in range(3):
         node[MOMENT + k] *= part
         node[PUSH + k] = pressure * n[k]
@@ -135,7 +138,7 @@ def pieces_below(
     count, marks = len(found), int(mesh[AT_MARKS])
     nodes, links = np.zeros((count, PATCH_NUMBERS)), np.empty((count, 3))
     partners = np.empty((count, 3), np.int64)
-    work = np.empty((2 * CORNERS + 2, POLYGON_CORNER))
+    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
     for k in range(count):
         mesh[marks + found[k]] = k
     for k in range(count):

@@ -8,7 +8,17 @@ from __future__ import annotations
 
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
-from mbsim.geometry.mesh.record import MOST, OF_ONE, OF_PSI, OF_PSI_U, OF_PSI_V, OF_SQUARE
+from mbsim.geometry.mesh.record import (
+    MOST,
+    OF_ONE,
+    OF_PSI,
+    OF_PSI_U,
+    OF_PSI_V,
+    OF_SQUARE,
+    OF_UU,
+    OF_UV,
+    OF_VV,
+)
 
 #: Corners at most: 3, and one more for each of up to 5 cuts.
 CORNERS = 8
@@ -66,7 +76,18 @@ def integrate(polygon: F2, count: int, psi: V3, sums: F1) -> None:
         total = p0 + p1 + p2
         sums[OF_ONE] += area
         sums[OF_PSI] += area * total / 3.0
-        sums[OF_PSI_U] += area / 12.0 * (total * (u0 + u1 + u2) + p0 * u0 + p1 * u1 + p2 * u2)
-        sums[OF_PSI_V] += area / 12.0 * (total * (v0 + v1 + v2) + p0 * v0 + p1 * v1 + p2 * v2)
+        u, v = u0 + u1 + u2, v0 + v1 + v2
+        pu, pv = p0 * u0 + p1 * u1 + p2 * u2, p0 * v0 + p1 * v1 + p2 * v2
+        sums[OF_PSI_U] += area / 12.0 * (total * u + pu)
+        sums[OF_PSI_V] += area / 12.0 * (total * v + pv)
+        # of a product of three linear functions: all products of sums, by 60
+        uu, uv, vv = u0 * u0 + u1 * u1 + u2 * u2, u0 * v0 + u1 * v1 + u2 * v2, v0 * v0 + v1 * v1 + v2 * v2
+        puu = p0 * u0 * u0 + p1 * u1 * u1 + p2 * u2 * u2
+        puv = p0 * u0 * v0 + p1 * u1 * v1 + p2 * u2 * v2
+        pvv = p0 * v0 * v0 + p1 * v1 * v1 + p2 * v2 * v2
+        part = area / 60.0
+        sums[OF_UU] += part * (total * (u * u + uu) + 2.0 * (u * pu + puu))
+        sums[OF_UV] += part * (total * (u * v + uv) + u * pv + v * pu + 2.0 * puv)
+        sums[OF_VV] += part * (total * (v * v + vv) + 2.0 * (v * pv + pvv))
         sums[OF_SQUARE] += area / 12.0 * (total * total + p0 * p0 + p1 * p1 + p2 * p2)
         u1, v1, p1 = u2, v2, p2

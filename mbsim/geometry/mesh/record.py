@@ -17,16 +17,18 @@ from mbsim.core.rotation import add, cross, dot, norm, scale
 #: about the origin (3) [L^4]; the area as a vector, sum w (-integral of n_I dA + integral of n_J
 #: dA) (3) [L^2]; the volume of the overlap [L^3]; the potential U [L^4], of which the force is the
 #: slope, as the sum of w/2 integral of psi^2 (n . g)/g^2 dA with g the slope of psi: exact where
-#: the other surface is flat below the patch.
-PATCH_NUMBERS = 17
+#: the other surface is flat below the patch; sum w integral of psi r r' dA (xx, yy, zz, xy, yz, zx)
+#: [L^5].
+PATCH_NUMBERS = 23
 PEAK, PRESSURE, MOMENT, PUSH, TWIST, AREA_VECTOR, VOLUME, POTENTIAL = 0, 1, 2, 5, 8, 11, 14, 15
+SPREAD = 16
 #: Largest psi that reached the inner end of a layer: the depth of the overlap is not known there.
-BEYOND = 16
+BEYOND = 22
 
-#: Integrals over a polygon in a triangle's own coordinates: of 1, psi, psi u, psi v, psi^2;
-#: largest psi.
-SUMS = 6
-OF_ONE, OF_PSI, OF_PSI_U, OF_PSI_V, OF_SQUARE, MOST = range(SUMS)
+#: Integrals over a polygon in a triangle's own coordinates: of 1, psi, psi u, psi v, psi^2, psi u^2,
+#: psi u v, psi v^2; largest psi.
+SUMS = 9
+OF_ONE, OF_PSI, OF_PSI_U, OF_PSI_V, OF_SQUARE, OF_UU, OF_UV, OF_VV, MOST = range(SUMS)
 
 
 @jitable
@@ -50,6 +52,15 @@ def add_piece(
         patch[PUSH + k] -= side * share * n[k] * sums[OF_PSI]
         patch[TWIST + k] -= side * share * twist[k]
         patch[AREA_VECTOR + k] -= side * share * n[k] * sums[OF_ONE]
+    for k in range(6):
+        i = k if k < 3 else k - 3
+        j = k if k < 3 else (k - 2 if k < 5 else 0)
+        # integral of psi (r + u e1 + v e2)_i (r + u e1 + v e2)_j; `first` holds r once
+        patch[SPREAD + k] += size * (
+            first[i] * r[j] + r[i] * (first[j] - sums[OF_PSI] * r[j])
+            + sums[OF_UU] * e1[i] * e1[j] + sums[OF_VV] * e2[i] * e2[j]
+            + sums[OF_UV] * (e1[i] * e2[j] + e2[i] * e1[j])
+        )  # fmt: skip
     patch[VOLUME] += dot(r, n) * sums[OF_ONE] / 3.0
     square = dot(slope, slope)
     if square > 0.0:

@@ -11,11 +11,13 @@ from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, scale, sub, vector
-from mbsim.geometry.catalog import AT_POINT, axis, pair, put_point
+from mbsim.geometry.catalog import AT_POINT, AT_WEIGHT, REGION_ROWS, axis, pair, put_point
 from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import HEADER, LENGTH, TRIANGLES
+
+PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
 
 
 @jitable
@@ -24,7 +26,7 @@ def surface_of(size: F1) -> F1:
     return floats_at(size[3], floats_at(size[3], float(HEADER))[LENGTH])
 
 
-@pair("SURFACE", "PLANE", slots=MOST_PEAKS, regroups=True)
+@pair("SURFACE", "PLANE", slots=PATCH_SLOTS, regroups=True, patches=True)
 def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The peaks of the patches below the plane; apart, the lowest corner."""
     mesh, up = surface_of(size_i), axis(frame_j, 2)
@@ -40,11 +42,11 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
     count = triangles_below(mesh, n, height, found)
     nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
     peaks = np.empty((count, PEAK_NUMBERS))
-    count = strongest(peaks, merge(nodes, links, partners, peaks), len(points))
+    count = strongest(peaks, merge(nodes, links, partners, peaks), MOST_PEAKS)
     write_points(peaks, count, frame_i, at, points)
-    for k in range(count):
+    for k in range(0, REGION_ROWS * count, REGION_ROWS):
         # half way between the surface of the mesh and the plane
         p, depth = vector(points[k, AT_POINT:]), points[k, 0]
         p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
-        put_point(points[k], depth, p, up, points[k, 7])
+        put_point(points[k], depth, p, up, points[k, AT_WEIGHT])
     return len(points)
