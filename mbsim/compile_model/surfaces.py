@@ -42,7 +42,11 @@ def packed(graphic: Graphic, layered: bool) -> Array:
     assert graphic.vertices is not None
     assert graphic.faces is not None
     vertices, faces = graphic.vertices, graphic.faces
-    return pack(vertices, faces, vertices, np.zeros(len(vertices)))
+    if not layered:
+        return pack(vertices, faces, vertices, np.zeros(len(vertices)))
+    from mbsim.model.surface_layer import layer
+
+    return pack(vertices, faces, *layer(vertices, faces))
 
 
 def packed_surfaces(

@@ -1,4 +1,4 @@
-"""Meshes that need not be convex: contact patches on a plane.
+"""Meshes that need not be convex: contact patches on a plane and on each other.
 
 `size` of a mesh has the address of its packed surface (`model.surface`) as its fourth number.
 """
@@ -13,9 +13,10 @@ from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, scale, sub, vector
 from mbsim.geometry.catalog import AT_POINT, AT_WEIGHT, REGION_ROWS, axis, pair, put_point
 from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
+from mbsim.geometry.mesh.overlap import box_gap, common_middle, nodes_of, partners_of
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.polyhedron import to_global
-from mbsim.model.surface import HEADER, LENGTH, TRIANGLES
+from mbsim.model.surface import AT_BOXES, HEADER, LENGTH, NODE, TRIANGLES
 
 PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
 
@@ -49,4 +50,39 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
         p, depth = vector(points[k, AT_POINT:]), points[k, 0]
         p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
         put_point(points[k], depth, p, up, points[k, AT_WEIGHT])
+    return len(points)
+
+
+@jitable
+def pose_of(frame_i: F1, frame_j: F1) -> F1:
+    """Return I in J's axes: origin, then the rotation by rows."""
+    pose, apart = np.empty(12), sub(vector(frame_i), vector(frame_j))
+    for r in range(3):
+        row = axis(frame_j, r)
+        pose[r] = dot(apart, row)
+        for c in range(3):
+            pose[3 + 3 * r + c] = dot(row, axis(frame_i, c))
+    return pose
+
+
+@pair("SURFACE", "SURFACE", slots=PATCH_SLOTS, regroups=True, patches=True)
+def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The peaks of the patches in which two meshes overlap."""
+    mesh_i, mesh_j = surface_of(size_i), surface_of(size_j)
+    pose = pose_of(frame_i, frame_j)
+    root_i, root_j = int(mesh_i[AT_BOXES]) + NODE, int(mesh_j[AT_BOXES]) + NODE
+    gap = box_gap(mesh_i[root_i:], mesh_j[root_j:], pose)
+    if gap > 0.0:
+        for k in range(len(points)):
+            put_point(points[k], -gap, vector(frame_j), (0.0, 0.0, 0.0))
+        return len(points)
+    # the middle of what both roots have in common is near the patches
+    origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
+    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    partners = partners_of(mesh_i, mesh_j, count, values, pairs)
+    peaks = np.empty((count, PEAK_NUMBERS))
+    count = merge(nodes[:count], values[:count], partners, peaks)
+    count = strongest(peaks, count, MOST_PEAKS)
+    at = add(vector(frame_j), to_global(frame_j, origin))
+    write_points(peaks, count, frame_j, at, points)
     return len(points)
