@@ -112,6 +112,7 @@ class FaceSlopes(IntEnum):
 
     STIFFNESS = 0  # add how the force changes with depth and tilt: its change where all get deeper
     CENTRE = 1  # add that friction acts elsewhere as tilting moves the centre: 0
+    TILTING = 2  # add the couples of a patch that tilts: 0
 
 
 class ContactSlopes(IntEnum):

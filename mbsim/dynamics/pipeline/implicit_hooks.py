@@ -16,6 +16,7 @@ from mbsim.dynamics.linearization.contact_slopes import (
     add_moves_of_centre,
     add_region_stiffness,
     couple_contacts,
+    resist_tilting,
 )
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
 from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
@@ -134,7 +135,10 @@ def slopes_of_faces(context: int, what: int, s: int, a: float, b: float, y: Poin
     state = vector_at(y, scene.rows.y.shape[1])
     if what == FaceSlopes.STIFFNESS:
         return add_region_stiffness(scene, T, state, s, a, b)
-    add_moves_of_centre(scene, T, state, s, a)
+    if what == FaceSlopes.TILTING:
+        resist_tilting(scene, T, state, s)
+    else:
+        add_moves_of_centre(scene, T, state, s, a)
     return 0.0
 
 
