@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbsim.model.mesh import load_mesh
+from mbsim.model.mesh_file import load_mesh
 from mbsim.model.surface_layer import inner_directions, layer, tetrahedra, volumes
 from tests.helpers.folders import data_file
 
@@ -53,7 +53,7 @@ FILES = ["L.stl", "bolt.stl", "gearA.stl", "plate.stl", "torus.stl"]
 def mesh(request: pytest.FixtureRequest) -> Mesh:
     if request.param in SHAPES:
         return SHAPES[request.param]()
-    return load_mesh(data_file(f"found/mesh/meshes/{request.param}"))
+    return load_mesh(data_file(f"found/mesh/meshes/{request.param}"))[:2]
 
 
 def coordinates(points: Any, cut: Any, x: Any) -> Any:

@@ -310,12 +310,12 @@ def add_contact_slopes(  # noqa: C901
     # depth and its rate are -n . of displacement and velocity
     normal, region = L.basis, stands_for_points(scene, s)
     if face_weight_of(scene, s) > 0.0 and not region:
-        given = (scene, FaceSlopes.TILTING, s, 0.0, 0.0, y)
-        call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
+        tilt = (scene, FaceSlopes.TILTING, s, 0.0, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], tilt)
     if region:
         slope = by_depth / weight
-        given = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
-        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
+        pressed = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
+        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], pressed)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
