@@ -375,8 +375,8 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        given = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
-        call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
+        moved = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], moved)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]
