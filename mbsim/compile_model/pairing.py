@@ -34,6 +34,8 @@ MOST_LISTED = 300
 
 #: Shapes that have patches as triangles do.
 AS_SURFACE = {"MESH": "SURFACE"}
+#: What a pair is called where the depth of a contact is that of a field.
+AS_FIELD = {"MESH": "FIELD"}
 
 
 @dataclass(frozen=True)
@@ -144,12 +146,12 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
     return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
 
 
-def _patches(contact: int, i: Graphic, j: Graphic) -> Kind | None:
+def _patches(contact: int, i: Graphic, j: Graphic, named: dict[str, str]) -> Kind | None:
     """Return the pair of surfaces for graphics of which one is a mesh, None for others."""
     if "MESH" not in (i.shape, j.shape):
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
-        name = f"{AS_SURFACE.get(a.shape, a.shape)}-{AS_SURFACE.get(b.shape, b.shape)}"
+        name = f"{named.get(a.shape, a.shape)}-{named.get(b.shape, b.shape)}"
         if name in PAIRS:
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
     return None
@@ -168,7 +170,7 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
                     break
                 return Kind(contact, a.shape, b.shape, swapped, name, slots)
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
-    patches = _patches(contact, i, j) if detector != "fcl" else None
+    patches = _patches(contact, i, j, AS_SURFACE) if detector != "fcl" else None
     return patches or Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
