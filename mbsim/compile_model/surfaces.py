@@ -11,7 +11,6 @@ from mbsim.model.elements import Array, Graphic, Model
 from mbsim.model.surface import pack
 from mbsim.model.tessellation import triangles_of
 
-
 #: Sides of pairs that are measured as triangles.
 _OF_TRIANGLES = {"SURFACE", "FIELD"}
 

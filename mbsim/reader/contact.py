@@ -250,13 +250,17 @@ FORCE_CONTACT = Statement(
             keyword(spellings(POINTS="", REGION="")), "one point each, or one in all", "", "POINTS"
         ),
         "contact_depth": Spec(
-            keyword(spellings(LARGEST="", FIELD="")), "of meshes: the largest, or of the field below"
-            " their surfaces", "", "LARGEST; FIELD with VOLUME"
+            keyword(spellings(LARGEST="", FIELD="")),
+            "of meshes: the largest, or of the field below their surfaces",
+            "",
+            "LARGEST; FIELD with VOLUME",
         ),
         "cnf_type": Spec(keyword(CNF_TYPES), "normal force", required=True),
         "stiffness": Spec(NOT_NEGATIVE, "stiffness k, force = k depth^exponent", "F/L^e", "0"),
         "exponent": Spec(POSITIVE, "exponent e of the depth", "", "1.5; 1 with VOLUME"),
-        "damping": Spec(NOT_NEGATIVE, "damping; T/L with HUNT_CROSSLEY, HERTZ, VOLUME", "F T/L", "0"),
+        "damping": Spec(
+            NOT_NEGATIVE, "damping; T/L with HUNT_CROSSLEY, HERTZ, VOLUME", "F T/L", "0"
+        ),
         "dmax": Spec(POSITIVE, "depth of full damping; IMPACT needs it with damping", "L"),
         "penalty": Spec(NOT_NEGATIVE, "stiffness of POISSON", "F/L", "0.1"),
         "restitution_coef": Spec(
@@ -265,8 +269,12 @@ FORCE_CONTACT = Statement(
         # ours
         "ref_velocity": Spec(POSITIVE, "approach speed at which it holds", "L/T"),
         "normal_trans_vel": Spec(POSITIVE, "speed over which POISSON softens", "L/T", "1e-3"),
-        "i_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of I, HERTZ, VOLUME", "F/L^2", "rigid"),
-        "j_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of J, HERTZ, VOLUME", "F/L^2", "rigid"),
+        "i_elastic_modulus": Spec(
+            NOT_NEGATIVE, "Young's modulus of I, HERTZ, VOLUME", "F/L^2", "rigid"
+        ),
+        "j_elastic_modulus": Spec(
+            NOT_NEGATIVE, "Young's modulus of J, HERTZ, VOLUME", "F/L^2", "rigid"
+        ),
         # ours: what Hertz's theory needs beside the moduli
         "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ, VOLUME"),
         "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ, VOLUME"),
