@@ -33,7 +33,9 @@ MOST_LISTED = 300
 
 
 #: Shapes that have patches as triangles do.
-AS_SURFACE = {"MESH": "SURFACE"}
+AS_SURFACE = dict.fromkeys(("MESH", "BOX", "CYLINDER", "FRUSTUM", "ELLIPSOID"), "SURFACE")
+#: What these are called where the depth of a contact is that of a field.
+AS_FIELD = dict.fromkeys(AS_SURFACE, "FIELD")
 
 
 @dataclass(frozen=True)
@@ -144,12 +146,12 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
     return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
 
 
-def _patches(contact: int, i: Graphic, j: Graphic) -> Kind | None:
-    """Return the pair of surfaces for graphics of which one is a mesh, None for others."""
-    if "MESH" not in (i.shape, j.shape):
+def _patches(contact: int, i: Graphic, j: Graphic, named: dict[str, str]) -> Kind | None:
+    """Return the pair of surfaces, `named` so; None without a mesh (unless of fields)."""
+    if named is AS_SURFACE and "MESH" not in (i.shape, j.shape):
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
-        name = f"{AS_SURFACE.get(a.shape, a.shape)}-{AS_SURFACE.get(b.shape, b.shape)}"
+        name = f"{named.get(a.shape, a.shape)}-{named.get(b.shape, b.shape)}"
         if name in PAIRS:
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
     return None
@@ -168,8 +170,28 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
                     break
                 return Kind(contact, a.shape, b.shape, swapped, name, slots)
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
-    patches = _patches(contact, i, j) if detector != "fcl" else None
+    patches = _patches(contact, i, j, AS_SURFACE) if detector != "fcl" else None
     return patches or Kind(contact, i.shape, j.shape, False, "", fcl_slots)
+
+
+def _kind_of(
+    model: Model, contact: Contact, i: Graphic, j: Graphic, detector: str, faults: list[Fault]
+) -> Kind:
+    """Return how graphics like these two are tested in a contact; say what it cannot have."""
+    if contact.contact_depth != "FIELD":
+        kind = _kind(contact.id, i, j, detector)
+        return _one_region(model, contact, i, j, kind, faults)
+    kind = _patches(contact.id, i, j, AS_FIELD)
+    if kind is not None and detector != "fcl":
+        return kind
+    why = "is measured without FCL; leave out --detector"
+    if kind is None:
+        why = f"has no field of depth ({i.shape} on {j.shape}); give what is round as a mesh"
+    by = 'cnf_type="VOLUME"' if contact.cnf_type == "VOLUME" else 'contact_depth="FIELD"'
+    where = f"Force_Contact[{contact.id}]"
+    message = f"{by}: Post_Graphic[{i.id}] on Post_Graphic[{j.id}] {why}"
+    faults.append(Fault(model.file, contact.source.line, where, message))
+    return Kind(contact.id, i.shape, j.shape, False, "", FCL_SLOTS)
 
 
 def _region_fault(model: Model, contact: Contact, i: Graphic, j: Graphic, why: str) -> Fault:
@@ -245,8 +267,7 @@ def _contact_set(
                 faults.append(_two_planes(model, contact, i, j))
             elif (shape_j, shape_i) not in kinds or not same:
                 a, b = model.graphics[i], model.graphics[j]
-                kind = _kind(contact.id, a, b, detector)
-                kinds[shape_i, shape_j] = _one_region(model, contact, a, b, kind, faults)
+                kinds[shape_i, shape_j] = _kind_of(model, contact, a, b, detector, faults)
     return BroadphasePlan(contact.id, i_ids, j_ids, same, kinds), faults
 
 
@@ -286,8 +307,7 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
                 if a.shape == b.shape == "PLANE":
                     faults.append(_two_planes(model, contact, i, j))
                     continue
-                kind = _kind(contact.id, a, b, detector)
-                kind = _one_region(model, contact, a, b, kind, faults)
+                kind = _kind_of(model, contact, a, b, detector, faults)
                 pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
     if faults:
         raise DeckError(faults)

@@ -9,6 +9,10 @@ import numpy as np
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
 from mbsim.model.surface import pack
+from mbsim.model.tessellation import triangles_of
+
+#: Sides of pairs that are measured as triangles.
+_OF_TRIANGLES = {"SURFACE", "FIELD"}
 
 
 def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
@@ -19,29 +23,27 @@ def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
     found: dict[int, bool] = {}
 
     def note(pair: str, first: int, second: int) -> None:
-        layered = pair == "SURFACE-SURFACE"
+        layered = pair in ("SURFACE-SURFACE", "FIELD-FIELD")
         for side, id in zip(pair.split("-"), (first, second), strict=True):
-            if side == "SURFACE":
+            if side in _OF_TRIANGLES:
                 found[id] = found.get(id, False) or layered
 
     for plan in plans.pairs:
-        if "SURFACE" in plan.kind.closed_form:
+        if _OF_TRIANGLES & set(plan.kind.closed_form.split("-")):
             note(plan.kind.closed_form, plan.graphic_i, plan.graphic_j)
     for contact_set in plans.broadphase:
         for i in contact_set.i:
             for j in contact_set.j:
                 classes = shape_class(model.graphics[i]), shape_class(model.graphics[j])
                 kind = contact_set.kinds.get(classes)
-                if kind is not None and "SURFACE" in kind.closed_form:
+                if kind is not None and _OF_TRIANGLES & set(kind.closed_form.split("-")):
                     note(kind.closed_form, *((j, i) if kind.swapped else (i, j)))
     return found
 
 
 def packed(graphic: Graphic, layered: bool) -> Array:
     """Return a graphic as a packed surface (`model.surface`)."""
-    assert graphic.vertices is not None
-    assert graphic.faces is not None
-    vertices, faces = graphic.vertices, graphic.faces
+    vertices, faces = triangles_of(graphic)
     if not layered:
         return pack(vertices, faces, vertices, np.zeros(len(vertices)))
     from mbsim.model.surface_layer import layer

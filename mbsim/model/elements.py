@@ -156,6 +156,7 @@ class Contact:
     j_graphics_id: tuple[int, ...] = ()
     ignore_penetration_larger_than: float | None = None
     contact_points: str = "POINTS"
+    contact_depth: str = "LARGEST"
     cnf_type: str = "IMPACT"
     stiffness: float = 0.0
     exponent: float = 1.5
@@ -169,6 +170,8 @@ class Contact:
     j_elastic_modulus: float | None = None
     i_poisson_ratio: float | None = None
     j_poisson_ratio: float | None = None
+    i_layer_depth: float | None = None
+    j_layer_depth: float | None = None
     i_radius: float | None = None  # HERTZ takes those of the graphics where these are None
     j_radius: float | None = None
     cff_type: str = "COULOMB_OFF"

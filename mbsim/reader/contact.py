@@ -8,7 +8,6 @@ from mbsim.laws.catalog import FRICTION_LAWS, Parameter
 from mbsim.model import elements as el
 from mbsim.reader.keywords import (
     CFF_TYPES,
-    CNF_NOT_BUILT,
     CNF_TYPES,
     MASTERS_NOT_BUILT,
     spellings,
@@ -95,9 +94,10 @@ def _build_contact(entry: Entry) -> None:
         j_graphics_id=entry.get("j_graphics_id", ()),
         ignore_penetration_larger_than=entry.get("ignore_penetration_larger_than"),
         contact_points=entry.get("contact_points", "POINTS"),
+        contact_depth="FIELD" if cnf_type == "VOLUME" else entry.get("contact_depth", "LARGEST"),
         cnf_type=cnf_type,
         stiffness=entry.get("stiffness", 0.0),
-        exponent=entry.get("exponent", 1.5),
+        exponent=entry.get("exponent", 1.0 if cnf_type == "VOLUME" else 1.5),
         damping=entry.get("damping", 0.0),
         dmax=entry.get("dmax"),
         penalty=entry.get("penalty", 0.1),
@@ -108,6 +108,8 @@ def _build_contact(entry: Entry) -> None:
         j_elastic_modulus=entry.get("j_elastic_modulus"),
         i_poisson_ratio=entry.get("i_poisson_ratio"),
         j_poisson_ratio=entry.get("j_poisson_ratio"),
+        i_layer_depth=entry.get("i_layer_depth"),
+        j_layer_depth=entry.get("j_layer_depth"),
         i_radius=entry.get("i_radius"),
         j_radius=entry.get("j_radius"),
         cff_type=cff_type,
@@ -261,10 +263,18 @@ FORCE_CONTACT = Statement(
         "contact_points": Spec(
             keyword(spellings(POINTS="", REGION="")), "one point each, or one in all", "", "POINTS"
         ),
-        "cnf_type": Spec(keyword(CNF_TYPES, CNF_NOT_BUILT), "normal force", required=True),
+        "contact_depth": Spec(
+            keyword(spellings(LARGEST="", FIELD="")),
+            "of meshes: the largest, or of the field below their surfaces",
+            "",
+            "LARGEST; FIELD with VOLUME",
+        ),
+        "cnf_type": Spec(keyword(CNF_TYPES), "normal force", required=True),
         "stiffness": Spec(NOT_NEGATIVE, "stiffness k, force = k depth^exponent", "F/L^e", "0"),
-        "exponent": Spec(POSITIVE, "exponent e of the depth", "", "1.5"),
-        "damping": Spec(NOT_NEGATIVE, "damping; T/L with HUNT_CROSSLEY and HERTZ", "F T/L", "0"),
+        "exponent": Spec(POSITIVE, "exponent e of the depth", "", "1.5; 1 with VOLUME"),
+        "damping": Spec(
+            NOT_NEGATIVE, "damping; T/L with HUNT_CROSSLEY, HERTZ, VOLUME", "F T/L", "0"
+        ),
         "dmax": Spec(POSITIVE, "depth of full damping; IMPACT needs it with damping", "L"),
         "penalty": Spec(NOT_NEGATIVE, "stiffness of POISSON", "F/L", "0.1"),
         "restitution_coef": Spec(
@@ -273,15 +283,19 @@ FORCE_CONTACT = Statement(
         # ours
         "ref_velocity": Spec(POSITIVE, "approach speed at which it holds", "L/T"),
         "normal_trans_vel": Spec(POSITIVE, "speed over which POISSON softens", "L/T", "1e-3"),
-        "i_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of I, HERTZ", "F/L^2", "rigid"),
-        "j_elastic_modulus": Spec(NOT_NEGATIVE, "Young's modulus of J, HERTZ", "F/L^2", "rigid"),
+        "i_elastic_modulus": Spec(
+            NOT_NEGATIVE, "Young's modulus of I, HERTZ, VOLUME", "F/L^2", "rigid"
+        ),
+        "j_elastic_modulus": Spec(
+            NOT_NEGATIVE, "Young's modulus of J, HERTZ, VOLUME", "F/L^2", "rigid"
+        ),
         # ours: what Hertz's theory needs beside the moduli
-        "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ"),
-        "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ"),
+        "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ, VOLUME"),
+        "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ, VOLUME"),
         "i_radius": Spec(POSITIVE, "radius of I where they touch", "L", "the graphic's"),
         "j_radius": Spec(POSITIVE, "radius of J where they touch", "L", "the graphic's"),
-        "i_layer_depth": Spec(POSITIVE, "of VOLUME, which is not built", "L"),
-        "j_layer_depth": Spec(POSITIVE, "of VOLUME, which is not built", "L"),
+        "i_layer_depth": Spec(POSITIVE, "depth of the elastic layer of I, VOLUME", "L"),
+        "j_layer_depth": Spec(POSITIVE, "depth of the elastic layer of J, VOLUME", "L"),
         "cnf_param_string": Spec(USER, "par of the user's normal force", "", "USER()"),
         "cnf_fnc_name": Spec(TEXT, "name of the user's normal force", "", "CNFSUB"),
         "cnf_dll_name": Spec(TEXT, "shared library that has it"),

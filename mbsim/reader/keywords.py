@@ -47,7 +47,6 @@ def spellings(**canonical: str) -> dict[str, str]:
 CNF_TYPES = spellings(**dict.fromkeys(NORMAL_LAWS, ""), USERCNF="USER")
 #: Laws that need no shapes: those of limits.
 CNF_OF_LIMITS = spellings(**{law: "" for law in NORMAL_LAWS if not NORMAL_LAWS[law].of_shapes})
-CNF_NOT_BUILT = spellings(VOLUME="")
 _OTHER_WORDS = {
     "COULOMB_ON": "ON",
     "COULOMB_OFF": "OFF",

@@ -10,7 +10,6 @@ from mbsim.reader.statement import Entry
 DEFAULT_SPEED = 1e-3  # of transition velocities, in model units whatever these are
 
 _USER_LAW = {"cnf_param_string", "cnf_fnc_name", "cnf_dll_name", "cnf_language"}
-_LAYERS = {"i_layer_depth", "j_layer_depth"}
 _MODULI = ("i_elastic_modulus", "j_elastic_modulus")
 
 
@@ -18,7 +17,7 @@ def check_normal(entry: Entry, cnf_type: str) -> None:
     """Note the attributes that the law does not read, and check those it does."""
     every = {name for law in NORMAL_LAWS for name in NORMAL_LAWS[law].parameters}
     read = _USER_LAW if cnf_type == "USERCNF" else set(NORMAL_LAWS[cnf_type].parameters)
-    note_unused(entry, f"cnf_type {cnf_type}", (every | _USER_LAW | _LAYERS) - read)
+    note_unused(entry, f"cnf_type {cnf_type}", (every | _USER_LAW) - read)
     if cnf_type == "USERCNF":
         return
     if cnf_type in _CHECKS:
@@ -105,10 +104,10 @@ def _check_hertz(entry: Entry) -> None:
         )
     else:
         for side in "ij":
-            _check_material(entry, side)
+            _check_material(entry, side, "HERTZ")
 
 
-def _check_material(entry: Entry, side: str) -> None:
+def _check_material(entry: Entry, side: str, law: str) -> None:
     """Check the material of one side: modulus and Poisson's ratio, or neither (rigid)."""
     modulus, ratio = f"{side}_elastic_modulus", f"{side}_poisson_ratio"
     if not entry.given(modulus):
@@ -117,9 +116,39 @@ def _check_material(entry: Entry, side: str) -> None:
             entry.note(f"has no effect without {modulus}", ratio)
         return
     if entry.get(modulus) == 0.0:
-        entry.fault("must be a number > 0 with HERTZ", modulus)
+        entry.fault(f"must be a number > 0 with {law}", modulus)
     if not entry.given(ratio):
-        entry.fault(f"{ratio}: missing; HERTZ needs it beside {modulus}, > -1 and <= 0.5")
+        entry.fault(f"{ratio}: missing; {law} needs it beside {modulus}, > -1 and <= 0.5")
+
+
+def _check_volume(entry: Entry) -> None:
+    """Check the layers of VOLUME: modulus, Poisson's ratio and depth of one side or both."""
+    if entry.get("contact_depth", "FIELD") == "LARGEST":
+        entry.fault("VOLUME presses by the field of depth: FIELD, or nothing", "contact_depth")
+    if not any(entry.given(name) for name in _MODULI):
+        entry.fault(
+            "i_elastic_modulus: missing; VOLUME needs i_elastic_modulus or j_elastic_modulus > 0 "
+            "(of one side only: the other is rigid)"
+        )
+        return
+    for side in "ij":
+        _check_material(entry, side, "VOLUME")
+        modulus, layer = f"{side}_elastic_modulus", f"{side}_layer_depth"
+        if not entry.given(modulus):
+            if entry.given(layer):
+                entry.note(f"has no effect without {modulus}", layer)
+            continue
+        if not entry.given(layer):
+            entry.fault(f"{layer}: missing; VOLUME needs the depth of the layer beside {modulus}")
+        if entry.get(f"{side}_poisson_ratio", 0.0) == 0.5:
+            message = "must be < 0.5 with VOLUME: a layer that cannot widen would not yield"
+            entry.fault(message, f"{side}_poisson_ratio")
+    _check_exponent(entry)
+
+
+def _check_exponent(entry: Entry) -> None:
+    if entry.get("exponent", 1.0) < 1.0:
+        entry.warn("below 1 the stiffness is infinite at touch", "exponent")
 
 
 def _check_poisson(entry: Entry) -> None:
@@ -136,4 +165,5 @@ _CHECKS: dict[str, Callable[[Entry], None]] = {
     "HUNT_CROSSLEY": _check_hunt_crossley,
     "HERTZ": _check_hertz,
     "POISSON": _check_poisson,
+    "VOLUME": _check_volume,
 }
