@@ -143,7 +143,7 @@ def test_anchors_are_those_of_github():
 
 
 def test_each_promise_of_what_happens_names_a_test_that_exists():
-    """One row a promise, the same number with its tests further down; a name stands for one test."""
+    """Each promise has a row of the same number with its tests; a name stands for one of them."""
     text = pages()["reference/results/what-happens-when"].text
     rows = [
         line.strip("| ").split(" | ") for line in text.splitlines() if re.match(r"\| \d+ \|", line)
