@@ -24,7 +24,8 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
     """Show what is in FILE, a model or a result file: elements, forces, end state, statistics.
 
-    Scripts that a model names are run, and each function of theirs is called once with iflag 1.
+    Scripts of --plugin are run, and each function of theirs is called once with iflag 1; those that
+    only the deck names are not.
     """
     from mbsim.cli.messages import print_json, warn
 

@@ -1,7 +1,8 @@
 """Damaged files of every kind are read or refused: no traceback, no hang, no dead process.
 
 ``MBSIM_FUZZ=9000 python -m pytest -s tests/fuzz`` reads so many of each kind, of those that take
-longer a part: 100,000 files, in about an hour. With ``-m slow`` decks are changed and run: one of six reaches its end.
+longer a part: 100,000 files, in about an hour. With ``-m slow`` decks are changed and run: one of
+six reaches its end.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections import Counter
 
 import pytest
 
@@ -139,3 +140,25 @@ def test_paths_that_pages_name_exist(page):
 
 def test_anchors_are_those_of_github():
     assert book.slug("What `tol` bounds, and not") == "what-tol-bounds-and-not"
+
+
+def test_each_promise_of_what_happens_names_a_test_that_exists():
+    """Each promise has a row of the same number with its tests; a name stands for one of them."""
+    text = pages()["reference/results/what-happens-when"].text
+    rows = [
+        line.strip("| ").split(" | ") for line in text.splitlines() if re.match(r"\| \d+ \|", line)
+    ]
+    promises = [row[0] for row in rows if len(row) == 3]
+    tests = {row[0]: row[1] for row in rows if len(row) == 2}
+    assert len(promises) > 30
+    assert list(tests) == promises == [str(k + 1) for k in range(len(promises))]
+    defined = Counter(
+        name
+        for path in (ROOT / "tests").rglob("test_*.py")
+        for name in re.findall(r"^def (test_\w+)", path.read_text(encoding="utf-8"), re.M)
+    )
+    for number, names in tests.items():
+        found = re.findall(r"`(\w+)`", names)
+        assert found, f"{number}: no test"
+        for name in found:
+            assert defined[name] == 1, f"{number}: {name}"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from pathlib import Path
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from mbsim.core import code_cache, jit
 from mbsim.errors import ModelError
@@ -33,6 +35,16 @@ def _forgotten() -> object:
 def double(x: float) -> float:
     """Twice x."""
     return 2.0 * x
+
+
+def half(x: float) -> float:
+    """A half of x."""
+    return x / 2.0
+
+
+def third(x: float) -> float:
+    """A third of x."""
+    return x / 3.0
 
 
 def compiled() -> float:
@@ -91,3 +103,20 @@ def test_one_that_cannot_be_made_is_told_once(
     said = [line for line in capsys.readouterr().err.splitlines() if "not kept" in line]
     assert len(said) == 1
     assert str(root) in said[0]
+
+
+def test_a_full_one_is_told_once(
+    root: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is there, but no file can be written in it."""
+    root.mkdir(mode=0o700)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+    monkeypatch.setattr(jit, "is_known", lambda function: True)
+    assert [jit.function(function)(3.0) for function in (half, third)] == [1.5, 1.0]
+    said = [line for line in capsys.readouterr().err.splitlines() if "not kept" in line]
+    assert len(said) == 1
+    assert "No space left on device" in said[0]

@@ -148,13 +148,16 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
         if worst <= _CLOSED or (stuck >= 3 and best < 1e-10) or stuck >= 20:
             break
         A, size = _scaled(scene)
+        if not (np.isfinite(A).all() and np.isfinite(residual).all()):
+            worst = np.nan  # numbers are too large
+            break
         # the equations that are not held at this level must not move
         solution = np.linalg.lstsq(A, -residual / size, rcond=_RANK)[0]
         scene.sweep.multiplier[:n] = solution / size
         serve(move, y)
     parts = np.abs(residual) / scene.equations.unit[:n]
     if not worst <= _OPEN:
-        order = [int(e) for e in np.argsort(-parts) if not parts[e] <= _OPEN]
+        order = [int(e) for e in np.argsort(-parts) if not parts[e] <= _OPEN or np.isnan(worst)]
         raise ContradictionError(order, [float(parts[e]) for e in order], column == _MISMATCH)
 
 
@@ -242,6 +245,12 @@ def describe(system: System, assembly: Assembly) -> tuple[list[str], list[str]]:
 def contradiction(system: System, error: ContradictionError) -> str:
     """Return what to tell the user of constraints that cannot all hold."""
     what = "velocities" if error.velocities else "positions"
+    if not np.isfinite(error.residuals).all():
+        names = ", ".join(equation_name(system, e) for e in error.equations[:10])
+        return (
+            f"{system.model.file}: the model cannot be assembled: {what} get no finite numbers, "
+            f"the deck's are too large or too small for {names}"
+        )
     parts = zip(error.equations[:10], error.residuals[:10], strict=True)
     names = ", ".join(f"{equation_name(system, e)} by {size:.3g}" for e, size in parts)
     return (

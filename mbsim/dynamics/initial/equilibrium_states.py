@@ -88,7 +88,7 @@ class _States:
             if F is None or ahead is None or behind is None:
                 return None
             J[:, k] = (ahead - behind) / (2.0 * DIFFERENCE)
-        return None if F is None else _Local(P, R, unit, F, J)
+        return None if F is None or not np.isfinite(J).all() else _Local(P, R, unit, F, J)
 
     def advance(self, local: _Local) -> bool:
         """Go by Newton's step, or a part of it; return whether the residual became smaller."""
