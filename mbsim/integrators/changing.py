@@ -174,7 +174,9 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
     # a short step, as after a change or a switch, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
-    m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain * (SHORT_TELLS if short else 1.0))
+    # what one trial tells is of where it was made
+    gain = min(gain * (SHORT_TELLS if short else 1.0), 0.5 * WRONG * m.memory[RELUCTANCE])
+    m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain)
     if m.memory[CALM_STEPS] < WRONG * m.memory[RELUCTANCE]:
         return False
     m.memory[STEP] = min(1.0, part) * h

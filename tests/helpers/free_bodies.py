@@ -87,12 +87,24 @@ class Kept:
     FIELDS = ("time", "y", "accel", "energy", "applied", "joint", "value")
 
     def __init__(self, rows):
-        self.rows, self.blocks = rows, []
+        self.rows, self.blocks, self.marked = rows, [], 0
 
     def take(self):
         """Take the rows away."""
         n = self.rows.used[0]
         self.blocks.append([getattr(self.rows, field)[:n].copy() for field in self.FIELDS])
+        self.rows.used[:] = 0
+
+    def mark(self):
+        """Keep in mind which rows are the run's for sure."""
+        self.marked = len(self.blocks)
+
+    def settle(self):
+        """Let all be the run's."""
+
+    def go_back(self):
+        """Drop those since the mark."""
+        del self.blocks[self.marked :]
         self.rows.used[:] = 0
 
     def due(self):

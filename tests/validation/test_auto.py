@@ -49,9 +49,7 @@ def test_a_run_that_is_stiff_from_its_begin_is_the_implicit_method_s(name, tol):
     assert auto.stats["method_changes"] == 1
     np.testing.assert_array_equal(auto["time"], implicit["time"])
     for signal in ("position", "velocity"):
-        np.testing.assert_array_equal(
-            auto[f"bodies/2/{signal}"], implicit[f"bodies/2/{signal}"]
-        )
+        np.testing.assert_array_equal(auto[f"bodies/2/{signal}"], implicit[f"bodies/2/{signal}"])
     # what was tried is counted: no more than 60 steps, of those few that were rejected
     tried = auto.stats["rhs_evaluations"] - implicit.stats["rhs_evaluations"]
     assert 0 < tried < 1.2 * 6 * 60

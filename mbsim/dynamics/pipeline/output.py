@@ -376,10 +376,9 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     L and V are those of the group of connected bodies (`bodies.scales`), the energy is that of
     its heaviest body at V, at least what was taken so far: a damper that holds back strong springs
     takes far more than bodies so slow ever have. Detection that is exact only to a given noise
-    makes forces uncertain; what the noise of a step can do to a velocity is not chased. With
-    h = 0, `e` is no step's error, and what it does to friction, over the normal force, counts as
-    well. The worst body
-    is left in `diagnostics`.
+    makes forces uncertain; what the noise of a step can do to a velocity is not chased. With h = 0,
+    `e` is no step's error, and what it does to friction, over the normal force, counts as well.
+    The worst body is left in `diagnostics`.
     """
     scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
     fill_squares(scene, y)
