@@ -261,6 +261,14 @@ def test_more_sweeps_are_undone_if_they_gain_nothing():
     assert task.look(after)[1] <= task.look(best)[1] + 1e-15
 
 
+def test_sweeps_go_on_from_where_they_are_and_not_from_the_best_again():
+    # a contact that closes slowly is left when the published error is met
+    result = solve(hdf5.read(problem_file("Capsules-i101-404")).problem, 1e-4, "NSGS")
+    chunks = [rows[:, 1:].tobytes() for _, rows in result.history]
+    assert len(chunks) > 2
+    assert len(set(chunks)) == len(chunks)
+
+
 def test_a_proximal_run_knows_the_mean_of_its_centres():
     task = Task(reduce(some_local(80)), np.zeros(240), 1e-12, 1e-12)
     run = newton.Proximal(task)
