@@ -431,7 +431,7 @@ def perturbed(problem, seed):
 )  # fmt: skip
 def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
     problem = perturbed(hdf5.read(problem_file(name)).problem, seed)
-    result = solve(problem, 1e-8, max_seconds=60.0)  # a busy machine must not decide
+    result = solve(problem, 1e-8, max_seconds=math.inf)  # a busy machine must not decide
     assert is_solved(result, name)
     assert judge(problem, result.solution).error <= 1e-8
 
@@ -441,7 +441,7 @@ def test_auto_solves_perturbed_copies_of_hard_problems(name, seed):
 @pytest.mark.parametrize("name", NAMES)
 def test_auto_solves_the_shared_folder(name, tol):
     problem = hdf5.read(problem_file(name)).problem
-    result = solve(problem, tol, max_seconds=60.0)  # a busy machine must not decide
+    result = solve(problem, tol, max_seconds=math.inf)  # a busy machine must not decide
     if name.startswith("Gen_boxwall-nc1058") and tol < 1e-4:
         # the one that may be missed; then it must say so
         assert result.status == "solved" or result.reason

@@ -293,7 +293,7 @@ def test_the_time_left_for_the_verdict_follows_from_what_a_look_takes(monkeypatc
     monkeypatch.setattr(task.Task, "look", slow)
     for module in (solving, task):
         monkeypatch.setattr(module, "clock", lambda: now[0])
-    monkeypatch.setattr(solving, "named", lambda *_, **__: lambda given: seen.append(given.deadline))
+    monkeypatch.setattr(solving, "named", lambda *_, **__: lambda run: seen.append(run.deadline))
     for allowed in (20.0, 6.0):
         now[0] = 100.0
         solve(some_local(3), 1e-8, "NSGS", max_seconds=allowed)
