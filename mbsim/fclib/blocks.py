@@ -139,41 +139,36 @@ def block_rows(
             node[row] = a
     seen = np.full(contacts, -1, np.int32)
     counts = np.zeros(contacts + 1, np.int32)
+    upper = np.empty(contacts + p[d * contacts], np.int32)  # no more than one block an entry
     total = 0
     for a in range(contacts):
         seen[a] = a
+        upper[total] = a
         total += 1
-        for row in range(d * a, d * a + d):
-            for k in range(p[row], p[row + 1]):
-                b = node[i[k]]
-                if seen[b] != a:
-                    seen[b] = a
-                    total += 1
+        last = a  # neighbours in a row are mostly of one block
+        for k in range(p[d * a], p[d * a + d]):
+            b = node[i[k]]
+            if b == last:
+                continue
+            last = b
+            if seen[b] != a:
+                seen[b] = a
+                upper[total] = b
+                total += 1
         counts[a + 1] = total
-    upper = np.empty(total, np.int32)
-    seen[:] = -1
-    at = 0
-    for a in range(contacts):
-        seen[a] = a
-        upper[at] = a
-        at += 1
-        for row in range(d * a, d * a + d):
-            for k in range(p[row], p[row + 1]):
-                b = node[i[k]]
-                if seen[b] != a:
-                    seen[b] = a
-                    upper[at] = b
-                    at += 1
-    ptr, col = symmetric_pattern(contacts, counts, upper)
+    ptr, col = symmetric_pattern(contacts, counts, upper[:total])
     val = np.zeros((len(col), d, d))
     where = np.empty(contacts, np.int32)
     for a in range(contacts):
         for k in range(ptr[a], ptr[a + 1]):
             where[col[k]] = k
         for row in range(d):
+            last, place = -1, 0
             for k in range(p[d * a + row], p[d * a + row + 1]):
                 b = node[i[k]]
-                val[where[b], row, i[k] - d * b] += x[k]
+                if b != last:
+                    last, place = b, where[b]
+                val[place, row, i[k] - d * b] += x[k]
     return ptr, col, val
 
 

@@ -21,7 +21,7 @@ from mbsim.fclib.problem import Global, Local, Solution
 from mbsim.fclib.reduction import Blocks, reduce
 from mbsim.fclib.solvers.auto import first_sweeps
 from mbsim.fclib.solvers.catalog import solver as named
-from mbsim.fclib.solvers.sweeps import local_sweeps, mended, sweep_work
+from mbsim.fclib.solvers.sweeps import LONG, local_sweeps, mended, sweep_work
 from mbsim.fclib.solvers.task import Task
 
 if TYPE_CHECKING:
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 ROUNDS = 4
 #: Share of the time allowed that looking for a proof may take.
 PROOF = 0.05
+#: What a solver leaves when it is late, in looks at an iterate: its last sweep and look, velocities
+#: by the matrices as given, the figures that decide, and weak contacts.
+CHECK = 8.0
 
 
 @dataclass(eq=False)
@@ -119,15 +122,17 @@ def solve(
         raise ModelError(f"the guess has {len(guess.r)} impulses, the problem {m}")
     r = np.zeros(m) if guess is None else np.array(guess.r, dtype=np.float64)
     plain = isinstance(problem, Local) and problem.V is None and problem.mu_r is None
-    if isinstance(problem, Local) and plain and solver == "AUTO" and m:
+    small = 0 < len(problem.mu) <= LONG
+    if isinstance(problem, Local) and plain and small and solver == "AUTO":
         return _solve_plain(problem, tol, r, strict, began, max_seconds)
     with loading():
         method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
     condensed = clock()
-    end = _end(began, max_seconds, blocks.contacts, len(blocks.col))
-    task = Task(blocks, r, tol, tol, strict, end)
+    task = Task(blocks, r, tol, tol, strict, began + max_seconds)
     error, error_q = task.look(r)
+    # by what a look took: a busy machine or a slow one needs as many times as long for the rest
+    task.end(task.deadline - min(0.5 * max_seconds, CHECK * (clock() - condensed)))
     if guess is not None or error == 0.0:
         # that r = 0 happens to be near enough makes it no solution
         task.offer(r, error, error_q)
@@ -140,14 +145,14 @@ def solve(
 def _solve_plain(
     problem: Local, tol: float, r: Vector, strict: bool, began: float, max_seconds: float
 ) -> Result:
-    """Solve a local problem without more to it; one compiled call is often all."""
+    """Solve a small local problem without more to it; one compiled call is often all."""
     w, mu = problem.W, problem.mu
     nc = len(mu)
     sweeps, every = first_sweeps(nc)
     tangent = (0,) if problem.spacedim == 2 else (0, 0)
     history = np.empty((100, 3))
     check, u = np.empty(6), np.empty(len(r))
-    end = _end(began, max_seconds, nc, len(w.x) / problem.spacedim**2)
+    end = began + max_seconds - min(0.5 * max_seconds, 3e-7 * nc + 5e-8 * len(w.x))
     done, error, error_q, rows, made = compiled(local_sweeps)(
         tangent, (w.m, w.nz, w.p, w.i, w.x), problem.q, mu, r, (tol, tol, until(end)), sweeps,
         every, history, check, u,
@@ -173,16 +178,11 @@ def _solve_plain(
     return result
 
 
-def _end(began: float, max_seconds: float, contacts: int, blocks: float) -> float:
-    """Return when solvers end: what they leave is still to be checked, in three products with W."""
-    return began + max_seconds - min(0.5 * max_seconds, 3e-7 * contacts + 5e-8 * blocks)
-
-
 def _rounds(problem: Local | Global, solver: str, method: Any, task: Task, proof: float) -> Result:
     """Run a solver until the errors of the problem as given are small enough."""
     tol = task.tol
     for _ in range(ROUNDS):
-        if not task.done:
+        if not task.over:
             method(task)
         found = completed(problem, task.r, task.blocks)
         left = errors(problem, found, task.blocks)

@@ -356,8 +356,10 @@ def run(task: Task) -> None:
     """Sweep until the goal is reached or the time is over (NSGS)."""
     every = 1 if task.blocks.contacts <= 10 else 5
     chunk = 1000
+    last = task.r
     while not task.done and not task.late:
         before = task.error
-        nsgs(task, chunk, every)
+        # from the last iterate: from a better one that stays the best the same sweeps would follow
+        last = nsgs(task, chunk, every, start=last)
         if task.error >= before * (1.0 - 1e-12) and task.iterations >= 20 * chunk:
             return  # at rounding, or it does not converge

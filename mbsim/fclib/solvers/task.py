@@ -98,7 +98,12 @@ class Task:
     until: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        self.until = until(self.deadline)
+        self.end(self.deadline)
+
+    def end(self, deadline: float) -> None:
+        """Give up at this value of `clock`."""
+        self.deadline = deadline
+        self.until = until(deadline)
 
     @property
     def done(self) -> bool:
