@@ -82,6 +82,8 @@ from mbsim.laws.user_normal import (
 from mbsim.laws.user_normal import MODE as INPUT_MODE
 from mbsim.laws.user_normal import RATE as INPUT_RATE
 
+# columns of `Contacts.numbers`, as `Contact.numbers` of the model has them
+IGNORE_DEEPER = 0
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
