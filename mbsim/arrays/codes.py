@@ -215,6 +215,8 @@ SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 
 # columns of `State.sides`: see events.switching
 SIDE, CHATTERING = range(2)
+# entries of `State.chattering`: how often sticking changed of late, whether it asks to change now
+CHANGES, ASKS = range(2)
 #: What chatters more changes at nearly every step, as the sign of what is at rest does: then
 #: steps are not cut there.
 CHATTERS = 4.0
@@ -254,6 +256,23 @@ BEST_CONTACT, BEST_ENERGY, BEST_FORCE, BEST_INVERSE = range(4)
 
 # entries of `World.scale`
 SCALE_LENGTH, SCALE_SPEED, SCALE_ENERGY, TOLERANCE = range(4)
+
+# columns of `Rows.energy`, entries of `Audit.energy`
+KINETIC, POTENTIAL, DISSIPATED, WORK_OF_MOTIONS = range(4)
+# entries of `World.accumulators`
+OF_MOTIONS, OF_DAMPERS = range(2)
+# columns of `Audit.contact`
+CHANGE, LARGEST_CHANGE, CHANGED_AT, LARGEST_FRICTION = range(4)
+# columns of `Audit.momentum`: linear, angular, whether ground touched
+LINEAR, ANGULAR, TOUCHED_THEN = 0, 3, 6
+# columns of `Work.sticking_point`: point, normal and x-axis, and the rates of the first two
+HELD_POINT, HELD_NORMAL, HELD_AXIS, POINT_RATE, NORMAL_RATE = 0, 3, 6, 9, 12
+# columns of a wrench: force, torque
+WRENCH_FORCE, WRENCH_TORQUE = 0, 3
+# columns of `Work.block`: stiffness 3 x 3 from 0 and its turning part, then damping
+TURNING_STIFFNESS, BLOCK_DAMPING, TURNING_DAMPING = 9, 10, 19
+# entries of `Work.bound`: the square of the highest frequency, the highest rate of damping
+HIGHEST_SQUARE, HIGHEST_DAMPING = range(2)
 
 # entries of `Rows.used`
 USED_ROWS, USED_INCIDENTS, USED_EVENTS = range(3)

@@ -66,7 +66,7 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
-    ignore_deeper: F1  # (nc,) inf if not given
+    numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts
     user_normal: I1  # (nc,) where `laws.user_normal` has its inputs, 0 for a built-in normal law

@@ -19,7 +19,7 @@ from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Change
 
 Array = np.ndarray[Any, Any]
-_OF_CONTACTS = ("normal_par", "friction_par", "ignore_deeper", "dmax")
+_OF_CONTACTS = ("normal_par", "friction_par", "numbers", "dmax")
 _OF_APPLIED = ("par", "bound", "law_par")
 
 

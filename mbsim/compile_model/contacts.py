@@ -310,9 +310,7 @@ def contacts_table(
         ),
         memory=memory,
         carried=carried,
-        ignore_deeper=np.array(
-            [_or(c.ignore_penetration_larger_than, math.inf) for c in contacts], dtype=np.float64
-        ),
+        numbers=table([np.array(c.numbers) for c in contacts]),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
         reads_x=np.array(
             [c.cff_type != "USERCFF" or user[c.id].reads_x for c in contacts], dtype=np.int64

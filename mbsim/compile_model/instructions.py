@@ -38,6 +38,22 @@ from typing import NamedTuple
 from mbsim.expressions import elementary
 from mbsim.expressions.elementary import FIRST_MEASURE
 
+#: Columns of an instruction: its operation, then markers of measures; the last of SPEED.
+OP, MARKER_I, MARKER_J, MARKER_K, MARKER_L = range(5)
+OBSERVER = 3
+#: Of OFFSET and SPIN the axis of K, of NET the component; of VELOCITY and accelerations the axis.
+AXIS_OF_K, AXIS = 4, 5
+#: Which angle of TURNS, which Euler parameter.
+WHICH = 3
+#: Of others: a row of `Programs.number`, `Angles`, `Sensors`, `Users`; how many arguments; where in
+#: y a state stands.
+ROW, COUNT, STATE_AT = 1, 1, 1
+RESULT, CALLS = 2, 3
+KIND, ELEMENT_ROW, JFLAG, COMPONENT, SEEN_BY = range(1, 6)
+FIRST_CURVE, CURVES, ORDER = range(1, 4)
+#: As an axis of accelerations: their magnitude.
+MAGNITUDE = 3
+
 DISTANCE, OFFSET, ANGLE, TURN, ORIENT, INCLUDED = range(FIRST_MEASURE, FIRST_MEASURE + 6)
 SPEED, CLOSING, VELOCITY, TURNING, SPIN = range(FIRST_MEASURE + 6, FIRST_MEASURE + 11)
 ACCELERATION, SPIN_UP, NET, ELEMENT = range(FIRST_MEASURE + 11, FIRST_MEASURE + 15)

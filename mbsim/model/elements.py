@@ -201,6 +201,12 @@ class Contact:
         return math.isinf(dict(self.friction).get("tangential_stiffness", 0.0))
 
     @property
+    def numbers(self) -> tuple[float, ...]:
+        """What kernels are given beside the laws' own, in `dynamics.contact.forces`' order."""
+        ignored = self.ignore_penetration_larger_than
+        return (math.inf if ignored is None else ignored,)
+
+    @property
     def with_itself(self) -> bool:
         """Whether I and J are the same graphics: all of them touch each other."""
         return set(self.i_graphics_id) == set(self.j_graphics_id)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
+from typing import Any
 
 from mbsim.laws.catalog import FRICTION_LAWS, Parameter
 from mbsim.model import elements as el
@@ -87,36 +89,14 @@ def _build_contact(entry: Entry) -> None:
     if not scripted and not (cnf_type == "USERCNF" and not cnf.dll_name):
         note_unused(entry, "no subroutine in a script", {"script_name", "interpreter"})
 
+    volume = cnf_type == "VOLUME"
     contact = el.Contact(
+        **_by_name(entry, {"id", "cnf_type", "cff_type", "contact_depth", "exponent"}),
         id=entry.get("id", 0),
-        label=entry.get("label", ""),
-        i_graphics_id=entry.get("i_graphics_id", ()),
-        j_graphics_id=entry.get("j_graphics_id", ()),
-        ignore_penetration_larger_than=entry.get("ignore_penetration_larger_than"),
-        contact_points=entry.get("contact_points", "POINTS"),
-        contact_depth="FIELD" if cnf_type == "VOLUME" else entry.get("contact_depth", "LARGEST"),
+        contact_depth="FIELD" if volume else entry.get("contact_depth", "LARGEST"),
         cnf_type=cnf_type,
-        stiffness=entry.get("stiffness", 0.0),
-        exponent=entry.get("exponent", 1.0 if cnf_type == "VOLUME" else 1.5),
-        damping=entry.get("damping", 0.0),
-        dmax=entry.get("dmax"),
-        penalty=entry.get("penalty", 0.1),
-        restitution_coef=entry.get("restitution_coef"),
-        ref_velocity=entry.get("ref_velocity"),
-        normal_trans_vel=entry.get("normal_trans_vel", DEFAULT_SPEED),
-        i_elastic_modulus=entry.get("i_elastic_modulus"),
-        j_elastic_modulus=entry.get("j_elastic_modulus"),
-        i_poisson_ratio=entry.get("i_poisson_ratio"),
-        j_poisson_ratio=entry.get("j_poisson_ratio"),
-        i_layer_depth=entry.get("i_layer_depth"),
-        j_layer_depth=entry.get("j_layer_depth"),
-        i_radius=entry.get("i_radius"),
-        j_radius=entry.get("j_radius"),
+        exponent=entry.get("exponent", 1.0 if volume else 1.5),
         cff_type=cff_type,
-        mu_static=entry.get("mu_static", 0.0),
-        mu_dynamic=entry.get("mu_dynamic", 0.0),
-        stiction_trans_vel=entry.get("stiction_trans_vel", DEFAULT_SPEED),
-        friction_trans_vel=entry.get("friction_trans_vel", DEFAULT_SPEED),
         friction=_own_attributes(entry, cff_type),
         cff=cff,
         source=entry.source,
@@ -124,6 +104,15 @@ def _build_contact(entry: Entry) -> None:
         cpost=cpost,
     )
     entry.register(entry.draft.contacts, contact)
+
+
+def _by_name(entry: Entry, but: set[str]) -> dict[str, Any]:
+    """Return what the contact calls as the statement does, `but` for some; else its own default."""
+    return {
+        field.name: entry.get(field.name, field.default)
+        for field in fields(el.Contact)
+        if field.name in FORCE_CONTACT.attributes and field.name not in but
+    }
 
 
 def _asks_user(entry: Entry, cff_type: str) -> bool:

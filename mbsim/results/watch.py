@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbsim.arrays.codes import OF_MOTIONS
 from mbsim.model.elements import Array
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ ENERGIES = ("kinetic", "potential", "dissipated", "work_of_motions")
 
 def energies(system: System) -> tuple[str, ...]:
     """Return which energies a system has: the work of motions only where something drives it."""
-    driven = system.model.motions or system.scene.world.accumulators[0] >= 0
+    driven = system.model.motions or system.scene.world.accumulators[OF_MOTIONS] >= 0
     return ENERGIES if driven else ENERGIES[:3]
 
 

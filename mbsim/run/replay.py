@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.codes import USED_INCIDENTS
 from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 
@@ -193,7 +194,7 @@ class Replay:
         scene, ids = self.system.scene, self.system.contact_ids
         count, n = len(incidents), len(y)
         scene.rows.incidents[:count] = incidents
-        scene.rows.used[1] = count
+        scene.rows.used[USED_INCIDENTS] = count
         groups = (len(scene.work.law_in), len(scene.work.law_out), codes.SLOT_COLUMNS)
         size, wide = codes.CONTACT_COLUMNS * len(ids), sum(groups)
         room = np.zeros(n + size + count * wide)

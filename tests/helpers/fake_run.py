@@ -91,7 +91,7 @@ def fake_system_of(model: Model) -> Any:
                 for c in model.contacts.values()
             ]
         ),
-        ignore_deeper=np.zeros(nc),
+        numbers=np.zeros((nc, 1)),
     )
     scene = SimpleNamespace(
         bodies=(np.array([body.mass for body in bodies]),),

@@ -46,4 +46,5 @@ TEMPLATES = {
     ),
     "request": Template("", 2),
     "attribute": Template("", 3),
+    "contact_attribute": Template("", 3),
 }

@@ -158,6 +158,7 @@ assert "ELLIPSOID-MESH" in PAIRS
 assert "HEUN" in catalog.METHODS and catalog.load("HEUN").stages == 3
 assert "MARKER_VELOCITY_IN_J" in keywords.REQUEST_TYPES.values()
 assert "preload_rate" in BY_KEY["forcejointfriction"].attributes
+assert "pull" in BY_KEY["forcecontact"].attributes
 assert "forcelift" in BY_KEY
 from mbsim.manual.tables import made
 from mbsim.manual.book import Page
@@ -166,7 +167,7 @@ for table, word in (
     ("law VISCOUS", "slip_coef"), ("law KELVIN_VOIGT", "damping"), ("joints", "PIN_IN_SLOT"),
     ("attributes Force_Tether", "stiffness"), ("couple-of-shapes", "C"), ("methods", "HEUN"),
     ("statements", "Force_Lift"), ("requests", "MARKER_VELOCITY_IN_J"),
-    ("attributes Force_JointFriction", "preload_rate"),
+    ("attributes Force_JointFriction", "preload_rate"), ("attributes Force_Contact", "pull"),
 ):
     assert word in made(table, page), table
 """
@@ -319,3 +320,13 @@ def test_attribute(copy_with):
     t = found["time"]
     # 1 kg: dv/dt = -0.5 (1 + 2 t), 1 m/s left
     np.testing.assert_allclose(found["bodies/2/velocity"][:, 2], 2.0 - 0.5 * (t + t * t), atol=1e-6)
+
+
+@pytest.mark.slow
+def test_contact_attribute(copy_with):
+    stands = 0.1 - (G + 5.0) / 1e4  # its weight of 9.81 N and the pull on 1e4 N/m
+    deck = GROUND + sphere(stands) + GRAVITY + contact(stiffness=1e4, exponent=1, pull=5)
+    folder, signals = copy_with("contact_attribute"), ["bodies/2/position", "contacts/301/force"]
+    (found,) = run_in_copy(folder, (whole(deck, 0.05), signals, {}))
+    np.testing.assert_allclose(found["bodies/2/position"][:, 2], stands, atol=1e-9)
+    np.testing.assert_allclose(np.abs(found["contacts/301/force"][:, 2]), G, rtol=1e-6)

@@ -533,7 +533,7 @@ MECHANISMS = (
             "AUTO",
             MECHANISMS + BRANCHES + OF_SOME_CONTACTS + "mbsim.dynamics.linearization",
         ),
-        ("bowling_ball", "RADAU5", MECHANISMS + BRANCHES + OF_SOME_CONTACTS),
+        ("bowling_ball", "RADAU5", BRANCHES + OF_SOME_CONTACTS),
     ],
 )
 @pytest.mark.slow

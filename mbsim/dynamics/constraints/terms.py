@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import HELD_AXIS, HELD_NORMAL, HELD_POINT, NORMAL_RATE, POINT_RATE
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
@@ -158,10 +159,10 @@ def touching_term(scene: Scene, y: F1, i: int, j: int, axis: int, s: int, G: F1)
     and where nothing slips t' . v = -(t . n') (n . v). `stiction.rigid_contact` places the slot.
     """
     row = scene.work.sticking_point[s]
-    p, n, t = (row[0], row[1], row[2]), (row[3], row[4], row[5]), (row[6], row[7], row[8])
+    p, n, t = vector(row[HELD_POINT:]), vector(row[HELD_NORMAL:]), vector(row[HELD_AXIS:])
     if axis == 1:
         t = cross(n, t)
-    dp, dn = (row[9], row[10], row[11]), (row[12], row[13], row[14])
+    dp, dn = vector(row[POINT_RATE:]), vector(row[NORMAL_RATE:])
     bi, bj = scene.markers.body[i], scene.markers.body[j]
     wi, wj = vector(scene.work.w[bi]), vector(scene.work.w[bj])
     vi, vj = vector(scene.work.v[bi]), vector(scene.work.v[bj])

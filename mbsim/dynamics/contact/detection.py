@@ -15,6 +15,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.kinematics import place_graphics
+from mbsim.dynamics.contact.forces import IGNORE_DEEPER
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, COUPLE
 
 
@@ -53,7 +54,10 @@ def gather(scene: Scene, pair: int) -> None:
     # what is behind the first row of an incident with an area is in that
     for s in range(first, first + scene.kinds.slots[kind], scene.kinds.step[kind]):
         depth = work.points[s, AT_DEPTH]
-        if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
+        if (
+            depth > 0.0
+            and depth <= scene.contacts.numbers[scene.kinds.contact[kind], IGNORE_DEEPER]
+        ):
             work.touching[s] = 1
             hit[hit[last]] = s
             hit[last] += 1

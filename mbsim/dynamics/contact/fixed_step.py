@@ -11,6 +11,7 @@ from mbsim.core.rotation import dot, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_POINT
+from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
@@ -37,9 +38,9 @@ def hold_back(scene: Scene, y: F1, s: int, h: float, slip: V2) -> None:
     """
     out, p, body = scene.work.law_out, vector(scene.work.points[s, AT_POINT:]), scene.graphics.body
     gi, gj = sides(scene, s)
-    force = math.hypot(out[0], out[1])
+    force = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
     inverse = yielding(scene, y, body[gi], p) + yielding(scene, y, body[gj], p)
     most = HELD_BACK * math.hypot(slip[0], slip[1]) / (h * inverse)
     if force > most:
         for k in range(2):
-            out[k] *= most / force
+            out[FORCE_X_OUT + k] *= most / force

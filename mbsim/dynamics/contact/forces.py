@@ -50,6 +50,8 @@ from mbsim.laws.abi import (
     AREA_IN,
     ELASTIC,
     ENERGY,
+    FORCE_X_OUT,
+    FORCE_Y_OUT,
     LOAD,
     LOCI_IN,
     LOCJ_IN,
@@ -59,6 +61,9 @@ from mbsim.laws.abi import (
     SLIDING_LIMIT,
     STEP_IN,
     TIME_IN,
+    TORQUE_X_OUT,
+    TORQUE_Y_OUT,
+    TORQUE_Z_OUT,
     X_IN,
     XDOT_IN,
 )
@@ -78,6 +83,8 @@ from mbsim.laws.user_normal import (
 from mbsim.laws.user_normal import MODE as INPUT_MODE
 from mbsim.laws.user_normal import RATE as INPUT_RATE
 
+# columns of `Contacts.numbers`, as `Contact.numbers` of the model has them
+IGNORE_DEEPER = 0
 # columns of `Work.slot`
 DEPTH, RATE, NORMAL, SLIP = range(4)
 FORCE, TORQUE, STORED, LOST = 4, 7, 10, 11
@@ -216,7 +223,7 @@ def friction(
         code = call_int(contacts.sliding_law[c], call)
         if code != 0:
             return code
-        given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[0], out[1])
+        given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 
@@ -327,7 +334,7 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         code = friction(scene, t, h, y, s, c, loci, locj, spin_rates, slip, pressed)
         if code != 0:
             return code
-        finite = math.isfinite(out[0] + out[1] + out[4])
+        finite = math.isfinite(out[FORCE_X_OUT] + out[FORCE_Y_OUT] + out[TORQUE_Z_OUT])
         if not finite and contacts.framed[c] == 1 and math.isfinite(normal + slip[0] + slip[1]):
             return Code.USER_NOT_FINITE
         held_back = scene.world.hooks[Hook.HOLD_BACK]
@@ -337,7 +344,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
             answer = call_int(scene.world.hooks[Hook.RECALL], (scene, Recall.TAKE, s, t, dy, 0))
             if answer < 0:
                 return -answer
-        fx, fy, mx, my, tz = out[0], out[1], out[2], out[3], out[4]
+        fx, fy = out[FORCE_X_OUT], out[FORCE_Y_OUT]
+        mx, my, tz = out[TORQUE_X_OUT], out[TORQUE_Y_OUT], out[TORQUE_Z_OUT]
         force = add(force, add(scale(fx, tx), scale(fy, ty)))
         torque = add(torque, add(scale(mx, tx), add(scale(my, ty), scale(tz, n))))
         along = fx * slip[0] + fy * slip[1]

@@ -28,6 +28,8 @@ from mbsim.dynamics.contact.points import record_event
 from mbsim.laws import catalog
 from mbsim.laws.abi import (
     BRANCH_OUT,
+    FORCE_X_OUT,
+    FORCE_Y_OUT,
     FRICTION_INPUTS,
     FROZEN,
     GROWTH,
@@ -84,7 +86,7 @@ def keep(scene: Scene, dy: F1, s: int) -> None:
     c, out = contact_of(scene, s), scene.work.law_out
     row, z, n = scene.work.slot[s], scene.slots.z[s], scene.contacts.memory[c]
     row[FRICTION_STORED], row[MODE], row[BRANCH] = out[STORED_OUT], out[MODE_OUT], out[BRANCH_OUT]
-    row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[0], out[1]
+    row[UNIT], row[ALONG_X], row[ALONG_Y] = out[UNIT_OUT], out[FORCE_X_OUT], out[FORCE_Y_OUT]
     for k in range(n):
         scene.work.memory[s, k] = out[MEMORY_OUT + k]
     for k in range(scene.contacts.carried[c]):

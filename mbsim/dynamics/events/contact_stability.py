@@ -12,6 +12,8 @@ from mbsim.arrays.codes import (
     BEST_INVERSE,
     CENTRE_ACCELERATION,
     FASTEST_POINT,
+    HIGHEST_DAMPING,
+    HIGHEST_SQUARE,
     SCALE_LENGTH,
     SCALE_SPEED,
 )
@@ -188,8 +190,8 @@ def add_meeting(scene: Scene, best: F1, out: F1, bound: F1) -> None:
     c, inverse = int(best[BEST_CONTACT]), best[BEST_INVERSE]
     depth = depth_to_come(scene, c, best[BEST_ENERGY], best[BEST_FORCE])
     k, damping = slopes(scene, c, depth, out)
-    bound[0] = max(bound[0], k * inverse)
-    bound[1] = max(bound[1], damping * inverse)
+    bound[HIGHEST_SQUARE] = max(bound[HIGHEST_SQUARE], k * inverse)
+    bound[HIGHEST_DAMPING] = max(bound[HIGHEST_DAMPING], damping * inverse)
 
 
 @jitable

@@ -20,12 +20,17 @@ import math
 
 from mbsim.arrays.codes import (
     AXIS_TORQUE,
+    BLOCK_DAMPING,
     BOUND_DAMPING,
     BOUND_FORCE,
     BOUND_STIFFNESS,
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
+    HIGHEST_DAMPING,
+    HIGHEST_SQUARE,
     REST,
+    TURNING_DAMPING,
+    TURNING_STIFFNESS,
     WRENCH,
 )
 from mbsim.arrays.hooks import Hook, Stability
@@ -62,9 +67,9 @@ def add_to_block(block: F1, n: V3, stiffness: float, damping: float, turn: float
     for r in range(3):
         for q in range(3):
             block[3 * r + q] += stiffness * n[r] * n[q]
-            block[10 + 3 * r + q] += damping * n[r] * n[q]
-    block[9] += stiffness * turn
-    block[19] += damping * turn
+            block[BLOCK_DAMPING + 3 * r + q] += damping * n[r] * n[q]
+    block[TURNING_STIFFNESS] += stiffness * turn
+    block[TURNING_DAMPING] += damping * turn
 
 
 @jitable
@@ -96,9 +101,9 @@ def add_wrench(scene: Scene, y: F1, f: int) -> None:
         most = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
         for r in range(3):
             block[4 * r] += both * k
-            block[10 + 4 * r] += both * c
-        block[9] += both * (k * square + turn_k + bent) * most
-        block[19] += both * (c * square + turn_c) * most
+            block[BLOCK_DAMPING + 4 * r] += both * c
+        block[TURNING_STIFFNESS] += both * (k * square + turn_k + bent) * most
+        block[TURNING_DAMPING] += both * (c * square + turn_c) * most
 
 
 @jitable
@@ -129,8 +134,8 @@ def add_spring(scene: Scene, y: F1, f: int) -> None:
         if applied.form[f] == AXIS_TORQUE:
             axis = unrotate(scene.work.R[b], marker_axis(scene, j, 2))
             turn = dot(axis, rotate(inverse, axis))
-            block[9] += k * turn
-            block[19] += damping * turn
+            block[TURNING_STIFFNESS] += k * turn
+            block[TURNING_DAMPING] += damping * turn
             continue
         arm = marker_arm(scene, m)
         add_to_block(block, n, k, damping, yielding(scene, b, arm, n))
@@ -139,7 +144,7 @@ def add_spring(scene: Scene, y: F1, f: int) -> None:
             for r in range(3):
                 block[4 * r] += across
             most = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
-            block[9] += (across * length * length + both * force * length) * most
+            block[TURNING_STIFFNESS] += (across * length * length + both * force * length) * most
 
 
 @jitable
@@ -191,14 +196,18 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     for k in range(len(scene.applied.form)):
         add_spring(scene, y, k)
     bound = work.bound
-    bound[0] = bound[1] = 0.0
+    bound[HIGHEST_SQUARE] = bound[HIGHEST_DAMPING] = 0.0
     for b in range(len(bodies.mass)):
         block, stiff, damped = work.block[b], 0.0, 0.0
         for k in range(9):
             stiff += block[k] * block[k]
-            damped += block[10 + k] * block[10 + k]
-        bound[0] = max(bound[0], math.sqrt(stiff) / bodies.mass[b] + block[9])
-        bound[1] = max(bound[1], math.sqrt(damped) / bodies.mass[b] + block[19])
+            damped += block[BLOCK_DAMPING + k] * block[BLOCK_DAMPING + k]
+        bound[HIGHEST_SQUARE] = max(
+            bound[HIGHEST_SQUARE], math.sqrt(stiff) / bodies.mass[b] + block[TURNING_STIFFNESS]
+        )
+        bound[HIGHEST_DAMPING] = max(
+            bound[HIGHEST_DAMPING], math.sqrt(damped) / bodies.mass[b] + block[TURNING_DAMPING]
+        )
     if hook != 0:
         call_float(hook, (scene, Stability.MEETING, y, f))
 
@@ -206,5 +215,7 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
     # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance. Friction is held back
     # instead (`contact.fixed_step`)
     part = min(LARGEST_PART, math.sqrt(tol / COARSE))
-    fastest = bound[1] + math.sqrt(bound[1] * bound[1] + bound[0])
+    fastest = bound[HIGHEST_DAMPING] + math.sqrt(
+        bound[HIGHEST_DAMPING] * bound[HIGHEST_DAMPING] + bound[HIGHEST_SQUARE]
+    )
     return min(longest, part / fastest) if fastest > 0.0 else longest

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    ASKS,
     AUDIT_TOL,
+    CHANGES,
     CHATTERING,
     CHATTERS,
     COMMITTED,
@@ -150,13 +152,13 @@ def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     """
     chattering, differs = scene.state.chattering, 0
     if what == PASS:
-        differs = 1 if chattering[1] == 1.0 else 0
-        chattering[0] = chattering[0] + 1.0 if chattering[1] == 1.0 else 0.5 * chattering[0]
-        chattering[1] = 0.0
-    elif chattering[0] <= CHATTERS:
+        differs, before = 1 if chattering[ASKS] == 1.0 else 0, chattering[CHANGES]
+        chattering[CHANGES] = before + 1.0 if differs == 1 else 0.5 * before
+        chattering[ASKS] = 0.0
+    elif chattering[CHANGES] <= CHATTERS:
         asked = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.ASK, t, y))
         differs = 2 if answer_of(scene, asked) == 1 else 0
-        chattering[1] = 1.0 if differs > 0 else 0.0
+        chattering[ASKS] = 1.0 if differs > 0 else 0.0
     return differs
 
 

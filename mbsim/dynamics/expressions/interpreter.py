@@ -7,20 +7,41 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,
+    AXIS,
+    AXIS_OF_K,
     CLOSING,
+    COMPONENT,
+    COUNT,
+    CURVES,
     DISTANCE,
+    ELEMENT_ROW,
+    FIRST_CURVE,
     INCLUDED,
+    JFLAG,
+    KIND,
+    MAGNITUDE,
+    MARKER_I,
+    MARKER_J,
+    MARKER_K,
+    MARKER_L,
     NET,
+    OBSERVER,
     OFFSET,
+    OP,
+    ORDER,
+    ROW,
+    SEEN_BY,
     SENSED,
     SPEED,
     SPIN,
     SPIN_UP,
     SPLINE,
     STATE,
+    STATE_AT,
     TURN,
     TURNING,
     VELOCITY,
+    WHICH,
 )
 from mbsim.core.arrays import F1, I1, V3
 from mbsim.core.jitable import jitable
@@ -50,48 +71,65 @@ from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, con
 @jitable
 def displacement(scene: Scene, y: F1, code: I1, body: int, direction: int) -> V3:
     """Return the jet of a displacement measure."""
-    op = code[0]
+    op = code[OP]
     if op == DISTANCE:
-        return distance(scene, y, code[1], code[2], body, direction)
+        return distance(scene, y, code[MARKER_I], code[MARKER_J], body, direction)
     if op == OFFSET:
-        return offset(scene, y, code[1], code[2], code[3], code[4], body, direction)
+        return offset(
+            scene,
+            y,
+            code[MARKER_I],
+            code[MARKER_J],
+            code[MARKER_K],
+            code[AXIS_OF_K],
+            body,
+            direction,
+        )
     if op == ANGLE:
-        return angle(scene, code[1], body, direction)
+        return angle(scene, code[ROW], body, direction)
     if op == TURN:
-        return euler_angle(scene, code[1], code[2], code[3], body, direction)
+        return euler_angle(scene, code[MARKER_I], code[MARKER_J], code[WHICH], body, direction)
     if op == INCLUDED:
-        return included_angle(scene, y, code[1], code[2], code[3], body, direction)
-    return euler_parameter(scene, code[1], code[2], code[3], body, direction)
+        return included_angle(
+            scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_K], body, direction
+        )
+    return euler_parameter(scene, code[MARKER_I], code[MARKER_J], code[WHICH], body, direction)
 
 
 @jitable
 def rate_or_force(scene: Scene, y: F1, code: I1) -> float:
     """Return a velocity or force measure."""
-    op = code[0]
+    op = code[OP]
     if op == SPEED:
-        return norm(relative_velocity(scene, y, code[1], code[2], code[3]))
+        return norm(relative_velocity(scene, y, code[MARKER_I], code[MARKER_J], code[OBSERVER]))
     if op == CLOSING:
-        return closing(scene, y, code[1], code[2])
+        return closing(scene, y, code[MARKER_I], code[MARKER_J])
     if op == VELOCITY:
-        v = relative_velocity(scene, y, code[1], code[2], code[4])
-        return dot(v, marker_axis(scene, code[3], code[5]))
+        v = relative_velocity(scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_L])
+        return dot(v, marker_axis(scene, code[MARKER_K], code[AXIS]))
     if op == TURNING:
-        return norm(relative_spin(scene, code[1], code[2]))
+        return norm(relative_spin(scene, code[MARKER_I], code[MARKER_J]))
     if op == SPIN:
-        return dot(relative_spin(scene, code[1], code[2]), marker_axis(scene, code[3], code[4]))
+        axis = marker_axis(scene, code[MARKER_K], code[AXIS_OF_K])
+        return dot(relative_spin(scene, code[MARKER_I], code[MARKER_J]), axis)
     if op == STATE:
-        return y[code[1]]
+        return y[code[STATE_AT]]
     if op == ACCELERATION:
-        a = relative_acceleration(scene, y, code[1], code[2], code[4])
-        return norm(a) if code[5] == 3 else dot(a, marker_axis(scene, code[3], code[5]))
+        a = relative_acceleration(scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_L])
+        if code[AXIS] == MAGNITUDE:
+            return norm(a)
+        return dot(a, marker_axis(scene, code[MARKER_K], code[AXIS]))
     if op == SPIN_UP:
-        a = relative_spin_up(scene, code[1], code[2], code[4])
-        return norm(a) if code[5] == 3 else dot(a, marker_axis(scene, code[3], code[5]))
+        a = relative_spin_up(scene, code[MARKER_I], code[MARKER_J], code[MARKER_L])
+        if code[AXIS] == MAGNITUDE:
+            return norm(a)
+        return dot(a, marker_axis(scene, code[MARKER_K], code[AXIS]))
     if op == SENSED:
-        return scene.state.sensed[code[1], SHOWN]
+        return scene.state.sensed[code[ROW], SHOWN]
     if op == NET:
-        return net_force(scene, y, code[1], code[2], code[3], code[4])
-    return element_force(scene, y, code[1], code[2], code[3], code[5], code[4])
+        return net_force(scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_K], code[COMPONENT])
+    kind, row = code[KIND], code[ELEMENT_ROW]
+    return element_force(scene, y, kind, row, code[JFLAG], code[SEEN_BY], code[COMPONENT])
 
 
 @jitable
@@ -101,22 +139,23 @@ def interpret(scene: Scene, t: float, y: F1, program: int, body: int, direction:
     stack, top = programs.stack, 0
     for at in range(programs.start[program], programs.start[program + 1]):
         code = programs.code[at]
-        op = code[0]
+        op = code[OP]
         if op == NUMBER:
-            put(stack, top, constant(programs.number[code[1]]))
+            put(stack, top, constant(programs.number[code[ROW]]))
             top += 1
         elif op == TIME:
             put(stack, top, (t, 1.0 if body == AS_THEY_ARE else 0.0, 0.0))
             top += 1
         elif op < FIRST_MEASURE:
-            top = apply(op, code[1], stack, top)
+            top = apply(op, code[COUNT], stack, top)
         elif op <= INCLUDED:
             put(stack, top, displacement(scene, y, code, body, direction))
             top += 1
         elif op == SPLINE:
             top -= 1
             x, z = get(stack, top - 1), get(stack, top)
-            put(stack, top - 1, spline(programs, code[1], code[2], code[3], x, z))
+            first, count, order = code[FIRST_CURVE], code[CURVES], code[ORDER]
+            put(stack, top - 1, spline(programs, first, count, order, x, z))
         else:
             rise = slope(scene, y, code, body, direction)
             put(stack, top, (rate_or_force(scene, y, code), rise, 0.0))

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from mbsim.arrays.codes import JET_CURVATURE, JET_SLOPE, JET_VALUE
+from mbsim.arrays.codes import JET_CURVATURE, JET_SLOPE, JET_VALUE, USED_ROWS
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
@@ -79,7 +79,7 @@ def gradient(scene: Scene, t: float, y: F1, program: int, body: int, out: F1) ->
 @jitable
 def fill_values(scene: Scene, t: float, y: F1) -> int:
     """Write the expressions of requests, which are the last programs, to the row; return 0."""
-    row = scene.rows.value[scene.rows.used[0]]
+    row = scene.rows.value[scene.rows.used[USED_ROWS]]
     first = len(scene.programs.start) - 1 - len(row)
     for k in range(len(row)):
         row[k] = value(scene, t, y, first + k)

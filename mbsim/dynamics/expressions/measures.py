@@ -9,7 +9,7 @@ are what follows from velocities: bodies' own are taken as zero. A vector's jet 
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import VECTOR_FORCE
+from mbsim.arrays.codes import USED_ROWS, VECTOR_FORCE
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -231,7 +231,7 @@ def spin_up(scene: Scene, b: int) -> V3:
     """Return the angular acceleration of body b at the output row that is being written."""
     if b >= len(scene.bodies.mass):
         return 0.0, 0.0, 0.0
-    return vector(scene.rows.accel[scene.rows.used[0], 6 * b + 3 : 6 * b + 6])
+    return vector(scene.rows.accel[scene.rows.used[USED_ROWS], 6 * b + 3 : 6 * b + 6])
 
 
 @jitable
@@ -241,7 +241,7 @@ def marker_acceleration(scene: Scene, m: int) -> V3:
     if b >= len(scene.bodies.mass):
         return 0.0, 0.0, 0.0
     arm, w = marker_arm(scene, m), vector(scene.work.w[b])
-    a = vector(scene.rows.accel[scene.rows.used[0], 6 * b : 6 * b + 3])
+    a = vector(scene.rows.accel[scene.rows.used[USED_ROWS], 6 * b : 6 * b + 3])
     return add(a, add(cross(spin_up(scene, b), arm), cross(w, cross(w, arm))))
 
 

@@ -11,7 +11,23 @@ of the cg or a unit angular velocity, global. `A_STATE` for `body` is the number
 from __future__ import annotations
 
 from mbsim.arrays.scene import Scene
-from mbsim.compile_model.instructions import CLOSING, SPEED, SPIN, STATE, TURNING, VELOCITY
+from mbsim.compile_model.instructions import (
+    AXIS,
+    AXIS_OF_K,
+    CLOSING,
+    MARKER_I,
+    MARKER_J,
+    MARKER_K,
+    MARKER_L,
+    OBSERVER,
+    OP,
+    SPEED,
+    SPIN,
+    STATE,
+    STATE_AT,
+    TURNING,
+    VELOCITY,
+)
 from mbsim.core.arrays import F1, I1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, sub, vector
@@ -96,29 +112,34 @@ def slope(scene: Scene, y: F1, code: I1, body: int, direction: int) -> float:
 
     Accelerations and forces of other elements count as they are.
     """
-    op = code[0]
+    op = code[OP]
     if op == STATE:
-        return 1.0 if body == A_STATE and code[1] == direction else 0.0
+        return 1.0 if body == A_STATE and code[STATE_AT] == direction else 0.0
     if body < 0:
         return 0.0
     if op == SPEED:
-        u = relative_velocity(scene, y, code[1], code[2], code[3])
-        return along_unit(u, relative_rise(scene, y, code[1], code[2], code[3], body, direction))
+        i, j, observer = code[MARKER_I], code[MARKER_J], code[OBSERVER]
+        u = relative_velocity(scene, y, i, j, observer)
+        return along_unit(u, relative_rise(scene, y, i, j, observer, body, direction))
     if op == CLOSING:
-        return closing_rise(scene, y, code[1], code[2], body, direction)
+        return closing_rise(scene, y, code[MARKER_I], code[MARKER_J], body, direction)
     if op == VELOCITY:
-        e = axis_jet(scene, code[3], code[5], body, direction)
-        v = relative_velocity(scene, y, code[1], code[2], code[4])
-        return dot(relative_rise(scene, y, code[1], code[2], code[4], body, direction), e[0]) + dot(
-            v, e[1]
-        )
+        e = axis_jet(scene, code[MARKER_K], code[AXIS], body, direction)
+        v = relative_velocity(scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_L])
+        return dot(
+            relative_rise(
+                scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_L], body, direction
+            ),
+            e[0],
+        ) + dot(v, e[1])
     if op == TURNING or op == SPIN:
-        w = relative_spin(scene, code[1], code[2])
+        w = relative_spin(scene, code[MARKER_I], code[MARKER_J])
         rise = sub(
-            spin_rise(scene, code[1], body, direction), spin_rise(scene, code[2], body, direction)
+            spin_rise(scene, code[MARKER_I], body, direction),
+            spin_rise(scene, code[MARKER_J], body, direction),
         )
         if op == TURNING:
             return along_unit(w, rise)
-        e = axis_jet(scene, code[3], code[4], body, direction)
+        e = axis_jet(scene, code[MARKER_K], code[AXIS_OF_K], body, direction)
         return dot(rise, e[0]) + dot(w, e[1])
     return 0.0

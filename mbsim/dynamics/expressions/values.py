@@ -9,14 +9,28 @@ from mbsim.compile_model.instructions import (
     ADD_N,
     ADD_TIME_N,
     ANGLE,
+    AXIS,
+    AXIS_OF_K,
+    CALLS,
+    COUNT,
+    CURVES,
     DISTANCE,
     DIV_N,
+    FIRST_CURVE,
     INCLUDED,
+    MARKER_I,
+    MARKER_J,
+    MARKER_K,
+    MARKER_L,
     MUL_N,
     N_DIV,
     N_SUB,
     OFFSET,
+    OP,
+    ORDER,
     POW_N,
+    RESULT,
+    ROW,
     SPLINE,
     SUB_N,
     TIME_N,
@@ -50,21 +64,23 @@ from mbsim.expressions.values import apply_value, power_value
 @jitable
 def displacement_value(scene: Scene, y: F1, code: I1) -> float:
     """Return a displacement measure."""
-    op = code[0]
+    op = code[OP]
     if op == OFFSET or op == DISTANCE:
-        r = sub(marker_point(scene, y, code[1]), marker_point(scene, y, code[2]))
-        return norm(r) if op == DISTANCE else dot(r, marker_axis(scene, code[3], code[4]))
+        r = sub(marker_point(scene, y, code[MARKER_I]), marker_point(scene, y, code[MARKER_J]))
+        if op == DISTANCE:
+            return norm(r)
+        return dot(r, marker_axis(scene, code[MARKER_K], code[AXIS_OF_K]))
     if op == ANGLE:
-        return followed_angle(scene, code[1])
+        return followed_angle(scene, code[ROW])
     return displacement(scene, y, code, AT_REST, 0)[0]
 
 
 @jitable
 def rate_value(scene: Scene, y: F1, code: I1) -> float:
     """Return a velocity, acceleration or force measure; most are velocities."""
-    if code[0] == VELOCITY:
-        v = relative_velocity(scene, y, code[1], code[2], code[4])
-        return dot(v, marker_axis(scene, code[3], code[5]))
+    if code[OP] == VELOCITY:
+        v = relative_velocity(scene, y, code[MARKER_I], code[MARKER_J], code[MARKER_L])
+        return dot(v, marker_axis(scene, code[MARKER_K], code[AXIS]))
     return rate_or_force(scene, y, code)
 
 
@@ -80,7 +96,7 @@ def evaluate_program(scene: Scene, t: float, y: F1, program: int) -> float:  # n
     top, x = 0, 0.0
     for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
         code = programs.quick[at]
-        op = code[0]
+        op = code[OP]
         # what is frequent stands in the chain
         if op == NUMBER:
             s[top] = x
@@ -134,14 +150,15 @@ def evaluate_program(scene: Scene, t: float, y: F1, program: int) -> float:  # n
             x = displacement_value(scene, y, code)
         elif op == SPLINE:
             top -= 1
-            x = spline_value(programs, code[1], code[2], code[3], s[top], x)
+            first, count, order = code[FIRST_CURVE], code[CURVES], code[ORDER]
+            x = spline_value(programs, first, count, order, s[top], x)
         elif op == USER:
             s[top] = x
             top += 1
-            x = user_result(scene, t, y, code[1], code[2], code[3])
+            x = user_result(scene, t, y, code[ROW], code[RESULT], code[CALLS])
         elif op < FIRST_MEASURE:
             s[top] = x
-            top = apply_value(op, code[1], s, top + 1) - 1
+            top = apply_value(op, code[COUNT], s, top + 1) - 1
             x = s[top]
         else:
             s[top] = x

@@ -30,6 +30,7 @@ from mbsim.arrays.codes import (
     EVENT_TIME,
     LINE_FORCE,
     LOST_POWER,
+    OF_DAMPERS,
     RESIDUAL,
     SLIDER,
     SLIDER_BEFORE,
@@ -38,6 +39,7 @@ from mbsim.arrays.codes import (
     SLIP,
     STICK,
     STORED_ENERGY,
+    USED_EVENTS,
     VECTOR_FORCE,
     WITHIN,
     WRENCH,
@@ -201,8 +203,8 @@ def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:
         if code != 0:
             return code
         lost += work.applied[f, LOST_POWER]
-    if scene.world.accumulators[1] >= 0:
-        dy[scene.world.accumulators[1]] = lost
+    if scene.world.accumulators[OF_DAMPERS] >= 0:
+        dy[scene.world.accumulators[OF_DAMPERS]] = lost
     return 0
 
 
@@ -210,11 +212,11 @@ def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:
 def record_mode(scene: Scene, t: float, kind: int, f: int) -> None:
     """Append an event of force f that slides or sticks; it has no slot."""
     rows = scene.rows
-    k = rows.used[2]
+    k = rows.used[USED_EVENTS]
     if k < len(rows.events):
         rows.events[k, EVENT_TIME], rows.events[k, EVENT_KIND] = t, kind
         rows.events[k, EVENT_ELEMENT], rows.events[k, EVENT_SLOT] = scene.applied.id[f], -1.0
-        rows.used[2] = k + 1
+        rows.used[USED_EVENTS] = k + 1
 
 
 @jitable
@@ -239,8 +241,8 @@ def commit_kept(scene: Scene, t: float, y: F1) -> int:
         ask_formula(scene, f, Asked.COMMIT, x, rate, kept[SLIDER], before)
         kept[SLIDER_BEFORE], kept[SLIDES_BEFORE] = kept[SLIDER], before
         kept[SLIDER], kept[SLIDES] = new[0], new[1]
-        if scene.world.accumulators[1] >= 0:
-            y[scene.world.accumulators[1]] += new[2]
+        if scene.world.accumulators[OF_DAMPERS] >= 0:
+            y[scene.world.accumulators[OF_DAMPERS]] += new[2]
         if kept[SLIDES] != before:
             record_mode(scene, t, STICK if kept[SLIDES] == 0.0 else SLIP, f)
     return 0

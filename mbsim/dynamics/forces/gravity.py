@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.arrays.codes import OF_DAMPERS
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -23,5 +24,5 @@ def add_weight(scene: Scene, t: float, y: F1, dy: F1) -> int:
         for b in range(len(bodies.mass)):
             work.force[b, k] += bodies.mass[b] * g
             lost -= bodies.mass[b] * g * work.v[b, k]
-    dy[scene.world.accumulators[1]] += lost
+    dy[scene.world.accumulators[OF_DAMPERS]] += lost
     return 0

@@ -29,8 +29,11 @@ from mbsim.arrays.codes import (
     BALL_FRICTION,
     FRICTION_CALLS,
     LOST_POWER,
+    OF_DAMPERS,
     SLIDE_FRICTION,
     TURN_FRICTION,
+    WRENCH_FORCE,
+    WRENCH_TORQUE,
 )
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -43,7 +46,7 @@ from mbsim.dynamics.constraints.equations import restick
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.reactions import fill_stresses, sum_reactions, take_stresses
 from mbsim.dynamics.forces.applied import push
-from mbsim.laws.abi import NFORCE_IN, TIME_IN, XDOT_IN
+from mbsim.laws.abi import FORCE_X_OUT, NFORCE_IN, TIME_IN, XDOT_IN
 
 # columns of `Work.joint_friction`: wrench on I of a unit force (force 3, torque 3), then
 SPEED, FORCE, MISS = 6, 7, 8
@@ -117,7 +120,7 @@ def ask_law(scene: Scene, t: float, f: int) -> float:
     scene.log.counters[FRICTION_CALLS] += 1
     if call_int(applied.law[f], (applied.id[f], given, applied.law_par[f], out)) != 0:
         return math.nan
-    return out[0]
+    return out[FORCE_X_OUT]
 
 
 @jitable
@@ -125,8 +128,8 @@ def add_force(scene: Scene, f: int, size: float) -> None:
     """Add a force along the slip to what friction f does to both bodies."""
     applied, row = scene.applied, scene.work.joint_friction[f]
     row[FORCE] += size
-    force = scale(size, (row[0], row[1], row[2]))
-    torque = scale(size, (row[3], row[4], row[5]))
+    force = scale(size, vector(row[WRENCH_FORCE:]))
+    torque = scale(size, vector(row[WRENCH_TORQUE:]))
     push(scene, applied.i[f], force, torque)
     push(scene, applied.j[f], scale(-1.0, force), scale(-1.0, torque))
 
@@ -204,5 +207,5 @@ def add_friction(scene: Scene, t: float, y: F1, dy: F1) -> int:
             work.applied[f, k] = force * work.joint_friction[f, k]
         work.applied[f, LOST_POWER] = -force * work.joint_friction[f, SPEED]
         lost += work.applied[f, LOST_POWER]
-    dy[scene.world.accumulators[1]] += lost
+    dy[scene.world.accumulators[OF_DAMPERS]] += lost
     return 0

@@ -23,10 +23,13 @@ from mbsim.arrays.codes import (
     COMPONENT,
     JOINT_FRICTION,
     LOST_POWER,
+    OF_DAMPERS,
     PROGRAM,
     ROW_OF,
     SCALAR,
     SCALE_LENGTH,
+    WRENCH_FORCE,
+    WRENCH_TORQUE,
 )
 from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import Scene
@@ -78,8 +81,8 @@ def fill_direction(scene: Scene, y: F1, f: int) -> None:
 def push_scalar(scene: Scene, f: int, size: float) -> None:
     """Add `size` of scalar force f to its bodies."""
     applied, row = scene.applied, scene.work.joint_friction[f]
-    force = scale(size, (row[0], row[1], row[2]))
-    torque = scale(size, (row[3], row[4], row[5]))
+    force = scale(size, vector(row[WRENCH_FORCE:]))
+    torque = scale(size, vector(row[WRENCH_TORQUE:]))
     push(scene, applied.i[f], force, torque)
     if applied.alone[f] == 0:
         push(scene, applied.j[f], scale(-1.0, force), scale(-1.0, torque))
@@ -308,6 +311,6 @@ def add_reaction_forces(scene: Scene, t: float, y: F1, dy: F1) -> int:
         power = lost_power(scene, y, u)
         work.applied[by_reactions[u, ROW_OF], LOST_POWER] += power
         lost += power
-    dy[scene.world.accumulators[1]] += lost
+    dy[scene.world.accumulators[OF_DAMPERS]] += lost
     # bodies that no joint holds may be pushed too
     return 0 if math.isfinite(accelerate(scene, y, dy)) else Code.NOT_FINITE

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mbsim.arrays.codes import JET_SLOPE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
-from mbsim.compile_model.instructions import USER
+from mbsim.compile_model.instructions import OP, RESULT, ROW, USER
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
@@ -65,9 +65,9 @@ def value_anew(scene: Scene, t: float, y: F1, program: int) -> float:
     programs = scene.programs
     for at in range(programs.quick_start[program], programs.quick_start[program + 1]):
         code = programs.quick[at]
-        if code[0] == USER and code[2] > 0:
+        if code[OP] == USER and code[RESULT] > 0:
             # which only reads what a call for the first result has left
-            user_result(scene, t, y, code[1], 0, 0)
+            user_result(scene, t, y, code[ROW], 0, 0)
     return value(scene, t, y, program)
 
 

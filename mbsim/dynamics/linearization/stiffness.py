@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mbsim.arrays.codes import WRENCH_FORCE, WRENCH_TORQUE
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2, F3, V3
 from mbsim.core.jitable import jitable
@@ -150,7 +151,7 @@ def add_geometry(scene: Scene, T: Tangent, y: F1, f: int, axes: int, at_j: int) 
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
     row = scene.work.applied[f]
-    force, torque = vector(row), (row[3], row[4], row[5])
+    force, torque = vector(row[WRENCH_FORCE:]), vector(row[WRENCH_TORQUE:])
     p = marker_point(scene, y, i)
     q, follows = (marker_point(scene, y, j), bj) if at_j == 1 else (p, bi)
     add_lever(scene, T, y, bi, bi, p, force, 1.0)

@@ -23,12 +23,16 @@ import math
 
 from mbsim.arrays.codes import (
     ANEW,
+    ANGULAR,
     AUDIT_EVERY,
     AUDIT_TOL,
     AUDIT_UNTIL,
+    CHANGE,
+    CHANGED_AT,
     CLOSED_AT,
     CONE,
     CONTACT_THEN,
+    DISSIPATED,
     DISSIPATED_FIRST,
     DRIVES,
     DRIVES_LIMIT,
@@ -45,11 +49,16 @@ from mbsim.arrays.codes import (
     FOUND_TIME,
     FOUND_VALUE,
     HITS_THEN,
+    KINETIC,
+    LARGEST_CHANGE,
     LARGEST_ENERGY,
+    LARGEST_FRICTION,
+    LINEAR,
     LOST_POWER,
     MOMENTUM,
     OPEN_BY,
     POSITION,
+    POTENTIAL,
     POTENTIAL_FIRST,
     SPIN,
     STEPS_ALL,
@@ -57,10 +66,12 @@ from mbsim.arrays.codes import (
     STICKING_SLIP,
     TIME_THEN,
     TOUCHED_NOW,
+    TOUCHED_THEN,
     USUAL_ENERGY,
     VELOCITY,
     WORK_FIRST,
     WORK_NOW,
+    WORK_OF_MOTIONS,
     WORK_THEN,
     WORST_OPEN,
     WORST_TIME,
@@ -141,28 +152,36 @@ def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) ->
     """Compare the energy with what it was; `local` is the sum of local errors of those steps."""
     audit, tally, energy = scene.audit, scene.audit.tally, scene.audit.energy
     fill_energy(scene, y, energy)
-    total = energy[0] + energy[1] + energy[2] - energy[3]
+    total = energy[KINETIC] + energy[POTENTIAL] + energy[DISSIPATED] - energy[WORK_OF_MOTIONS]
     none = contact = len(scene.contacts.id)
     if scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
         contact = answer_of(scene, call_int(contacts, (scene, Contacts.HARDEST, t, 0.0, y, y)))
     if tally[ANEW] == 1.0:
         tally[CLOSED_AT] = total - tally[OPEN_BY]
-        tally[POTENTIAL_FIRST], tally[DISSIPATED_FIRST] = energy[1], energy[2]
-        tally[WORK_FIRST] = energy[3]
+        tally[POTENTIAL_FIRST], tally[DISSIPATED_FIRST] = energy[POTENTIAL], energy[DISSIPATED]
+        tally[WORK_FIRST] = energy[WORK_OF_MOTIONS]
         tally[CONTACT_THEN] = contact
         return
     tally[LARGEST_ENERGY] = max(
-        max(tally[LARGEST_ENERGY], energy[0]),
+        max(tally[LARGEST_ENERGY], energy[KINETIC]),
         max(
-            abs(energy[1] - tally[POTENTIAL_FIRST]),
-            max(abs(energy[2] - tally[DISSIPATED_FIRST]), abs(energy[3] - tally[WORK_FIRST])),
+            abs(energy[POTENTIAL] - tally[POTENTIAL_FIRST]),
+            max(
+                abs(energy[DISSIPATED] - tally[DISSIPATED_FIRST]),
+                abs(energy[WORK_OF_MOTIONS] - tally[WORK_FIRST]),
+            ),
         ),
     )
     open_by = total - tally[CLOSED_AT]
     change = open_by - tally[OPEN_BY]
     size = max(tally[LARGEST_ENERGY], tally[USUAL_ENERGY])
-    rounding = ROUNDING * (energy[0] + abs(energy[1]) + abs(energy[2]) + abs(energy[3]))
+    rounding = ROUNDING * (
+        energy[KINETIC]
+        + abs(energy[POTENTIAL])
+        + abs(energy[DISSIPATED])
+        + abs(energy[WORK_OF_MOTIONS])
+    )
     # a contact that ended since counts still
     who = contact if contact < none else int(tally[CONTACT_THEN])
     tol = audit.plan[AUDIT_TOL]
@@ -171,9 +190,9 @@ def examine_energy(scene: Scene, t: float, y: F1, steps: float, local: float) ->
     rounding *= math.sqrt(tally[STEPS_ALL])
     note(scene, ENERGY, abs(open_by), size * errors + rounding, t, who)
     row = audit.contact[who]
-    row[0] += change
-    if abs(change) > abs(row[1]):
-        row[1], row[2] = change, t
+    row[CHANGE] += change
+    if abs(change) > abs(row[LARGEST_CHANGE]):
+        row[LARGEST_CHANGE], row[CHANGED_AT] = change, t
     if abs(open_by) > abs(tally[WORST_OPEN]):
         tally[WORST_OPEN], tally[WORST_TIME] = open_by, t
     tally[OPEN_BY], tally[CONTACT_THEN] = open_by, contact
@@ -240,17 +259,17 @@ def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) 
             vector(row[TURN : TURN + 3]),
             scale(1.0 / m, cross(vector(row[SHIFT : SHIFT + 3]), flow)),
         )
-        if then[6] == 0.0 and touched == 0.0 and audit.tally[ANEW] == 0.0:
-            missed = sub(sub(P, vector(then[0:3])), scale(m * dt, gravity))
+        if then[TOUCHED_THEN] == 0.0 and touched == 0.0 and audit.tally[ANEW] == 0.0:
+            missed = sub(sub(P, vector(then[LINEAR:ANGULAR])), scale(m * dt, gravity))
             size = m * norm(v) + row[SPEEDS]
             allowed = errors * (size + m * speed) + ROUNDING * (size + m * dt * norm(gravity))
             note(scene, MOMENTUM, norm(missed), allowed, t, audit.first[g])
-            turned = norm(sub(L, vector(then[3:6])))
+            turned = norm(sub(L, vector(then[ANGULAR:TOUCHED_THEN])))
             size = row[SPINS] + m * length * speed
             note(scene, SPIN, turned, errors * size + ROUNDING * size, t, audit.first[g])
         for k in range(3):
-            then[k], then[3 + k] = P[k], L[k]
-        then[6] = touched
+            then[LINEAR + k], then[ANGULAR + k] = P[k], L[k]
+        then[TOUCHED_THEN] = touched
 
 
 @jitable
@@ -308,9 +327,9 @@ def examine_friction(scene: Scene, t: float) -> None:
         tangential = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
         row = audit.contact[c]
-        row[3] = max(row[3], most)
+        row[LARGEST_FRICTION] = max(row[LARGEST_FRICTION], most)
         if tangential > most + CONE_ROUNDING * abs(normal):
-            beyond = (tangential - most) / max(row[3], tangential)
+            beyond = (tangential - most) / max(row[LARGEST_FRICTION], tangential)
             note(scene, CONE, beyond, audit.plan[AUDIT_TOL], t, c)
 
 

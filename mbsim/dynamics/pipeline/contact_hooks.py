@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import AT_FAULT
+from mbsim.arrays.codes import AT_FAULT, USED_ROWS
 from mbsim.arrays.hooks import Contacts, Effects, FclPoints, Gauges, Recall, Stability, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
@@ -74,7 +74,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     elif what == Contacts.ENERGY:
         add_stored(scene, y, vector_at(b, scene.rows.energy.shape[1]))
     elif what == Contacts.ROW:
-        fill_contacts(scene, y, scene.rows.contact[scene.rows.used[0]])
+        fill_contacts(scene, y, scene.rows.contact[scene.rows.used[USED_ROWS]])
     elif what == Contacts.TOUCHED:
         mark_touched(scene)
     else:

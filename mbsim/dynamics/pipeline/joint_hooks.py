@@ -7,7 +7,16 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import DRIFT, DRIFTER, FOLD_AT, FOLD_BEGINS, FOLD_OFF, FOLD_POWER, NEAR_FOLD
+from mbsim.arrays.codes import (
+    DRIFT,
+    DRIFTER,
+    FOLD_AT,
+    FOLD_BEGINS,
+    FOLD_OFF,
+    FOLD_POWER,
+    NEAR_FOLD,
+    OF_MOTIONS,
+)
 from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -46,7 +55,7 @@ def constrain(scene: Scene, t: float, y: F1, dy: F1) -> int:
             return code
     show_sticking(scene)
     total = write_accelerations(scene, dy)
-    accumulators = scene.world.accumulators[0]
+    accumulators = scene.world.accumulators[OF_MOTIONS]
     if accumulators >= 0:
         passing = passes_fold(scene, t)
         power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene)

@@ -7,6 +7,7 @@ import math
 from mbsim.arrays.codes import (
     ACTIVE,
     CONTACT_COLUMNS,
+    DISSIPATED,
     DRIFT,
     INC_COUPLE,
     INC_DEPTH,
@@ -25,9 +26,17 @@ from mbsim.arrays.codes import (
     INC_TOUCHES,
     INC_WEIGHT,
     INC_X,
+    KINETIC,
     NOISE_FORCE,
     NOISE_TORQUE,
+    OF_DAMPERS,
+    OF_MOTIONS,
+    POTENTIAL,
     STORED_ENERGY,
+    USED_EVENTS,
+    USED_INCIDENTS,
+    USED_ROWS,
+    WORK_OF_MOTIONS,
     WORST_BODY,
     X_BY_X,
     X_BY_Y,
@@ -91,18 +100,19 @@ def fill_energy(scene: Scene, y: F1, row: F1) -> None:
         w = (y[at + 10], y[at + 11], y[at + 12])
         kinetic += 0.5 * (bodies.mass[b] * dot(v, v) + dot(w, rotate(bodies.inertia[b], w)))
         potential -= bodies.mass[b] * dot(vector(scene.world.gravity), position(scene, y, b))
-    row[0], row[1], row[2] = kinetic, potential, dissipated
+    row[KINETIC], row[POTENTIAL], row[DISSIPATED] = kinetic, potential, dissipated
     if scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
         answer_of(scene, call_int(contacts, (scene, Contacts.ENERGY, 0.0, 0.0, y, row)))
-        potential, dissipated = row[1], row[2]
+        potential, dissipated = row[POTENTIAL], row[DISSIPATED]
     for f in range(len(scene.applied.form)):
         potential += scene.work.applied[f, STORED_ENERGY]
-    work, damped = scene.world.accumulators[0], scene.world.accumulators[1]
+    accumulators = scene.world.accumulators
+    work, damped = accumulators[OF_MOTIONS], accumulators[OF_DAMPERS]
     if damped >= 0:
         dissipated += y[damped]
-    row[1], row[2] = potential, dissipated
-    row[3] = y[work] if work >= 0 else 0.0
+    row[POTENTIAL], row[DISSIPATED] = potential, dissipated
+    row[WORK_OF_MOTIONS] = y[work] if work >= 0 else 0.0
 
 
 @jitable
@@ -110,10 +120,11 @@ def add_stored(scene: Scene, y: F1, row: F1) -> None:
     """Add what contacts have stored and lost to a row of energies."""
     hit = scene.work.hit
     for k in range(hit[len(hit) - 1]):
-        row[1] += scene.work.slot[hit[k], STORED] + scene.work.slot[hit[k], FRICTION_STORED]
-        row[2] -= scene.work.slot[hit[k], FRICTION_STORED]
+        slot = scene.work.slot[hit[k]]
+        row[POTENTIAL] += slot[STORED] + slot[FRICTION_STORED]
+        row[DISSIPATED] -= slot[FRICTION_STORED]
     for c in range(len(scene.contacts.id)):
-        row[2] += y[len(y) - len(scene.contacts.id) + c]
+        row[DISSIPATED] += y[len(y) - len(scene.contacts.id) + c]
 
 
 @jitable
@@ -143,7 +154,7 @@ def fill_contacts(scene: Scene, y: F1, row: F1) -> None:
 def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
     rows, work, state = scene.rows, scene.work, scene.state
-    first = rows.used[1]
+    first = rows.used[USED_INCIDENTS]
     k = first
     for touching in range(work.hit[len(work.hit) - 1]):
         s = work.hit[touching]
@@ -181,7 +192,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
             for j in range(2):
                 row[INC_STICKING + j] = work.sticking_force[s, j]
         k += 1
-    rows.used[1] = k
+    rows.used[USED_INCIDENTS] = k
     return k - first
 
 
@@ -189,7 +200,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
 def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
     """Append the row of (t, y), y' = f evaluated with `h`; return whether the table is full."""
     rows, work = scene.rows, scene.work
-    k = rows.used[0]
+    k = rows.used[USED_ROWS]
     rows.time[k] = t
     for j in range(len(y)):
         rows.y[k, j] = y[j]
@@ -217,7 +228,7 @@ def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
         answer = call_int(contacts, (scene, Contacts.INCIDENTS, t, h, y, y))
         incidents = answer_of(scene, answer)
     rows.incident_count[k] = incidents
-    rows.used[0] = k + 1
+    rows.used[USED_ROWS] = k + 1
     return k + 1 >= len(rows.time) or no_room(scene)
 
 
@@ -225,7 +236,9 @@ def write_row(scene: Scene, t: float, h: float, y: F1, f: F1) -> bool:
 def no_room(scene: Scene) -> bool:
     """Return whether another step or row could overflow the tables of events and incidents."""
     rows, pairs, slots = scene.rows, scene.pairs, 0
-    room = min(len(rows.events) - rows.used[2], len(rows.incidents) - rows.used[1])
+    room = min(
+        len(rows.events) - rows.used[USED_EVENTS], len(rows.incidents) - rows.used[USED_INCIDENTS]
+    )
     if room >= 2 * len(scene.slots.pair):
         return False
     for k in range(pairs.count[ACTIVE]):

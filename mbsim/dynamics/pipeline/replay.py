@@ -27,6 +27,7 @@ from mbsim.arrays.codes import (
     NOW,
     REPLAYED,
     SLOT_COLUMNS,
+    USED_INCIDENTS,
 )
 from mbsim.arrays.hooks import failure_or
 from mbsim.arrays.scene import Scene
@@ -81,7 +82,7 @@ def evaluate_replay(scene: Scene, t: float, y: F1, dy: F1, contacts: F1, table: 
     work, rows = scene.work, scene.rows
     place_bodies(scene, y)
     scene.world.past[0], scene.state.frozen[0] = REPLAYED, 1
-    count, code = rows.used[1], 0
+    count, code = rows.used[USED_INCIDENTS], 0
     work.hit[len(work.hit) - 1] = count
     for k in range(count):
         s = put_back(scene, rows.incidents[k])
@@ -107,7 +108,7 @@ def replay_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     n = scene.rows.y.shape[1]
     size = CONTACT_COLUMNS * len(scene.contacts.id)
     wide = len(scene.work.law_in) + len(scene.work.law_out) + SLOT_COLUMNS
-    count = scene.rows.used[1]
+    count = scene.rows.used[USED_INCIDENTS]
     room = vector_at(b, n + size + count * wide)
     table = room[n + size :].reshape(count, wide)
     found = evaluate_replay(scene, t, vector_at(a, n), room[:n], room[n : n + size], table)

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import (
+    HELD_AXIS,
+    HELD_NORMAL,
+    HELD_POINT,
+    NORMAL_RATE,
+    POINT_RATE,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -14,6 +22,7 @@ from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.contact.forces import contact_of, sides
 from mbsim.dynamics.contact.frames import tangent
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
+from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
 #: speed goes its length: truncation and rounding are about as large.
@@ -94,12 +103,12 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 
 @jitable
 def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
-    """Fill the row of `Work.hold` of slot s, whose pair has been looked at."""
+    """Fill the row of `Work.sticking_point` of slot s, whose pair has been looked at."""
     points, row = scene.work.look, scene.work.sticking_point[s]
     k = s - scene.pairs.slot[scene.slots.pair[s]]
     now, later, before = points[0, k], points[1, k], points[2, k]
-    ahead = sub(vector(later[1:4]), vector(now[1:4]))
-    back = sub(vector(now[1:4]), vector(before[1:4]))
+    ahead = sub(vector(later[AT_POINT:]), vector(now[AT_POINT:]))
+    back = sub(vector(now[AT_POINT:]), vector(before[AT_POINT:]))
     jump, path = norm(sub(ahead, back)), norm(add(ahead, back))
     first, last, time = 2, 1, 2.0 * moment
     if jump > 0.1 * path + SMOOTH * scene.world.scale[SCALE_LENGTH]:
@@ -108,14 +117,22 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
             first, time = 0, moment
         else:
             last, time = 0, moment
-    n = vector(now[4:7])
+    n = vector(now[AT_NORMAL:])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
     for i in range(3):
-        row[i], row[3 + i], row[6 + i] = now[1 + i], n[i], x[i]
-        row[9 + i] = (points[last, k, 1 + i] - points[first, k, 1 + i]) / time
-        row[12 + i] = (points[last, k, 4 + i] - points[first, k, 4 + i]) / time
+        row[HELD_POINT + i], row[HELD_NORMAL + i], row[HELD_AXIS + i] = (
+            now[AT_POINT + i],
+            n[i],
+            x[i],
+        )
+        row[POINT_RATE + i] = (
+            points[last, k, AT_POINT + i] - points[first, k, AT_POINT + i]
+        ) / time
+        row[NORMAL_RATE + i] = (
+            points[last, k, AT_NORMAL + i] - points[first, k, AT_NORMAL + i]
+        ) / time
 
 
 @jitable
