@@ -290,8 +290,8 @@ def add_contact_slopes(  # noqa: C901
     normal, region = L.basis, face_weight_of(scene, s) > 0.0
     if region:
         slope = by_depth / weight
-        given = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
-        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
+        asked = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
+        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], asked)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
@@ -351,8 +351,8 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        given = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
-        call_float(scene.world.hooks[Hook.FACE_SLOPES], given)
+        asked = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], asked)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]
