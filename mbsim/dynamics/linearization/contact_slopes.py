@@ -310,12 +310,12 @@ def add_contact_slopes(  # noqa: C901
     # depth and its rate are -n . of displacement and velocity
     normal, region = L.basis, stands_for_points(scene, s)
     if face_weight_of(scene, s) > 0.0 and not region:
-        tilt = (scene, FaceSlopes.TILTING, s, 0.0, 0.0, y)
-        call_float(scene.world.hooks[Hook.FACE_SLOPES], tilt)
+        asked = (scene, FaceSlopes.TILTING, s, 0.0, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], asked)
     if region:
         slope = by_depth / weight
-        pressed = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
-        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], pressed)
+        asked = (scene, FaceSlopes.STIFFNESS, s, work.slot[s, NORMAL] / weight, slope, y)
+        by_depth = call_float(scene.world.hooks[Hook.FACE_SLOPES], asked)
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
@@ -375,8 +375,8 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])
             add_two_sided(P, L.D, nb, i, j, -by_normal * by_rate, u, L.basis[:, ALONG_N])
     if region:
-        moved = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
-        call_float(scene.world.hooks[Hook.FACE_SLOPES], moved)
+        asked = (scene, FaceSlopes.CENTRE, s, by_rate, 0.0, y)
+        call_float(scene.world.hooks[Hook.FACE_SLOPES], asked)
     if scene.world.hooks[Hook.MEMORY] != 0 and (scene.slots.x[s] >= 0 or scene.slots.z[s] >= 0):
         K = T.keeps
         count = K.held[len(K.held) - 1]
