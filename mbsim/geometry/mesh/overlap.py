@@ -113,9 +113,7 @@ def corners_of(prism: F1) -> tuple[V3, V3, V3]:
 
 
 @jitable
-def measure_pair_of(
-    a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2
-) -> bool:
+def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2) -> bool:
     """Fill the node of triangles a of I and b of J; return whether there is any piece.
 
     `values` are the largest psi on the edges of a and of b.
@@ -147,9 +145,7 @@ def grown(table: F2, count: int) -> F2:
 
 
 @jitable
-def nodes_of(
-    mesh_i: F1, mesh_j: F1, pose: F1, origin: V3
-) -> tuple[int, F2, F2, F2]:
+def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2, F2]:
     """Return how many pairs of triangles overlap, their nodes, psi on their edges, the pairs.
 
     Sums are in J's axes, from `origin`.
@@ -157,7 +153,11 @@ def nodes_of(
     count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
     pairs = np.empty((64, 2))
     work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
-    placed_i, placed_j, other = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM)), np.empty(EDGES)
+    placed_i, placed_j, other = (
+        np.empty((LEAF + 1, PRISM)),
+        np.empty((LEAF + 1, PRISM)),
+        np.empty(EDGES),
+    )
     waiting = np.empty((4 * WAITING, 3), np.int64)
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 1, 1, I_IN_J | J_IN_I
     many = 1
