@@ -24,7 +24,7 @@ CREASE = 30.0
 #: Triangles stand off the curved surface by at most this part of the mesh's size ...
 SAGITTA = 4e-6
 #: ... unless they would be more than this.
-MOST_TRIANGLES = 350_000
+MOST_TRIANGLES = 420_000
 #: A curve that leaves its chord by less than this part of its length is straight.
 STRAIGHT = 1e-6
 
