@@ -36,7 +36,7 @@ def _units(a: Array) -> Array:
 
 
 def _edges(faces: Faces) -> tuple[Faces, Faces, Faces]:
-    """Return unique edges (e, 2) low vertex first, the edge of each side (m, 3), and the sides (e, 2).
+    """Return unique edges (e, 2) low vertex first, the edge of each side (m, 3), sides (e, 2).
 
     Side 3 f + k of face f goes from its corner k to the next; the first of an edge goes up.
     """

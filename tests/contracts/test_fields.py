@@ -7,9 +7,9 @@ import ctypes
 import numpy as np
 import pytest
 import trimesh
+
 from helpers.fields import Shape, box_planes, potential, sliced, slopes, wrench
 from helpers.pairs import frame, random_rotation, turned
-
 from mbsim.compile_model.contacts import pair_address
 from mbsim.geometry.catalog import PAIRS, POINT
 

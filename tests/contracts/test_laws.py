@@ -33,8 +33,8 @@ NORMAL_CASES = {
         f"VOLUME {e}": (
             "VOLUME",
             {
-                **{"i_elastic_modulus": 1e7, "i_poisson_ratio": 0.3, "i_layer_depth": 0.01},
-                **{"j_elastic_modulus": 2e7, "j_poisson_ratio": 0.2, "j_layer_depth": 0.02},
+                **{"i_elastic_modulus": 1e3, "i_poisson_ratio": 0.3, "i_layer_depth": 0.01},
+                **{"j_elastic_modulus": 2e3, "j_poisson_ratio": 0.2, "j_layer_depth": 0.02},
                 "exponent": e,
             },
         )

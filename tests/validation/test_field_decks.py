@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from helpers.decks import GRAVITY, GROUND, run_deck, write_deck
 
 import mbsim
+from helpers.decks import GRAVITY, GROUND, run_deck, write_deck
 from mbsim.errors import DeckError
 
 FIELD = (
