@@ -23,6 +23,7 @@ _FLAT = {"BOX", "PLANE"}
 FCL_SLOTS = 8
 #: Shapes with round sides that are flat at their ends.
 _ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
+_ROUND = {"CYLINDER", "FRUSTUM", "ELLIPSOID"}
 #: Points on which a round end rests in a closed form, and a face of a box on one.
 _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 #: Contacts with more pairs than this are large contacts. Every pair listed for good costs some 5 ns
@@ -54,6 +55,11 @@ class Kind:
     def has_area(self) -> bool:
         """Whether its incidents have an area."""
         return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
+
+    @property
+    def moves(self) -> bool:
+        """Whether its rows are no parts of a shape: incidents keep their slots by their places."""
+        return bool({"SURFACE", "FIELD"} & set(self.closed_form.split("-")))
 
     @property
     def step(self) -> int:
@@ -147,8 +153,13 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
 
 
 def _patches(contact: int, i: Graphic, j: Graphic, named: dict[str, str]) -> Kind | None:
-    """Return the pair of surfaces, `named` so; None without a mesh (unless of fields)."""
-    if named is AS_SURFACE and "MESH" not in (i.shape, j.shape):
+    """Return the pair of surfaces, `named` so, for graphics of which one is a mesh, else None.
+
+    A convex mesh on a round solid is none: `geometry.hull_overlap` knows their exact distance.
+    Of fields none needs to be a mesh.
+    """
+    shapes = {i.shape, j.shape}
+    if named is AS_SURFACE and ("MESH" not in shapes or (shapes & _ROUND and _convex(i, j))):
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{named.get(a.shape, a.shape)}-{named.get(b.shape, b.shape)}"

@@ -89,3 +89,55 @@ def wrench(points, step=1, about=(0.0, 0.0, 0.0)):
 
 
 PLANE = (frame(np.zeros(3), np.eye(3)), np.zeros(4))
+
+
+def angle():
+    """Return an L of 20 triangles, 0.2 m along both legs, 0.1 m thick and high; its cg at 0."""
+    profile = 0.1 * np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    ring = [np.column_stack([profile, np.full(6, z)]) for z in (0.0, 0.1)]
+    k = np.arange(6)
+    m = (k + 1) % 6
+    end = np.array([[0, j, j + 1] for j in range(1, 5)])
+    faces = np.vstack(
+        [
+            np.column_stack([k, m, m + 6]),
+            np.column_stack([k, m + 6, k + 6]),
+            end + 6,
+            end[:, ::-1],
+        ]
+    )
+    return np.vstack(ring) - [0.25 / 3, 0.25 / 3, 0.05], faces
+
+
+def mesh_graphic(id, marker, vertices, faces):
+    """Return a TriaMesh with its triangles in the deck."""
+    nodes = " ".join(repr(float(x)) for x in np.ravel(vertices))
+    rows = " ".join(str(int(k)) for k in np.ravel(faces))
+    return (
+        f'<Post_Graphic id="{id}" type="TriaMesh" rm_id="{marker}">'
+        f"<Nodes>{nodes}</Nodes><Faces>{rows}</Faces></Post_Graphic>"
+    )
+
+
+GROUND = '<Post_Graphic id="100" type="Plane" rm_id="10"/>'
+
+
+def angle_on_ground(height, contact, ground=GROUND):
+    """Return the statements of an L of 1 kg above ground at z = 0."""
+    return f"""
+<Param_Unit force_unit="NEWTON" mass_unit="KILOGRAM" length_unit="METER" time_unit="SECOND"/>
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="11" body_id="1" pos_z="-0.1"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.004" inertia_yy="0.004" inertia_zz="0.006"/>
+<Reference_Marker id="20" body_id="2" pos_z="{height}"/>
+{ground}
+{mesh_graphic(200, 20, *angle())}
+<Force_Contact id="301" i_graphics_id="200" j_graphics_id="100" {contact}/>
+<Force_Gravity grav_z="-9.81"/>"""
+
+
+IMPACT = (
+    'cnf_type="IMPACT" stiffness="1e6" exponent="1.5" damping="1e3" dmax="1e-4" '
+    'cff_type="COULOMB_ON" mu_static="0.3" mu_dynamic="0.3" '
+    'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
+)

@@ -90,6 +90,40 @@ def box_gap(a: F1, b: F1, pose: F1) -> float:
 
 
 @jitable
+def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
+    """Return a lower bound of the distance of two meshes: the least one of boxes of leaves."""
+    waiting, far = np.empty((4 * WAITING, 2), np.int64), np.empty(4 * WAITING)
+    waiting[0, 0], waiting[0, 1], far[0], many = 1, 1, 0.0, 1
+    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
+    best = math.inf
+    while many > 0 and best > 0.0:
+        many -= 1
+        i, j = waiting[many, 0], waiting[many, 1]
+        if far[many] >= best:
+            continue
+        if i >= leaves_i and j >= leaves_j:
+            best = far[many]
+            continue
+        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
+        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
+        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
+        of_i = i < leaves_i and (larger or j >= leaves_j)
+        for k in range(2):
+            a, b = (2 * i + k, j) if of_i else (i, 2 * j + k)
+            box_a = mesh_i[int(mesh_i[AT_BOXES]) + NODE * a :]
+            box_b = mesh_j[int(mesh_j[AT_BOXES]) + NODE * b :]
+            waiting[many + k, 0], waiting[many + k, 1] = a, b
+            far[many + k] = box_gap(box_a, box_b, pose)
+        if far[many] < far[many + 1]:
+            # the nearer one is looked at first, so it is put on last
+            for c in range(2):
+                waiting[many, c], waiting[many + 1, c] = waiting[many + 1, c], waiting[many, c]
+            far[many], far[many + 1] = far[many + 1], far[many]
+        many += 2
+    return best
+
+
+@jitable
 def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F1) -> None:
     """Write corners, inner points, depths and order of a triangle in J's axes from `origin`."""
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
