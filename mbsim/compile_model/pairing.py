@@ -163,7 +163,7 @@ def _patches(contact: int, i: Graphic, j: Graphic, named: dict[str, str]) -> Kin
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{named.get(a.shape, a.shape)}-{named.get(b.shape, b.shape)}"
-        if name in PAIRS:
+        if name in PAIRS and set(name.split("-")) & set(named.values()):
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
     return None
 

@@ -20,6 +20,7 @@ from mbsim.reader.statement import Statement
 _NORMAL = "stiffness exponent damping dmax penalty restitution_coef ref_velocity normal_trans_vel"
 _FRICTION = "mu_static mu_dynamic stiction_trans_vel friction_trans_vel"
 _ELASTIC = "i_elastic_modulus j_elastic_modulus i_poisson_ratio j_poisson_ratio i_radius j_radius"
+_ELASTIC += " i_layer_depth j_layer_depth"
 #: Statement, the table of its elements, and what of them may change between simulations.
 CHANGEABLE = {
     **{

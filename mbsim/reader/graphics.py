@@ -14,7 +14,7 @@ from mbsim.model.hull import polyhedron_of
 from mbsim.model.mesh import merge_vertices
 from mbsim.model.mesh_file import load_mesh
 from mbsim.reader import units
-from mbsim.reader.keywords import ENDS_TYPES, fold, nearest
+from mbsim.reader.keywords import ENDS_TYPES, FACETS, fold, nearest
 from mbsim.reader.kinds import (
     FLAG,
     ID,
@@ -78,7 +78,7 @@ SHAPES = (
         ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)),
     ),
     Shape("Plane", "PLANE", ("rm_id", "center_marker_id"), (), _BOUNDS),
-    Shape("TriaMesh", "MESH", ("rm_id",), (), ("file", "length_unit")),
+    Shape("TriaMesh", "MESH", ("rm_id",), (), ("file", "length_unit", "facets", "crease_angle")),
 )
 _BY_TYPE = {fold(shape.type): shape for shape in SHAPES}
 
@@ -132,6 +132,12 @@ def _build_graphic(entry: Entry) -> None:
     vertices, faces, file = _mesh(entry) if shape.shape == "MESH" else (None, None, "")
 
     convex = None if vertices is None or faces is None else polyhedron_of(vertices, faces)
+    if entry.get("facets", "FLAT") == "FLAT" and entry.given("crease_angle"):
+        entry.note('has no effect without facets="SMOOTH"', "crease_angle")
+    elif vertices is not None and faces is not None and entry.get("facets", "FLAT") == "SMOOTH":
+        vertices, faces, curved = _smoothed(entry, vertices, faces)
+        # a polyhedron is known by its corners: what is curved is measured as patches
+        convex = None if curved else convex
 
     id = entry.get("id")
     if id in entry.draft.display_graphics:
@@ -183,6 +189,22 @@ def _marker_id(entry: Entry, shape: Shape) -> int:
     what = "missing" if not given else "give only one"
     entry.fault(f"{names}: {what}; type {shape.type} needs the id of its marker")
     return 0
+
+
+def _smoothed(
+    entry: Entry, vertices: el.Array, faces: npt.NDArray[np.int64]
+) -> tuple[el.Array, npt.NDArray[np.int64], bool]:
+    """Return a mesh with smooth facets, and whether any are curved."""
+    from mbsim.model.mesh import solid_fault
+    from mbsim.model.smooth_facets import CREASE, smooth
+
+    if solid_fault(vertices, faces):
+        return vertices, faces, False
+    finer, cut = smooth(vertices, faces, entry.get("crease_angle", CREASE))
+    if len(cut) == len(faces):
+        entry.note("no edge is smooth: all bend by more than crease_angle", "facets")
+        return vertices, faces, False
+    return finer, cut, True
 
 
 def _mesh(entry: Entry) -> tuple[el.Array | None, npt.NDArray[np.int64] | None, str]:
@@ -304,6 +326,8 @@ POST_GRAPHIC = Statement(
             "",
             "the file's own, else the deck's",
         ),
+        "facets": Spec(keyword(FACETS), "SMOOTH: rounded between sharp edges", "", "FLAT"),
+        "crease_angle": Spec(POSITIVE, "bend above which an edge is sharp", "deg", "30"),
     },
     _build_graphic,
     children=("Nodes", "Faces"),

@@ -56,6 +56,7 @@ _OTHER_WORDS = {
 CFF_TYPES = spellings(**(dict.fromkeys(FRICTION_LAWS, "") | _OTHER_WORDS))
 CFF_OF_JOINTS = {word: name for word, name in CFF_TYPES.items() if name.startswith("COULOMB")}
 MASTERS_NOT_BUILT = spellings(I="", J="", I_AND_J="")
+FACETS = spellings(FLAT="", SMOOTH="")
 ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")
 
 REQUEST_TYPES = spellings(**{name: type.spellings for name, type in TYPES.items()})

@@ -29,6 +29,17 @@ NORMAL_CASES = {
             **{"j_radius": math.inf, "restitution_coef": 0.8, "ref_velocity": 1.0, "damping": 0.0},
         },
     ),
+    **{
+        f"VOLUME {e}": (
+            "VOLUME",
+            {
+                **{"i_elastic_modulus": 1e3, "i_poisson_ratio": 0.3, "i_layer_depth": 0.01},
+                **{"j_elastic_modulus": 2e3, "j_poisson_ratio": 0.2, "j_layer_depth": 0.02},
+                "exponent": e,
+            },
+        )
+        for e in (1.0, 1.4)
+    },
     **{f"POISSON {e}": ("POISSON", {"restitution_coef": e}) for e in (0.0, 0.5, 1.0)},
     "POISSON wide": ("POISSON", {"restitution_coef": 0.2, "normal_trans_vel": 0.5}),
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from mbsim.model.surface import pack
@@ -44,7 +46,7 @@ def sliced(vertices, faces, height):
     z = vertices[:, 2]
     levels = np.unique(np.append(z[z < height], height))
     volume = potential = 0.0
-    for low, high in zip(levels[:-1], levels[1:], strict=True):
+    for low, high in itertools.pairwise(levels):
         for x, w in zip(*_GAUSS, strict=True):
             t = 0.5 * (low + high) + 0.5 * (high - low) * x
             area = _section(vertices[faces], t)

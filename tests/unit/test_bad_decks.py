@@ -289,10 +289,28 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         END_OF_COMMAND,
         ("Load_Command is not taken", "<Command>"),
     ),
-    "VOLUME": (
-        law('cnf_type="VOLUME" i_elastic_modulus="1e5"'),
+    "VOLUME without a layer": (
+        law('cnf_type="VOLUME" i_elastic_modulus="1e5" i_poisson_ratio="0.3"'),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "i_layer_depth: missing", "beside i_elastic_modulus"),
+    ),
+    "VOLUME without elastic sides": (
+        law('cnf_type="VOLUME" i_layer_depth="1"'),
+        CONTACT_LINE,
+        ("Force_Contact[301]", "i_elastic_modulus: missing", "the other is rigid"),
+    ),
+    "VOLUME that cannot yield": (
+        law('cnf_type="VOLUME" i_elastic_modulus="1e5" i_poisson_ratio="0.5" i_layer_depth="1"'),
         CONTACT_LINE + 1,
-        ("Force_Contact[301]", 'cnf_type="VOLUME"', "not built yet", "IMPACT, POISSON"),
+        ('i_poisson_ratio="0.5"', "must be < 0.5 with VOLUME"),
+    ),
+    "VOLUME by the largest depth": (
+        law(
+            'cnf_type="VOLUME" i_elastic_modulus="1e5" i_poisson_ratio="0.3" i_layer_depth="1" '
+            'contact_depth="LARGEST"'
+        ),
+        CONTACT_LINE + 1,
+        ('contact_depth="LARGEST"', "presses by the field of depth"),
     ),
     "incidents": (
         deck(('cff_type="C', 'contact_points="PATCH" cff_type="C')),

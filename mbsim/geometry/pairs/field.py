@@ -8,23 +8,20 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.core.arrays import F1, F2
-from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, dot, scale, sub, vector
-from mbsim.geometry.catalog import AT_DEPTH, AT_POINT, REGION_ROWS, axis, pair, put_point
+from mbsim.geometry.catalog import AT_DEPTH, AT_POINT, REGION_ROWS, axis, pair
 from mbsim.geometry.mesh.field import write_patches
-from mbsim.geometry.mesh.overlap import box_gap, common_middle, nodes_of, partners_of
+from mbsim.geometry.mesh.overlap import (
+    box_gap,
+    common_middle,
+    least_gap,
+    nodes_of,
+    partners_of,
+)
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
-from mbsim.geometry.pairs.surface import PATCH_SLOTS, pose_of, surface_of
+from mbsim.geometry.pairs.surface import PATCH_SLOTS, far_apart, pose_of, surface_of
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import AT_BOXES, NODE, TRIANGLES
-
-
-@jitable
-def put_apart(gap: float, points: F2) -> int:
-    """Fill the rows of shapes that are at least `gap` apart."""
-    for k in range(len(points)):
-        put_point(points[k], -gap, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    return len(points)
 
 
 @pair("FIELD", "PLANE", slots=PATCH_SLOTS, regroups=True, patches=True)
@@ -35,7 +32,7 @@ def field_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
     height = dot(sub(vector(frame_j), vector(frame_i)), up)
     low, corner = lowest_corner(mesh, n)
     if low >= height:
-        return put_apart(low - height, points)
+        return far_apart(low - height, frame_j, points)
     at = add(vector(frame_i), to_global(frame_i, corner))
     found = np.empty(int(mesh[TRIANGLES]), np.int64)
     count = triangles_below(mesh, n, height, found)
@@ -57,9 +54,11 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
     root_i, root_j = int(mesh_i[AT_BOXES]) + NODE, int(mesh_j[AT_BOXES]) + NODE
     gap = box_gap(mesh_i[root_i:], mesh_j[root_j:], pose)
     if gap > 0.0:
-        return put_apart(gap, points)
+        return far_apart(gap, frame_j, points)
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    if count == 0:
+        return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
     write_patches(nodes[:count], partners, frame_j, at, points)

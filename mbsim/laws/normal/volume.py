@@ -1,14 +1,15 @@
 """VOLUME: two elastic layers in series, pressed by the volume in which the shapes overlap.
 
-    F = (K/h) (V/A) A max(0, 1 + a d'),   that is F = (K/h) V on a rigid plane with exponent 1
+    F = (K/h) V max(0, 1 + a d')
     K = (1 - nu) E / ((1 + nu) (1 - 2 nu)),   1/(K/h) = h_i/K_i + h_j/K_j
 
 K is the modulus of a layer that is bonded to a rigid body and cannot widen, h its depth, so K/h is
-the stiffness of a unit of area; a side without a modulus is rigid. The depth d is that of
-the patch's field (`contact_depth="FIELD"`: 2 U/G, with the weight G/d, G = V on a plane), so that
-exponent 1 has the force (K/h) V and the energy (K/h) U. Another exponent e takes (K/h) h (d/h)^e,
-h = h_i + h_j of the elastic sides; its force is no exact slope of its energy where the patch's
-shape changes with the depth. `damping` is that of HUNT_CROSSLEY, a [T/L].
+the stiffness of a unit of area; a side without a modulus is rigid. V is the volume of the overlap
+with a plane; else it is |G|, the slope of the potential U of the patch's field
+(`contact_depth="FIELD"`, `geometry.mesh.field`). The stored energy is (K/h) U. The law is asked
+with the depth d = 2 U/|G| for a unit of the weight |G|/d. An exponent e other than 1 takes
+(K/h) h (d/h)^e, h = h_i + h_j of the elastic sides: no exact slope of its energy where the patch's
+shape changes with the depth. `damping` is a [T/L], as of HUNT_CROSSLEY.
 
 Source: K. L. Johnson, Contact Mechanics, Cambridge 1985, section 4.3 (elastic foundation), with
 the constrained modulus of its section 5.8.

@@ -35,6 +35,16 @@ _NORMAL: dict[str, dict[str, Any]] = {
         "restitution_coef": 0.5,
         "ref_velocity": 1.0,
     },
+    "VOLUME": {
+        "i_elastic_modulus": 1e6,
+        "i_poisson_ratio": 0.3,
+        "i_layer_depth": 0.5,
+        "j_elastic_modulus": None,
+        "j_poisson_ratio": None,
+        "j_layer_depth": None,
+        "exponent": 1.0,
+        "damping": 0.3,
+    },
     "POISSON": {"penalty": 1e5, "restitution_coef": 0.5, "normal_trans_vel": 1e-2},
 }
 #: Speeds at which a mass hits [m/s].
