@@ -136,8 +136,8 @@ class ChunkWriter:
 
     def _packed(self, whole: Table) -> bytes | None:
         """Return a chunk as HDF5's filters make it, None where that does not pay."""
-        bits = whole.reshape(-1).view("u8" if whole.itemsize % 8 == 0 else "u1")
-        bits = bits.reshape(len(whole), -1)
+        numbers = whole.reshape(-1).view("u8" if whole.itemsize % 8 == 0 else "u1")
+        bits = numbers.reshape(len(whole), -1)
         changed = np.count_nonzero(bits[1:] != bits[:-1])
         if not changed:
             row = bits[0].tobytes()
@@ -155,7 +155,7 @@ class ChunkWriter:
 def _deflated(whole: Table) -> bytes:
     """Return a chunk shuffled: first bytes of all numbers, then second ones; and deflated."""
     numbers = whole.reshape(-1).view("u1").reshape(-1, whole.itemsize)
-    return zlib.compress(np.ascontiguousarray(numbers.T), 1)
+    return zlib.compress(numbers.T.tobytes(), 1)
 
 
 def _holds(rows: Table) -> bool:

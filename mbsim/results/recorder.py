@@ -49,7 +49,7 @@ BUFFER_BYTES = 32 << 20
 FEWEST_ROWS = 16
 #: Memory that an output time takes while its rows are not there yet [bytes].
 TIME_BYTES = 32
-#: Time between two publications: at least this [s], and so many times what one costs.
+#: Time between two publications: at least this [s], and so many times what one takes.
 FLUSH_SECONDS = 5.0
 FLUSH_SHARE = 20.0
 #: The first comes sooner, so that a folder soon shows this run and not an earlier one.
@@ -108,6 +108,7 @@ class Recorder:
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
+        self._flush_seconds = 0.0  # what the last flush took
         self._target: Path | None = None
         self._saved: set[str] = set()  # tables of the checkpoint in the part file
         self._last: dict[str, Table] = {}  # those of the last published one
@@ -231,7 +232,7 @@ class Recorder:
 
     def due(self) -> bool:
         """Return whether it is time for a flush: they cost a twentieth of the run at most."""
-        pause = max(FLUSH_SECONDS, FLUSH_SHARE * self._store.publish_seconds)
+        pause = max(FLUSH_SECONDS, FLUSH_SHARE * self._flush_seconds)
         return self._target is not None and time.monotonic() - self._published_at > pause
 
     def flush(self, checkpoint: Mapping[str, Table]) -> None:
@@ -249,6 +250,7 @@ class Recorder:
         """
         if self._target is None:
             return
+        began = time.perf_counter()
         before = self._written, self._saved, self._started
         self._store.mark()
         self._put(self._gathered.block)
@@ -257,6 +259,7 @@ class Recorder:
         self._store.publish()
         self._written, self._saved, self._started = before
         self._published_at = time.monotonic()
+        self._flush_seconds = time.perf_counter() - began
 
     def _state(self, checkpoint: Mapping[str, Table]) -> dict[str, Table]:
         """Return all tables of a checkpoint made behind the last row written."""

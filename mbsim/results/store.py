@@ -7,7 +7,6 @@ atomically, so that a reader, or whoever looks after a kill, finds the last one 
 from __future__ import annotations
 
 import contextlib
-import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -49,7 +48,6 @@ class Store:
         self.target = target
         self.broken = False
         self.failure: ResultsError | None = None
-        self.publish_seconds = 0.0
         #: How many rows signals will have, and how many come at once; chunks are not longer.
         self.rows, self.rows_at_once = _FEW, CHUNK_ROWS
         self._growing = resume
@@ -248,7 +246,6 @@ class Store:
         """Put what is written in the target's place; does nothing in memory."""
         if self.broken or self._part is None:
             return
-        began = time.perf_counter()
         if self._before is None:
             self.mark()
         assert self._before is not None
@@ -260,7 +257,6 @@ class Store:
             self._growing, rests = self._before
             self._before = None
             self._open_again(rests)
-        self.publish_seconds = time.perf_counter() - began
 
     def _open_again(self, rests: dict[str, Table | None]) -> None:
         """Open the part file anew, with rows that wait for a whole chunk."""
