@@ -77,8 +77,10 @@ class ChunkWriter:
         self._type = dataset.dtype
         self._filtered = dataset.compression == "gzip" and dataset.shuffle
         self._length = len(dataset)
-        if rest is None and self._chunk is not None:
+        if self._chunk is not None:
+            # rows of a last chunk that is not whole are in the rest too
             self._length -= self._length % self._chunk[0]
+        if rest is None and self._chunk is not None:
             rest = dataset[self._length :]
             # another handle knows nothing of what this one has read
             del dataset

@@ -163,6 +163,11 @@ class Recorder:
                 self._saved, self._last = set(tables), dict(tables)
                 tables.pop(MADE_OF, None)
                 self._written = tables.pop(WRITTEN).tolist()
+                if len(results["time"]) < self._written[0]:
+                    raise ModelError(
+                        f"--resume: {self._target}: has fewer rows than its checkpoint was made "
+                        "behind; start without --resume"
+                    )
                 self.watch.restore(tables)
                 return tables
         except ResultsError as error:
@@ -417,6 +422,11 @@ class Recorder:
     def _fill(self, block: Block, columns: Mapping[str, Mapping[str, Any]]) -> NoReturn:
         """Publish the rows for which there is room, and raise; the last checkpoint stays."""
         said = "no space left on device"
+        if self._last and self._written[0] + len(block.time) < self._last[WRITTEN][0]:
+            # fewer than were published with the last checkpoint, which stay as they are
+            self._store.fail(
+                f"{said}; rows of the last flush are kept; with more room, --resume goes on"
+            )
         if len(block.time):
             self._store.update(dict(self._signals(block)), attributes=columns)
             said += f"; rows up to time {block.time[-1]:.9g} are kept"

@@ -218,6 +218,41 @@ def test_when_a_run_was_published_changes_no_byte(
         assert (len(found), found) == (len(straight), straight)
 
 
+def test_a_resumed_run_that_is_published_before_a_chunk_is_whole(tmp_path: Path) -> None:
+    first = Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path)
+    first.check_room(200)
+    add_rows(first.system, 0, 3)
+    first.take()
+    first.flush(checkpoint(3))
+    first.abandon()
+    again = Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
+    again.check_room(200)
+    for k in range(3, 51, 3):
+        add_rows(again.system, k, 3)
+        again.take()
+        if k % 2:
+            again._write()
+        again.flush(checkpoint(k + 3))
+        assert numbers(tmp_path) == list(range(k + 3))
+    close(again)
+    assert numbers(tmp_path) == list(range(51))
+
+
+def test_a_full_disk_keeps_no_fewer_rows_than_the_checkpoint_knows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = recording(tmp_path, 50)
+    recorder.flush(checkpoint(50))
+    with monkeypatch.context() as patch:
+        patch.setattr(PartFile, "room", lambda part: (1 << 18) + 4000)
+        with pytest.raises(ResultsError, match=r"no space left on device.*--resume goes on"):
+            close(recorder)
+    assert numbers(tmp_path) == list(range(50))
+    again = Recorder(fake_system(tmp_path / "deck"), SETTINGS, tmp_path, resume=True)
+    assert again.checkpoint["stage"] == 50
+    again.abandon()
+
+
 def test_files_with_a_dataset_a_body_stay_readable(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "old.h5", "w") as file:
         file.attrs.update(mbsim_version="0.1.0", status="finished")
