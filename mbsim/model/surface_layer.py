@@ -165,7 +165,8 @@ def inner_directions(vertices: Array, faces: Faces) -> tuple[Array, Array]:
     def solution(below: float) -> Array:
         good = values > below**2 * largest
         step = np.where(good, part / np.where(good, values, 1.0), 0.0)
-        return mean + np.einsum("vij,vj->vi", axes, step)
+        found: Array = mean + np.einsum("vij,vj->vi", axes, step)
+        return found
 
     exact, other = solution(EXACT), solution(INEXACT)
     worst = np.zeros(count)
