@@ -23,7 +23,7 @@ class Hook(IntEnum):
 
     CONTACTS = 0  # what contacts are asked for: `Contacts`
     FCL = 1  # distances of pairs without a closed form
-    SLOTS = 2  # which incident of a pair of patches is which
+    SLOTS = 2  # which incident of a pair is which, where rows are no parts of a shape
     TILTING = 3  # damping of what tilts on a flat face that is one incident
     RECALL = 4  # friction of contacts that keeps something: `Recall`
     VALUE = 5  # value of an expression

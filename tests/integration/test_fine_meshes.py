@@ -63,7 +63,8 @@ def test_a_body_rests_on_the_pole_of_a_fine_ball(tmp_path, shape):
       <Simulate analysis_type="Transient" end_time="0.4" print_interval="0.05"/>
     </Command></MotionSolve>""")
     results = mbsim.simulate(mbsim.read_model(deck))
-    assert results.stats["fcl_calls"] > 0
+    # under a sphere the nearest points of the triangles are known without FCL
+    assert (results.stats["fcl_calls"] > 0) == (shape == "Ellipsoid")
     depth = (MASS * WEIGHT / STIFFNESS) ** (2.0 / 3.0)
     height = results["bodies/2/position"][-1]
     # balanced on a point: what FCL's solver leaves of an ellipsoid's normal makes it roll off

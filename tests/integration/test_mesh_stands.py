@@ -22,9 +22,9 @@ def test_an_angle_stands(ground, method, tmp_path):
     run = run_deck(
         tmp_path, angle_on_ground(0.0501, IMPACT, ground), end_time=0.6, integrator=method
     )
-    assert run.statistics["fcl_calls"] == 0
-    assert abs(run.bodies.angular_velocity[-1]).max() < 1e-3
-    assert run.contacts.force[-1, 0, 2] == pytest.approx(9.81, rel=1e-3)
-    assert run.contacts.penetration[-1, 0] == pytest.approx(SAG, rel=0.02)
-    assert run.contacts.area[-1, 0] == pytest.approx(0.03, rel=1e-3)
-    assert run.contacts.incidents[-1, 0] == 1
+    assert run.stats["fcl_calls"] == 0
+    assert abs(run["bodies/2/angular_velocity"][-1]).max() < 1e-3
+    assert run["contacts/301/force"][-1, 2] == pytest.approx(9.81, rel=1e-3)
+    assert run["contacts/301/penetration"][-1] == pytest.approx(SAG, rel=0.02)
+    assert run["contacts/301/area"][-1] == pytest.approx(0.03, rel=1e-3)
+    assert run["contacts/301/incidents"][-1] == 1
