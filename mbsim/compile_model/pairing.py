@@ -193,8 +193,8 @@ def _kind_of(
 ) -> Kind:
     """Return how graphics like these two are tested in a contact; say what it cannot have."""
     if contact.contact_depth != "FIELD":
-        kind = _kind(contact.id, i, j, detector)
-        return _one_region(model, contact, i, j, kind, faults)
+        usual = _kind(contact.id, i, j, detector)
+        return _one_region(model, contact, i, j, usual, faults)
     kind = _patches(contact.id, i, j, AS_FIELD)
     if kind is not None and detector != "fcl":
         return kind

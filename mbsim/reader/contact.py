@@ -253,10 +253,7 @@ FORCE_CONTACT = Statement(
             keyword(spellings(POINTS="", REGION="")), "one point each, or one in all", "", "POINTS"
         ),
         "contact_depth": Spec(
-            keyword(spellings(LARGEST="", FIELD="")),
-            "of meshes: the largest, or of the field below their surfaces",
-            "",
-            "LARGEST; FIELD with VOLUME",
+            keyword(spellings(LARGEST="", FIELD="")), "which depth of meshes counts", "", "LARGEST"
         ),
         "cnf_type": Spec(keyword(CNF_TYPES), "normal force", required=True),
         "stiffness": Spec(NOT_NEGATIVE, "stiffness k, force = k depth^exponent", "F/L^e", "0"),

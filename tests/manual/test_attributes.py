@@ -29,6 +29,8 @@ DECK = """<MotionSolve><Model>
 <Post_Graphic id="1" type="Plane" rm_id="10"/>
 <Post_Graphic id="2" type="Sphere" center_marker_id="20" radius="0.1"/>
 <Post_Graphic id="3" type="Cylinder" center_marker_id="30" radius="0.1" length="1"/>
+<Post_Graphic id="4" type="TriaMesh" rm_id="30"><Nodes>0 0 0 1 0 0 0 1 0 0 0 1</Nodes>
+<Faces>0 2 1 0 1 3 0 3 2 1 2 3</Faces></Post_Graphic>
 {contacts}
 <Force_Gravity grav_x="1"/>
 <Param_Transient/>
@@ -149,7 +151,7 @@ _OF_USERS = ("usrsub", "script", "interpreter")
 def _takes(statement, name):
     """Return which elements of the deck may have an attribute."""
     if statement == "Post_Graphic":
-        of = {"ends_type": "Cylinder"}
+        of = {"ends_type": "Cylinder", "facets": "TriaMesh", "crease_angle": "TriaMesh"}
         return lambda inside: of.get(name, "") in inside
     if statement == "Body_Rigid" and name.startswith("inertia"):
         return lambda inside: "inertia_xx" in inside
