@@ -7,7 +7,8 @@ From a loose tolerance steps go beyond that bound; where that costs something, t
 
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
-wrong, the explicit method goes on. `Methods.change_over` learns from what came of a change.
+wrong, and two trials agree, the explicit method goes on. `Methods.change_over` learns from what
+came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.

@@ -76,6 +76,13 @@ def test_it_changes_back():
     assert auto.stats["method_changes"] >= 2
 
 
+@pytest.mark.parametrize("name", ["jammed_wedge", "lugre"])
+def test_it_does_not_leave_a_stiff_model_for_what_one_trial_says(name):
+    """Where the implicit method had rejections one trial was enough: 3 changes."""
+    stats = mbsim.simulate(mbsim.read_model(STIFF / f"{name}.xml"), tol=1e-4).stats
+    assert stats["method_changes"] == 1
+
+
 def test_motionsolve_names_run_their_kind(tmp_path):
     model = mbsim.read_model(MODELS / "free_top.xml")
     explicit = mbsim.simulate(model, integrator="ABAM", end_time=0.1)
