@@ -19,6 +19,8 @@ LOG_COLUMNS = 9
 # the last column of `Log.samples`, whose first ones are those of PEAK_FORCE, PEAK_DEPTH, PEAK_SLIP
 SAMPLE_RATE = 3
 SAMPLE_COLUMNS = 4
+#: Rows of `Log.ends` and `Log.end_times`: the step's end before the last one, the last one.
+END_BEFORE, END_LAST = range(2)
 # rows of it: what is known of a step from its ends, and looks into it
 SAMPLES = 3 + 12
 

@@ -2,7 +2,7 @@
 
 Every element carries its `Source` (file and line), so that a fault found late,
 in the geometry or in a running solver, can still be shown in the user's deck.
-Forces have a file of their own and are found here under the same names.
+Forces and simulations have files of their own and are found here under the same names.
 Nothing here is converted, placed or checked; see `placement` and `checks`.
 """
 
@@ -21,12 +21,14 @@ from mbsim.forces.catalog import FORCES
 from mbsim.model.forces import (
     BodyForce,
     ForceElement,
+    Gravity,
     JointFriction,
     JointLimit,
     MarkerForce,
     ScalarForce,
     VectorForce,
 )
+from mbsim.model.simulation import Change, Simulation, Static, Transient
 from mbsim.model.source import ASIDE, NO_RESULT, Source, Subroutine
 
 __all__ = [
@@ -210,64 +212,6 @@ class Contact:
     def with_itself(self) -> bool:
         """Whether I and J are the same graphics: all of them touch each other."""
         return set(self.i_graphics_id) == set(self.j_graphics_id)
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """Force_Gravity [L/T^2] in the global frame; `exprs` of TIME stand in place of numbers."""
-
-    g: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    source: Source = Source()
-    exprs: tuple[Expression | None, ...] = (None, None, None)
-    id: int = 1
-
-
-@dataclass(frozen=True)
-class Transient:
-    """Param_Transient; None where the deck says nothing."""
-
-    integrator_type: str | None = None
-    integr_tol: float | None = None
-    h_max: float | None = None
-    h_min: float | None = None
-    h0_max: float | None = None
-    source: Source = Source()
-
-
-@dataclass(frozen=True)
-class Static:
-    """Param_Static; None where the deck says nothing."""
-
-    max_num_iter: int | None = None
-    imbalance: float | None = None  # [F]
-    source: Source = Source()
-
-
-@dataclass(frozen=True)
-class Change:
-    """An element as a statement of <Command> leaves it; `table` is what `Model.table` takes."""
-
-    table: str
-    element: Any
-    text: str = field(metadata=NO_RESULT)  # for the log
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`.
-
-    STATIC and ASSEMBLY take no time: both are where they stand.
-    """
-
-    analysis_type: str = "TRANSIENT"
-    start_time: float = 0.0
-    end_time: float = 0.0
-    print_interval: float = 0.0
-    transient: Transient | None = None  # a Param_Transient that stood before it in <Command>
-    gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
-    static: Static = Static()
-    changes: tuple[Change, ...] = ()  # all that stood before it in <Command>
-    source: Source = Source()
 
 
 @dataclass(frozen=True)
@@ -470,8 +414,8 @@ class Model:
     splines: dict[int, Spline] = field(default_factory=dict)
     arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
     sensors: dict[int, Sensor] = field(default_factory=dict)
-    gravity: Gravity = Gravity()
-    transient: Transient = Transient()
+    gravity: Gravity = field(default_factory=Gravity)
+    transient: Transient = field(default_factory=Transient)
     simulations: tuple[Simulation, ...] = ()
     requests: dict[int, Request] = field(default_factory=dict)
     compatibility: str = ""

@@ -180,3 +180,13 @@ def rigid_forces(model: Model) -> list[tuple[ForceKind, MarkerForce]]:
         for force in model.table(kind.name).values()
         if kind.form.is_rigid(force.values)
     ]
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Force_Gravity [L/T^2] in the global frame; `exprs` of TIME stand in place of numbers."""
+
+    g: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    source: Source = Source()
+    exprs: tuple[Expression | None, ...] = (None, None, None)
+    id: int = 1

@@ -165,7 +165,7 @@ class Store:
         if attributes and self._changed and self._part is not None and self._before is None:
             # HDF5 puts texts where it remembers room: only while the file is open
             with self._writing():
-                self._open_again({name: writer.rest for name, writer in self._writers.items()})
+                self._reopen({name: writer.rest for name, writer in self._writers.items()})
         self._changed = True
         with self._writing() as file:
             for name in remove:
@@ -256,9 +256,9 @@ class Store:
             # what HDF5 knew of the file is wrong now
             self._growing, rests = self._before
             self._before = None
-            self._open_again(rests)
+            self._reopen(rests)
 
-    def _open_again(self, rests: dict[str, Table | None]) -> None:
+    def _reopen(self, rests: dict[str, Table | None]) -> None:
         """Open the part file anew, with rows that wait for a whole chunk."""
         assert self.file is not None
         assert self._part is not None

@@ -261,7 +261,7 @@ def test_check_repair_writes_a_copy_once_that_a_run_takes(tmp_path: Path) -> Non
     path.write_text(text, encoding="utf-8")
     found = CliRunner().invoke(main, ["check", str(path)])
     assert found.exit_code == 0
-    assert "costly, 1 pair: Post_Graphic[400] of 576 triangles is not convex" in found.output
+    assert "costly" not in found.output
     assert "Post_Graphic[400]: 576 triangles, 0.26 x 0.26 x 0.06, volume" in found.output
     found = CliRunner().invoke(main, ["check", str(path), "--repair"])
     assert found.exit_code == 0

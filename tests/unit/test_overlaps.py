@@ -28,7 +28,7 @@ def test_depths_of_rounding_are_not_told(depth, logged, told, faults):
         pairs=pairs,
         work=Some(points=points),
         slots=Some(pair=one),
-        kinds=Some(whole=np.zeros(1), contact=one),
+        kinds=Some(whole=np.zeros(1), step=np.ones(1, np.int64), contact=one),
         graphics=Some(half=np.array([[0.5, 0.5, 0.5], [1.0, 1.0, 2.0]])),
     )
     contact = Some(id=1, ignore_penetration_larger_than=None, source=Some(line=3))

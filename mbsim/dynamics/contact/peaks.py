@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    END_BEFORE,
+    END_LAST,
     PEAK_DEPTH,
     PEAK_FORCE,
     PEAK_FORCE_TIME,
@@ -72,10 +74,13 @@ def watch_end(scene: Scene, t: float) -> None:
     log = scene.log
     sample(scene, END)
     keep_largest(scene, END, t)
-    log.end_times[0], log.end_times[1] = log.end_times[1], t
+    log.end_times[END_BEFORE], log.end_times[END_LAST] = log.end_times[END_LAST], t
     for c in range(len(log.contacts)):
         for q in range(SAMPLE_COLUMNS):
-            log.ends[0, c, q], log.ends[1, c, q] = log.ends[1, c, q], log.samples[END, c, q]
+            log.ends[END_BEFORE, c, q], log.ends[END_LAST, c, q] = (
+                log.ends[END_LAST, c, q],
+                log.samples[END, c, q],
+            )
 
 
 @jitable
@@ -246,10 +251,10 @@ def next_look(scene: Scene, tol: float) -> float:
             last = r
     if last >= 0:
         # nearer than the step's begin
-        log.end_times[0] += log.parts[last] * log.span[0]
+        log.end_times[END_BEFORE] += log.parts[last] * log.span[0]
         for c in range(len(log.contacts)):
             for q in range(SAMPLE_COLUMNS):
-                log.ends[0, c, q] = log.samples[last, c, q]
+                log.ends[END_BEFORE, c, q] = log.samples[last, c, q]
     return -1.0
 
 
@@ -263,7 +268,7 @@ def first_look(scene: Scene, h: float, tol: float) -> float:
     log.span[0] = h
     log.sampled[0] = LOOKS
     log.parts[BEFORE], log.parts[BEGIN], log.parts[END] = (
-        (log.end_times[0] - log.end_times[1]) / h,
+        (log.end_times[END_BEFORE] - log.end_times[END_LAST]) / h,
         0.0,
         1.0,
     )
