@@ -3,7 +3,8 @@
 A root's code is stored under a digest of *all* project files that it can reach through imports:
 Numba's own check sees only the file of the function itself, and would go on using an edited
 helper's old code. Numba's version, the link policy, Python's minor version, signature and processor
-are part of the key as well.
+are part of the key as well. A process whose files were changed after it began (an edit, an upgrade)
+may run other code than they hold: it neither loads nor stores what they reach.
 
 A shipped folder (`mbsim warm --target`) holds code for families of processors. It is looked into
 for what the user's folder has not, and never written.
@@ -16,6 +17,7 @@ import hashlib
 import os
 import re
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -31,6 +33,7 @@ from numba.core.caching import (
 from mbsim.core import linking, processors
 from mbsim.errors import ModelError
 
+_BEGAN = time.time()
 PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(
     r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
@@ -143,8 +146,8 @@ def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
     return hashlib.sha256(text).digest(), tuple(found)
 
 
-def source_digest(files: list[Path]) -> str:
-    """Return a digest of `files` and of every project file they reach through imports."""
+def _reached(files: list[Path]) -> dict[Path, bytes]:
+    """Return the digests of `files` and of every project file they reach through imports."""
     reached: dict[Path, bytes] = {}
     waiting = [file.resolve() for file in files]
     while waiting:
@@ -152,9 +155,26 @@ def source_digest(files: list[Path]) -> str:
         if file not in reached:
             reached[file], imported = _imports(file)
             waiting.extend(imported)
+    return reached
+
+
+def source_digest(files: list[Path]) -> str:
+    """Return a digest of `files` and of every project file they reach through imports."""
     # names too: a file that moves changes what its callers mean
-    lines = sorted(file.name.encode() + digest for file, digest in reached.items())
+    lines = sorted(file.name.encode() + digest for file, digest in _reached(files).items())
     return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
+
+
+def _changed(file: Path) -> bool:
+    """Return whether a file of the package was changed since this process began."""
+    try:
+        found = file.stat()
+    except OSError:
+        return True
+    return PACKAGE in file.parents and max(found.st_mtime, found.st_ctime) > _BEGAN
+
+
+_changed_once = functools.cache(_changed)
 
 
 def is_known(function: Callable[..., Any]) -> bool:
@@ -166,8 +186,9 @@ def is_known(function: Callable[..., Any]) -> bool:
 class _ContentLocator(_CacheLocator):
     """A folder named by content."""
 
-    def __init__(self, digest: str) -> None:
-        self.digest = digest
+    def __init__(self, files: list[Path]) -> None:
+        self.files = tuple(_reached(files))
+        self.digest = source_digest(files)
 
     def get_cache_path(self) -> str:
         return str(trusted_root() / _VERSION / self.digest)
@@ -189,7 +210,7 @@ class _ContentLocator(_CacheLocator):
         # an adapter closes over the law it adapts: that law's file counts as well
         cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
         files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
-        return cls(source_digest([Path(py_file), *files]))
+        return cls([Path(py_file), *files])
 
 
 class _ByContent(CompileResultCacheImpl):
@@ -207,13 +228,16 @@ class CodeCache(FunctionCache):
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
-        data = self._find(key)
+        files = self._impl.locator.files
+        data = None if any(map(_changed_once, files)) else self._find(key)
         if data is None:
             self._on_miss(self._py_func.__qualname__)
             return None
         return self._impl.rebuild(target_context, data)
 
     def _save_overload(self, sig: Any, data: Any) -> None:
+        if any(map(_changed, self._impl.locator.files)):
+            return
         try:
             super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
         except OSError as error:  # a folder that cannot be written, or is full
