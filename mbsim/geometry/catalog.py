@@ -20,7 +20,8 @@ its slopes.
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
-The largest depth, where negative, is a lower bound of the distance of the two shapes.
+The largest depth, where negative, is a lower bound of the distance of the two shapes. A pair that
+does not know the depth of an overlap as deep as this one returns less the number.
 
 A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> count,
 area``, which writes the same rows and returns beside their number the area of contact, seen along

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from helpers.pairs import frame, random_rotation, turned
+from helpers.pairs import entry, frame, random_rotation, turned
 from helpers.surfaces import (
     PLANE,
     Meshed,
@@ -18,7 +18,7 @@ from helpers.surfaces import (
     torus,
     wrench,
 )
-from mbsim.geometry.catalog import REGION_ROWS
+from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS
 
 SAME = np.eye(3)
 
@@ -226,6 +226,18 @@ def test_a_box_on_a_slab_is_a_box_on_a_plane():
         assert first[0, 4:7] == pytest.approx(plane[0, 4:7], abs=2e-2)
         assert first[0, 1:3] == pytest.approx(plane[0, 1:3], abs=2e-3)
         assert numbers[0, 1] == pytest.approx(area[0, 1], rel=2e-2)
+
+
+def test_an_overlap_deeper_than_the_layer_is_told():
+    small, slab = Meshed(*box(0.2, 0.2, 0.2)), Meshed(*box(1.0, 1.0, 0.2))
+    told = []
+    for depth in (0.01, 0.12):
+        points = np.zeros((PAIRS["SURFACE-SURFACE"].slots, POINT))
+        pose = frame([0.05, 0.1, 0.1 - depth], SAME)
+        arrays = (pose, small.size, frame([0.0, 0.0, -0.1], SAME), slab.size, points)
+        told.append(entry("SURFACE-SURFACE")(*(a.ctypes.data for a in arrays)) < 0)
+        assert points[:, 0].max() > 0.0
+    assert told == [False, True]
 
 
 def test_a_sphere_finds_the_nearest_point_of_a_mesh(tori):

@@ -7,7 +7,7 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import ACTIVE, BEYOND_LAYERS, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -26,7 +26,7 @@ def measure_pair(scene: Scene, pair: int) -> bool:
     if kinds.kernel[kind] == 0:
         return False
     i, j, first = pairs.graphic_i[pair], pairs.graphic_j[pair], pairs.slot[pair]
-    call_int(
+    count = call_int(
         kinds.kernel[kind],
         (
             work.frames[i],
@@ -36,6 +36,8 @@ def measure_pair(scene: Scene, pair: int) -> bool:
             work.points[first:],
         ),
     )
+    if count < 0:
+        scene.log.counters[BEYOND_LAYERS] += 1
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):

@@ -24,7 +24,14 @@ from mbsim.geometry.mesh.ball import (
     strongest_points,
     triangles_near,
 )
-from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
+from mbsim.geometry.mesh.merging import (
+    AT_NODE,
+    MOST_PEAKS,
+    PEAK_NUMBERS,
+    merge,
+    strongest,
+    write_points,
+)
 from mbsim.geometry.mesh.overlap import (
     box_gap,
     common_middle,
@@ -33,10 +40,13 @@ from mbsim.geometry.mesh.overlap import (
     partners_of,
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
+from mbsim.geometry.mesh.record import BEYOND, PEAK
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import AT_BOXES, HEADER, LENGTH, NODE, TRIANGLES
 
 PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
+#: A peak with this part of its depth at the inner end of a layer may be deeper.
+AT_END = 0.9
 
 
 @jitable
@@ -108,10 +118,15 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
     count = merge(nodes[:count], values[:count], partners, peaks)
+    known = 1
+    for k in range(count):
+        patch = nodes[int(peaks[k, AT_NODE])]
+        if patch[BEYOND] > AT_END * patch[PEAK]:
+            known = -1
     count = strongest(peaks, count, MOST_PEAKS)
     at = add(vector(frame_j), to_global(frame_j, origin))
     write_points(peaks, count, frame_j, at, points)
-    return len(points)
+    return known * len(points)
 
 
 @pair("SPHERE", "SURFACE", slots=MOST_PEAKS, regroups=True)
