@@ -35,11 +35,17 @@ def icosphere(level):
     return Shape(mesh.vertices, mesh.faces)
 
 
-def rows(name, frame_i, size_i, frame_j, size_j):
+def asked(name, frame_i, size_i, frame_j, size_j):
+    """Return whether the depth of the overlap is known, and the rows of a pair."""
     points = np.full((PAIRS[name].slots, POINT), np.nan)
     call = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5)(pair_address(PAIRS[name]))
-    call(*[array.ctypes.data for array in (frame_i, size_i, frame_j, size_j, points)])
-    return points
+    count = call(*[array.ctypes.data for array in (frame_i, size_i, frame_j, size_j, points)])
+    assert abs(count) == len(points)
+    return count > 0, points
+
+
+def rows(*given):
+    return asked(*given)[1]
 
 
 @pytest.mark.parametrize("made", [box, l_shape, lambda: icosphere(1)], ids=["box", "L", "sphere"])
@@ -82,6 +88,14 @@ def test_of_two_meshes_force_and_torque_are_slopes_of_the_potential(made):
         np.testing.assert_allclose(force, found[0], atol=1e-6 * scale)
         np.testing.assert_allclose(torque, found[1], atol=1e-6 * scale)
     assert met == len(spots)
+
+
+def test_an_overlap_that_reaches_below_the_layer_is_told():
+    shape = box()
+    still = frame(np.zeros(3), np.eye(3))
+    for overlap, known in ((0.2, True), (0.34, False)):
+        above = frame(np.array([0.02, 0.01, 0.6 - overlap]), np.eye(3))
+        assert asked("FIELD-FIELD", above, shape.size, still, shape.size)[0] == known
 
 
 def test_the_force_is_of_second_order_in_the_edges_of_a_sphere():

@@ -19,6 +19,7 @@ from mbsim.geometry.mesh.overlap import (
     partners_of,
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
+from mbsim.geometry.mesh.record import BEYOND
 from mbsim.geometry.pairs.surface import PATCH_SLOTS, far_apart, pose_of, surface_of
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import AT_BOXES, NODE, TRIANGLES
@@ -61,5 +62,10 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
         return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
+    known = 1
+    for k in range(count):
+        # what is below the layer does not press: forces keep their potential, and are too small
+        if nodes[k, BEYOND] > 0.0:
+            known = -1
     write_patches(nodes[:count], partners, frame_j, at, points)
-    return len(points)
+    return known * len(points)
