@@ -24,7 +24,7 @@ class Graphics(NamedTuple):
     body: I1  # (ng,)
     p: F2  # (ng, 3) centre, in the body's cg axes
     R: F3  # (ng, 3, 3) shape axes to cg axes
-    size: F2  # (ng, 3) see geometry.catalog
+    size: F2  # (ng, 4) see geometry.catalog
     radius: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
     half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
@@ -32,6 +32,7 @@ class Graphics(NamedTuple):
     shape: I1  # (ng,) class of shape, see `Broadphase.kind`
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)
+    surfaces: F1  # packed triangles of shapes that need them (`model.surface`), see `size`
 
 
 @tags.constant
@@ -43,7 +44,8 @@ class Kinds(NamedTuple):
     slots: I1  # (nk,) points it gives at most
     swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
     regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
-    whole: F1  # (nk,) shares of a flat face, where a pair is one incident with its area; else 0
+    whole: F1  # (nk,) shares of a flat face, where incidents have an area; else 0
+    step: I1  # (nk,) rows from one incident to the next: 1 for points, all where a pair is one
     noise: F1  # (nk,) scatter of the normals that its detector gives
 
 

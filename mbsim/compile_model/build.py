@@ -243,7 +243,7 @@ def _sizes(
         ahead=y if looked and contacts.laws.carried.any() else 0,
         points=int((pairs.last - pairs.slot).max(initial=0)) if contacts.laws.rigid.any() else 0,
         groups=groups,
-        region=codes.INC_REGION if any(kind.region for kind in plans.kinds) else 0,
+        region=codes.INC_REGION if any(kind.has_area for kind in plans.kinds) else 0,
     )
 
 

@@ -22,9 +22,10 @@ from mbsim.compile_model.pairing import (
     shape_class,
     thinnest,
 )
+from mbsim.compile_model.surfaces import needed_as_triangles, packed_surfaces
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
-from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, Pair
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
@@ -73,15 +74,25 @@ def pair_address(pair: Pair) -> int:
 
 
 def graphics_table(
-    model: Model, placement: Placement, ids: list[int], row: dict[int, int], shapes: list[str]
+    model: Model,
+    placement: Placement,
+    ids: list[int],
+    row: dict[int, int],
+    shapes: list[str],
+    meshed: Mapping[int, bool],
 ) -> Graphics:
-    """Return the shapes in their bodies' cg axes; `row` is the body row by body id."""
+    """Return the shapes in their bodies' cg axes.
+
+    `row` is the body row by body id; `meshed` has the graphics that are needed as triangles, and
+    whether with their layer.
+    """
     n = len(ids)
+    surfaces, begins = packed_surfaces(model.graphics, meshed)
     made = Graphics(
         body=np.zeros(n, dtype=np.int64),
         p=np.zeros((n, 3)),
         R=np.zeros((n, 3, 3)),
-        size=np.zeros((n, 3)),
+        size=np.zeros((n, SIZE)),
         radius=np.zeros(n),
         half=np.zeros((n, 3)),
         turns=np.ones(n, dtype=np.int64),
@@ -89,6 +100,7 @@ def graphics_table(
         shape=np.zeros(n, dtype=np.int64),
         marker_p=np.zeros((n, 3)),
         marker_R=np.zeros((n, 3, 3)),
+        surfaces=surfaces,
     )
     for g, graphic_id in enumerate(ids):
         graphic = model.graphics[graphic_id]
@@ -96,7 +108,9 @@ def graphics_table(
         made.body[g] = row[marker.body_id]
         made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
         made.R[g] = marker.R_B
-        made.size[g] = kernel_size(graphic)
+        made.size[g, :3] = kernel_size(graphic)
+        if graphic_id in begins:
+            made.size[g, 3] = surfaces.ctypes.data + surfaces.itemsize * begins[graphic_id]
         made.radius[g] = radius(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
@@ -107,6 +121,13 @@ def graphics_table(
     return made
 
 
+def _face_weight(kind: Kind) -> float:
+    """Return the shares of a flat face where incidents of a kind have an area, else 0."""
+    if kind.region:
+        return REGIONS[kind.closed_form].whole
+    return 1.0 if kind.has_area else 0.0
+
+
 def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
     return Kinds(
@@ -115,7 +136,8 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         slots=np.array([k.slots for k in kinds], dtype=np.int64),
         swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
         regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
-        whole=np.array([REGIONS[k.closed_form].whole if k.region else 0.0 for k in kinds]),
+        whole=np.array([_face_weight(k) for k in kinds]),
+        step=np.array([k.step for k in kinds], dtype=np.int64),
         noise=np.array(
             [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),
@@ -368,7 +390,9 @@ def contact_tables(
     shapes = sorted({shape_class(model.graphics[g]) for g in graphic_row})
     contacts = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
     contact_row = {contact.id: k for k, contact in enumerate(contacts)}
-    graphics = graphics_table(model, placement, list(graphic_row), body_row, shapes)
+    graphics = graphics_table(
+        model, placement, list(graphic_row), body_row, shapes, needed_as_triangles(model, plans)
+    )
     pairs, ns = pairs_table(plans, plans.kinds, graphic_row)
     laws, uses_x = contacts_table(contacts, user, user_normal)
     first = BODY_SIZE * len(placement.bodies)

@@ -13,7 +13,7 @@ from numba import types
 
 from mbsim.core.address import table_at, vector_at
 from mbsim.core.arrays import Pointer
-from mbsim.geometry.catalog import POINT, REGION_ROWS
+from mbsim.geometry.catalog import POINT, REGION_ROWS, SIZE
 from mbsim.geometry.region import sum_points
 
 _POINTER = types.CPointer(types.float64)
@@ -28,9 +28,9 @@ def adapt_pair(points: Callable[..., int], slots: int) -> Any:
     ) -> int:
         return points(
             vector_at(frame_i, 12),
-            vector_at(size_i, 3),
+            vector_at(size_i, SIZE),
             vector_at(frame_j, 12),
-            vector_at(size_j, 3),
+            vector_at(size_j, SIZE),
             table_at(out, slots, POINT),
         )
 
@@ -46,9 +46,9 @@ def adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: 
         rows = table_at(out, slots, POINT)
         count, area = region(
             vector_at(frame_i, 12),
-            vector_at(size_i, 3),
+            vector_at(size_i, SIZE),
             vector_at(frame_j, 12),
-            vector_at(size_j, 3),
+            vector_at(size_j, SIZE),
             rows[REGION_ROWS:],
         )
         count += REGION_ROWS

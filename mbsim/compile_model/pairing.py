@@ -32,6 +32,10 @@ _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 MOST_LISTED = 300
 
 
+#: Shapes that have patches as triangles do.
+AS_SURFACE = {"MESH": "SURFACE"}
+
+
 @dataclass(frozen=True)
 class Kind:
     """How two shapes of a contact are tested, in the order that their detector wants."""
@@ -45,6 +49,18 @@ class Kind:
     region: bool = False  # whether its points are summed up to one incident
 
     @property
+    def has_area(self) -> bool:
+        """Whether its incidents have an area."""
+        return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
+
+    @property
+    def step(self) -> int:
+        """Return the rows from one incident to the next."""
+        if self.region:
+            return self.slots
+        return REGION_ROWS if self.has_area else 1
+
+    @property
     def regroups(self) -> bool:
         """Whether a contact that goes on may begin another slot, which is then no impact."""
         if self.region:
@@ -55,6 +71,8 @@ class Kind:
     def detector(self) -> str:
         """How `mbsim check` names it."""
         one = ", one region" if self.region else ""
+        if self.has_area and not self.region:
+            return "patches of triangles"
         if self.closed_form:
             return f"closed form {self.closed_form}{one}"
         shapes = {self.shape_i, self.shape_j}
@@ -126,6 +144,17 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
     return slots if slots <= HULL_SLOTS and edges <= MOST_EDGE_PAIRS else 0
 
 
+def _patches(contact: int, i: Graphic, j: Graphic) -> Kind | None:
+    """Return the pair of surfaces for graphics of which one is a mesh, None for others."""
+    if "MESH" not in (i.shape, j.shape):
+        return None
+    for a, b, swapped in ((i, j, False), (j, i, True)):
+        name = f"{AS_SURFACE.get(a.shape, a.shape)}-{AS_SURFACE.get(b.shape, b.shape)}"
+        if name in PAIRS:
+            return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
+    return None
+
+
 def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
     """Return how graphics like these two are tested."""
     flat = i.shape in _FLAT and j.shape in _FLAT
@@ -139,7 +168,8 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
                     break
                 return Kind(contact, a.shape, b.shape, swapped, name, slots)
             return Kind(contact, a.shape, b.shape, swapped, name, PAIRS[name].slots)
-    return Kind(contact, i.shape, j.shape, False, "", fcl_slots)
+    patches = _patches(contact, i, j) if detector != "fcl" else None
+    return patches or Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
 def _region_fault(model: Model, contact: Contact, i: Graphic, j: Graphic, why: str) -> Fault:
@@ -160,7 +190,7 @@ def _one_region(
 
     A pair of shapes that touch in one point only is one incident without area as it is.
     """
-    if contact.contact_points != "REGION":
+    if contact.contact_points != "REGION" or kind.has_area:
         return kind
     if kind.closed_form in REGIONS:
         return replace(kind, slots=kind.slots + REGION_ROWS, region=True)

@@ -4,9 +4,10 @@ A pair is a function ``points(frame_i, size_i, frame_j, size_j, points) -> count
 arrays:
 
 * `frame` (12,): the shape's centre, then its rotation matrix by rows, global frame;
-* `size` (3,): radius | semi-axes | half edge lengths | radius and half length | bottom radius, top
+* `size` (4,): radius | semi-axes | half edge lengths | radius and half length | bottom radius, top
   radius, half length of a frustum | nothing | of a convex mesh the address and length of its
-  polyhedron (`model.hull`);
+  polyhedron (`model.hull`); last the address of its surface as triangles (`model.surface`) where
+  a pair needs that, then it is a SURFACE;
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   its weight of the law's force (1 unless a manifold splits the force of one corner over
@@ -36,6 +37,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.core.rotation import any_tangent, cross, scale
 
+#: Numbers of a shape's size.
+SIZE = 4
 #: Numbers of one candidate: depth, point, normal, weight, couple.
 POINT = 11
 #: Where they begin.
@@ -45,6 +48,8 @@ AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
 #: points' part of the force about the incident, in `plane_axes`.
 REGION_ROWS = 2
 AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY = 1, 2, 3, 7
+#: A pair of patches has as many rows for each of them; the second one has the mean depth too.
+MEAN_DEPTH = 4
 
 
 class Pair(NamedTuple):
@@ -55,6 +60,8 @@ class Pair(NamedTuple):
     slots: int
     #: Whether a contact that goes on may begin another row (a corner that passes over an edge).
     regroups: bool = False
+    #: Whether its rows are patches: `REGION_ROWS` each, without points.
+    patches: bool = False
 
 
 class Region(NamedTuple):
@@ -71,13 +78,13 @@ REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
 def pair(
-    shape_i: str, shape_j: str, slots: int, regroups: bool = False
+    shape_i: str, shape_j: str, slots: int, regroups: bool = False, patches: bool = False
 ) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
     def register(points: Kernel) -> Kernel:
         name = f"{shape_i}-{shape_j}"
-        PAIRS.put(name, Pair(name, jitable(points), slots, regroups))
+        PAIRS.put(name, Pair(name, jitable(points), slots, regroups, patches))
         return points
 
     return register

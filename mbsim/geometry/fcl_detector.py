@@ -61,6 +61,7 @@ class FclDetector:
     def __init__(self, scene: Scene, graphics: list[Graphic]) -> None:
         self._scene = scene
         self._graphics = graphics
+        self._size = scene.graphics.size[:, :3]
         self._objects: dict[tuple[int, int], Any] = {}
         self._surfaces: dict[int, Surface] = {}
         self._hulls: dict[int, Hull] = {}
@@ -85,7 +86,7 @@ class FclDetector:
 
     def _geometry(self, g: int, flat_partner: float) -> Any:
         """Return FCL's geometry of graphic g; a plane under a flat shape is a box that size."""
-        fcl, graphic, size = self._fcl, self._graphics[g], self._scene.graphics.size[g]
+        fcl, graphic, size = self._fcl, self._graphics[g], self._size[g]
         if graphic.shape == "SPHERE":
             return fcl.Sphere(size[0])
         if graphic.shape == "ELLIPSOID":
@@ -218,7 +219,7 @@ class FclDetector:
             )
         hull = self._hulls[mesh]
         (p, R), (p_o, R_o) = self._frame(mesh), self._frame(other)
-        size = self._scene.graphics.size[other]
+        size = self._size[other]
         solid = Solid(shape, size, R.T @ (p_o - p), R.T @ R_o)
         depth, n = least_overlap(hull, solid)
         row[AT_DEPTH], row[AT_WEIGHT], row[COUPLE:] = max(depth, -0.0), 1.0, 0.0
@@ -256,7 +257,7 @@ class FclDetector:
     def _on_other(self, mesh: int, other: int, contacts: list[Any]) -> tuple[float, Any, Any]:
         """Return (depth, point, normal out of the mesh) of a mesh and a shape, in its axes."""
         surface, shape = self._surface(mesh), self._graphics[other].shape
-        size = self._scene.graphics.size[other]
+        size = self._size[other]
         (p, R), (p_o, R_o) = self._frame(mesh), self._frame(other)
         centre, axes = R.T @ (p_o - p), R.T @ R_o
         if shape == "PLANE":
@@ -280,7 +281,7 @@ class FclDetector:
     def _sharpen(self, i: int, j: int, n: Any) -> Any:
         """Return the normal made exact where a shape is round and the other round or a box."""
         shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
-        size, frame_i, frame_j = self._scene.graphics.size, self._frame(i), self._frame(j)
+        size, frame_i, frame_j = self._size, self._frame(i), self._frame(j)
         if shape_i in ROUND and shape_j in ROUND:
             return round_normal(shape_i, size[i], frame_i, shape_j, size[j], frame_j, n)
         if shape_i in ROUND and shape_j == "BOX":
@@ -315,7 +316,7 @@ class FclDetector:
 
     def _overlap(self, i: int, j: int, n: Any) -> float:
         """Return how far convex shapes overlap along n."""
-        size = self._scene.graphics.size
+        size = self._size
         low = support(self._graphics[i].shape, size[i], *self._frame(i), -n)
         high = support(self._graphics[j].shape, size[j], *self._frame(j), n)
         return float(n @ (high - low))
@@ -323,7 +324,7 @@ class FclDetector:
     def _refine(self, i: int, j: int, depth: float, p: Any, n: Any) -> tuple[float, Any]:
         """Return depth and midpoint made exact along n from the shapes' support points."""
         shape_i, shape_j = self._graphics[i].shape, self._graphics[j].shape
-        size = self._scene.graphics.size
+        size = self._size
 
         def far(g: int, d: Any) -> Any:
             return support(self._graphics[g].shape, size[g], *self._frame(g), d)

@@ -113,7 +113,7 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
         if not depth > 0.0:
             continue
         pair = int(scene.slots.pair[s])
-        if scene.kinds.whole[pairs.kind[pair]] > 0.0 and s != pairs.slot[pair]:
+        if (s - pairs.slot[pair]) % scene.kinds.step[pairs.kind[pair]] != 0:
             continue
         rows = (int(pairs.graphic_i[pair]), int(pairs.graphic_j[pair]))
         graphic_i, graphic_j = (system.graphic_ids[row] for row in rows)

@@ -50,9 +50,8 @@ def gather(scene: Scene, pair: int) -> None:
     work, hit = scene.work, scene.work.hit
     kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
     last = len(hit) - 1
-    # of one region the points behind the first row are in that
-    count = scene.kinds.slots[kind] if scene.kinds.whole[kind] == 0.0 else 1
-    for s in range(first, first + count):
+    # what is behind the first row of an incident with an area is in that
+    for s in range(first, first + scene.kinds.slots[kind], scene.kinds.step[kind]):
         depth = work.points[s, AT_DEPTH]
         if depth > 0.0 and depth <= scene.contacts.ignore_deeper[scene.kinds.contact[kind]]:
             work.touching[s] = 1

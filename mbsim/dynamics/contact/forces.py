@@ -44,6 +44,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    REGION_ROWS,
 )
 from mbsim.laws.abi import (
     AREA_IN,
@@ -140,6 +141,12 @@ def contact_of(scene: Scene, s: int) -> int:
 def face_weight_of(scene: Scene, s: int) -> float:
     """Return the weights of a flat face where slot s is the one incident of its pair, else 0."""
     return scene.kinds.whole[scene.pairs.kind[scene.slots.pair[s]]]
+
+
+@jitable
+def stands_for_points(scene: Scene, s: int) -> bool:
+    """Return whether slot s is the one incident of a pair for the points behind it."""
+    return scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]] > REGION_ROWS
 
 
 @jitable
@@ -332,7 +339,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
         row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
     if whole > 0.0:
         # see geometry.region
-        stored = whole * out[ENERGY]
+        if stands_for_points(scene, s):
+            stored = whole * out[ENERGY]
         code = call_int(scene.world.hooks[Hook.TILTING], (scene, s, t, normal, y))
         if code != 0:
             return code

@@ -22,11 +22,19 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides
+from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides, stands_for_points
 from mbsim.dynamics.contact.points import deepest_of_impact
 from mbsim.dynamics.events.stability import add_to_block, translation, yielding
 from mbsim.dynamics.events.step_limits import longest_travel
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, REGION_ROWS
+from mbsim.geometry.catalog import (
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    AT_WEIGHT,
+    MOMENT_XX,
+    MOMENT_YY,
+    REGION_ROWS,
+)
 from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
@@ -96,7 +104,7 @@ def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) ->
     """Add the points that slot s stands for to the block of body b, each with its weight."""
     rows = scene.work.points
     first = s + REGION_ROWS
-    for row in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+    for row in range(first, s + scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]]):
         if rows[row, AT_DEPTH] > 0.0:
             p, n, weight = (
                 vector(rows[row, AT_POINT:]),
@@ -133,10 +141,15 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     for b in (bi, bj):
         if b == ground:
             continue
-        if face_weight_of(scene, s) > 0.0:
+        if stands_for_points(scene, s):
             add_points(scene, y, s, b, both * k / weight, both * damping / weight)
             continue
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
+        if face_weight_of(scene, s) > 0.0:
+            # tilting about the centre of a patch
+            moments = work.points[s + 1, MOMENT_XX] + work.points[s + 1, MOMENT_YY]
+            inverse = bodies.inverse[b]
+            turn += moments * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
         add_to_block(work.block[b], n, both * k, both * damping, turn)
 
 

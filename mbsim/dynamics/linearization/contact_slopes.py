@@ -13,7 +13,7 @@ from mbsim.arrays.codes import PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCAL
 from mbsim.arrays.hooks import Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, F2, V3
+from mbsim.core.arrays import F1, F2, F3, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
@@ -27,6 +27,7 @@ from mbsim.dynamics.contact.forces import (
     in_marker,
     patch,
     sides,
+    stands_for_points,
     velocity_at,
 )
 from mbsim.dynamics.linearization.blocks import couple
@@ -36,6 +37,7 @@ from mbsim.geometry.catalog import (
     AT_NORMAL,
     AT_POINT,
     AT_WEIGHT,
+    MEAN_DEPTH,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
@@ -147,19 +149,38 @@ def friction_slopes(
 @jitable
 def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     """Add the couple against tilting of `contact.tilting`."""
+    add_tilting(scene, T, T.linear.D, y, s, scene.work.slot[s, TILTING])
+
+
+@jitable
+def resist_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
+    """Add the couples of a patch that tilts: of its dampers, and as its centre moves.
+
+    Depth over a flat patch grows by tilt times lever, so its centre of pressure moves by the
+    tilt times the moments over the mean depth.
+    """
+    damp_tilting(scene, T, y, s)
+    mean = scene.work.points[s + 1, MEAN_DEPTH]
+    if mean > 0.0:
+        force = scene.work.slot[s, NORMAL] / scene.work.points[s, AT_WEIGHT]
+        add_tilting(scene, T, T.linear.K, y, s, force / mean)
+
+
+@jitable
+def add_tilting(scene: Scene, T: Tangent, matrix: F3, y: F1, s: int, damping: float) -> None:
+    """Add to K or D the couple against tilting by `damping` times the moments of slot s."""
     P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
     i, j = contact_bodies(scene, s)
-    point, damping = scene.work.points[s], scene.work.slot[s, TILTING]
-    numbers = scene.work.points[s + 1]
+    point, numbers = scene.work.points[s], scene.work.points[s + 1]
     p, (ax, ay) = vector(point[AT_POINT:]), plane_axes(vector(point[AT_NORMAL:]))
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, ABOUT_X])
         lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, ABOUT_Y])
     u, v = L.basis[:, ABOUT_X], L.basis[:, ABOUT_Y]
-    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
-    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], u, v)
-    add_two_sided(P, L.D, nb, i, j, damping * numbers[MOMENT_XY], v, u)
-    add_two_sided(P, L.D, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
+    add_two_sided(P, matrix, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
+    add_two_sided(P, matrix, nb, i, j, damping * numbers[MOMENT_XY], u, v)
+    add_two_sided(P, matrix, nb, i, j, damping * numbers[MOMENT_XY], v, u)
+    add_two_sided(P, matrix, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
 
 
 @jitable
@@ -181,7 +202,7 @@ def add_region_stiffness(
     every[:] = press[:] = 0.0
     weight, moment = 0.0, 0.0
     first = s + REGION_ROWS
-    for k in range(first, s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+    for k in range(first, s + scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]]):
         if rows[k, AT_DEPTH] > 0.0:
             p, n, w = vector(rows[k, AT_POINT:]), vector(rows[k, AT_NORMAL:]), rows[k, AT_WEIGHT]
             for side in range(2):
@@ -216,7 +237,7 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
     ty, w_rel = cross(n, tx), sub(vector(work.w[i]), vector(work.w[j]))
     rub = sub(vector(work.slot[s, FORCE : FORCE + 3]), scale(work.slot[s, NORMAL], n))
     one, moved, first = L.basis[:, POINT], L.basis[:, MOVED], s + REGION_ROWS
-    last = s + scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]
+    last = s + scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]]
     for k in range(first, last):
         weight += max(0.0, work.points[k, AT_DEPTH]) * work.points[k, AT_WEIGHT]
     for k in range(first, last):
@@ -287,7 +308,9 @@ def add_contact_slopes(  # noqa: C901
         return code
 
     # depth and its rate are -n . of displacement and velocity
-    normal, region = L.basis, face_weight_of(scene, s) > 0.0
+    normal, region = L.basis, stands_for_points(scene, s)
+    if face_weight_of(scene, s) > 0.0 and not region:
+        resist_tilting(scene, T, y, s)
     if region:
         slope = by_depth / weight
         by_depth = add_region_stiffness(scene, T, y, s, work.slot[s, NORMAL] / weight, slope)

@@ -1,0 +1,69 @@
+"""Shapes as packed triangles, for the pairs that are measured as patches of surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mbsim.compile_model.pairing import Plans, shape_class
+from mbsim.model.elements import Array, Graphic, Model
+from mbsim.model.surface import pack
+
+
+def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
+    """Return the graphics (ids) that a pair needs as triangles, and whether with their layer.
+
+    On a plane and under a sphere the layer has no part.
+    """
+    found: dict[int, bool] = {}
+
+    def note(pair: str, first: int, second: int) -> None:
+        layered = pair == "SURFACE-SURFACE"
+        for side, id in zip(pair.split("-"), (first, second), strict=True):
+            if side == "SURFACE":
+                found[id] = found.get(id, False) or layered
+
+    for plan in plans.pairs:
+        if "SURFACE" in plan.kind.closed_form:
+            note(plan.kind.closed_form, plan.graphic_i, plan.graphic_j)
+    for contact_set in plans.broadphase:
+        for i in contact_set.i:
+            for j in contact_set.j:
+                classes = shape_class(model.graphics[i]), shape_class(model.graphics[j])
+                kind = contact_set.kinds.get(classes)
+                if kind is not None and "SURFACE" in kind.closed_form:
+                    note(kind.closed_form, *((j, i) if kind.swapped else (i, j)))
+    return found
+
+
+def packed(graphic: Graphic, layered: bool) -> Array:
+    """Return a graphic as a packed surface (`model.surface`)."""
+    assert graphic.vertices is not None
+    assert graphic.faces is not None
+    vertices, faces = graphic.vertices, graphic.faces
+    if not layered:
+        return pack(vertices, faces, vertices, np.zeros(len(vertices)))
+    from mbsim.model.surface_layer import layer
+
+    return pack(vertices, faces, *layer(vertices, faces))
+
+
+def packed_surfaces(
+    graphics: Mapping[int, Graphic], needed: Mapping[int, bool]
+) -> tuple[Array, dict[int, int]]:
+    """Return the packed surfaces of graphics behind each other, and where each one begins.
+
+    Equal shapes have one in common.
+    """
+    parts: list[Array] = []
+    places: dict[tuple[str, tuple[float, ...], bool], int] = {}
+    begins, length = {}, 0
+    for id, layered in needed.items():
+        key = (shape_class(graphics[id]), graphics[id].size, layered)
+        if key not in places:
+            parts.append(packed(graphics[id], layered))
+            places[key] = length
+            length += len(parts[-1])
+        begins[id] = places[key]
+    return np.concatenate([*parts, np.zeros(0)]), begins

@@ -1,0 +1,1 @@
+"""Contact patches of closed triangle meshes that need not be convex, compiled."""

@@ -1,0 +1,271 @@
+"""From pieces of surface to contact points: one for each depth that stands out.
+
+The pieces of an overlap are nodes of a graph. A link joins two that share a segment, and has the
+largest psi on it. Each node belongs to the peak that it leads up to. Where the pieces of two peaks
+p >= q are linked at a saddle s (the largest there is between them), the lower one stands out by
+u = (q - s)/q: it has the weight u, and the higher one, whose weight is 1, acts at
+
+    u x_p + (1 - u) x_both
+
+with x the centre of pressure of the one and of both. Peaks that do not stand out (the corners of a
+flat face, the noise of a tessellation) have no weight, patches that do not touch have their own,
+and nothing jumps where patches merge or one peak overtakes the other.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.core.arrays import F1, F2, I1, I2, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, dot, norm, scale, sub, vector
+from mbsim.geometry.catalog import (
+    AREA,
+    MEAN_DEPTH,
+    MOMENT_XX,
+    MOMENT_XY,
+    MOMENT_YY,
+    REGION_ROWS,
+    axis,
+    plane_axes,
+    put_point,
+)
+from mbsim.geometry.mesh.record import (
+    AREA_VECTOR,
+    MOMENT,
+    PEAK,
+    PRESSURE,
+    PUSH,
+    SPREAD,
+    add_patch,
+)
+from mbsim.geometry.polyhedron import to_global
+
+#: A link this near (as a part) to a node's own peak leads up.
+LEADS = 1.0 - 1e-9
+#: Incidents of a pair: what peaks beyond that count press, the nearest of those does.
+MOST_PEAKS = 8
+#: Numbers of a peak: depth, weight, then point (3), direction (3), area, mean depth and the moments
+#: of the pressure over itself (xx, yy, zz, xy, yz, zx; about the origin of sums); its node.
+PEAK_NUMBERS = 17
+PLACE, NORMAL, SURFACE, MEAN, MOMENTS, AT_NODE = 2, 5, 8, 9, 10, 16
+#: A peak that presses less than this part of the strongest one is none.
+LEAST = 1e-9
+
+
+@jitable
+def root_of(above: I1, k: int) -> int:
+    """Return where the way up from node k ends, and shorten it."""
+    while above[k] != k:
+        above[k] = above[above[k]]
+        k = above[k]
+    return k
+
+
+@jitable
+def lead_up(nodes: F2, links: F2, partners: I2, above: I1) -> None:
+    """Find for each node the highest neighbour that it leads up to, itself for a peak."""
+    for k in range(len(above)):
+        best = k
+        for e in range(links.shape[1]):
+            other = partners[k, e]
+            if other < 0 or links[k, e] < LEADS * nodes[k, PEAK]:
+                continue
+            higher = nodes[other, PEAK] - nodes[best, PEAK]
+            if higher > 0.0 or (higher == 0.0 and other > best):
+                best = other
+        above[k] = best
+
+
+@jitable
+def sort_down(values: F1, order: I1) -> None:
+    """Sort the indices in `order` so that their values fall (Shell's sort)."""
+    gap = len(order) // 2
+    while gap > 0:
+        for k in range(gap, len(order)):
+            moving, j = order[k], k
+            while j >= gap and values[order[j - gap]] < values[moving]:
+                order[j] = order[j - gap]
+                j -= gap
+            order[j] = moving
+        gap //= 2
+
+
+@jitable
+def saddles(above: I1, links: F2, partners: I2) -> tuple[F1, I2]:
+    """Return the links between pieces of different peaks: their psi, and the two peaks."""
+    count = 0
+    for k in range(len(above)):
+        for e in range(links.shape[1]):
+            other = partners[k, e]
+            if other > k and root_of(above, k) != root_of(above, other):
+                count += 1
+    levels, ends = np.empty(count), np.empty((count, 2), np.int64)
+    count = 0
+    for k in range(len(above)):
+        for e in range(links.shape[1]):
+            other = partners[k, e]
+            if other > k and root_of(above, k) != root_of(above, other):
+                levels[count] = links[k, e]
+                ends[count, 0], ends[count, 1] = above[k], above[other]
+                count += 1
+    return levels, ends
+
+
+@jitable
+def blend(peak: F1, patch: F1, part: float) -> None:
+    """Let what a peak has but depth and weight be a part of what it is and the rest of a patch."""
+    push = vector(patch[PUSH:])
+    size, pressure = norm(push), patch[PRESSURE]
+    rest = 1.0 - part
+    by_push = rest / size if size > 0.0 else 0.0
+    by_pressure = rest / pressure if pressure > 0.0 else 0.0
+    for k in range(PLACE, AT_NODE):
+        peak[k] *= part
+    for k in range(3):
+        peak[PLACE + k] += by_pressure * patch[MOMENT + k]
+        peak[NORMAL + k] += by_push * push[k]
+    for k in range(6):
+        peak[MOMENTS + k] += by_pressure * patch[SPREAD + k]
+    area = norm(vector(patch[AREA_VECTOR:]))
+    peak[SURFACE] += rest * area
+    peak[MEAN] += rest * size / area if area > 0.0 else 0.0
+
+
+@jitable
+def begin_peak(peak: F1, patch: F1) -> None:
+    """Write a peak that stands alone."""
+    for k in range(PLACE, AT_NODE):
+        peak[k] = 0.0
+    peak[0], peak[1] = patch[PEAK], 1.0
+    blend(peak, patch, 0.0)
+
+
+@jitable
+def join(high: F1, low: F1, whole: F1, saddle: float) -> None:
+    """Let the lower peak stand out above the saddle only; `whole` is the patch of both."""
+    u = max(0.0, 1.0 - saddle / low[0])
+    low[1] = u
+    blend(high, whole, u)
+
+
+@jitable
+def merge(nodes: F2, links: F2, partners: I2, peaks: F2) -> int:
+    """Fill `peaks` (as many rows as nodes) with the peaks that stand out; return their number.
+
+    What belongs to a peak is added up in its node; links (n, e) [L] and partners (n, e) are the
+    largest psi on a shared segment and the node beyond it, -1 for none.
+    """
+    count = len(nodes)
+    above = np.empty(count, np.int64)
+    lead_up(nodes, links, partners, above)
+    levels, ends = saddles(above, links, partners)
+    found = np.empty(count, np.int64)  # row in `peaks` of a node that is a peak
+    tops = 0
+    for k in range(count):
+        top = root_of(above, k)
+        if top == k:
+            peaks[tops, AT_NODE] = k
+            found[k] = tops
+            tops += 1
+        else:
+            add_patch(nodes[top], nodes[k])
+    for t in range(tops):
+        begin_peak(peaks[t], nodes[int(peaks[t, AT_NODE])])
+    order = np.arange(len(levels))
+    sort_down(levels, order)
+    for k in range(len(order)):
+        a, b = root_of(above, ends[order[k], 0]), root_of(above, ends[order[k], 1])
+        if a == b:
+            continue
+        if nodes[a, PEAK] < nodes[b, PEAK]:
+            a, b = b, a
+        add_patch(nodes[a], nodes[b])
+        join(peaks[found[a]], peaks[found[b]], nodes[a], levels[order[k]])
+        above[b] = a
+    return tops
+
+
+@jitable
+def strongest(peaks: F2, count: int, most: int) -> int:
+    """Move the `most` peaks of greatest weight times depth to the front; return their number.
+
+    What those behind press is added to the nearest of those in front, at their common centre.
+    """
+    for k in range(count):
+        # in no direction there is no force
+        if norm(vector(peaks[k, NORMAL:])) == 0.0:
+            peaks[k, 1] = 0.0
+    kept = 0
+    while kept < min(most, count):
+        best = kept
+        for k in range(kept + 1, count):
+            if peaks[k, 0] * peaks[k, 1] > peaks[best, 0] * peaks[best, 1]:
+                best = k
+        if peaks[best, 0] * peaks[best, 1] <= LEAST * peaks[0, 0]:
+            break
+        for c in range(PEAK_NUMBERS):
+            peaks[kept, c], peaks[best, c] = peaks[best, c], peaks[kept, c]
+        kept += 1
+    for k in range(kept, count):
+        if kept < most or peaks[k, 1] <= 0.0:
+            continue
+        nearest, least = 0, math.inf
+        x = vector(peaks[k, PLACE:])
+        for j in range(kept):
+            away = norm(sub(vector(peaks[j, PLACE:]), x))
+            if away < least:
+                nearest, least = j, away
+        add_weight(peaks[nearest], peaks[k])
+    return kept
+
+
+@jitable
+def add_weight(kept: F1, lost: F1) -> None:
+    """Add to a peak what another one presses, as of a linear law."""
+    more = lost[1] * lost[0] / kept[0]
+    part = more / (kept[1] + more)
+    kept[1] += more
+    for k in range(PLACE, AT_NODE):
+        kept[k] += part * (lost[k] - kept[k])
+
+
+@jitable
+def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
+    """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
+    m = vector(peak[MOMENTS:])
+    xy, yz, zx = peak[MOMENTS + 3], peak[MOMENTS + 4], peak[MOMENTS + 5]
+    total = m[0] * x[0] * y[0] + m[1] * x[1] * y[1] + m[2] * x[2] * y[2]
+    total += xy * (x[0] * y[1] + x[1] * y[0]) + yz * (x[1] * y[2] + x[2] * y[1])
+    total += zx * (x[2] * y[0] + x[0] * y[2])
+    return total - dot(p, x) * dot(p, y)
+
+
+@jitable
+def to_local(frame: F1, d: V3) -> V3:
+    """Return a vector of global axes in a frame's axes."""
+    return (dot(d, axis(frame, 0)), dot(d, axis(frame, 1)), dot(d, axis(frame, 2)))
+
+
+@jitable
+def write_points(peaks: F2, count: int, frame: F1, origin: V3, points: F2) -> None:
+    """Write peaks, measured in the axes of `frame` from `origin` (global), as contact points.
+
+    The normal is the global direction of I from J. Rows without a peak have depth 0.
+    """
+    for k in range(len(points)):
+        put_point(points[k], -0.0, origin, axis(frame, 2))
+    for k in range(count):
+        peak, row, numbers = peaks[k], points[REGION_ROWS * k], points[REGION_ROWS * k + 1]
+        n = vector(peak[NORMAL:])
+        n = to_global(frame, scale(1.0 / norm(n), n))
+        p = vector(peak[PLACE:])
+        x, y = plane_axes(n)
+        put_point(row, peak[0], add(origin, to_global(frame, p)), n, peak[1])
+        numbers[AREA], numbers[MEAN_DEPTH] = peak[SURFACE], peak[MEAN]
+        x, y = to_local(frame, x), to_local(frame, y)
+        numbers[MOMENT_XX] = peak[1] * moment(peak, p, x, x)
+        numbers[MOMENT_XY] = peak[1] * moment(peak, p, x, y)
+        numbers[MOMENT_YY] = peak[1] * moment(peak, p, y, y)

@@ -1,0 +1,239 @@
+"""The pieces of two meshes in each other's layers.
+
+Both trees are walked together. A node of the graph that `merging` takes is a pair of triangles,
+one of I and one of J: what the one is in the other's prism, and the other in its.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.core.arrays import F1, F2, I1, I2, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import vector
+from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
+from mbsim.geometry.mesh.polygon import CORNERS
+from mbsim.geometry.mesh.prism import above_or_below, piece_in_prism
+from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
+from mbsim.geometry.mesh.tree import WAITING, leaf_range
+from mbsim.model.surface import (
+    AT_BOXES,
+    AT_TRIANGLES,
+    BESIDE,
+    BOX,
+    CORNER,
+    DEEP_BOX,
+    DEPTH,
+    LEAF,
+    LEVELS,
+    NODE,
+    TRIANGLE,
+)
+
+#: Which surface may be in which layer: I's in J's, J's in I's.
+I_IN_J, J_IN_I = 1, 2
+#: Numbers of a triangle that the walk needs: corners, inner points, depths, order.
+PRISM = 24
+#: Edges of a pair of triangles.
+EDGES = 6
+
+
+@jitable
+def boxes_meet(a: F1, b: F1, pose: F1) -> bool:
+    """Return whether box a (six numbers, I's axes) and b (J's) meet, seen along their own axes.
+
+    `pose` is I in J's axes: origin, then the rotation by rows.
+    """
+    x, y, z = a[0], a[1], a[2]
+    u = pose[0] + pose[3] * x + pose[4] * y + pose[5] * z - b[0]
+    if abs(u) > abs(pose[3]) * a[3] + abs(pose[4]) * a[4] + abs(pose[5]) * a[5] + b[3]:
+        return False
+    v = pose[1] + pose[6] * x + pose[7] * y + pose[8] * z - b[1]
+    if abs(v) > abs(pose[6]) * a[3] + abs(pose[7]) * a[4] + abs(pose[8]) * a[5] + b[4]:
+        return False
+    w = pose[2] + pose[9] * x + pose[10] * y + pose[11] * z - b[2]
+    if abs(w) > abs(pose[9]) * a[3] + abs(pose[10]) * a[4] + abs(pose[11]) * a[5] + b[5]:
+        return False
+    for k in range(3):
+        along = abs(pose[3 + k] * u + pose[6 + k] * v + pose[9 + k] * w)
+        reach = abs(pose[3 + k]) * b[3] + abs(pose[6 + k]) * b[4] + abs(pose[9 + k]) * b[5]
+        if along > reach + a[3 + k]:
+            return False
+    return True
+
+
+@jitable
+def common_middle(a: F1, b: F1, pose: F1) -> V3:
+    """Return the middle of what box a (I's axes) and b (J's) have in common, in J's axes."""
+    found = np.empty(3)
+    for r in range(3):
+        m = 3 + 3 * r
+        at = pose[r] + pose[m] * a[0] + pose[m + 1] * a[1] + pose[m + 2] * a[2]
+        reach = abs(pose[m]) * a[3] + abs(pose[m + 1]) * a[4] + abs(pose[m + 2]) * a[5]
+        found[r] = 0.5 * (max(at - reach, b[r] - b[3 + r]) + min(at + reach, b[r] + b[3 + r]))
+    return (found[0], found[1], found[2])
+
+
+@jitable
+def box_gap(a: F1, b: F1, pose: F1) -> float:
+    """Return a lower bound of the distance of box a (I's axes) and b (J's); 0 where they meet."""
+    square = 0.0
+    for r in range(3):
+        m = 3 + 3 * r
+        at = pose[r] + pose[m] * a[0] + pose[m + 1] * a[1] + pose[m + 2] * a[2]
+        reach = abs(pose[m]) * a[3] + abs(pose[m + 1]) * a[4] + abs(pose[m + 2]) * a[5]
+        out = max(0.0, abs(at - b[r]) - reach - b[3 + r])
+        square += out * out
+    return math.sqrt(square)
+
+
+@jitable
+def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F1) -> None:
+    """Write corners, inner points, depths and order of a triangle in J's axes from `origin`."""
+    at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
+    for k in range(0, DEPTH, 3):
+        p = vector(mesh[at + k :])
+        if moves:
+            p = (
+                pose[0] + pose[3] * p[0] + pose[4] * p[1] + pose[5] * p[2],
+                pose[1] + pose[6] * p[0] + pose[7] * p[1] + pose[8] * p[2],
+                pose[2] + pose[9] * p[0] + pose[10] * p[1] + pose[11] * p[2],
+            )
+        prism[k], prism[k + 1], prism[k + 2] = p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]
+    for k in range(DEPTH, PRISM):
+        prism[k] = mesh[at + k]
+
+
+@jitable
+def corners_of(prism: F1) -> tuple[V3, V3, V3]:
+    """Return the corners of a placed triangle."""
+    return (vector(prism[CORNER:]), vector(prism[CORNER + 3 :]), vector(prism[CORNER + 6 :]))
+
+
+@jitable
+def measure_pair_of(
+    a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2
+) -> bool:
+    """Fill the node of triangles a of I and b of J; return whether there is any piece.
+
+    `values` are the largest psi on the edges of a and of b.
+    """
+    for k in range(PATCH_NUMBERS):
+        node[k] = 0.0
+    for k in range(EDGES):
+        values[k] = other[k] = 0.0
+    if ways & I_IN_J:
+        tri = corners_of(a)
+        if not above_or_below(b, tri):
+            piece_in_prism(b, tri, 1.0, node, values, work)
+    if ways & J_IN_I:
+        tri = corners_of(b)
+        if not above_or_below(a, tri):
+            piece_in_prism(a, tri, -1.0, node, other, work)
+            for k in range(3):
+                values[k] = max(values[k], other[3 + k])
+                values[3 + k] = max(values[3 + k], other[k])
+    return node[PEAK] > 0.0
+
+
+@jitable
+def grown(table: F2, count: int) -> F2:
+    """Return a table with twice the rows, the first `count` as they are."""
+    larger = np.empty((2 * len(table), table.shape[1]))
+    larger[:count] = table[:count]
+    return larger
+
+
+@jitable
+def nodes_of(
+    mesh_i: F1, mesh_j: F1, pose: F1, origin: V3
+) -> tuple[int, F2, F2, F2]:
+    """Return how many pairs of triangles overlap, their nodes, psi on their edges, the pairs.
+
+    Sums are in J's axes, from `origin`.
+    """
+    count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
+    pairs = np.empty((64, 2))
+    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    placed_i, placed_j, other = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM)), np.empty(EDGES)
+    waiting = np.empty((4 * WAITING, 3), np.int64)
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 1, 1, I_IN_J | J_IN_I
+    many = 1
+    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
+    while many > 0:
+        many -= 1
+        i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
+        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
+        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
+        if ways & I_IN_J and not boxes_meet(box_i[BOX:], box_j[DEEP_BOX:], pose):
+            ways -= I_IN_J
+        if ways & J_IN_I and not boxes_meet(box_i[DEEP_BOX:], box_j[BOX:], pose):
+            ways -= J_IN_I
+        if ways == 0:
+            continue
+        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
+        if i < leaves_i and (larger or j >= leaves_j):
+            for k in range(2):
+                waiting[many, 0], waiting[many, 1], waiting[many, 2] = 2 * i + k, j, ways
+                many += 1
+            continue
+        if j < leaves_j:
+            for k in range(2):
+                waiting[many, 0], waiting[many, 1], waiting[many, 2] = i, 2 * j + k, ways
+                many += 1
+            continue
+        first_i, last_i = leaf_range(mesh_i, i)
+        first_j, last_j = leaf_range(mesh_j, j)
+        for t in range(first_i, last_i):
+            place_triangle(mesh_i, t, pose, True, origin, placed_i[t - first_i])
+        for t in range(first_j, last_j):
+            place_triangle(mesh_j, t, pose, False, origin, placed_j[t - first_j])
+        for a in range(first_i, last_i):
+            for b in range(first_j, last_j):
+                if count == len(nodes):
+                    nodes, values = grown(nodes, count), grown(values, count)
+                    pairs = grown(pairs, count)
+                if measure_pair_of(
+                    placed_i[a - first_i], placed_j[b - first_j], ways, nodes[count],
+                    values[count], other, work,
+                ):  # fmt: skip
+                    pairs[count, 0], pairs[count, 1] = a, b
+                    count += 1
+    return count, nodes, values, pairs
+
+
+@jitable
+def place_in(table: I1, pairs: F2, a: int, b: int) -> int:
+    """Return the place of a pair of triangles in the table, or the free one where it would be."""
+    mask = len(table) - 1
+    at = (a * 73856093 ^ b * 19349663) & mask
+    while table[at] >= 0:
+        k = table[at]
+        if pairs[k, 0] == a and pairs[k, 1] == b:
+            return at
+        at = (at + 1) & mask
+    return at
+
+
+@jitable
+def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2:
+    """Return the nodes beyond the six edges of each pair of triangles, -1 for none."""
+    size = 16
+    while size < 2 * count:
+        size *= 2
+    table = np.full(size, -1)
+    for k in range(count):
+        table[place_in(table, pairs, int(pairs[k, 0]), int(pairs[k, 1]))] = k
+    partners = np.full((count, EDGES), -1)
+    for k in range(count):
+        a, b = int(pairs[k, 0]), int(pairs[k, 1])
+        beside_i = int(mesh_i[AT_TRIANGLES]) + TRIANGLE * a + BESIDE
+        beside_j = int(mesh_j[AT_TRIANGLES]) + TRIANGLE * b + BESIDE
+        for e in range(3):
+            if values[k, e] > 0.0:
+                partners[k, e] = table[place_in(table, pairs, int(mesh_i[beside_i + e]), b)]
+            if values[k, 3 + e] > 0.0:
+                partners[k, 3 + e] = table[place_in(table, pairs, a, int(mesh_j[beside_j + e]))]
+    return partners

@@ -1,0 +1,88 @@
+"""Meshes that need not be convex: contact patches on a plane and on each other.
+
+`size` of a mesh has the address of its packed surface (`model.surface`) as its fourth number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbsim.core.arrays import F1, F2
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.geometry.catalog import AT_POINT, AT_WEIGHT, REGION_ROWS, axis, pair, put_point
+from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
+from mbsim.geometry.mesh.overlap import box_gap, common_middle, nodes_of, partners_of
+from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
+from mbsim.geometry.polyhedron import to_global
+from mbsim.model.surface import AT_BOXES, HEADER, LENGTH, NODE, TRIANGLES
+
+PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
+
+
+@jitable
+def surface_of(size: F1) -> F1:
+    """Return the packed surface of a shape."""
+    return floats_at(size[3], floats_at(size[3], float(HEADER))[LENGTH])
+
+
+@pair("SURFACE", "PLANE", slots=PATCH_SLOTS, regroups=True, patches=True)
+def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The peaks of the patches below the plane; apart, the lowest corner."""
+    mesh, up = surface_of(size_i), axis(frame_j, 2)
+    n = (dot(axis(frame_i, 0), up), dot(axis(frame_i, 1), up), dot(axis(frame_i, 2), up))
+    height = dot(sub(vector(frame_j), vector(frame_i)), up)
+    low, corner = lowest_corner(mesh, n)
+    at = add(vector(frame_i), to_global(frame_i, corner))
+    if low >= height:
+        for k in range(len(points)):
+            put_point(points[k], height - low, add(at, scale(0.5 * (height - low), up)), up)
+        return len(points)
+    found = np.empty(int(mesh[TRIANGLES]), np.int64)
+    count = triangles_below(mesh, n, height, found)
+    nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
+    peaks = np.empty((count, PEAK_NUMBERS))
+    count = strongest(peaks, merge(nodes, links, partners, peaks), MOST_PEAKS)
+    write_points(peaks, count, frame_i, at, points)
+    for k in range(0, REGION_ROWS * count, REGION_ROWS):
+        # half way between the surface of the mesh and the plane
+        p, depth = vector(points[k, AT_POINT:]), points[k, 0]
+        p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
+        put_point(points[k], depth, p, up, points[k, AT_WEIGHT])
+    return len(points)
+
+
+@jitable
+def pose_of(frame_i: F1, frame_j: F1) -> F1:
+    """Return I in J's axes: origin, then the rotation by rows."""
+    pose, apart = np.empty(12), sub(vector(frame_i), vector(frame_j))
+    for r in range(3):
+        row = axis(frame_j, r)
+        pose[r] = dot(apart, row)
+        for c in range(3):
+            pose[3 + 3 * r + c] = dot(row, axis(frame_i, c))
+    return pose
+
+
+@pair("SURFACE", "SURFACE", slots=PATCH_SLOTS, regroups=True, patches=True)
+def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The peaks of the patches in which two meshes overlap."""
+    mesh_i, mesh_j = surface_of(size_i), surface_of(size_j)
+    pose = pose_of(frame_i, frame_j)
+    root_i, root_j = int(mesh_i[AT_BOXES]) + NODE, int(mesh_j[AT_BOXES]) + NODE
+    gap = box_gap(mesh_i[root_i:], mesh_j[root_j:], pose)
+    if gap > 0.0:
+        for k in range(len(points)):
+            put_point(points[k], -gap, vector(frame_j), (0.0, 0.0, 0.0))
+        return len(points)
+    # the middle of what both roots have in common is near the patches
+    origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
+    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    partners = partners_of(mesh_i, mesh_j, count, values, pairs)
+    peaks = np.empty((count, PEAK_NUMBERS))
+    count = merge(nodes[:count], values[:count], partners, peaks)
+    count = strongest(peaks, count, MOST_PEAKS)
+    at = add(vector(frame_j), to_global(frame_j, origin))
+    write_points(peaks, count, frame_j, at, points)
+    return len(points)

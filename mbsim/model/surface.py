@@ -1,0 +1,134 @@
+"""A closed triangle mesh packed with its tree of boxes, as the contact patches read it.
+
+One array holds all: a header, the boxes of a complete binary tree over the triangles, the
+triangles in the order of its leaves, and a mark for each triangle that the patches use while they
+work (it is -1 in between).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from mbsim.model.elements import Array
+from mbsim.model.mesh import Faces
+
+#: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles and
+#: marks begin, length of the whole.
+HEADER = 6
+TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, LENGTH = range(HEADER)
+#: Most triangles of a leaf.
+LEAF = 4
+#: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
+#: box of its triangles, and of the box of these and of their layer.
+NODE = 12
+BOX, DEEP_BOX = 0, 6
+#: Numbers of a triangle: corners, their inner points in the layer and depths of these, the corners
+#: in the order of their numbers in the mesh, the triangles beyond the edges (edge k from corner k
+#: to the next), its number in the mesh, unit normal, the angle-weighted normals of the corners.
+TRIANGLE = 40
+CORNER, INNER, DEPTH, ORDER, BESIDE, NUMBER, UNIT, CORNER_NORMAL = 0, 9, 18, 21, 24, 27, 28, 31
+
+Indices = npt.NDArray[np.int64]
+
+
+def leaves_order(middles: Array, levels: int) -> Indices:
+    """Return the triangles in the order of the leaves of a tree.
+
+    Node k of level l holds those from k m // 2^l to (k + 1) m // 2^l: halves along the longest
+    side of what it holds.
+    """
+    count = len(middles)
+    order = np.arange(count)
+    for level in range(levels):
+        bounds = np.arange(2**level + 1) * count // 2**level
+        part = np.repeat(np.arange(2**level), np.diff(bounds))
+        here = middles[order]
+        low = np.minimum.reduceat(here, bounds[:-1], axis=0)
+        high = np.maximum.reduceat(here, bounds[:-1], axis=0)
+        longest = (high - low).argmax(axis=1)
+        order = order[np.lexsort((here[np.arange(count), longest[part]], part))]
+    return order
+
+
+def _boxes(low: Array, high: Array, levels: int) -> Array:
+    """Return centre and half edges of the boxes of all nodes, shape (2^(levels + 1), 6)."""
+    count = len(low)
+    made = np.zeros((2 ** (levels + 1), 6))
+    bounds = np.arange(2**levels) * count // 2**levels
+    low = np.minimum.reduceat(low, bounds, axis=0)
+    high = np.maximum.reduceat(high, bounds, axis=0)
+    for level in range(levels, -1, -1):
+        first = 2**level
+        made[first : 2 * first, :3] = 0.5 * (low + high)
+        # rounded outward
+        made[first : 2 * first, 3:] = 0.5 * (high - low) * (1.0 + 1e-15) + 1e-15 * np.abs(low)
+        if level:
+            low = np.minimum(low[::2], low[1::2])
+            high = np.maximum(high[::2], high[1::2])
+    return made
+
+
+def beyond_edges(faces: Faces) -> Indices:
+    """Return the face beyond each edge of each face of a closed mesh, shape (m, 3)."""
+    count = int(faces.max()) + 1
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    ahead, back = start * count + end, end * count + start
+    order = np.argsort(ahead)
+    beside: Indices = (order[np.searchsorted(ahead[order], back)] // 3).reshape(-1, 3)
+    return beside
+
+
+def _corner_normals(corners: Array, faces: Faces, units: Array) -> Array:
+    """Return the angle-weighted normal of every corner (m, 3, 3), of any length.
+
+    A point whose nearest point is a vertex is outside where it is above that normal (Baerentzen
+    and Aanaes 2005).
+    """
+    ahead = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(corners, 1, axis=1) - corners
+    angle = np.arctan2(np.linalg.norm(np.cross(ahead, back), axis=2), (ahead * back).sum(axis=2))
+    total = np.zeros((int(faces.max()) + 1, 3))
+    np.add.at(total, faces.ravel(), (angle[:, :, None] * units[:, None, :]).reshape(-1, 3))
+    return total[faces]
+
+
+def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
+    """Return a closed mesh as one packed array.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Positions [L], shape axes.
+    faces : ndarray of int, shape (m, 3)
+        Triangles of a closed mesh, counter-clockwise seen from outside.
+    inner : ndarray, shape (n, 3)
+        The inner points of its layer (`model.surface_layer`) [L]; the vertices for a mesh that is
+        used without.
+    depth : ndarray, shape (n,)
+        The depths of these [L].
+    """
+    count = len(faces)
+    levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0)))))
+    order = leaves_order(vertices[faces].mean(axis=1), levels)
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    beside = place[beyond_edges(faces)[order]]
+    ordered = faces[order]
+    corners, below = vertices[ordered], inner[ordered]
+    units = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(units, axis=1)
+    units = units / np.where(length > 0.0, length, 1.0)[:, None]
+
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    deep_low, deep_high = np.minimum(low, below.min(axis=1)), np.maximum(high, below.max(axis=1))
+    boxes = np.hstack([_boxes(low, high, levels), _boxes(deep_low, deep_high, levels)])
+    table = np.hstack([
+        corners.reshape(count, 9), below.reshape(count, 9), depth[ordered],
+        np.argsort(ordered, axis=1), beside, order[:, None], units,
+        _corner_normals(corners, ordered, units).reshape(count, 9),
+    ])  # fmt: skip
+    at = HEADER + np.cumsum([0, boxes.size, table.size, count])
+    head = [count, levels, *at]
+    packed: Array = np.concatenate([head, boxes.ravel(), table.ravel(), np.full(count, -1.0)])
+    return packed
