@@ -33,7 +33,7 @@ MOST_LISTED = 300
 
 
 #: Shapes that have patches as triangles do.
-AS_SURFACE = {"MESH": "SURFACE"}
+AS_SURFACE = dict.fromkeys(("MESH", "BOX", "CYLINDER", "FRUSTUM", "ELLIPSOID"), "SURFACE")
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
 from mbsim.model.surface import pack
+from mbsim.model.tessellation import triangles_of
 
 
 def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
@@ -39,9 +40,7 @@ def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
 
 def packed(graphic: Graphic, layered: bool) -> Array:
     """Return a graphic as a packed surface (`model.surface`)."""
-    assert graphic.vertices is not None
-    assert graphic.faces is not None
-    vertices, faces = graphic.vertices, graphic.faces
+    vertices, faces = triangles_of(graphic)
     if not layered:
         return pack(vertices, faces, vertices, np.zeros(len(vertices)))
     from mbsim.model.surface_layer import layer

@@ -24,3 +24,12 @@ def lowest(mesh: F1, at: int, n: V3) -> float:
     centre = mesh[at] * n[0] + mesh[at + 1] * n[1] + mesh[at + 2] * n[2]
     half = mesh[at + 3] * abs(n[0]) + mesh[at + 4] * abs(n[1]) + mesh[at + 5] * abs(n[2])
     return centre - half
+
+
+@jitable
+def box_square(mesh: F1, at: int, c: V3) -> float:
+    """Return the squared distance of c from the box whose six numbers begin at `at`."""
+    x = max(0.0, abs(c[0] - mesh[at]) - mesh[at + 3])
+    y = max(0.0, abs(c[1] - mesh[at + 1]) - mesh[at + 4])
+    z = max(0.0, abs(c[2] - mesh[at + 2]) - mesh[at + 5])
+    return x * x + y * y + z * z

@@ -10,8 +10,20 @@ import numpy as np
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
-from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.core.rotation import add, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import AT_POINT, AT_WEIGHT, REGION_ROWS, axis, pair, put_point
+from mbsim.geometry.mesh.ball import (
+    NEAR_NORMAL,
+    NEAR_NUMBERS,
+    NEAR_POINT,
+    NEAR_WEIGHT,
+    in_reach,
+    measure_near,
+    merge_points,
+    nearest_triangle,
+    strongest_points,
+    triangles_near,
+)
 from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
 from mbsim.geometry.mesh.overlap import box_gap, common_middle, nodes_of, partners_of
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
@@ -85,4 +97,34 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     count = strongest(peaks, count, MOST_PEAKS)
     at = add(vector(frame_j), to_global(frame_j, origin))
     write_points(peaks, count, frame_j, at, points)
+    return len(points)
+
+
+@pair("SPHERE", "SURFACE", slots=MOST_PEAKS, regroups=True)
+def sphere_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The nearest points of the mesh that stand out; inside, the nearest way out."""
+    mesh, radius = surface_of(size_j), size_i[0]
+    apart, edges = sub(vector(frame_i), vector(frame_j)), np.empty(3)
+    c = (dot(apart, axis(frame_j, 0)), dot(apart, axis(frame_j, 1)), dot(apart, axis(frame_j, 2)))
+    _, nearest = nearest_triangle(mesh, c, edges)
+    row = np.empty(NEAR_NUMBERS)
+    measure_near(mesh, nearest, c, radius, row, edges)
+    count, least = 0, -0.0
+    rows = row.reshape(1, NEAR_NUMBERS)
+    if row[0] > 0.0:
+        found = np.empty(int(mesh[TRIANGLES]), np.int64)
+        count = triangles_near(mesh, c, radius, found)
+        rows, links, partners = in_reach(mesh, c, radius, nearest, found[:count])
+        merge_points(rows, links, partners)
+        count = strongest_points(rows, len(points))
+    else:
+        least = row[0]
+    for k in range(len(points)):
+        at = rows[min(k, max(count - 1, 0))]
+        n = to_global(frame_j, vector(at[NEAR_NORMAL:]))
+        p = add(vector(frame_j), to_global(frame_j, vector(at[NEAR_POINT:])))
+        size = norm(n)
+        depth = at[0] if k < count else least
+        weight = at[NEAR_WEIGHT] if k < count else 1.0
+        put_point(points[k], depth, add(p, scale(-0.5 * depth, n)), scale(1.0 / size, n), weight)
     return len(points)
