@@ -204,8 +204,8 @@ def pawl(length: float, thick: float, width: float) -> Mesh:
 
 
 PARTS: dict[str, Callable[[], Mesh]] = {
-    "gear20.stl": lambda: gear(20, 2.0, 10.0, 20),
-    "gear30.stl": lambda: gear(30, 2.0, 10.0, 20),
+    "gear20.stl": lambda: gear(20, 2.0, 10.0, 8),
+    "gear30.stl": lambda: gear(30, 2.0, 10.0, 8),
     "ratchet_wheel.stl": lambda: ratchet(16, 40.0, 34.0, 10.0),
     "ratchet_pawl.stl": lambda: pawl(30.0, 6.0, 8.0),
     "bolt.stl": lambda: bolt(5.0, 20.0, 8.0, 6.0),
