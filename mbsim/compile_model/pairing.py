@@ -65,6 +65,9 @@ class Kind:
         """Whether a contact that goes on may begin another slot, which is then no impact."""
         if self.region:
             return False
+        if self.closed_form == "MESH-PLANE" and self.slots == hull.MOST_ROWS:
+            # of a fine mesh the deepest corner has the force alone, and the next one takes it over
+            return True
         return not self.closed_form or PAIRS[self.closed_form].regroups
 
     @property

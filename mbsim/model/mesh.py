@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +15,13 @@ from mbsim.model.elements import Array
 from mbsim.model.mass_properties import polyhedron
 
 Faces = npt.NDArray[np.int64]
+Marks = npt.NDArray[np.bool_]
 
 _PLACES = 3  # so many positions of one kind of fault are told
 
 
-class Finding(NamedTuple):
+@dataclass(frozen=True)
+class Finding:
     """One kind of thing that is wrong with a mesh: how often, and the first few places."""
 
     what: str

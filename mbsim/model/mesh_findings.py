@@ -9,6 +9,7 @@ from mbsim.model.mesh import (
     Edges,
     Faces,
     Finding,
+    Marks,
     edges_of,
     point_text,
     shell_findings,
@@ -58,7 +59,7 @@ def crossing_findings(vertices: Array, faces: Faces) -> list[Finding]:
     return [Finding(f"{len(pairs)} pairs of triangles intersect", len(pairs), first)]
 
 
-def _at_faces(vertices: Array, faces: Faces, bad: Array, what: str) -> list[Finding]:
+def _at_faces(vertices: Array, faces: Faces, bad: Marks, what: str) -> list[Finding]:
     """Return a finding about the faces that are marked, placed at their centroids."""
     count = int(bad.sum())
     if count == 0:
@@ -67,7 +68,7 @@ def _at_faces(vertices: Array, faces: Faces, bad: Array, what: str) -> list[Find
     return [Finding(what.format(count), count, tuple(f"at {point_text(p)}" for p in centres))]
 
 
-def doubles(faces: Faces) -> Array:
+def doubles(faces: Faces) -> Marks:
     """Return which faces have the three corners of an earlier one, shape (m,)."""
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     again = np.ones(len(faces), dtype=bool)

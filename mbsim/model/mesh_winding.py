@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-import numpy.typing as npt
 
 from mbsim.model.elements import Array
 from mbsim.model.mass_properties import polyhedron
-from mbsim.model.mesh import Edges, Faces, shells, surroundings
-
-Marks = npt.NDArray[np.bool_]
+from mbsim.model.mesh import Edges, Faces, Marks, shells, surroundings
 
 
 def wound_outwards(vertices: Array, faces: Faces, edges: Edges) -> Marks | None:

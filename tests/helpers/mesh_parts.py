@@ -64,9 +64,7 @@ def prism(outline: np.ndarray, height: float) -> Mesh:
     return bands([low, high], closed=False)
 
 
-def gear(
-    teeth: int, module: float, width: float, points: int, backlash: float = 0.02
-) -> Mesh:
+def gear(teeth: int, module: float, width: float, points: int, backlash: float = 0.02) -> Mesh:
     """Return an involute gear about z, a tooth on the x axis.
 
     Parameters
@@ -179,9 +177,7 @@ def angle_piece(leg: float, thick: float, width: float) -> Mesh:
 def prism_of(outline: np.ndarray, caps: list[list[int]], half: float) -> Mesh:
     """Return the solid between z = -half and half of an outline with given triangles."""
     n = len(outline)
-    vertices = np.concatenate(
-        [np.column_stack([outline, np.full(n, z)]) for z in (-half, half)]
-    )
+    vertices = np.concatenate([np.column_stack([outline, np.full(n, z)]) for z in (-half, half)])
     k, after = np.arange(n), (np.arange(n) + 1) % n
     top = np.array(caps)
     return vertices, np.concatenate(

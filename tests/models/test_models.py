@@ -597,6 +597,24 @@ def wheel_angle(results):
     return np.unwrap(2 * np.arctan2(q[:, 3], q[:, 0]))
 
 
+def test_cam_from_stl():
+    """A fine convex mesh that rolls: the deepest corner hands the force over to the next one."""
+    results = run_model("cam_from_stl.xml")
+    late = results["time"] > 0.05  # of the first touch
+    angle, face = (results[f"requests/1/{name}"][late] for name in ("F2", "F3"))
+    force = results["contacts/301/force/y"][late]
+    lift = 35.0 + 5.0 * np.cos(2.0 * angle)
+    off = face + force / 1e4 - lift
+    # the radius of curvature is 35 - 15 cos 2a at most 50, a facet spans a degree
+    facet = 50.0 * (1.0 - np.cos(np.pi / 360.0))
+    assert -facet - 2e-4 < off.min()
+    assert off.max() < 2e-4
+    # spring and inertia of the follower, in the mean over half a turn
+    half = angle < angle[0] + np.pi
+    mean = np.mean(20.0 + 5.0 * np.cos(2.0 * angle) - 5.0 - 0.25e-3 * 2000.0 * np.cos(2.0 * angle))
+    assert force[half].mean() == pytest.approx(mean, rel=0.03)
+
+
 def test_geneva_indexes_by_a_quarter_a_turn():
     results = run_model("geneva.xml")
     t, angle = results["time"], wheel_angle(results)
