@@ -23,30 +23,31 @@ class Hook(IntEnum):
 
     CONTACTS = 0  # what contacts are asked for: `Contacts`
     FCL = 1  # distances of pairs without a closed form
-    TILTING = 2  # damping of what tilts on a flat face that is one incident
-    RECALL = 3  # friction of contacts that keeps something: `Recall`
-    VALUE = 4  # value of an expression
-    JET = 5  # its value and rates
-    APPLIED = 6  # forces between markers, states of the user's own
-    WRENCH = 7  # a bushing or a vector force
-    ELEMENT = 8  # a Force_Element by its residual
-    JOINTS = 9  # what joints are asked for: `Joints`
-    STICKING = 10  # contacts whose friction holds without give: `Sticking`
-    REACTION_FORCES = 11  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 12  # the whole rhs
-    TANGENT = 13  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 14  # how forces of equations turn with the bodies
-    CONTACT_SLOPES = 15  # derivatives of contacts: `ContactSlopes`
-    MEMORY = 16  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 17  # derivatives of forces between markers
-    MEMORY_PAIR = 18  # as MEMORY in complex systems
-    GAUGES = 19  # what is measured of contacts: `Gauges`
-    EFFECTS = 20  # what an error does to contacts, as implicit methods ask: `Effects`
-    STABILITY = 21  # what contacts bound steps of fixed length by: `Stability`
-    DRY = 22  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 23  # turns of followed angles
-    NEAR = 24  # the lists of near pairs
-    REQUESTS = 25  # expressions of requests
+    SLOTS = 2  # which incident of a pair of patches is which
+    TILTING = 3  # damping of what tilts on a flat face that is one incident
+    RECALL = 4  # friction of contacts that keeps something: `Recall`
+    VALUE = 5  # value of an expression
+    JET = 6  # its value and rates
+    APPLIED = 7  # forces between markers, states of the user's own
+    WRENCH = 8  # a bushing or a vector force
+    ELEMENT = 9  # a Force_Element by its residual
+    JOINTS = 10  # what joints are asked for: `Joints`
+    STICKING = 11  # contacts whose friction holds without give: `Sticking`
+    REACTION_FORCES = 12  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 13  # the whole rhs
+    TANGENT = 14  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 15  # how forces of equations turn with the bodies
+    CONTACT_SLOPES = 16  # derivatives of contacts: `ContactSlopes`
+    MEMORY = 17  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 18  # derivatives of forces between markers
+    MEMORY_PAIR = 19  # as MEMORY in complex systems
+    GAUGES = 20  # what is measured of contacts: `Gauges`
+    EFFECTS = 21  # what an error does to contacts, as implicit methods ask: `Effects`
+    STABILITY = 22  # what contacts bound steps of fixed length by: `Stability`
+    DRY = 23  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 24  # turns of followed angles
+    NEAR = 25  # the lists of near pairs
+    REQUESTS = 26  # expressions of requests
 
 
 class Contacts(IntEnum):

@@ -46,6 +46,7 @@ class Kinds(NamedTuple):
     regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
     whole: F1  # (nk,) shares of a flat face, where incidents have an area; else 0
     step: I1  # (nk,) rows from one incident to the next: 1 for points, all where a pair is one
+    moves: I1  # (nk,) 1 where a row is no part of a shape: incidents keep their slots by place
     noise: F1  # (nk,) scatter of the normals that its detector gives
 
 

@@ -22,7 +22,7 @@ from mbsim.compile_model.pairing import (
     shape_class,
     thinnest,
 )
-from mbsim.compile_model.surfaces import needed_as_triangles, packed_surfaces
+from mbsim.compile_model.surfaces import needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
@@ -109,12 +109,13 @@ def graphics_table(
         made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
         made.R[g] = marker.R_B
         made.size[g, :3] = kernel_size(graphic)
+        made.thin[g] = thinnest(graphic)
         if graphic_id in begins:
             made.size[g, 3] = surfaces.ctypes.data + surfaces.itemsize * begins[graphic_id]
+            made.thin[g] = min(thinnest(graphic), thickness(surfaces[begins[graphic_id] :]))
         made.radius[g] = radius(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
-        made.thin[g] = thinnest(graphic)
         made.shape[g] = shapes.index(shape_class(graphic))
         made.marker_p[g] = marker.p_B
         made.marker_R[g] = marker.R_B
@@ -138,6 +139,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
         whole=np.array([_face_weight(k) for k in kinds]),
         step=np.array([k.step for k in kinds], dtype=np.int64),
+        moves=np.array([k.moves for k in kinds], dtype=np.int64),
         noise=np.array(
             [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
         ),

@@ -23,6 +23,7 @@ _FLAT = {"BOX", "PLANE"}
 FCL_SLOTS = 8
 #: Shapes with round sides that are flat at their ends.
 _ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
+_ROUND = {"CYLINDER", "FRUSTUM", "ELLIPSOID"}
 #: Points on which a round end rests in a closed form, and a face of a box on one.
 _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 #: Contacts with more pairs than this are large contacts. Every pair listed for good costs some 5 ns
@@ -52,6 +53,11 @@ class Kind:
     def has_area(self) -> bool:
         """Whether its incidents have an area."""
         return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
+
+    @property
+    def moves(self) -> bool:
+        """Whether its rows are no parts of a shape: incidents keep their slots by their places."""
+        return "SURFACE" in self.closed_form
 
     @property
     def step(self) -> int:
@@ -148,8 +154,12 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
 
 
 def _patches(contact: int, i: Graphic, j: Graphic) -> Kind | None:
-    """Return the pair of surfaces for graphics of which one is a mesh, None for others."""
-    if "MESH" not in (i.shape, j.shape):
+    """Return the pair of surfaces for graphics of which one is a mesh, None for others.
+
+    A convex mesh on a round solid is none: `geometry.hull_overlap` knows their exact distance.
+    """
+    shapes = {i.shape, j.shape}
+    if "MESH" not in shapes or (shapes & _ROUND and _convex(i, j)):
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{AS_SURFACE.get(a.shape, a.shape)}-{AS_SURFACE.get(b.shape, b.shape)}"

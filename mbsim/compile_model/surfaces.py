@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
-from mbsim.model.surface import pack
+from mbsim.model.surface import AT_TRIANGLES, DEPTH, ORDER, TRIANGLE, TRIANGLES, pack
 from mbsim.model.tessellation import triangles_of
+
+#: A layer reaches this part of half of a wall's thickness, by `model.surface_layer`; how many
+#: in a hundred of its depths are taken for faults of the mesh rather than for walls.
+OF_HALF, THIN = 0.72, 2.0
 
 
 def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
@@ -46,6 +51,15 @@ def packed(graphic: Graphic, layered: bool) -> Array:
     from mbsim.model.surface_layer import layer
 
     return pack(vertices, faces, *layer(vertices, faces))
+
+
+def thickness(surface: Array) -> float:
+    """Return half of how thin a packed surface is where its layer is thin; inf without a layer."""
+    count = int(surface[TRIANGLES])
+    table = surface[int(surface[AT_TRIANGLES]) :][: count * TRIANGLE].reshape(count, TRIANGLE)
+    depth = table[:, DEPTH:ORDER]
+    depth = depth[depth > 0.0]
+    return float(np.percentile(depth, THIN)) / OF_HALF if len(depth) else math.inf
 
 
 def packed_surfaces(

@@ -14,6 +14,7 @@ from helpers import crowd_decks, mechanism_decks
 from helpers.decks import write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
+from helpers.surfaces import IMPACT, angle_on_ground
 from mbsim.arrays.codes import NEAR_FOLD
 from mbsim.arrays.hooks import (
     Contacts,
@@ -46,6 +47,7 @@ METHOD_OF = {Effects.FRICTION: "GALPHA", Effects.IMPACT: "GALPHA"}
 CASES = [
     *((Hook.CONTACTS, what, "bowling_ball", "DOPRI5") for what in Contacts),
     (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
+    (Hook.SLOTS, None, "angle", "DOPRI5"),
     (Hook.TILTING, None, "contensou_disc", "DOPRI5"),
     *((Hook.RECALL, what, "lugre_stick_slip", "DOPRI5") for what in Recall),
     (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),
@@ -94,7 +96,7 @@ def _contact_set():
 
 def model_of(deck, folder):
     """Return the model of a deck of `models/`, or of one above."""
-    made = {"pin": _pin, "crowd": _contact_set}
+    made = {"pin": _pin, "crowd": _contact_set, "angle": lambda: angle_on_ground(0.0501, IMPACT)}
     path = write_deck(folder, made[deck]()) if deck in made else MODELS / f"{deck}.xml"
     return mbsim.read_model(path)
 

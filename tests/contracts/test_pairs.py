@@ -79,7 +79,10 @@ def wrench(points, about=(0.0, 0.0, 0.0)):
 
 
 # pairs of meshes have their own tests: their rows depend on the mesh
-@pytest.fixture(params=[name for name in PAIRS if "MESH" not in name])
+SOLIDS = [name for name in PAIRS if "MESH" not in name and "SURFACE" not in name]
+
+
+@pytest.fixture(params=SOLIDS)
 def name(request):
     return request.param
 
@@ -142,9 +145,7 @@ def test_does_not_depend_on_where_the_scene_stands(name):
         np.testing.assert_allclose(there[3:], Q @ here[3:], atol=1e-7)
 
 
-@pytest.mark.parametrize(
-    "name", [n for n in PAIRS if len(set(n.split("-"))) == 1 and "MESH" not in n]
-)
+@pytest.mark.parametrize("name", [n for n in SOLIDS if len(set(n.split("-"))) == 1])
 def test_is_symmetric_under_exchange(name):
     compared = 0
     for frame_i, frame_j in random_poses(name, 4):
@@ -164,7 +165,7 @@ def test_is_symmetric_under_exchange(name):
     assert compared > 20
 
 
-CONVEX_PAIRS = [n for n in PAIRS if "PLANE" not in n and "MESH" not in n]
+CONVEX_PAIRS = [n for n in SOLIDS if "PLANE" not in n]
 
 
 @pytest.mark.parametrize("name", CONVEX_PAIRS)

@@ -8,7 +8,7 @@ skipping a pair never changes a result; it only saves the kernel.
 from __future__ import annotations
 
 from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
-from mbsim.arrays.hooks import Hook
+from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -41,6 +41,8 @@ def measure_pair(scene: Scene, pair: int) -> bool:
             for k in range(3):
                 work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
+    if kinds.moves[kind] == 1:
+        note_failure(scene, call_int(scene.world.hooks[Hook.SLOTS], (scene, pair)))
     return True
 
 

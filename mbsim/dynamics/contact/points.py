@@ -323,7 +323,8 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         state.depth[s] = work.slot[s, DEPTH]
         state.rate[s] = work.slot[s, RATE]
         state.normal[s] = work.slot[s, NORMAL]
-        if scene.world.fixed_step[0] == 0 or scene.contacts.framed[contact_of(scene, s)] == 1:
+        framed = scene.contacts.framed[contact_of(scene, s)] == 1 or scene.kinds.moves[kind] == 1
+        if scene.world.fixed_step[0] == 0 or framed:
             for k in range(3):
                 state.p[s, k] = work.points[s, AT_POINT + k]
                 state.n[s, k] = work.points[s, AT_NORMAL + k]

@@ -10,6 +10,7 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
+from mbsim.dynamics.contact.patch_slots import keep_slots
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, watch_peaks
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
@@ -74,6 +75,12 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     else:
         examine_friction(scene, t)
         examine_work(scene, t, y)
+    return 0
+
+
+def keep_slots_of(context: int, pair: int) -> int:
+    """Put the incidents of a pair into the slots that they had at the committed state."""
+    keep_slots(view(context, Scene), pair)
     return 0
 
 

@@ -89,6 +89,10 @@ def _has_faces(scene: Scene, method: Method) -> bool:
     return bool((scene.kinds.whole > 0.0).any())
 
 
+def _has_patches(scene: Scene, method: Method) -> bool:
+    return bool(scene.kinds.moves.any())
+
+
 def _recalls(scene: Scene, method: Method) -> bool:
     return bool((scene.contacts.memory > 0).any())
 
@@ -250,6 +254,13 @@ TABLE = (
         _never,
         _no_entry,
         "writes the points of pairs without a closed form; a scene with such a pair has it",
+    ),
+    Row(
+        Hook.SLOTS,
+        _INT(_INT, _INT),  # context, pair
+        _has_patches,
+        _of("pipeline.contact_hooks", "keep_slots_of"),
+        "puts incidents that have no identity of their own into the slots that they had",
     ),
     Row(
         Hook.TILTING,

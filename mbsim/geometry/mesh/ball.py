@@ -155,9 +155,7 @@ def measure_near(mesh: F1, t: int, c: V3, radius: float, row: F1, edges: F1) -> 
 
 
 @jitable
-def in_reach(
-    mesh: F1, c: V3, radius: float, nearest: int, found: I1
-) -> tuple[F2, F2, I2]:
+def in_reach(mesh: F1, c: V3, radius: float, nearest: int, found: I1) -> tuple[F2, F2, I2]:
     """Return the triangles that a sphere reaches, the depths of their edges, those beyond.
 
     Of what the centre is inside of, only the nearest triangle counts.

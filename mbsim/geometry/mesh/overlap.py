@@ -90,6 +90,40 @@ def box_gap(a: F1, b: F1, pose: F1) -> float:
 
 
 @jitable
+def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
+    """Return a lower bound of the distance of two meshes: the least one of boxes of leaves."""
+    waiting, far = np.empty((4 * WAITING, 2), np.int64), np.empty(4 * WAITING)
+    waiting[0, 0], waiting[0, 1], far[0], many = 1, 1, 0.0, 1
+    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
+    best = math.inf
+    while many > 0 and best > 0.0:
+        many -= 1
+        i, j = waiting[many, 0], waiting[many, 1]
+        if far[many] >= best:
+            continue
+        if i >= leaves_i and j >= leaves_j:
+            best = far[many]
+            continue
+        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
+        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
+        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
+        of_i = i < leaves_i and (larger or j >= leaves_j)
+        for k in range(2):
+            a, b = (2 * i + k, j) if of_i else (i, 2 * j + k)
+            box_a = mesh_i[int(mesh_i[AT_BOXES]) + NODE * a :]
+            box_b = mesh_j[int(mesh_j[AT_BOXES]) + NODE * b :]
+            waiting[many + k, 0], waiting[many + k, 1] = a, b
+            far[many + k] = box_gap(box_a, box_b, pose)
+        if far[many] < far[many + 1]:
+            # the nearer one is looked at first, so it is put on last
+            for c in range(2):
+                waiting[many, c], waiting[many + 1, c] = waiting[many + 1, c], waiting[many, c]
+            far[many], far[many + 1] = far[many + 1], far[many]
+        many += 2
+    return best
+
+
+@jitable
 def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F1) -> None:
     """Write corners, inner points, depths and order of a triangle in J's axes from `origin`."""
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
@@ -113,9 +147,7 @@ def corners_of(prism: F1) -> tuple[V3, V3, V3]:
 
 
 @jitable
-def measure_pair_of(
-    a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2
-) -> bool:
+def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2) -> bool:
     """Fill the node of triangles a of I and b of J; return whether there is any piece.
 
     `values` are the largest psi on the edges of a and of b.
@@ -147,9 +179,7 @@ def grown(table: F2, count: int) -> F2:
 
 
 @jitable
-def nodes_of(
-    mesh_i: F1, mesh_j: F1, pose: F1, origin: V3
-) -> tuple[int, F2, F2, F2]:
+def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2, F2]:
     """Return how many pairs of triangles overlap, their nodes, psi on their edges, the pairs.
 
     Sums are in J's axes, from `origin`.
@@ -157,7 +187,11 @@ def nodes_of(
     count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
     pairs = np.empty((64, 2))
     work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
-    placed_i, placed_j, other = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM)), np.empty(EDGES)
+    placed_i, placed_j, other = (
+        np.empty((LEAF + 1, PRISM)),
+        np.empty((LEAF + 1, PRISM)),
+        np.empty(EDGES),
+    )
     waiting = np.empty((4 * WAITING, 3), np.int64)
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 1, 1, I_IN_J | J_IN_I
     many = 1

@@ -9,8 +9,8 @@ import numpy as np
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, scale, sub, vector
-from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
+from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.record import (
     MOMENT,
     PATCH_NUMBERS,
@@ -31,7 +31,6 @@ from mbsim.model.surface import (
     LEVELS,
     NODE,
     TRIANGLE,
-    TRIANGLES,
 )
 
 #: A box is looked into if it may hold what is lower by more than this part of its own height.
@@ -131,9 +130,7 @@ def measure_below(
 
 
 @jitable
-def pieces_below(
-    mesh: F1, found: I1, n: V3, height: float, origin: V3
-) -> tuple[F2, F2, I2]:
+def pieces_below(mesh: F1, found: I1, n: V3, height: float, origin: V3) -> tuple[F2, F2, I2]:
     """Return the pieces of the triangles `found`, psi on their edges, and the pieces beyond."""
     count, marks = len(found), int(mesh[AT_MARKS])
     nodes, links = np.zeros((count, PATCH_NUMBERS)), np.empty((count, 3))

@@ -81,7 +81,11 @@ def integrate(polygon: F2, count: int, psi: V3, sums: F1) -> None:
         sums[OF_PSI_U] += area / 12.0 * (total * u + pu)
         sums[OF_PSI_V] += area / 12.0 * (total * v + pv)
         # of a product of three linear functions: all products of sums, by 60
-        uu, uv, vv = u0 * u0 + u1 * u1 + u2 * u2, u0 * v0 + u1 * v1 + u2 * v2, v0 * v0 + v1 * v1 + v2 * v2
+        uu, uv, vv = (
+            u0 * u0 + u1 * u1 + u2 * u2,
+            u0 * v0 + u1 * v1 + u2 * v2,
+            v0 * v0 + v1 * v1 + v2 * v2,
+        )
         puu = p0 * u0 * u0 + p1 * u1 * u1 + p2 * u2 * u2
         puv = p0 * u0 * v0 + p1 * u1 * v1 + p2 * u2 * v2
         pvv = p0 * v0 * v0 + p1 * v1 * v1 + p2 * v2 * v2

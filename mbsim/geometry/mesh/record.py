@@ -25,8 +25,8 @@ SPREAD = 16
 #: Largest psi that reached the inner end of a layer: the depth of the overlap is not known there.
 BEYOND = 22
 
-#: Integrals over a polygon in a triangle's own coordinates: of 1, psi, psi u, psi v, psi^2, psi u^2,
-#: psi u v, psi v^2; largest psi.
+#: Integrals over a polygon in the coordinates of its triangle: of 1, psi, psi u, psi v, psi^2,
+#: psi u^2, psi u v, psi v^2; largest psi.
 SUMS = 9
 OF_ONE, OF_PSI, OF_PSI_U, OF_PSI_V, OF_SQUARE, OF_UU, OF_UV, OF_VV, MOST = range(SUMS)
 

@@ -25,7 +25,13 @@ from mbsim.geometry.mesh.ball import (
     triangles_near,
 )
 from mbsim.geometry.mesh.merging import MOST_PEAKS, PEAK_NUMBERS, merge, strongest, write_points
-from mbsim.geometry.mesh.overlap import box_gap, common_middle, nodes_of, partners_of
+from mbsim.geometry.mesh.overlap import (
+    box_gap,
+    common_middle,
+    least_gap,
+    nodes_of,
+    partners_of,
+)
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import AT_BOXES, HEADER, LENGTH, NODE, TRIANGLES
@@ -77,6 +83,14 @@ def pose_of(frame_i: F1, frame_j: F1) -> F1:
     return pose
 
 
+@jitable
+def far_apart(gap: float, frame_j: F1, points: F2) -> int:
+    """Write that two meshes are at least so far apart, in no direction that would be known."""
+    for k in range(len(points)):
+        put_point(points[k], -gap, vector(frame_j), (0.0, 0.0, 0.0))
+    return len(points)
+
+
 @pair("SURFACE", "SURFACE", slots=PATCH_SLOTS, regroups=True, patches=True)
 def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The peaks of the patches in which two meshes overlap."""
@@ -85,12 +99,12 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     root_i, root_j = int(mesh_i[AT_BOXES]) + NODE, int(mesh_j[AT_BOXES]) + NODE
     gap = box_gap(mesh_i[root_i:], mesh_j[root_j:], pose)
     if gap > 0.0:
-        for k in range(len(points)):
-            put_point(points[k], -gap, vector(frame_j), (0.0, 0.0, 0.0))
-        return len(points)
+        return far_apart(gap, frame_j, points)
     # the middle of what both roots have in common is near the patches
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    if count == 0:
+        return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
     count = merge(nodes[:count], values[:count], partners, peaks)
