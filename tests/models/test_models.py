@@ -618,7 +618,7 @@ def test_cam_from_stl():
 
 
 def test_bolt_on_plate():
-    """The ring under the head is one patch with two borders: it stands, and nothing pushes sideways."""
+    """The ring under the head is one patch with two borders: it stands."""
     results = run_model("bolt_on_plate.xml")
     weight = 7.85e-6 * 9.81 * polyhedron(*bolt(5.0, 20.0, 8.0, 6.0)).volume
     force = results["contacts/301/force"][-10:]
