@@ -13,6 +13,7 @@ from scipy.integrate import trapezoid
 import mbsim
 from helpers.decks import run_model
 from helpers.folders import MODELS, SHARED, USERFUNCS
+from helpers.mesh_parts import bolt
 from helpers.reference import (
     Governor,
     angle_between,
@@ -31,6 +32,7 @@ from helpers.reference import (
     top_attitude,
     wall_pendulum,
 )
+from mbsim.model.mass_properties import polyhedron
 
 REFERENCES = SHARED / "references.json"
 BOTH = pytest.mark.parametrize("detector", ["auto", "fcl"])
@@ -621,6 +623,40 @@ def test_cam_from_stl():
     half = angle < angle[0] + np.pi
     mean = np.mean(20.0 + 5.0 * np.cos(2.0 * angle) - 5.0 - 0.25e-3 * 2000.0 * np.cos(2.0 * angle))
     assert force[half].mean() == pytest.approx(mean, rel=0.03)
+
+
+def test_bolt_on_plate():
+    """The ring under the head is one patch with two borders: it stands."""
+    results = run_model("bolt_on_plate.xml")
+    weight = 7.85e-6 * 9.81 * polyhedron(*bolt(5.0, 20.0, 8.0, 6.0)).volume
+    force = results["contacts/301/force"][results["time"] > 0.1].mean(axis=0)
+    assert force[2] == pytest.approx(weight, rel=3e-3)
+    assert np.abs(force[:2]).max() < 1e-3 * weight
+    sunk = results["bodies/2/position/z"][0] - 0.02 - results["bodies/2/position/z"][-1]
+    # under the largest depth it stands as far tilted as its deepest corner lets it
+    assert sunk == pytest.approx(weight / 1e3, rel=0.05)
+
+
+def test_ratchet_holds():
+    results = run_model("ratchet.xml")
+    t, teeth = results["time"], results["requests/1/F2"] * 16 / (2 * np.pi)
+    held = teeth[t > 0.4]
+    assert np.ptp(held) < 1e-9
+    # it has gone over two teeth and a part of the next, and is back on a flank
+    assert teeth.max() > 3.5
+    assert 2.9 < held[-1] < 3.0
+
+
+def test_balls_in_bowl():
+    results = run_model("balls_in_bowl.xml")
+    t = results["time"]
+    weight = 4 * 7.8e-6 * 4 / 3 * np.pi * 20.0**3 * 9.81
+    force = results["contacts/301/force"][t >= 0.5].mean(axis=0)
+    assert force[2] == pytest.approx(weight, rel=1e-2)
+    depth = results["contacts/301/peak_penetration"]
+    for ball in (2, 3, 4, 5):
+        away = np.linalg.norm(results[f"bodies/{ball}/position"], axis=1)
+        assert away.max() < 80.0 + depth
 
 
 def test_geneva_indexes_by_a_quarter_a_turn():
