@@ -359,12 +359,12 @@ def test_detector_names_are_what_is_used(tmp_path):
     wanted = {
         (200, 100): ("closed form MESH-PLANE", 4),
         (100, 200): ("closed form MESH-PLANE", 4),
-        (300, 100): ("FCL", 1),
+        (300, 100): ("patches of triangles", 16),
         (400, 200): ("closed form SPHERE-MESH", 1),
         (500, 200): ("closed form MESH-BOX", 12),
-        (200, 300): ("FCL", 1),
-        (500, 300): ("FCL", 1),
-        (300, 400): ("FCL", 1),
+        (200, 300): ("patches of triangles", 16),
+        (500, 300): ("patches of triangles", 16),
+        (300, 400): ("closed form SPHERE-SURFACE", 8),
     }
     model = GROUND + shapes
     for k, (i, j) in enumerate(wanted):

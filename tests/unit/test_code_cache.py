@@ -60,7 +60,7 @@ def test_it_is_made_for_the_user_alone(root: Path) -> None:
     before = os.umask(0)
     try:
         assert code_cache.trusted_root() == root
-        locator = code_cache._ContentLocator("abc")
+        locator = code_cache._ContentLocator([Path(__file__)])
         locator.ensure_cache_path()
     finally:
         os.umask(before)
@@ -77,7 +77,7 @@ def test_one_that_others_can_write_is_refused(root: Path, bits: int) -> None:
 
 
 def test_a_folder_within_that_others_can_write_is_refused(root: Path) -> None:
-    locator = code_cache._ContentLocator("abc")
+    locator = code_cache._ContentLocator([Path(__file__)])
     locator.ensure_cache_path()
     Path(locator.get_cache_path()).chmod(0o770)
     with pytest.raises(ModelError, match="can be written by others"):

@@ -55,3 +55,40 @@ def test_cache_root_can_be_named(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "x"))
     if sys.platform.startswith("linux"):
         assert jit.cache_root() == tmp_path / "x" / "mbsim"
+
+
+def test_files_changed_meanwhile_are_neither_loaded_nor_stored(tmp_path):
+    """An upgrade under a running process: what it imported before is not what they hold now."""
+    shutil.copytree(PACKAGE, tmp_path / "mbsim")
+    script = (
+        "import sys; from pathlib import Path; "
+        "from mbsim.core import jit; import mbsim.core.blend as blend; "
+        f"law = Path({str(tmp_path / 'mbsim/core/blend.py')!r}); "
+        "law.write_text(law.read_text() + '\\n#\\n') if sys.argv[1] == 'edit' else None; "
+        "print(jit.function(blend.step)(0.5, 0.0, 0.0, 1.0, 1.0))"
+    )
+
+    def run(what):
+        done = subprocess.run(
+            [sys.executable, "-c", script, what],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+            env={
+                "PYTHONPATH": str(tmp_path),
+                "PATH": "",
+                "MBSIM_CACHE_DIR": str(tmp_path / "cache"),
+            },
+        )
+        stored = {p for p in (tmp_path / "cache").rglob("*.nb?")}
+        return done.stdout, stored
+
+    value, stored = run("run")
+    assert stored
+    assert run("run") == (value, stored)
+    assert run("edit") == (value, stored)
+    # a process that begins later has the files as they are
+    later, more = run("run")
+    assert later == value
+    assert more > stored

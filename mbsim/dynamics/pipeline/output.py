@@ -51,7 +51,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
-from mbsim.dynamics.bodies.scales import fill_squares
+from mbsim.dynamics.bodies.scales import PART, fill_squares
 from mbsim.dynamics.contact.forces import (
     ALONG_X,
     ALONG_Y,
@@ -387,11 +387,11 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     """Return the largest of |dx|/L, |dtheta|, |dv|/V, |dw| L/V, of incidents' X/L, energy, states.
 
     L and V are those of the group of connected bodies (`bodies.scales`), the energy is that of
-    its heaviest body at V, at least what was taken so far: a damper that holds back strong springs
-    takes far more than bodies so slow ever have. Detection that is exact only to a given noise
-    makes forces uncertain; what the noise of a step can do to a velocity is not chased. With h = 0,
-    `e` is no step's error, and what it does to friction, over the normal force, counts as well.
-    The worst body is left in `diagnostics`.
+    its heaviest body at V, at least PART^2 of what was taken so far (as V is PART of a speed): a
+    damper that holds back strong springs takes far more than bodies so slow ever have. Detection
+    that is exact only to a given noise makes forces uncertain; what the noise of a step can do to a
+    velocity is not chased. With h = 0, `e` is no step's error, and what it does to friction, over
+    the normal force, counts as well. The worst body is left in `diagnostics`.
     """
     scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
     fill_squares(scene, y)
@@ -416,13 +416,13 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     first, most = len(e) - max(1, len(scene.contacts.id)), 0.0
     for c in range(len(scene.contacts.id)):
         g = scales.of_contact[c]
-        energy = max(scales.mass[g] * squares[g], abs(y[first + c]))
+        energy = max(scales.mass[g] * squares[g], PART**2 * abs(y[first + c]))
         largest = max(largest, (e[first + c] / energy) ** 2)
     for g in range(len(squares)):
         most = max(most, scales.mass[g] * squares[g])
     for kept in scene.world.accumulators:
         if kept >= 0:
-            largest = max(largest, (e[kept] / max(most, abs(y[kept]))) ** 2)
+            largest = max(largest, (e[kept] / max(most, PART**2 * abs(y[kept]))) ** 2)
     states = scene.states
     for k in range(len(states.offset)):
         at = states.offset[k]
