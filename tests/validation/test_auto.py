@@ -32,11 +32,15 @@ def test_a_block_that_creeps_is_stiff_from_soon_on(tmp_path):
     assert "RADAU5 from the begin on" in log
 
 
-@pytest.mark.parametrize("name", ["rolling_sphere", "overdamped", "preloaded_stop"])
-def test_a_run_that_is_stiff_from_its_begin_changes_over_within_some_steps(name):
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    # the begin of overdamped is a motion of 1e-4 s, of which steps are short in any method
+    [("rolling_sphere", 1), ("overdamped", 3), ("preloaded_stop", 1)],
+)
+def test_a_run_that_is_stiff_from_its_begin_changes_over_within_some_steps(name, changes):
     model = mbsim.read_model(STIFF / f"{name}.xml")
     auto, implicit = (mbsim.simulate(model, integrator=name) for name in ("AUTO", "RADAU5"))
-    assert auto.stats["method_changes"] == 1
+    assert auto.stats["method_changes"] == changes
     assert auto.stats["steps"] < implicit.stats["steps"] + 60
 
 
