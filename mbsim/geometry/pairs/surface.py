@@ -27,6 +27,7 @@ from mbsim.geometry.mesh.ball import (
 from mbsim.geometry.mesh.merging import (
     AT_NODE,
     MOST_PEAKS,
+    NORMAL,
     PEAK_NUMBERS,
     merge,
     strongest,
@@ -80,7 +81,12 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
     count = triangles_below(mesh, n, height, found)
     nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
     peaks = np.empty((count, PEAK_NUMBERS))
-    count = strongest(peaks, merge(nodes, links, partners, peaks), MOST_PEAKS)
+    count = merge(nodes, links, partners, peaks)
+    for k in range(count):
+        # what faces up (the inside of a cup's bottom) does not press on the plane
+        if dot(vector(peaks[k, NORMAL:]), n) <= 0.0:
+            peaks[k, 1] = 0.0
+    count = strongest(peaks, count, MOST_PEAKS)
     write_points(peaks, count, frame_i, at, points)
     for k in range(0, REGION_ROWS * count, REGION_ROWS):
         # half way between the surface of the mesh and the plane
