@@ -13,8 +13,9 @@ from __future__ import annotations
     TOUCHES,
     PEAK_FORCE_TIME,
     ENERGY_LOST,  # dissipated by the damper and by friction
-) = range(9)
-LOG_COLUMNS = 9
+    BEYOND_TIME,  # of the first overlap deeper than the layer under a mesh's surface; NaN before
+) = range(10)
+LOG_COLUMNS = 10
 
 # the last column of `Log.samples`, whose first ones are those of PEAK_FORCE, PEAK_DEPTH, PEAK_SLIP
 SAMPLE_RATE = 3

@@ -88,6 +88,7 @@ def empty_log(nc: int) -> Log:
     """Return empty counters and peaks."""
     contacts = np.zeros((nc, codes.LOG_COLUMNS))
     contacts[:, codes.FIRST_TOUCH] = np.nan
+    contacts[:, codes.BEYOND_TIME] = np.nan
     contacts[:, codes.REBOUND] = np.nan
     contacts[:, codes.PEAK_FORCE_TIME] = np.nan
     return Log(
@@ -131,6 +132,7 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
         speed=np.full((ng, 2), np.nan),
         points=np.zeros((ns, POINT)),
         touching=np.zeros(ns, dtype=np.int64),
+        beyond=np.zeros(n.contacts, dtype=np.int64),
         hit=np.zeros(ns + 1, dtype=np.int64),
         t=np.zeros((ns, 3)),
         slot=np.zeros((ns, codes.SLOT_COLUMNS)),

@@ -105,6 +105,12 @@ ENERGIES = ("energy", "energy_step")
 #: A balance that is off by more than this part of the largest energy is told whatever explains it.
 COARSE = 0.02
 
+#: What is said of overlaps whose depth is not known.
+BEYOND_LAYERS = (
+    "meshes overlap deeper than the layer under their surface, first at time {time:.9g} at {who}: "
+    "what lies below the layer does not press, so the force is too small"
+)
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -184,6 +190,11 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
             warnings.append(
                 f"{says} at time {time:.9g}{at}: {entry.excess:.3g} times what tol explains"
             )
+    for c, id in enumerate(system.contact_ids):
+        since = float(system.scene.log.contacts[c, codes.BEYOND_TIME])
+        if not math.isnan(since):
+            who = element_name(system.model.file, "Force_Contact", id)
+            warnings.append(BEYOND_LAYERS.format(time=since, who=who))
     ids = [*system.contact_ids, None]
     works = [*kept.friction[:, codes.WORK_NOW], 0.0]
     shares = {

@@ -25,11 +25,6 @@ from mbsim.results.watch import Watch, energies
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
-#: What is said of overlaps whose depth is not known.
-BEYOND_LAYERS = (
-    "meshes overlapped {} times deeper than the layer under their surface: depth there is "
-    "that of the layer's inner end"
-)
 #: A user subroutine may talk at every evaluation; no more lines than this are kept.
 MOST_LINES = 20_000
 _WRITE_SECONDS = 2.0
@@ -307,7 +302,6 @@ def summary(
         yield fact("closing speed of the last touch", number(row[codes.APPROACH]))
         yield fact("effective rebound, first impact", number(row[codes.REBOUND]))
         yield fact("energy lost, damper and friction", number(row[codes.ENERGY_LOST]))
-    yield from _layer_lines(stats)
     if watch is not None:
         yield from _force_lines(system, watch)
     yield ""
@@ -344,13 +338,6 @@ def summary(
     for name in _TIMES:
         if name in stats:
             yield fact(name, f"{float(stats[name]):.3f}")
-
-
-def _layer_lines(stats: Mapping[str, Value]) -> Iterator[str]:
-    """Yield that depths of meshes were not known, where that was so."""
-    if stats.get("beyond_layers"):
-        yield ""
-        yield "warning: " + BEYOND_LAYERS.format(stats["beyond_layers"])
 
 
 def _force_lines(system: System, watch: Watch) -> Iterator[str]:

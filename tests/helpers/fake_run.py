@@ -67,7 +67,7 @@ def fake_system_of(model: Model) -> Any:
         for number, expr in enumerate(request.exprs, 1)
         if expr is not None
     ]
-    log = np.zeros((nc, codes.LOG_COLUMNS))
+    log = empty_log(nc).contacts
     rows = Rows(
         time=np.zeros(CAPACITY),
         y=np.zeros((CAPACITY, n)),

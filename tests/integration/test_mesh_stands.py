@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+import trimesh
 
+from helpers import decks
 from helpers.decks import run_deck
 from helpers.surfaces import GROUND, IMPACT, angle_on_ground
 
@@ -28,3 +31,22 @@ def test_an_angle_stands(ground, method, tmp_path):
     assert run["contacts/301/penetration"][-1] == pytest.approx(SAG, rel=0.02)
     assert run["contacts/301/area"][-1] == pytest.approx(0.03, rel=1e-3)
     assert run["contacts/301/incidents"][-1] == 1
+
+
+def test_the_inside_of_a_cup_below_the_plane_presses_nothing(tmp_path):
+    # profile of a cup with a bottom of 1 mm, which sinks in by 2.1 mm
+    profile = [(0, 0), (0.05, 0), (0.05, 0.05), (0.049, 0.05), (0.049, 0.001), (0, 0.001)]
+    cup = trimesh.creation.revolve(np.array(profile), sections=24)
+    nodes = " ".join(repr(float(x)) for x in cup.vertices.ravel())
+    faces = " ".join(str(int(k)) for k in cup.faces.ravel())
+    deck = (
+        decks.GROUND + '<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.006" '
+        'inertia_yy="0.006" inertia_zz="0.011"/><Reference_Marker id="20" body_id="2" '
+        'pos_z="-0.0021"/><Post_Graphic id="200" type="TriaMesh" rm_id="20">'
+        f"<Nodes>{nodes}</Nodes><Faces>{faces}</Faces></Post_Graphic>"
+        '<Force_Contact id="301" i_graphics_id="200" j_graphics_id="100" cnf_type="IMPACT" '
+        'stiffness="1e5" exponent="1.5" damping="0" dmax="1e-4"/>'
+    )
+    run = run_deck(tmp_path, deck + decks.GRAVITY, end_time=1e-3, print_interval=1e-3)
+    assert run["contacts/301/force"][0, 2] == pytest.approx(1e5 * 0.0021**1.5, rel=1e-6)
+    assert run["contacts/301/incidents"][0] == 1

@@ -7,7 +7,7 @@ skipping a pair never changes a result; it only saves the kernel.
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import ACTIVE, BEYOND_LAYERS, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -38,7 +38,7 @@ def measure_pair(scene: Scene, pair: int) -> bool:
         ),
     )
     if count < 0:
-        scene.log.counters[BEYOND_LAYERS] += 1
+        work.beyond[kinds.contact[kind]] = 1
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):
@@ -75,6 +75,8 @@ def find_contacts(scene: Scene, y: F1) -> int:
     for k in range(hit[last]):
         work.touching[hit[k]] = 0
     hit[last] = 0
+    for c in range(len(work.beyond)):
+        work.beyond[c] = 0
     if not place_graphics(scene, y):
         return Code.TOO_FAR
     if pairs.count[WANTED] > 0:

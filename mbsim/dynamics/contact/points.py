@@ -12,6 +12,8 @@ from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
     AT_FAULT,
+    BEYOND_LAYERS,
+    BEYOND_TIME,
     ENERGY_LOST,
     EVENT_ELEMENT,
     EVENT_KIND,
@@ -281,11 +283,23 @@ def forget_apart(scene: Scene, y: F1) -> None:
 
 
 @jitable
+def log_beyond(scene: Scene, t: float) -> None:
+    """Note the contacts whose meshes overlap deeper than their layer at the accepted point."""
+    for c in range(len(scene.work.beyond)):
+        if scene.work.beyond[c] == 0:
+            continue
+        scene.log.counters[BEYOND_LAYERS] += 1
+        if math.isnan(scene.log.contacts[c, BEYOND_TIME]):
+            scene.log.contacts[c, BEYOND_TIME] = t
+
+
+@jitable
 def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     """Write the incident table for the accepted point; return what `commit` does."""
     state, work, pairs = scene.state, scene.work, scene.pairs
     old, new, last = state.hit, work.hit, len(work.hit) - 1
     changed = 0
+    log_beyond(scene, t)
     for k in range(old[last]):
         pairs.touches[scene.slots.pair[old[k]]] = 0
         if work.touching[old[k]] == 0:

@@ -14,13 +14,18 @@ from mbsim.geometry.mesh.field import write_patches
 from mbsim.geometry.mesh.overlap import (
     box_gap,
     common_middle,
-    least_gap,
     nodes_of,
     partners_of,
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.mesh.record import BEYOND
-from mbsim.geometry.pairs.surface import PATCH_SLOTS, far_apart, pose_of, surface_of
+from mbsim.geometry.pairs.surface import (
+    PATCH_SLOTS,
+    far_apart,
+    pose_of,
+    surface_of,
+    without_pieces,
+)
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import AT_BOXES, NODE, TRIANGLES
 
@@ -59,7 +64,7 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
     if count == 0:
-        return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
+        return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
     known = 1

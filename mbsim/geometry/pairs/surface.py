@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbsim.core.arrays import F1, F2
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
@@ -27,6 +27,7 @@ from mbsim.geometry.mesh.ball import (
 from mbsim.geometry.mesh.merging import (
     AT_NODE,
     MOST_PEAKS,
+    NORMAL,
     PEAK_NUMBERS,
     merge,
     strongest,
@@ -42,7 +43,16 @@ from mbsim.geometry.mesh.overlap import (
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.mesh.record import BEYOND, PEAK
 from mbsim.geometry.polyhedron import to_global
-from mbsim.model.surface import AT_BOXES, HEADER, LENGTH, NODE, TRIANGLES
+from mbsim.model.surface import (
+    AT_BOXES,
+    AT_TRIANGLES,
+    DEPTH,
+    HEADER,
+    LENGTH,
+    NODE,
+    TRIANGLE,
+    TRIANGLES,
+)
 
 PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
 #: A peak with this part of its depth at the inner end of a layer may be deeper.
@@ -71,7 +81,12 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
     count = triangles_below(mesh, n, height, found)
     nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
     peaks = np.empty((count, PEAK_NUMBERS))
-    count = strongest(peaks, merge(nodes, links, partners, peaks), MOST_PEAKS)
+    count = merge(nodes, links, partners, peaks)
+    for k in range(count):
+        # what faces up (the inside of a cup's bottom) does not press on the plane
+        if dot(vector(peaks[k, NORMAL:]), n) <= 0.0:
+            peaks[k, 1] = 0.0
+    count = strongest(peaks, count, MOST_PEAKS)
     write_points(peaks, count, frame_i, at, points)
     for k in range(0, REGION_ROWS * count, REGION_ROWS):
         # half way between the surface of the mesh and the plane
@@ -101,6 +116,54 @@ def far_apart(gap: float, frame_j: F1, points: F2) -> int:
     return len(points)
 
 
+@jitable
+def in_core(mesh: F1, c: V3) -> bool:
+    """Return whether a point lies below the layer of a mesh, by the depth of the nearest triangle.
+
+    Half of that depth tells it from a point on the surface, which may be inside by rounding.
+    """
+    edges, row = np.empty(3), np.empty(NEAR_NUMBERS)
+    _, nearest = nearest_triangle(mesh, c, edges)
+    if measure_near(mesh, nearest, c, 0.0, row, edges) > 0.0:
+        return False
+    at = int(mesh[AT_TRIANGLES]) + TRIANGLE * nearest + DEPTH
+    return row[0] > 0.5 * min(mesh[at], mesh[at + 1], mesh[at + 2])
+
+
+@jitable
+def swallowed(mesh_i: F1, mesh_j: F1, pose: F1) -> bool:
+    """Return whether one of two meshes lies in the core of the other one, below its layer.
+
+    It is asked where no piece of surface lies in a layer: then all of a mesh is inside or outside.
+    """
+    p = vector(mesh_i[int(mesh_i[AT_TRIANGLES]) :])
+    c = (
+        pose[0] + pose[3] * p[0] + pose[4] * p[1] + pose[5] * p[2],
+        pose[1] + pose[6] * p[0] + pose[7] * p[1] + pose[8] * p[2],
+        pose[2] + pose[9] * p[0] + pose[10] * p[1] + pose[11] * p[2],
+    )
+    if in_core(mesh_j, c):
+        return True
+    p = sub(vector(mesh_j[int(mesh_j[AT_TRIANGLES]) :]), vector(pose))
+    c = (
+        pose[3] * p[0] + pose[6] * p[1] + pose[9] * p[2],
+        pose[4] * p[0] + pose[7] * p[1] + pose[10] * p[2],
+        pose[5] * p[0] + pose[8] * p[1] + pose[11] * p[2],
+    )
+    return in_core(mesh_i, c)
+
+
+@jitable
+def without_pieces(mesh_i: F1, mesh_j: F1, pose: F1, frame_j: F1, points: F2) -> int:
+    """Write that no piece of two meshes' surfaces overlaps: they are apart, or one is in the other.
+
+    Within each other, a distance of 0: the pair is looked at again at every step.
+    """
+    if swallowed(mesh_i, mesh_j, pose):
+        return -far_apart(0.0, frame_j, points)
+    return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
+
+
 @pair("SURFACE", "SURFACE", slots=PATCH_SLOTS, regroups=True, patches=True)
 def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The peaks of the patches in which two meshes overlap."""
@@ -114,7 +177,7 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
     if count == 0:
-        return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
+        return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
     count = merge(nodes[:count], values[:count], partners, peaks)
