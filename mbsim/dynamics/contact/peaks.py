@@ -69,9 +69,24 @@ def keep_largest(scene: Scene, row: int, t: float) -> None:
 
 
 @jitable
+def touches(scene: Scene) -> bool:
+    """Tell whether anything touches at the point just evaluated, or did at the last two ends."""
+    hit, ends = scene.work.hit, scene.log.ends
+    if hit[len(hit) - 1] > 0:
+        return True
+    for c in range(ends.shape[1]):
+        if ends[END_LAST, c, PEAK_DEPTH] > 0.0 or ends[END_BEFORE, c, PEAK_DEPTH] > 0.0:
+            return True
+    return False
+
+
+@jitable
 def watch_end(scene: Scene, t: float) -> None:
     """Watch contacts at the accepted point just evaluated."""
     log = scene.log
+    if not touches(scene):
+        log.end_times[END_BEFORE], log.end_times[END_LAST] = log.end_times[END_LAST], t
+        return
     sample(scene, END)
     keep_largest(scene, END, t)
     log.end_times[END_BEFORE], log.end_times[END_LAST] = log.end_times[END_LAST], t
@@ -172,6 +187,13 @@ def look_at_leave(scene: Scene, c: int, tol: float) -> float:
 def look_at_top(scene: Scene, c: int, q: int, tol: float) -> float:
     """Return where to look for the largest of what contact c does within the step, or -1."""
     parts, values, best = scene.log.parts, scene.log.samples, -1
+    if scene.log.sampled[0] == LOOKS and values[BEFORE, c, PEAK_DEPTH] > 0.0:
+        # most steps end here: what their ends tell of a top adds nothing to what was before
+        y0, y1, y2 = values[BEFORE, c, q], values[BEGIN, c, q], values[END, c, q]
+        bend = ((y2 - y1) + (y1 - y0) / parts[BEFORE]) / (1.0 - parts[BEFORE])
+        known = max(y0, max(y1, max(y2, scene.log.contacts[c, q])))
+        if bend >= 0.0 or max(y1, y2) - 0.25 * bend <= (1.0 + WORTH * tol) * known:
+            return -1.0
     for r in range(scene.log.sampled[0]):
         if values[r, c, PEAK_DEPTH] > 0.0 and (best < 0 or values[r, c, q] > values[best, c, q]):
             best = r
@@ -265,6 +287,8 @@ def first_look(scene: Scene, h: float, tol: float) -> float:
     Called at its end, before that is committed.
     """
     log = scene.log
+    if not touches(scene):
+        return -1.0
     log.span[0] = h
     log.sampled[0] = LOOKS
     log.parts[BEFORE], log.parts[BEGIN], log.parts[END] = (
