@@ -9,6 +9,7 @@ import numpy as np
 
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
+from mbsim.model.flat_parts import fewer_triangles
 from mbsim.model.surface import AT_TRIANGLES, DEPTH, ORDER, TRIANGLE, TRIANGLES, pack
 from mbsim.model.tessellation import triangles_of
 
@@ -47,7 +48,7 @@ def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
 
 def packed(graphic: Graphic, layered: bool) -> Array:
     """Return a graphic as a packed surface (`model.surface`)."""
-    vertices, faces = triangles_of(graphic)
+    vertices, faces = fewer_triangles(*triangles_of(graphic))
     if not layered:
         return pack(vertices, faces, vertices, np.zeros(len(vertices)))
     from mbsim.model.surface_layer import layer

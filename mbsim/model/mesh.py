@@ -70,6 +70,14 @@ def three_corners(faces: Faces) -> npt.NDArray[np.bool_]:
     return np.asarray((a != b) & (b != c) & (c != a))
 
 
+def in_order(faces: Faces) -> Faces:
+    """Return the faces by their least corner, which is the first of each."""
+    first = faces.argmin(axis=1)
+    turned = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+    ordered: Faces = turned[np.lexsort(turned.T[::-1])]
+    return ordered
+
+
 def edges_of(faces: Faces, count: int) -> Edges:
     """Return the edges of faces (m, 3) over so many vertices."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -86,13 +94,17 @@ def shells(edges: Edges, faces: int) -> npt.NDArray[np.int64]:
     order = np.argsort(edges.of_face, axis=None, kind="stable")
     at, edge = owner[order], edges.of_face.ravel()[order]
     beside = edge[1:] == edge[:-1]
-    a, b = at[:-1][beside], at[1:][beside]
-    # each face hangs on one with a smaller number; trees are joined at their roots
-    root = np.arange(faces)
+    return joined(at[:-1][beside], at[1:][beside], faces)
+
+
+def joined(a: npt.NDArray[np.int64], b: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+    """Return for each of so many things the number of what hangs together by pairs a, b (k,)."""
+    # each hangs on one with a smaller number; trees are joined at their roots
+    root = np.arange(count)
     while True:
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         if (low == high).all():
-            return np.unique(root, return_inverse=True)[1].astype(np.int64)
+            return np.unique(root, return_inverse=True)[1].reshape(-1).astype(np.int64)
         np.minimum.at(root, high, low)
         while (root[root] != root).any():
             root = root[root]

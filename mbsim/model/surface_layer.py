@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.model.elements import Array
-from mbsim.model.mesh import Faces
+from mbsim.model.mesh import Faces, in_order
 from mbsim.model.triangle_distance import nearest_on
 
 #: An inner point at depth d is at least so much times d away from the surface.
@@ -318,14 +318,6 @@ def _free_depths(vertices: Array, faces: Faces, m: Array, slope: Array) -> Array
     return depth
 
 
-def _in_order(faces: Faces) -> Faces:
-    """Return the faces by their least corner, which is the first of each."""
-    first = faces.argmin(axis=1)
-    turned = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
-    ordered: Faces = turned[np.lexsort(turned.T[::-1])]
-    return ordered
-
-
 def layer(vertices: Array, faces: Faces) -> Layer:
     """Return the inner vertices and depths of the layer under a closed mesh.
 
@@ -344,7 +336,7 @@ def layer(vertices: Array, faces: Faces) -> Layer:
     the corners of tetrahedra that are turned over or nearly flat shrink until all are upright.
     The order of the faces changes nothing, to the last bit.
     """
-    faces = _in_order(faces)
+    faces = in_order(faces)
     m, slope = inner_directions(vertices, faces)
     depth = PART * _free_depths(vertices, faces, m, slope)
     cut = tetrahedra(faces)
