@@ -30,12 +30,15 @@ def forgetful(patch, budget=1):
         if not runners or runners[-1].recorder is not self:
             return
         runner = runners[-1]
+        # where AUTO may go back to is kept: a checkpoint goes back there, this is about the rest
+        first, runner._first = runner._first, None
         saved = runner.checkpoint()
         for group in groups_of(runner):
             tags.forget(group, tags.STATE)
             tags.forget(group, tags.SCRATCH)
         place_fixed(runner.system.scene.work, runner.system.scene.graphics)
         runner.restore(saved)
+        runner._first = first
 
     patch.setattr(loop.Runner, "__init__", begin)
     patch.setattr(Recorder, "take", forget)

@@ -147,11 +147,12 @@ def test_a_resumed_run_gives_up_where_the_straight_one_does(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("calls", [3, 12, 40])
+@pytest.mark.parametrize("deck", ["rolling_sphere", "box_stack", "incline_creep"])
 def test_a_run_that_ends_while_auto_may_go_back_goes_on_as_if_it_had_not(
-    calls, tmp_path, monkeypatch
+    deck, calls, tmp_path, monkeypatch
 ):
     """It is found stiff behind some 100 evaluations; rows of what was tried are dropped."""
-    model = mbsim.read_model(MODELS / "stiff" / "rolling_sphere.xml")
+    model = mbsim.read_model(MODELS / "stiff" / f"{deck}.xml")
     settings = {"end_time": 0.02, "print_interval": 1e-4, "output": tmp_path}
     one = mbsim.simulate(model, **{**settings, "output": None})
     returning(monkeypatch, 1, 256)
