@@ -68,7 +68,7 @@ class Task:
         Wanted: error <= tol and error_q <= tol_q.
     strict
         Whether the second must be reached; else it gets more work while it gains, at most twenty
-        times as much, or 50 ms and a third, at a time; while it is FAR_OFF, these.
+        times as much, or 50 ms and a half, at a time; while it is FAR_OFF, these.
     deadline
         Value of `clock` at which to give up.
     """
@@ -161,7 +161,7 @@ class Task:
                 self.reached = self.work
             if self.error_q < GAINED * self.graced_at:
                 self.graced_at = self.error_q
-                more = 0.05 + 0.3 * self.reached
+                more = 0.05 + 0.5 * self.reached
                 if self.error_q <= FAR_OFF * self.tol_q:
                     more = min(20.0 * self.reached + 2e-5, more)
                 self.grace = self.work + more
