@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 #: Groups of a result file that have members or attributes of a known form.
 _GROUPS = ("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state")
 _EVENT = ("time", "kind")
+#: What a group says of its elements, beside their signals.
+FACTS = ("id", "label", "type")
 
 
 def facts_of(item: Any) -> dict[str, Any]:
@@ -50,6 +52,29 @@ def check_members(file: h5py.File) -> None:
         ids = item.get("id") if isinstance(item, h5py.Group) else None
         if ids is not None and not (_is_table(ids, 1) and ids.dtype.kind in "iu"):
             raise ValueError(f"/{name}/id is no list of whole numbers")
+        if ids is not None:
+            _check_columns(item, len(ids))
+
+
+def _check_columns(group: h5py.Group, count: int) -> None:
+    """Look whether all datasets beside the ids of a group have a column for each of them.
+
+    Raises
+    ------
+    ValueError
+        If one has not.
+    """
+    for name, item in group.items():
+        shape = getattr(item, "shape", None)
+        if not hasattr(item, "dtype") or name == "id":
+            continue
+        one = name in FACTS or name.startswith("peak_")
+        if shape is None or len(shape) not in ((1,) if one else (2, 3)):
+            raise ValueError(f"{item.name} is no {'list' if one else 'signal'}")
+        if shape[0 if one else 1] != count:
+            raise ValueError(f"{item.name} has not one column for each id")
+        if name not in FACTS and item.dtype.kind not in "iuf":
+            raise ValueError(f"{item.name} is no numbers")
 
 
 def _is_table(item: Any, axes: int) -> bool:

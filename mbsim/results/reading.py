@@ -15,6 +15,7 @@ import numpy as np
 from mbsim.errors import MbsimError, ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
 from mbsim.results.form import (
+    FACTS,
     check_members,
     facts_of,
     last_row,
@@ -68,8 +69,6 @@ class Location(NamedTuple):
     column: int | None
 
 
-#: What a group says of its elements, beside their signals.
-_FACTS = ("id", "label", "type")
 #: Attributes that have a text for each column.
 _LISTS = ("columns", "measures")
 #: Groups of other things than elements.
@@ -187,7 +186,7 @@ class Results:
             self._table = {}
             for group, ids in self._columns().items():
                 for last, item in self._open()[group].items():
-                    if last in _FACTS or not hasattr(item, "shape"):
+                    if last in FACTS or not hasattr(item, "shape"):
                         continue
                     for k, id in enumerate(ids):
                         self._table[f"{group}/{id}/{last}"] = Location(f"{group}/{last}", k)
@@ -269,7 +268,7 @@ class Results:
         group, _, id = name.strip("/").partition("/")
         ids = self._columns().get(group)
         if ids is not None and id.isdecimal() and int(id) in ids:
-            if attribute not in _FACTS or attribute not in file[group]:
+            if attribute not in FACTS or attribute not in file[group]:
                 return None
             return text_of(file[group], attribute, file[group][attribute][ids.index(int(id))])
         item = file.get(name)
@@ -278,7 +277,7 @@ class Results:
             return None
         if attribute in _LISTS:
             return texts_of(item, attribute, value)
-        return text_of(item, attribute, value) if attribute in _FACTS else plain(value)
+        return text_of(item, attribute, value) if attribute in FACTS else plain(value)
 
     @property
     @_reads
@@ -364,7 +363,7 @@ class Results:
         group, _, rest = name.partition("/")
         id, _, last = rest.partition("/")
         ids = self._columns().get(group)
-        if ids is None or last in _FACTS or not id.isdecimal() or int(id) not in ids:
+        if ids is None or last in FACTS or not id.isdecimal() or int(id) not in ids:
             return None
         if not isinstance(file.get(f"{group}/{last}"), h5py.Dataset):
             return None

@@ -70,3 +70,26 @@ def test_info_of_a_file_of_another_form(
     if found.exit_code:
         assert found.exit_code == 5
         assert "cannot be read, the file is damaged" in found.output
+
+
+@pytest.mark.parametrize("value", [np.ones((1, 3)), np.ones(2), np.ones((10, 2)), "text", b"", 2.0])
+@pytest.mark.parametrize("name", ["contacts/peak_force", "contacts/force", "bodies/velocity"])
+def test_tables_that_have_no_column_for_each_id_are_refused(
+    tmp_path: Path, name: str, value: Any
+) -> None:
+    """By every command that opens the file: `plot` asks for a peak where it draws a force."""
+    system = fake_system(tmp_path, REQUESTS)
+    recorder = Recorder(system, SETTINGS, tmp_path)
+    add_rows(system, 0, 10)
+    recorder.take()
+    recorder.close("finished", {"steps": 1}, system.scene.log.contacts).close()
+    with h5py.File(tmp_path / "deck.h5", "r+") as file:
+        table(name, value)(file)
+    path = str(tmp_path / "deck.h5")
+    for line in (
+        ["plot", path, "contacts/*/force/mag", "-o", str(tmp_path / "a.png")],
+        ["info", path],
+    ):
+        found = CliRunner().invoke(main, line)
+        assert found.exception is None or isinstance(found.exception, SystemExit)
+        assert (found.exit_code, "the file is damaged" in found.output) == (5, True)
