@@ -40,7 +40,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="forks")
 Do = Callable[[Path, random.Random], None]
 #: What takes longer than most is done with one of so many files.
 SLOW = {"info_of_results, objects": 4, "read_results, objects": 4, "draw_results, objects": 4}
-SLOW |= {"fclib, objects": 10, "plot_results, objects": 10, "plot_results, bytes": 10}
+SLOW |= {"fclib, objects": 4, "plot_results, objects": 10, "plot_results, bytes": 10}
 
 
 def command(*line: str) -> None:

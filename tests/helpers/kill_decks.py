@@ -32,6 +32,11 @@ REQUESTS = (
     '<Post_Request id="2" type="MARKER_VELOCITY" i_marker_id="20"/>'
 )
 USER = {"cff_type": "USERCFF", "cff_fnc_name": "CFFSUB"}
+#: The law of meshes with elastic layers, without a stiffness.
+VOLUME = {
+    **{"cnf_type": "VOLUME", "damping": 0.5},
+    **{"i_elastic_modulus": 1e7, "i_poisson_ratio": 0.3, "i_layer_depth": 0.02},
+}
 
 
 def transient(end: float, interval: float) -> str:
@@ -129,7 +134,7 @@ def broadphase(folder: Path, method: str, end: float) -> Case:
     return written(folder, text + GRAVITY, transient(end, 0.002)), ["--integrator", method]
 
 
-def meshes(folder: Path) -> Case:
+def meshes(folder: Path, end: float = 25.0, **law: object) -> Case:
     """Return meshes that fall on a plane and tumble."""
     random = np.random.default_rng(5)
     text = GROUND
@@ -138,8 +143,8 @@ def meshes(folder: Path) -> Case:
         text += solid(
             body, partial(shape_graphic, "MESH", size=0.1), place, v=random.normal(size=3)
         )
-        text += contact(i=100 * body, j=100, id=300 + body, **COULOMB)
-    return written(folder, text + GRAVITY, transient(25.0, 0.005)), ["--tol", "1e-7"]
+        text += contact(i=100 * body, j=100, id=300 + body, **{**COULOMB, **law})
+    return written(folder, text + GRAVITY, transient(end, 0.005)), ["--tol", "1e-7"]
 
 
 def some_signals(folder: Path) -> Case:
@@ -182,5 +187,11 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "broadphase": partial(broadphase, method="AUTO", end=0.2),
     "broadphase, VERLET": partial(broadphase, method="VERLET", end=1.5),
     "meshes": meshes,
+    "meshes, FIELD": partial(meshes, end=4.0, contact_depth="FIELD"),
+    "meshes, VOLUME": partial(meshes, end=4.0, **VOLUME),
+    "bolt and plate": of_models("bolt_on_plate", "--end-time", "0.02"),
+    "balls in a bowl": of_models("balls_in_bowl", "--end-time", "0.6"),
+    "ratchet": of_models("ratchet", "--end-time", "0.3", "--print-interval", "0.001"),
+    "cam from a mesh": of_models("cam_from_stl"),
     "some signals": some_signals,
 }
