@@ -127,11 +127,11 @@ def planned(make: Callable[[], Made]) -> Made:
 def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     """Return `py_func` compiled at its first call (or loaded from the cache), once a process.
 
-    What stands elsewhere is not cached: Numba would keep it while the arrays that it looks at
-    change.
+    It runs without Python's lock, so that another thread may write meanwhile. What stands elsewhere
+    is not cached: Numba would keep it while the arrays that it looks at change.
     """
     _register()
-    made: Any = numba.njit(error_model="numpy")(py_func)
+    made: Any = numba.njit(error_model="numpy", nogil=True)(py_func)
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
     return cast(Callable[..., Any], made)

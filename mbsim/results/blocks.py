@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
 Table = np.ndarray[Any, Any]
+Tables = dict[str, Table]
 
 #: Names of the kinds of `Rows.events`, by number.
 EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
@@ -41,23 +42,30 @@ class Block:
     @property
     def wrenches(self) -> Table:
         """Force and torque of all elements between markers, in the order of `acting`."""
-        return np.hstack([self.joint, self.applied])
+        parts = [table for table in (self.joint, self.applied) if table.shape[1]]
+        return np.hstack(parts) if len(parts) > 1 else (parts or [self.joint])[0]
 
 
 class Gathered:
-    """Rows taken so far, in tables that are filled anew once what they hold is written.
+    """Rows taken so far, in tables that go to whoever writes them.
 
-    What is asked of it shares their memory, and is there until the next `clear`.
+    Parameters
+    ----------
+    system : System
+    rows : int
+        How many are usually written at once.
+    columnwise : bool
+        Let the values of a column lie side by side: where chunks have one column, they are stored
+        from where they are.
     """
 
-    def __init__(self, system: System) -> None:
-        self._system = system
+    def __init__(self, system: System, rows: int = 0, columnwise: bool = False) -> None:
+        self._system, self._usual = system, rows
+        self._order: Literal["C", "F"] = "F" if columnwise else "C"
         found = system.scene.rows
-        self._tables = {f.name: getattr(found, f.name)[:0].copy() for f in fields(Block)}
-        self._widths = {
-            name: table.itemsize * math.prod(table.shape[1:])
-            for name, table in self._tables.items()
-        }
+        self._tables = {f.name: _without_rows(getattr(found, f.name)) for f in fields(Block)}
+        #: Tables whose rows are written, to be filled anew.
+        self._spare = dict(self._tables)
         self._ends = dict.fromkeys(self._tables, 0)
 
     def take(self, rows: int, incidents: int, events: int) -> Block:
@@ -66,15 +74,28 @@ class Gathered:
         added = []
         for name, first in self._ends.items():
             end = first + counts.get(name, rows)
+            self._make_room(name, end)
             table = self._tables[name]
-            if end > len(table):
-                table = np.empty((max(end, 2 * len(table)), *table.shape[1:]), table.dtype)
-                table[:first] = self._tables[name][:first]
-                self._tables[name] = table
             table[first:end] = getattr(self._system.scene.rows, name)[: end - first]
             self._ends[name] = end
             added.append(table[first:end])
         return Block(*added)
+
+    def _make_room(self, name: str, rows: int) -> None:
+        """Let a table have so many rows."""
+        table = self._tables[name]
+        if rows <= len(table):
+            return
+        if rows <= len(self._spare[name]):
+            made, self._spare[name] = self._spare[name], _without_rows(table)
+        else:
+            # a long run's are made once; columns a power of two apart meet in a cache
+            most = self._usual + self._usual // 8 if 8 * rows > self._usual else 0
+            room = max(rows, most, 2 * len(table)) + 24
+            order = self._order if name not in _NOT_A_ROW else "C"
+            made = np.empty((room, *table.shape[1:]), table.dtype, order)
+        made[: self._ends[name]] = table[: self._ends[name]]
+        self._tables[name] = made
 
     @property
     def block(self) -> Block:
@@ -89,19 +110,33 @@ class Gathered:
     @property
     def bytes(self) -> int:
         """Memory that the rows take."""
-        return sum(end * self._widths[name] for name, end in self._ends.items())
+        widths = {name: _row_bytes(table) for name, table in self._tables.items()}
+        return sum(end * widths[name] for name, end in self._ends.items())
 
-    @property
-    def row_bytes(self) -> int:
-        """Memory that an output row takes, without incidents and events."""
-        return sum(width for name, width in self._widths.items() if name not in _NOT_A_ROW)
+    def hand_over(self, block: Block) -> Tables:
+        """Let go of the first rows, as `first_rows` has them, and of the tables that hold them.
 
-    def drop(self, block: Block) -> None:
-        """Let go of the first rows, as `first_rows` has them."""
-        for name, end in self._ends.items():
-            gone, table = len(getattr(block, name)), self._tables[name]
-            table[: end - gone] = table[gone:end]
-            self._ends[name] = end - gone
+        Returns
+        -------
+        dict
+            These tables, for `take_back` when nobody needs the rows any more.
+        """
+        gone = self._tables
+        self._tables = {name: _without_rows(table) for name, table in gone.items()}
+        for name, end in list(self._ends.items()):
+            first = len(getattr(block, name))
+            self._ends[name] = 0
+            self._make_room(name, end - first)
+            self._tables[name][: end - first] = gone[name][first:end]
+            self._ends[name] = end - first
+        return gone
+
+    def take_back(self, tables: Tables) -> None:
+        """Let tables whose rows are written be filled anew, where they are no larger than usual."""
+        # while AUTO may go back to the begin of a run its rows are kept, and tables grow
+        self._spare |= {
+            name: table for name, table in tables.items() if len(table) < 2 * self._usual
+        }
 
     @property
     def ends(self) -> dict[str, int]:
@@ -111,6 +146,22 @@ class Gathered:
     def shorten(self, ends: dict[str, int]) -> None:
         """Let go of the rows behind those ends."""
         self._ends = dict(ends)
+
+
+def row_bytes(system: System) -> int:
+    """Return the memory that an output row takes, without incidents and events."""
+    rows = system.scene.rows
+    return sum(_row_bytes(getattr(rows, f.name)) for f in fields(Block) if f.name not in _NOT_A_ROW)
+
+
+def _without_rows(table: Table) -> Table:
+    """Return a table of the same columns without rows, and without what the other one holds."""
+    return np.empty((0, *table.shape[1:]), table.dtype)
+
+
+def _row_bytes(table: Table) -> int:
+    """Return the memory that a row of a table takes."""
+    return table.itemsize * math.prod(table.shape[1:])
 
 
 def first_rows(block: Block, rows: int) -> Block:

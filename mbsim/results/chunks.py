@@ -33,7 +33,7 @@ _AS_IT_IS = 0b11
 #: It is deflated where one of so many numbers differs from that of the row before.
 _CHANGED = 4
 #: So long a chunk has one column.
-_LONG = 2048
+LONG = 2048
 #: How many deflated chunks of one number, or row of numbers, are remembered.
 _REMEMBERED = 256
 
@@ -45,7 +45,7 @@ def chunk_shape(shape: tuple[int, ...], itemsize: int, rows: int) -> tuple[int, 
     does not change takes no room beside others that do.
     """
     rows = max(1, min(rows, CHUNK_ROWS, CHUNK_BYTES // itemsize))
-    room = CHUNK_BYTES // (rows * itemsize) if rows < _LONG else 1
+    room = CHUNK_BYTES // (rows * itemsize) if rows < LONG else 1
     columns: list[int] = []
     for size in reversed(shape[1:]):
         # the last axis has the components of a vector, which are read together
@@ -138,11 +138,11 @@ class ChunkWriter:
 
     def _packed(self, whole: Table) -> bytes | None:
         """Return a chunk as HDF5's filters make it, None where that does not pay."""
-        numbers = whole.reshape(-1).view("u8" if whole.itemsize % 8 == 0 else "u1")
-        bits = numbers.reshape(len(whole), -1)
-        changed = np.count_nonzero(bits[1:] != bits[:-1])
+        bits = whole.reshape(-1).view("u8" if whole.itemsize % 8 == 0 else "u1")
+        width = bits.size // len(whole)
+        changed = np.count_nonzero(bits[width:] != bits[:-width])
         if not changed:
-            row = bits[0].tobytes()
+            row = bits[:width].tobytes()
             if row not in self._alike:
                 if len(self._alike) == _REMEMBERED:
                     self._alike.clear()

@@ -329,8 +329,11 @@ def _legend(axis: Axes, picture: Picture, panel: Panel, lines: Sequence[Line2D])
 
 
 def _plain(text: str) -> str:
-    """Return a text that is drawn letter by letter: a ``$`` in a label begins no formula."""
-    return text.replace("$", r"\$")
+    """Return a text that is drawn letter by letter: a ``$`` in a label begins no formula.
+
+    Bytes of a name that are no text, which no font has, are shown by their numbers.
+    """
+    return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("$", r"\$")
 
 
 def save(figure: Figure, path: Path) -> list[str]:

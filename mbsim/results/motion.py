@@ -22,7 +22,9 @@ def rotate(q: Array, v: Array) -> Array:
 
 def _cross(a: Array, b: Array) -> Array:
     """Return cross products of vectors (..., 3), as `numpy.cross` does in three times the time."""
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    shape = np.broadcast_shapes(a.shape, b.shape)
+    # each component of all vectors lies together
+    found = np.moveaxis(np.empty((3, *shape[:-1])), 0, -1)
     for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.subtract(a[..., i] * b[..., j], a[..., j] * b[..., i], out=found[..., k])
     return found

@@ -47,8 +47,10 @@ class PartFile:
         self._at = 0
         #: Where bytes were written since both files held the same: [first, end].
         self._new: list[list[int]] = []
-        #: Checksums of the blocks of what was published last, and its size without them.
-        self._sums, self._summed = array("I"), 0
+        self._summed = 0  # the size of what was published last, without its checksums
+        #: Checksums of the blocks up to an end, and where was written since they were made.
+        self._sums, self._sums_end = array("I"), 0
+        self._unsummed: list[list[int]] = []
         self._published: tuple[int, int] | None = None  # device and inode of the other file
         #: Since the mark: the size there, bytes that were written over, and where was written.
         self._marked: int | None = None
@@ -100,6 +102,7 @@ class PartFile:
         except OSError as error:
             self.failure = error
         _note(self._new, first, first + size)
+        _note(self._unsummed, first, first + size)
         return size
 
     def mark(self) -> None:
@@ -170,12 +173,24 @@ class PartFile:
 
     def _sum(self) -> None:
         """Write the checksums behind all that is there."""
-        size = self._size()
+        self._sum_up()
+        self._summed = self._sums_end
+        _write(self._fd, end_of(self._sums, self._summed), self._summed)
+
+    def sum_ahead(self) -> None:
+        """Make the checksums of all that is there, which publishing would have to make."""
+        try:
+            self._sum_up()
+        except OSError as error:
+            self.failure = self.failure or error
+
+    def _sum_up(self) -> None:
+        """Make the checksums of what was written since they were made last."""
+        size, end = self._size(), self._sums_end
         # what lies behind an end that has moved is new too, written or not
-        moved = [[min(size, self._summed), size]] if size != self._summed else []
-        self._sums = renewed(self._fd, self._sums, _merged(self._new + moved), size)
-        self._summed = size
-        _write(self._fd, end_of(self._sums, size), size)
+        moved = [[min(size, end), size]] if size != end else []
+        self._sums = renewed(self._fd, self._sums, _merged(self._unsummed + moved), size)
+        self._sums_end, self._unsummed = size, []
 
     def _keep(self) -> bool:
         """Give the published file a second name; return whether it is there and ours."""
@@ -223,6 +238,7 @@ class PartFile:
             _write(self._fd, data, first)
         # of these the published file and the checksums have others
         self._new, self._summed = self._passing, self._marked
+        self._unsummed, self._sums_end = [*map(list, self._passing)], self._marked
         self._marked, self._undo, self._passing = None, [], []
 
     def _copy_from(self, path: Path) -> None:
@@ -236,6 +252,7 @@ class PartFile:
         if found is not None and sums != whole:
             raise DamagedError("its bytes are not those that were written")
         self._sums, self._summed, self._new = whole, size, []
+        self._sums_end, self._unsummed = size, []
 
     @staticmethod
     def discard(path: Path) -> None:

@@ -16,7 +16,9 @@ from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
-from mbsim.results.blocks import Block, Gathered, Table, first_rows, nothing
+from mbsim.results.background import Background
+from mbsim.results.blocks import Block, Gathered, Table, Tables, first_rows, nothing, row_bytes
+from mbsim.results.chunks import LONG
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
@@ -98,14 +100,17 @@ class Recorder:
         self.checkpoint: dict[str, Table] = {}
         self._watch = Watch(acting(system))
         self._watched = 0  # of the rows gathered, how many it has looked at
-        self._gathered = Gathered(system)
         #: How many output rows are written at once, a power of two: chunks end where they do.
-        self._block = FEWEST_ROWS
-        while 4 * self._block * self._gathered.row_bytes <= BUFFER_BYTES:
+        self._block, size = FEWEST_ROWS, row_bytes(system)
+        while 4 * self._block * size <= BUFFER_BYTES:
             self._block *= 2
-        self._most = max(BUFFER_BYTES, 4 * self._block * self._gathered.row_bytes)
+        self._most = max(BUFFER_BYTES, 4 * self._block * size)
+        self._gathered = Gathered(system, self._block, self._block >= LONG)
+        self._background = Background()
+        self._free: Tables = {}  # those of the rows that are written in the background
         self._mark: dict[str, int] | None = None  # where rows end that are the run's for sure
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
+        self._given = 0  # output rows in the file, or on their way there
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._flush_seconds = 0.0  # what the last flush took
@@ -125,6 +130,7 @@ class Recorder:
         self.earlier = self._target is not None and not resume and self._target.exists()
         if resume:
             self.checkpoint = self._resumed(settings)
+        self._given = self._written[0]
         self._store = Store(self._target, resume)
         self._store.rows_at_once = self._block
         if resume:
@@ -210,10 +216,10 @@ class Recorder:
         if self._mark is not None:
             return
         # the same rows at once, however often the loop comes back
-        while self._gathered.rows >= (wanted := self._block - self._written[0] % self._block):
-            self._write(wanted)
+        while self._gathered.rows >= (wanted := self._block - self._given % self._block):
+            self._hand_over(wanted)
         if self._gathered.bytes > self._most:  # points of contact
-            self._write()
+            self._hand_over(self._gathered.rows)
 
     def mark(self) -> None:
         """Write no rows taken from here on until `settle`: `go_back` may drop them."""
@@ -256,6 +262,7 @@ class Recorder:
         if self._target is None:
             return
         began = time.perf_counter()
+        self._background.wait()
         before = self._written, self._saved, self._started
         self._store.mark()
         self._put(self._gathered.block)
@@ -293,21 +300,25 @@ class Recorder:
     @property
     def watch(self) -> Watch:
         """What the log says of all rows, those before a resume included."""
-        self._look(self._gathered.block)
+        self._background.wait()
+        block = self._gathered.block
+        first, self._watched = self._watched, len(block.time)
+        self._look(block, first)
         return self._watch
 
-    def _look(self, block: Block) -> None:
-        """Look at the rows gathered since the last look: many at once, for each look costs."""
-        first, self._watched = self._watched, len(block.time)
+    def _look(self, block: Block, first: int) -> None:
+        """Look at rows from a first one on: many at once, for each look costs."""
         self._watch.add(block.time[first:], block.energy[first:], block.wrenches[first:])
 
     @property
     def empty(self) -> bool:
         """Whether not one row was recorded, by this run or by the one that it resumes."""
-        return not (self._started or self._gathered.bytes)
+        return not (self._started or self._given or self._gathered.bytes)
 
     def abandon(self) -> None:
         """Leave what an earlier run published as it is, and drop this one."""
+        with contextlib.suppress(ResultsError):
+            self._background.wait()
         self._store.abandon()
 
     def close(
@@ -392,15 +403,30 @@ class Recorder:
             return error
         return None
 
-    def _write(self, rows: int | None = None, last: bool = False) -> None:
-        """Hand the first rows gathered to the store, all of them where no number is given."""
+    def _write(self, last: bool = False) -> None:
+        """Hand all rows gathered to the store."""
+        self._background.wait()
         block = self._gathered.block
-        self._look(block)
-        if rows is not None:
-            block = first_rows(block, rows)
+        self._look(block, self._watched)
         self._put(block, last)
-        self._gathered.drop(block)
-        self._watched -= len(block.time)
+        self._gathered.hand_over(block)
+        self._watched = 0
+
+    def _hand_over(self, rows: int) -> None:
+        """Let the first rows gathered be written while the loop goes on."""
+        self._background.wait()
+        self._gathered.take_back(self._free)
+        block = first_rows(self._gathered.block, rows)
+        self._free = self._gathered.hand_over(block)
+        first, self._watched = min(self._watched, rows), max(0, self._watched - rows)
+        self._given += rows
+
+        def write() -> None:
+            self._look(block, first)
+            self._put(block)
+            self._store.sum_ahead()
+
+        self._background.begin(write)
 
     def _put(self, block: Block, last: bool = False) -> None:
         """Write rows behind those that are in the file."""

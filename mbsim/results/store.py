@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from mbsim.errors import ResultsError
-from mbsim.results.chunks import CHUNK_ROWS, ChunkWriter, chunk_shape
+from mbsim.results.checksums import BLOCK
+from mbsim.results.chunks import CHUNK_BYTES, CHUNK_ROWS, ChunkWriter, chunk_shape
 from mbsim.results.files import RunLock, problem
 from mbsim.results.part_file import PartFile
 
@@ -183,6 +184,12 @@ class Store:
                 file[name].attrs.update({key: _text(value) for key, value in facts.items()})
             file.flush()
 
+    def sum_ahead(self) -> None:
+        """Make the checksums of what is written by now."""
+        if not self.broken and self._part is not None:
+            with self._writing():
+                self._part.sum_ahead()
+
     def complete(self) -> None:
         """Write all rows that are held back; none follow, but behind a publication."""
         if not self.broken:
@@ -288,7 +295,8 @@ def _opened(part: PartFile, mode: str) -> h5py.File:
     """Open a part file."""
     import h5py
 
-    return h5py.File(part, mode)
+    # pages that are written whole cost half as much
+    return h5py.File(part, mode, alignment_threshold=CHUNK_BYTES, alignment_interval=BLOCK)
 
 
 def _text(value: Any) -> Any:

@@ -93,3 +93,25 @@ def test_tables_that_have_no_column_for_each_id_are_refused(
         found = CliRunner().invoke(main, line)
         assert found.exception is None or isinstance(found.exception, SystemExit)
         assert (found.exit_code, "the file is damaged" in found.output) == (5, True)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_plot_of_a_file_and_a_fact_whose_bytes_are_no_text(tmp_path: Path, suffix: str) -> None:
+    """No font has them: they are shown by their numbers."""
+    system = fake_system(tmp_path, REQUESTS)
+    recorder = Recorder(system, SETTINGS, tmp_path)
+    add_rows(system, 0, 10)
+    recorder.take()
+    recorder.close("finished", {"steps": 1}, system.scene.log.contacts).close()
+    odd = tmp_path / "a\udcff.h5"
+    try:
+        (tmp_path / "deck.h5").rename(odd)
+    except (OSError, ValueError):
+        pytest.skip("names of files are texts here")
+    with h5py.File(odd, "r+") as file:
+        file.attrs["mbsim_version"] = b"\xff"
+    picture = tmp_path / f"a{suffix}"
+    line = ["plot", str(odd), "bodies/*/position", "-o", str(picture)]
+    found = CliRunner().invoke(main, line)
+    assert found.exit_code == 0, found.output
+    assert picture.stat().st_size > 1000
