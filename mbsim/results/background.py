@@ -1,4 +1,4 @@
-"""`Background`: one piece of work beside the loop of a run, which compiled code does not hold up."""
+"""`Background`: a piece of work beside the loop of a run, in another thread."""
 
 from __future__ import annotations
 

@@ -57,24 +57,21 @@ def check_members(file: h5py.File) -> None:
 
 
 def _check_columns(group: h5py.Group, count: int) -> None:
-    """Look whether all datasets beside the ids of a group have a column for each of them.
+    """Look whether what a group says of its elements has a value for each of them.
 
     Raises
     ------
     ValueError
-        If one has not.
+        If it has not.
     """
     for name, item in group.items():
-        shape = getattr(item, "shape", None)
-        if not hasattr(item, "dtype") or name == "id":
+        peak = name.startswith("peak_")
+        if not (peak or name in FACTS) or not hasattr(item, "dtype"):
             continue
-        one = name in FACTS or name.startswith("peak_")
-        if shape is None or len(shape) not in ((1,) if one else (2, 3)):
-            raise ValueError(f"{item.name} is no {'list' if one else 'signal'}")
-        if shape[0 if one else 1] != count:
-            raise ValueError(f"{item.name} has not one column for each id")
-        if name not in FACTS and item.dtype.kind not in "iuf":
-            raise ValueError(f"{item.name} is no numbers")
+        if not _is_table(item, 1) or len(item) != count:
+            raise ValueError(f"{item.name} has not one value for each id")
+        if peak and item.dtype.kind not in "iuf":
+            raise ValueError(f"{item.name} is no list of numbers")
 
 
 def _is_table(item: Any, axes: int) -> bool:

@@ -73,8 +73,10 @@ def test_info_of_a_file_of_another_form(
 
 
 @pytest.mark.parametrize("value", [np.ones((1, 3)), np.ones(2), np.ones((10, 2)), "text", b"", 2.0])
-@pytest.mark.parametrize("name", ["contacts/peak_force", "contacts/force", "bodies/velocity"])
-def test_tables_that_have_no_column_for_each_id_are_refused(
+@pytest.mark.parametrize(
+    "name", ["contacts/peak_force", "contacts/peak_slip_speed", "bodies/label"]
+)
+def test_tables_that_have_no_value_for_each_id_are_refused(
     tmp_path: Path, name: str, value: Any
 ) -> None:
     """By every command that opens the file: `plot` asks for a peak where it draws a force."""
