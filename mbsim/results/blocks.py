@@ -64,6 +64,7 @@ class Gathered:
         self._order: Literal["C", "F"] = "F" if columnwise else "C"
         found = system.scene.rows
         self._tables = {f.name: _without_rows(getattr(found, f.name)) for f in fields(Block)}
+        self._widths = {name: _row_bytes(table) for name, table in self._tables.items()}
         #: Tables whose rows are written, to be filled anew.
         self._spare = dict(self._tables)
         self._ends = dict.fromkeys(self._tables, 0)
@@ -110,8 +111,7 @@ class Gathered:
     @property
     def bytes(self) -> int:
         """Memory that the rows take."""
-        widths = {name: _row_bytes(table) for name, table in self._tables.items()}
-        return sum(end * widths[name] for name, end in self._ends.items())
+        return sum(end * self._widths[name] for name, end in self._ends.items())
 
     def hand_over(self, block: Block) -> Tables:
         """Let go of the first rows, as `first_rows` has them, and of the tables that hold them.

@@ -409,6 +409,7 @@ class Recorder:
         block = self._gathered.block
         self._look(block, self._watched)
         self._put(block, last)
+        self._given += len(block.time)
         self._gathered.hand_over(block)
         self._watched = 0
 

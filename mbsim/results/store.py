@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from mbsim.errors import ResultsError
-from mbsim.results.checksums import BLOCK
-from mbsim.results.chunks import CHUNK_BYTES, CHUNK_ROWS, ChunkWriter, chunk_shape
+from mbsim.results.chunks import CHUNK_ROWS, ChunkWriter, chunk_shape
 from mbsim.results.files import RunLock, problem
 from mbsim.results.part_file import PartFile
 
@@ -295,8 +294,7 @@ def _opened(part: PartFile, mode: str) -> h5py.File:
     """Open a part file."""
     import h5py
 
-    # pages that are written whole cost half as much
-    return h5py.File(part, mode, alignment_threshold=CHUNK_BYTES, alignment_interval=BLOCK)
+    return h5py.File(part, mode)
 
 
 def _text(value: Any) -> Any:
