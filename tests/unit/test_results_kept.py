@@ -13,7 +13,9 @@ import pytest
 from helpers.dying import Killed, dying
 from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from mbsim.errors import ModelError, ResultsError
+from mbsim.results.blocks import Gathered, first_rows
 from mbsim.results.checksums import end_of, sums_of
+from mbsim.results.chunks import LONG
 from mbsim.results.part_file import PartFile
 from mbsim.results.reading import end_state, open_results
 from mbsim.results.recorder import Recorder
@@ -189,16 +191,17 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "deck.h5").exists()
 
 
-def bytes_of(folder: Path, monkeypatch: pytest.MonkeyPatch, flushes: set[int]) -> bytes:
+def bytes_of(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, flushes: set[int], rows: int, at_once: int
+) -> bytes:
     """Return the file of a run whose rows come in pieces, published after some of them."""
     with monkeypatch.context() as patch:
-        # two rows at once
         patch.setattr("mbsim.results.recorder.BUFFER_BYTES", 8000)
-        patch.setattr("mbsim.results.recorder.FEWEST_ROWS", 2)
+        patch.setattr("mbsim.results.recorder.FEWEST_ROWS", at_once)
         system = fake_system(folder / "deck")
         recorder = Recorder(system, SETTINGS, folder)
-        recorder.check_room(61)
-    for k in range(20):
+        recorder.check_room(20 * rows + 1)
+    for k in range(20 * rows // 3):
         add_rows(system, 3 * k, 3)
         recorder.take()
         if k in flushes:
@@ -208,14 +211,53 @@ def bytes_of(folder: Path, monkeypatch: pytest.MonkeyPatch, flushes: set[int]) -
     return (folder / "deck.h5").read_bytes()
 
 
+# two rows at once; as many as chunks of one column have, which are written from where rows lie
+@pytest.mark.parametrize(("rows", "at_once"), [(3, 2), (300, LONG)])
 def test_when_a_run_was_published_changes_no_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int, at_once: int
+) -> None:
+    straight = bytes_of(tmp_path / "straight", monkeypatch, set(), rows, at_once)
+    assert numbers(tmp_path / "straight") == list(range(20 * rows))
+    last = 20 * rows // 3
+    every = set(range(0, last, rows // 3))
+    for name, flushes in {"first": {0}, "some": {1, 2, last - 11}, "all": every}.items():
+        found = bytes_of(tmp_path / name, monkeypatch, flushes, rows, at_once)
+        assert (len(found), found) == (len(straight), straight)
+
+
+def test_rows_that_could_not_be_written_beside_the_loop_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    straight = bytes_of(tmp_path / "straight", monkeypatch, set())
-    assert numbers(tmp_path / "straight") == list(range(60))
-    for name, flushes in {"first": {0}, "some": {1, 2, 9}, "all": set(range(20))}.items():
-        found = bytes_of(tmp_path / name, monkeypatch, flushes)
-        assert (len(found), found) == (len(straight), straight)
+    """By the next thing that is asked of the recorder; what was published stays."""
+    monkeypatch.setattr("mbsim.results.recorder.BUFFER_BYTES", 8000)
+    recorder = recording(tmp_path, 10)
+    recorder.flush(checkpoint(10))
+    monkeypatch.setattr(PartFile, "room", lambda part: (1 << 18) + 100)
+    add_rows(recorder.system, 10, 40)
+    with pytest.raises(ResultsError, match="no space left on device"):
+        for k in range(50, 400, 10):
+            recorder.take()
+            add_rows(recorder.system, k, 10)
+    recorder.abandon()
+    assert numbers(tmp_path) == list(range(10))
+
+
+def test_rows_come_as_they_were_given_however_many_at_once(tmp_path: Path) -> None:
+    """What is gathered, let go, gathered again in tables that are used in turn."""
+    for order in (False, True):
+        system = fake_system(tmp_path / "deck")
+        gathered, seen, free = Gathered(system, 50, order), [], {}
+        for k in range(60):
+            add_rows(system, 7 * k, 7)
+            gathered.take(*map(int, system.scene.rows.used))
+            system.scene.rows.used[:] = 0
+            while gathered.rows >= 50:
+                gathered.take_back(free)
+                block = first_rows(gathered.block, 50)
+                free = gathered.hand_over(block)
+                seen.append(block.y[:, 0].copy())
+        seen.append(gathered.block.y[:, 0])
+        np.testing.assert_array_equal(np.concatenate(seen), np.arange(420.0))
 
 
 def test_a_resumed_run_that_is_published_before_a_chunk_is_whole(tmp_path: Path) -> None:
