@@ -234,10 +234,14 @@ def test_rows_that_could_not_be_written_beside_the_loop_are_told(
     recorder.flush(checkpoint(10))
     monkeypatch.setattr(PartFile, "room", lambda part: (1 << 18) + 100)
     add_rows(recorder.system, 10, 40)
-    with pytest.raises(ResultsError, match="no space left on device"):
+
+    def go_on() -> None:
         for k in range(50, 400, 10):
             recorder.take()
             add_rows(recorder.system, k, 10)
+
+    with pytest.raises(ResultsError, match="no space left on device"):
+        go_on()
     recorder.abandon()
     assert numbers(tmp_path) == list(range(10))
 
