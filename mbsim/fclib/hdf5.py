@@ -132,16 +132,16 @@ def _contents(file: h5py.File, kind: str | None) -> Contents:
     if len(there) > 1 and kind is None:
         raise ModelError(f"holds several problems ({', '.join(there)}); name the kind")
     chosen = kind or there[0]
-    problem = _problem(file[GROUPS[chosen]], chosen)
-    solution = _solution(file["solution"], problem) if "solution" in file else None
+    problem = _problem(_group(file, GROUPS[chosen]), chosen)
+    solution = _solution(_group(file, "solution"), problem) if "solution" in file else None
     return Contents(problem, solution, _guesses(file, problem))
 
 
 def _problem(group: h5py.Group, kind: str) -> Local | Global:
     """Return the problem of a group."""
     spacedim = _whole(group, "spacedim")
-    vectors = _member(group, "vectors")
-    info = _info(group["info"]) if "info" in group else None
+    vectors = _group(group, "vectors")
+    info = _info(_group(group, "info")) if "info" in group else None
     mu = _vector(vectors, "mu")
     if kind == "local":
         return Local(
@@ -173,6 +173,14 @@ def _member(group: h5py.Group, name: str) -> Any:
     if name not in group:
         raise ModelError(f"{group.name}/{name} is missing")
     return group[name]
+
+
+def _group(parent: h5py.Group, name: str) -> h5py.Group:
+    """Return a group in a group: asked what it has, a data set would look through all its rows."""
+    found = _member(parent, name)
+    if not hasattr(found, "keys"):
+        raise ModelError(f"{found.name} is no group")
+    return found
 
 
 def _values(group: h5py.Group, name: str) -> Any:
@@ -209,7 +217,7 @@ def _vector(group: h5py.Group, name: str) -> Vector:
 
 def _matrix(parent: h5py.Group, name: str) -> Matrix:
     """Return a matrix as it is stored."""
-    group = _member(parent, name)
+    group = _group(parent, name)
     return Matrix(
         _whole(group, "m"),
         _whole(group, "n"),
@@ -277,9 +285,9 @@ def _guesses(file: h5py.File, problem: Local | Global) -> tuple[Solution, ...]:
     """Return the guesses, "1" first."""
     if "guesses" not in file:
         return ()
-    group = file["guesses"]
+    group = _group(file, "guesses")
     count = _whole(group, "number_of_guesses")
-    return tuple(_solution(_member(group, str(k)), problem) for k in range(1, count + 1))
+    return tuple(_solution(_group(group, str(k)), problem) for k in range(1, count + 1))
 
 
 # writing

@@ -207,9 +207,22 @@ def put(name, value):
     return change
 
 
+def claim(name):
+    """Put a data set of 2^50 numbers that are not there in the place of a group."""
+
+    def change(group):
+        if name in group:
+            del group[name]
+        group.create_dataset(name, (2**50,), "f8", chunks=(2**16,))
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        *((claim(name), f"{name} is no group") for name in ("W", "vectors", "info", "V")),
+        *((claim(f"/{name}"), f"/{name} is no group") for name in ("solution", "guesses")),
         (put("W", None), "/fclib_local/W is missing"),
         (put("vectors/mu", None), "vectors/mu is missing"),
         (put("vectors/mu", [0.5, 0.5, 0.5]), "mu names 3 contacts"),
