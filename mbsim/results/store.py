@@ -30,6 +30,8 @@ _FEW = 256
 _UNKNOWN = ("events", "state/incidents")
 #: All rows of a run that take no more than this [bytes] are stored without chunks.
 _SMALL = 1 << 12
+#: Most bytes, as in the file, of indices that HDF5 keeps in memory while it writes.
+_INDEX_BYTES = 1 << 19
 #: Room that stays free beside rows for tables, the log and HDF5's own.
 _SPARE = 1 << 18
 
@@ -294,7 +296,13 @@ def _opened(part: PartFile, mode: str) -> h5py.File:
     """Open a part file."""
     import h5py
 
-    return h5py.File(part, mode)
+    file = h5py.File(part, mode)
+    # HDF5 keeps nodes of its indices at many times their size in the file: 0.7 kB a chunk
+    memory = file.id.get_mdc_config()
+    memory.set_initial_size = True
+    memory.initial_size = memory.min_size = memory.max_size = _INDEX_BYTES
+    file.id.set_mdc_config(memory)
+    return file
 
 
 def _text(value: Any) -> Any:
