@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -27,22 +27,31 @@ def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
     """
     found: dict[int, bool] = {}
 
-    def note(pair: str, first: int, second: int) -> None:
+    def note(pair: str, first: Sequence[int], second: Sequence[int]) -> None:
         layered = pair in ("SURFACE-SURFACE", "FIELD-FIELD")
-        for side, id in zip(pair.split("-"), (first, second), strict=True):
+        for side, ids in zip(pair.split("-"), (first, second), strict=True):
             if side in _OF_TRIANGLES:
-                found[id] = found.get(id, False) or layered
+                for id in ids:
+                    found[id] = found.get(id, False) or layered
 
     for plan in plans.pairs:
         if _OF_TRIANGLES & set(plan.kind.closed_form.split("-")):
-            note(plan.kind.closed_form, plan.graphic_i, plan.graphic_j)
+            note(plan.kind.closed_form, [plan.graphic_i], [plan.graphic_j])
     for contact_set in plans.broadphase:
-        for i in contact_set.i:
-            for j in contact_set.j:
-                classes = shape_class(model.graphics[i]), shape_class(model.graphics[j])
-                kind = contact_set.kinds.get(classes)
-                if kind is not None and _OF_TRIANGLES & set(kind.closed_form.split("-")):
-                    note(kind.closed_form, *((j, i) if kind.swapped else (i, j)))
+        # by class: pairs of graphics are too many
+        of_i, of_j = _by_class(model, contact_set.i), _by_class(model, contact_set.j)
+        for classes, kind in contact_set.kinds.items():
+            if _OF_TRIANGLES & set(kind.closed_form.split("-")):
+                i, j = of_i.get(classes[0], []), of_j.get(classes[1], [])
+                note(kind.closed_form, *((j, i) if kind.swapped else (i, j)))
+    return found
+
+
+def _by_class(model: Model, ids: Sequence[int]) -> dict[str, list[int]]:
+    """Return graphics by what they have in common."""
+    found: dict[str, list[int]] = {}
+    for id in ids:
+        found.setdefault(shape_class(model.graphics[id]), []).append(id)
     return found
 
 
