@@ -161,7 +161,7 @@ def _without_rows(table: Table) -> Table:
 
 def _row_bytes(table: Table) -> int:
     """Return the memory that a row of a table takes."""
-    return table.itemsize * math.prod(table.shape[1:])
+    return int(table.itemsize * math.prod(table.shape[1:]))
 
 
 def first_rows(block: Block, rows: int) -> Block:
