@@ -17,12 +17,12 @@ from mbsim.compile_model.pairing import (
     Kind,
     Plans,
     half_extent,
+    half_width,
     kernel_size,
     radius,
     shape_class,
-    thinnest,
 )
-from mbsim.compile_model.surfaces import needed_as_triangles, packed_surfaces, thickness
+from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
@@ -79,12 +79,12 @@ def graphics_table(
     ids: list[int],
     row: dict[int, int],
     shapes: list[str],
-    meshed: Mapping[int, bool],
+    meshed: Mapping[int, Need],
 ) -> Graphics:
     """Return the shapes in their bodies' cg axes.
 
     `row` is the body row by body id; `meshed` has the graphics that are needed as triangles, and
-    whether with their layer.
+    what of them.
     """
     n = len(ids)
     surfaces, begins = packed_surfaces(model.graphics, meshed)
@@ -97,6 +97,7 @@ def graphics_table(
         half=np.zeros((n, 3)),
         turns=np.ones(n, dtype=np.int64),
         thin=np.zeros(n),
+        width=np.zeros(n),
         shape=np.zeros(n, dtype=np.int64),
         marker_p=np.zeros((n, 3)),
         marker_R=np.zeros((n, 3, 3)),
@@ -109,10 +110,12 @@ def graphics_table(
         made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
         made.R[g] = marker.R_B
         made.size[g, :3] = kernel_size(graphic)
-        made.thin[g] = thinnest(graphic)
+        made.thin[g] = made.width[g] = half_width(graphic)
         if graphic_id in begins:
             made.size[g, 3] = surfaces.ctypes.data + surfaces.itemsize * begins[graphic_id]
-            made.thin[g] = min(thinnest(graphic), thickness(surfaces[begins[graphic_id] :]))
+            made.thin[g] = min(
+                made.width[g], thickness(surfaces[begins[graphic_id] :], meshed[graphic_id])
+            )
         made.radius[g] = radius(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1

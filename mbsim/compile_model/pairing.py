@@ -12,6 +12,8 @@ import hashlib
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mbsim.errors import DeckError, Fault
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS
 from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
@@ -351,9 +353,18 @@ def why_costly(model: Model, plan: PairPlan) -> str:
     return f"{' and '.join(reasons)}: FCL looks at triangles at every evaluation, {points}"
 
 
-def thinnest(graphic: Graphic) -> float:
-    """Return half of the thinnest side; inf for a plane."""
-    return min(half_extent(graphic))
+def half_width(graphic: Graphic) -> float:
+    """Return half of the least width of a shape; inf for a plane.
+
+    A convex mesh is measured along the normals of its faces, another one along its axes.
+    """
+    if graphic.vertices is None:
+        return min(half_extent(graphic))
+    ways = np.eye(3)
+    if graphic.hull is not None:
+        first, count = int(graphic.hull[hull.AT_PLANES]), int(graphic.hull[hull.FACES])
+        ways = graphic.hull[first : first + 4 * count].reshape(count, 4)[:, :3]
+    return 0.5 * float(np.ptp(graphic.vertices @ ways.T, axis=0).min())
 
 
 def half_extent(graphic: Graphic) -> tuple[float, float, float]:
