@@ -28,7 +28,7 @@ class Graphics(NamedTuple):
     radius: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
     half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
-    thin: F1  # (ng,) half of the thinnest side, of a mesh with a layer also of its walls; inf for a plane
+    thin: F1  # (ng,) half of the thinnest side, of meshes also of their walls; inf for a plane
     width: F1  # (ng,) half of the least width of the whole shape; inf for a plane
     shape: I1  # (ng,) class of shape, see `Broadphase.kind`
     marker_p: F2  # (ng, 3) reference marker, in cg axes

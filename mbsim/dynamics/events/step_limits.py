@@ -40,8 +40,8 @@ BLIND_JUMP, AT_ONCE = 0.1, 1e-4
 SEEN = 0.6
 #: The end of a damper's ramp that is met within this part of a step is as good as at its begin.
 AT_BEGIN = 0.02
-#: How much deeper a step may lead, over half of the thickness of both shapes: `points.log_deep` looks
-#: at ends of steps, and is told within 0.4 of it.
+#: How much deeper a step may lead, over half of the thickness of both shapes: `points.log_deep`
+#: looks at ends of steps, and sees what passes within 0.4 of it.
 DEEPER = 0.3
 #: Part of the scene's length below which a depth is rounding.
 ROUNDING = 1e-13

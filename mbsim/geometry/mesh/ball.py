@@ -27,8 +27,8 @@ from mbsim.model.surface import (
 #: of the mesh (3), and what is left of its weight.
 NEAR_NUMBERS = 8
 NEAR_POINT, NEAR_NORMAL, NEAR_WEIGHT = 1, 4, 7
-#: A wall's other side bends from its first by less than arccos of this; part of a way within which a
-#: triangle is where it begins; part of a wall that a layer would reach.
+#: A wall's other side bends from its first by less than arccos of this; part of a way within which
+#: a triangle is where it begins; part of a wall that a layer would reach.
 SQUARE, AT_START, OF_WALL = 0.5, 1e-6, 0.36
 #: Parts of a triangle on which a point may be nearest: its edges, its corners, its face.
 ON_CORNER, ON_FACE = 3, 6
