@@ -26,7 +26,6 @@ from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfa
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
-from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.contact_radius import with_radii
@@ -132,6 +131,13 @@ def _face_weight(kind: Kind) -> float:
     return 1.0 if kind.has_area else 0.0
 
 
+def _noise(kind: Kind) -> float:
+    """Return the scatter of the normals that FCL gives for a kind."""
+    from mbsim.geometry.fcl_detector import states_noise
+
+    return states_noise(kind.shape_i, kind.shape_j)
+
+
 def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
     return Kinds(
@@ -143,9 +149,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         whole=np.array([_face_weight(k) for k in kinds]),
         step=np.array([k.step for k in kinds], dtype=np.int64),
         moves=np.array([k.moves for k in kinds], dtype=np.int64),
-        noise=np.array(
-            [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
-        ),
+        noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
     )
 
 

@@ -301,7 +301,8 @@ def log_deep(scene: Scene, t: float) -> None:
         c = contact_of(scene, hit[k])
         way = graphics.width[gi] + graphics.width[gj]
         kind = scene.pairs.kind[scene.slots.pair[hit[k]]]
-        known = scene.kinds.moves[kind] == 1 or work.points[hit[k], AT_DEPTH] <= MIDDLE * way
+        told = scene.kinds.moves[kind] == 1 and scene.kinds.kernel[kind] != 0
+        known = told or work.points[hit[k], AT_DEPTH] <= MIDDLE * way
         if not known and work.beyond[c] == 0:
             work.beyond[c] = 1 + scene.slots.pair[hit[k]]
     for c in range(len(work.beyond)):
