@@ -68,6 +68,7 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
+    spreads: I1  # (nc,) 1 where the law is asked all over a patch: `contact.spreading`
     numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts

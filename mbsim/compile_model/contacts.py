@@ -269,7 +269,7 @@ def contacts_table(
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, carried = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    memory, carried, spreads = (np.zeros(n, dtype=np.int64) for _ in range(3))
     for k, contact in enumerate(contacts):
         if contact.id in user_normal:
             own = user_normal[contact.id]
@@ -290,6 +290,7 @@ def contacts_table(
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
             carried[k] = friction_law.carried
+            spreads[k] = not (memory[k] or uses_x[k] or friction_law.of_area)
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -319,6 +320,7 @@ def contacts_table(
         ),
         memory=memory,
         carried=carried,
+        spreads=spreads,
         numbers=table([np.array(c.numbers) for c in contacts]),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
         reads_x=np.array(
