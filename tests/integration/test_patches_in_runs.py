@@ -114,7 +114,7 @@ def test_methods_agree(depth, friction, tmp_path):
 
 
 def test_a_users_law_is_never_given_less_than_no_normal_force(tmp_path):
-    """Slopes by the normal force too: in this run a damper outweighs the spring while they touch."""
+    """Nor in slopes: in this run a damper outweighs the spring while they touch."""
     model = deck(tmp_path, "LARGEST", "CFFSUB", end=0.06)
     (tmp_path / "law.py").write_text(
         "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
