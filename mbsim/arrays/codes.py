@@ -13,9 +13,11 @@ from __future__ import annotations
     TOUCHES,
     PEAK_FORCE_TIME,
     ENERGY_LOST,  # dissipated by the damper and by friction
-    BEYOND_TIME,  # of the first overlap deeper than the layer under a mesh's surface; NaN before
-) = range(10)
-LOG_COLUMNS = 10
+    BEYOND_TIME,  # of the first overlap too deep for its force to be trusted; NaN before
+    BEYOND_I,  # rows of the graphics of that overlap
+    BEYOND_J,
+) = range(12)
+LOG_COLUMNS = 12
 
 # the last column of `Log.samples`, whose first ones are those of PEAK_FORCE, PEAK_DEPTH, PEAK_SLIP
 SAMPLE_RATE = 3
@@ -27,7 +29,7 @@ SAMPLES = 3 + 12
 
 # entries of `Log.counters`
 NARROWPHASE, SKIPPED, FCL_CALLS, FRICTION_CALLS, PYTHON_CALLS, NORMAL_CALLS, LISTINGS = range(7)
-BEYOND_LAYERS = 7
+TOO_DEEP = 7
 COUNTERS = 8
 
 # entries of `Pairs.count`

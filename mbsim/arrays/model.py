@@ -28,7 +28,8 @@ class Graphics(NamedTuple):
     radius: F1  # (ng,) radius of the ball around the centre that holds the shape; inf for a plane
     half: F2  # (ng, 3) half edges of the box in shape axes that holds the shape; inf for a plane
     turns: I1  # (ng,) 0 for a sphere, whose surface a rotation about its centre does not move
-    thin: F1  # (ng,) half of the thinnest side; inf for a plane
+    thin: F1  # (ng,) half of the thinnest side, of meshes also of their walls; inf for a plane
+    width: F1  # (ng,) half of the least width of the whole shape; inf for a plane
     shape: I1  # (ng,) class of shape, see `Broadphase.kind`
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)
@@ -67,6 +68,7 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
+    spreads: I1  # (nc,) 1 where the law is asked all over a patch: `contact.spreading`
     numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts

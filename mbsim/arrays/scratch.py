@@ -23,7 +23,7 @@ class Work(NamedTuple):
     speed: F2  # (ng, 2) of its fastest point, and acceleration of its centre
     points: F2  # (ns, POINT) candidates of geometry.catalog
     touching: I1  # (ns,)
-    beyond: I1  # (nc,) 1 where meshes overlap deeper than the layer under their surface
+    beyond: I1  # (nc,) 1 + the first pair whose overlap is deeper than its form knows; 0: none
     hit: I1  # (ns + 1,) slots that touch, their number last
     t: F2  # (ns, 3) x-axis of the incident marker at the trial point
     slot: F2  # (ns, SLOT_COLUMNS) see contact.forces

@@ -17,16 +17,15 @@ from mbsim.compile_model.pairing import (
     Kind,
     Plans,
     half_extent,
+    half_width,
     kernel_size,
     radius,
     shape_class,
-    thinnest,
 )
-from mbsim.compile_model.surfaces import needed_as_triangles, packed_surfaces, thickness
+from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
-from mbsim.geometry.fcl_detector import states_noise
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.contact_radius import with_radii
@@ -79,12 +78,12 @@ def graphics_table(
     ids: list[int],
     row: dict[int, int],
     shapes: list[str],
-    meshed: Mapping[int, bool],
+    meshed: Mapping[int, Need],
 ) -> Graphics:
     """Return the shapes in their bodies' cg axes.
 
     `row` is the body row by body id; `meshed` has the graphics that are needed as triangles, and
-    whether with their layer.
+    what of them.
     """
     n = len(ids)
     surfaces, begins = packed_surfaces(model.graphics, meshed)
@@ -97,6 +96,7 @@ def graphics_table(
         half=np.zeros((n, 3)),
         turns=np.ones(n, dtype=np.int64),
         thin=np.zeros(n),
+        width=np.zeros(n),
         shape=np.zeros(n, dtype=np.int64),
         marker_p=np.zeros((n, 3)),
         marker_R=np.zeros((n, 3, 3)),
@@ -109,10 +109,12 @@ def graphics_table(
         made.p[g] = marker.p_B + marker.R_B @ np.array(graphic.offset)
         made.R[g] = marker.R_B
         made.size[g, :3] = kernel_size(graphic)
-        made.thin[g] = thinnest(graphic)
+        made.thin[g] = made.width[g] = half_width(graphic)
         if graphic_id in begins:
             made.size[g, 3] = surfaces.ctypes.data + surfaces.itemsize * begins[graphic_id]
-            made.thin[g] = min(thinnest(graphic), thickness(surfaces[begins[graphic_id] :]))
+            made.thin[g] = min(
+                made.width[g], thickness(surfaces[begins[graphic_id] :], meshed[graphic_id])
+            )
         made.radius[g] = radius(graphic)
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
@@ -129,6 +131,13 @@ def _face_weight(kind: Kind) -> float:
     return 1.0 if kind.has_area else 0.0
 
 
+def _noise(kind: Kind) -> float:
+    """Return the scatter of the normals that FCL gives for a kind."""
+    from mbsim.geometry.fcl_detector import states_noise
+
+    return states_noise(kind.shape_i, kind.shape_j)
+
+
 def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
     """Return how pairs are tested; `contacts` is the contact row by id."""
     return Kinds(
@@ -140,9 +149,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         whole=np.array([_face_weight(k) for k in kinds]),
         step=np.array([k.step for k in kinds], dtype=np.int64),
         moves=np.array([k.moves for k in kinds], dtype=np.int64),
-        noise=np.array(
-            [0.0 if k.closed_form else states_noise(k.shape_i, k.shape_j) for k in kinds]
-        ),
+        noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
     )
 
 
@@ -262,7 +269,7 @@ def contacts_table(
     """Return the contacts, and for each whether X has to be carried."""
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, carried = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    memory, carried, spreads = (np.zeros(n, dtype=np.int64) for _ in range(3))
     for k, contact in enumerate(contacts):
         if contact.id in user_normal:
             own = user_normal[contact.id]
@@ -283,6 +290,7 @@ def contacts_table(
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
             carried[k] = friction_law.carried
+            spreads[k] = not (memory[k] or uses_x[k] or friction_law.of_area)
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -312,6 +320,7 @@ def contacts_table(
         ),
         memory=memory,
         carried=carried,
+        spreads=spreads,
         numbers=table([np.array(c.numbers) for c in contacts]),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
         reads_x=np.array(

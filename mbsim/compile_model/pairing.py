@@ -12,6 +12,8 @@ import hashlib
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mbsim.errors import DeckError, Fault
 from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS
 from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
@@ -24,6 +26,8 @@ FCL_SLOTS = 8
 #: Shapes with round sides that are flat at their ends.
 _ROUND_ENDED = {"CYLINDER", "FRUSTUM"}
 _ROUND = {"CYLINDER", "FRUSTUM", "ELLIPSOID"}
+#: Pairs of meshes of which one has more triangles are told to be costly.
+MANY_TRIANGLES = 50_000
 #: Points on which a round end rests in a closed form, and a face of a box on one.
 _UNDER_AN_END, _UNDER_A_FACE = 3, 4
 #: Contacts with more pairs than this are large contacts. Every pair listed for good costs some 5 ns
@@ -59,6 +63,8 @@ class Kind:
     @property
     def moves(self) -> bool:
         """Whether its rows are no parts of a shape: incidents keep their slots by their places."""
+        if not self.closed_form:
+            return self.slots > 1
         return bool({"SURFACE", "FIELD"} & set(self.closed_form.split("-")))
 
     @property
@@ -146,7 +152,7 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
     """Return the rows of a pair with convex meshes, 0 where it is too large for a closed form."""
     if i.hull is None:
         assert j.hull is not None
-        return 1 if j.hull[hull.EDGES] <= MOST_EDGES else 0
+        return 1 if i.shape != "SPHERE" or j.hull[hull.EDGES] <= MOST_EDGES else 0
     if j.shape == "PLANE":
         return int(i.hull[hull.ROWS])
     other = CUBE if j.hull is None else j.hull
@@ -158,11 +164,10 @@ def _mesh_slots(i: Graphic, j: Graphic) -> int:
 def _patches(contact: int, i: Graphic, j: Graphic, named: dict[str, str]) -> Kind | None:
     """Return the pair of surfaces, `named` so, for graphics of which one is a mesh, else None.
 
-    A convex mesh on a round solid is none: `geometry.hull_overlap` knows their exact distance.
     Of fields none needs to be a mesh.
     """
     shapes = {i.shape, j.shape}
-    if named is AS_SURFACE and ("MESH" not in shapes or (shapes & _ROUND and _convex(i, j))):
+    if named is AS_SURFACE and "MESH" not in shapes:
         return None
     for a, b, swapped in ((i, j, False), (j, i, True)):
         name = f"{named.get(a.shape, a.shape)}-{named.get(b.shape, b.shape)}"
@@ -330,30 +335,33 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
 
 def why_costly(model: Model, plan: PairPlan) -> str:
     """Return why a pair of listed graphics is costly to detect, an empty string if it is not."""
-    kind = plan.kind
-    meshes = [
-        graphic
-        for graphic in (model.graphics[plan.graphic_i], model.graphics[plan.graphic_j])
-        if graphic.faces is not None
-    ]
-    if kind.closed_form or not meshes:
-        return ""
     reasons = []
-    for mesh in meshes:
-        assert mesh.faces is not None
-        about = "is convex" if mesh.hull is not None else "is not convex"
-        if mesh.hull is None and len(mesh.faces) > hull.MOST_FACES:
-            about = f"is taken as not convex (over {hull.MOST_FACES} triangles)"
-        elif mesh.hull is not None:
-            about += f" with {int(mesh.hull[hull.EDGES])} edges"
-        reasons.append(f"Post_Graphic[{mesh.id}] of {len(mesh.faces)} triangles {about}")
-    points = "1 point" if kind.slots == 1 else f"up to {kind.slots} points"
-    return f"{' and '.join(reasons)}: FCL looks at triangles at every evaluation, {points}"
+    for mesh in (model.graphics[plan.graphic_i], model.graphics[plan.graphic_j]):
+        if mesh.faces is None:
+            continue
+        edges = 0 if mesh.hull is None else int(mesh.hull[hull.EDGES])
+        if plan.kind.closed_form in ("SURFACE-SURFACE", "FIELD-FIELD"):
+            if len(mesh.faces) > MANY_TRIANGLES:
+                why = "of which each gets a layer before the run"
+                reasons.append(f"Post_Graphic[{mesh.id}] has {len(mesh.faces)} triangles, {why}")
+        elif plan.kind.shape_i in _ROUND and edges > MOST_EDGES:
+            why = "which are all looked at in touch"
+            reasons.append(f"Post_Graphic[{mesh.id}] has {edges} edges, {why}")
+    return " and ".join(reasons)
 
 
-def thinnest(graphic: Graphic) -> float:
-    """Return half of the thinnest side; inf for a plane."""
-    return min(half_extent(graphic))
+def half_width(graphic: Graphic) -> float:
+    """Return half of the least width of a shape; inf for a plane.
+
+    A convex mesh is measured along the normals of its faces, another one along its axes.
+    """
+    if graphic.vertices is None:
+        return min(half_extent(graphic))
+    ways = np.eye(3)
+    if graphic.hull is not None:
+        first, count = int(graphic.hull[hull.AT_PLANES]), int(graphic.hull[hull.FACES])
+        ways = graphic.hull[first : first + 4 * count].reshape(count, 4)[:, :3]
+    return 0.5 * float(np.ptp(graphic.vertices @ ways.T, axis=0).min())
 
 
 def half_extent(graphic: Graphic) -> tuple[float, float, float]:

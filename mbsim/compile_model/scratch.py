@@ -88,7 +88,7 @@ def empty_log(nc: int) -> Log:
     """Return empty counters and peaks."""
     contacts = np.zeros((nc, codes.LOG_COLUMNS))
     contacts[:, codes.FIRST_TOUCH] = np.nan
-    contacts[:, codes.BEYOND_TIME] = np.nan
+    contacts[:, [codes.BEYOND_TIME, codes.BEYOND_I, codes.BEYOND_J]] = np.nan
     contacts[:, codes.REBOUND] = np.nan
     contacts[:, codes.PEAK_FORCE_TIME] = np.nan
     return Log(

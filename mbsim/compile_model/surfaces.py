@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from enum import IntEnum
 
 import numpy as np
 
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
 from mbsim.model.flat_parts import fewer_triangles
-from mbsim.model.surface import AT_TRIANGLES, DEPTH, ORDER, TRIANGLE, TRIANGLES, pack
+from mbsim.model.surface import (
+    AT_TRIANGLES,
+    CORNER_NORMAL,
+    DEPTH,
+    ORDER,
+    TRIANGLE,
+    TRIANGLES,
+    UNIT,
+    pack,
+)
 from mbsim.model.tessellation import triangles_of
 
 #: Sides of pairs that are measured as triangles.
@@ -18,21 +28,33 @@ _OF_TRIANGLES = {"SURFACE", "FIELD"}
 #: A layer reaches this part of half of a wall's thickness, by `model.surface_layer`; how many
 #: in a hundred of its depths are taken for faults of the mesh rather than for walls.
 OF_HALF, THIN = 0.72, 2.0
+#: Ways in at least, and triangles at most that these are tried on.
+LEAST_WAYS, MOST_CROSSINGS = 16, 1_000_000
 
 
-def needed_as_triangles(model: Model, plans: Plans) -> dict[int, bool]:
-    """Return the graphics (ids) that a pair needs as triangles, and whether with their layer.
+class Need(IntEnum):
+    """What of a mesh the pairs of a graphic need; each one has those before it."""
 
-    On a plane and under a sphere the layer has no part.
+    TRIANGLES = 0
+    WALL = 1  # how thick its walls are
+    LAYER = 2
+
+
+def needed_as_triangles(model: Model, plans: Plans) -> dict[int, Need]:
+    """Return the graphics (ids) that a pair needs as triangles, and what of them.
+
+    On a plane and under a sphere the layer has no part; nothing passes through a plane.
     """
-    found: dict[int, bool] = {}
+    found: dict[int, Need] = {}
 
     def note(pair: str, first: Sequence[int], second: Sequence[int]) -> None:
-        layered = pair in ("SURFACE-SURFACE", "FIELD-FIELD")
+        need = Need.LAYER
+        if "SPHERE" in pair or "PLANE" in pair:
+            need = Need.WALL if "SPHERE" in pair else Need.TRIANGLES
         for side, ids in zip(pair.split("-"), (first, second), strict=True):
             if side in _OF_TRIANGLES:
                 for id in ids:
-                    found[id] = found.get(id, False) or layered
+                    found[id] = max(found.get(id, Need.TRIANGLES), need)
 
     for plan in plans.pairs:
         if _OF_TRIANGLES & set(plan.kind.closed_form.split("-")):
@@ -65,17 +87,41 @@ def packed(graphic: Graphic, layered: bool) -> Array:
     return pack(vertices, faces, *layer(vertices, faces))
 
 
-def thickness(surface: Array) -> float:
-    """Return half of how thin a packed surface is where its layer is thin; inf without a layer."""
+def thickness(surface: Array, need: Need) -> float:
+    """Return half of how thin a packed surface is where it is thin; inf where none asks.
+
+    With a layer it is known by its depths, else by ways in from some triangles' middles.
+    """
     count = int(surface[TRIANGLES])
     table = surface[int(surface[AT_TRIANGLES]) :][: count * TRIANGLE].reshape(count, TRIANGLE)
-    depth = table[:, DEPTH:ORDER]
-    depth = depth[depth > 0.0]
-    return float(np.percentile(depth, THIN)) / OF_HALF if len(depth) else math.inf
+    if need == Need.LAYER:
+        depth = table[:, DEPTH:ORDER]
+        depth = depth[depth > 0.0]
+        return float(np.percentile(depth, THIN)) / OF_HALF if len(depth) else math.inf
+    if need == Need.TRIANGLES:
+        return math.inf
+    from mbsim.geometry.mesh.ball import SQUARE
+
+    corners, unit = table[:, :9].reshape(count, 3, 3), table[:, UNIT:CORNER_NORMAL]
+    ways = min(count, max(LEAST_WAYS, MOST_CROSSINGS // count))
+    begins = np.linspace(0, count - 1, ways).astype(np.int64)
+    least = math.inf
+    for p, n in zip(corners[begins].mean(axis=1), unit[begins], strict=True):
+        slope = -unit @ n
+        out = slope > SQUARE
+        triangle = corners[out]
+        way = ((triangle[:, 0] - p) * unit[out]).sum(axis=1) / slope[out]
+        x = p - way[:, None] * n
+        hit = way > 0.0
+        for k in range(3):
+            edge = triangle[:, (k + 1) % 3] - triangle[:, k]
+            hit &= (np.cross(edge, x - triangle[:, k]) * unit[out]).sum(axis=1) >= 0.0
+        least = min(least, float(way[hit].min(initial=math.inf)))
+    return 0.5 * least
 
 
 def packed_surfaces(
-    graphics: Mapping[int, Graphic], needed: Mapping[int, bool]
+    graphics: Mapping[int, Graphic], needed: Mapping[int, Need]
 ) -> tuple[Array, dict[int, int]]:
     """Return the packed surfaces of graphics behind each other, and where each one begins.
 
@@ -84,7 +130,8 @@ def packed_surfaces(
     parts: list[Array] = []
     places: dict[tuple[str, tuple[float, ...], bool], int] = {}
     begins, length = {}, 0
-    for id, layered in needed.items():
+    for id, need in needed.items():
+        layered = need == Need.LAYER
         key = (shape_class(graphics[id]), graphics[id].size, layered)
         if key not in places:
             parts.append(packed(graphics[id], layered))

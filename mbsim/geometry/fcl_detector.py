@@ -183,13 +183,10 @@ class FclDetector:
         points = scene.work.points
         points[first:last, 0] = -0.0
         sign = -1.0 if scene.kinds.swapped[kind] else 1.0
-        for depth, p, n in found[: last - first]:
+        for slot, (depth, p, n) in enumerate(found[: last - first], first):
             if last - first == 1:
                 n = self._sharpen(i, j, n)
                 depth, p = self._refine(i, j, depth, p, n)
-                slot = first
-            else:
-                slot = self._slot_of(p, first, last)
             points[slot, AT_DEPTH] = depth
             points[slot, AT_POINT:AT_NORMAL] = p
             points[slot, AT_NORMAL:AT_WEIGHT] = sign * n
@@ -355,15 +352,3 @@ class FclDetector:
             p = place(side, side, n)
             return exact, p + n * (0.5 * float(n @ (high + low)) - float(n @ p))
         return exact, place(highest, lowest, n)
-
-    def _slot_of(self, p: Any, first: int, last: int) -> int:
-        """Return the free slot whose committed incident is nearest, else the first free one."""
-        state, points = self._scene.state, self._scene.work.points
-        best, nearest = -1, np.inf
-        for s in range(first, last):
-            if points[s, AT_DEPTH] > 0.0:
-                continue
-            away = float(np.linalg.norm(p - state.p[s])) if state.touching[s] else 1e300
-            if away < nearest:
-                best, nearest = s, away
-        return best

@@ -93,6 +93,7 @@ class FrictionLaw(NamedTuple):
     memory: int = 0  # numbers that it keeps
     carried: int = 0  # how many of these are integrated
     uses_x: bool = False  # whether it looks at X
+    of_area: bool = False  # whether it is that of a whole area, with its torque against spin
     takes_function: bool = False  # whether a user's function may give its friction of sliding
     modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
     rigid: FrictionLaw | None = None  # where what sticks is held by equations
@@ -152,6 +153,7 @@ def friction_law(
     memory: int = 0,
     carried: int = 0,
     uses_x: bool = False,
+    of_area: bool = False,
     takes_function: bool = False,
     modes: bool = False,
     rigid: FrictionLaw | None = None,
@@ -163,7 +165,7 @@ def friction_law(
         names = tuple(each.name if isinstance(each, Parameter) else each for each in parameters)
         made = jitable(force)
         law = FrictionLaw(
-            name, made, names, own, memory, carried, uses_x, takes_function, modes, rigid
+            name, made, names, own, memory, carried, uses_x, of_area, takes_function, modes, rigid
         )
         FRICTION_LAWS.put(name, law)
         return force

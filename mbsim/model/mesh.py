@@ -59,9 +59,14 @@ def merge_vertices(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
     faces : ndarray of int, shape (m, 3)
         Vertex indices.
     """
+    unique, merged = equal_as_one(vertices, faces)
+    return unique, merged[three_corners(merged)]
+
+
+def equal_as_one(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
+    """Return the mesh with equal vertices made one, and all of its faces."""
     unique, index = np.unique(vertices + 0.0, axis=0, return_inverse=True)
-    merged = index.reshape(-1)[faces]
-    return unique, merged[three_corners(merged)].astype(np.int64)
+    return unique, index.reshape(-1)[faces].astype(np.int64)
 
 
 def three_corners(faces: Faces) -> npt.NDArray[np.bool_]:

@@ -14,23 +14,27 @@ import numpy as np
 from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 from mbsim.model.elements import Array
-from mbsim.model.mesh import Faces, merge_vertices
+from mbsim.model.mesh import Faces, equal_as_one, three_corners
 
 FORMATS = ("stl", "obj", "off", "ply", "glb", "gltf", "3mf")
 MAX_BYTES = 512 * 2**20
 _LARGEST = 1e40
+_NORMALS = "normals"
 
 
 class MeshFile(NamedTuple):
     """A mesh as its file has it.
 
     `vertices` (n, 3) in the file's unit of length, `faces` (m, 3), equal vertices merged;
-    `length_unit` is that unit where the format says it, else empty.
+    `length_unit` is that unit where the format says it, else empty. `normals` (m, 3, 3) are those
+    that the file has at the corners of the faces, of whatever length, NaN where one of its parts
+    has none; None where the whole file has none.
     """
 
     vertices: Array
     faces: Faces
     length_unit: str
+    normals: Array | None = None
 
 
 def load_mesh(path: Path) -> MeshFile:
@@ -61,17 +65,18 @@ def load_mesh(path: Path) -> MeshFile:
         data = read_regular(path)
     except (OSError, ValueError) as error:
         raise ModelError(f"cannot be read: {error}") from None
-    vertices, faces, unit = _decode(data, kind)
+    vertices, faces, unit, normals = _decode(data, kind)
     if len(faces) == 0:
         raise ModelError("holds no triangles")
     if not (np.abs(vertices) < _LARGEST).all():
         raise ModelError(f"holds vertices that are not finite numbers below {_LARGEST:g}")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ModelError("holds faces that name vertices it does not have")
-    vertices, faces = merge_vertices(vertices, faces)
-    if len(faces) == 0:
+    vertices, faces = equal_as_one(vertices, faces)
+    whole = three_corners(faces)
+    if not whole.any():
         raise ModelError("holds no triangle with three different corners")
-    return MeshFile(vertices, faces, unit)
+    return MeshFile(vertices, faces[whole], unit, None if normals is None else normals[whole])
 
 
 def _decode(data: bytes, kind: str) -> MeshFile:
@@ -94,10 +99,20 @@ def _by_trimesh(data: bytes, kind: str) -> MeshFile:
     if kind == "gltf" and _names_files(data):
         raise ValueError("its buffers are in other files; save it as one .glb file")
     # from memory and without a resolver, so that no file named in `data` is opened
-    mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
+    parts = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
+    # normals that were not in the file are made when they are asked for
+    told = ["vertex_normals" in part._cache for part in parts]
+    for part, own in zip(parts, told, strict=True):
+        normals = part.vertex_normals if own else np.full((len(part.vertices), 3), np.nan)
+        part.vertex_attributes = {_NORMALS: normals}
+    mesh = scene.to_mesh()
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
-    return MeshFile(vertices, faces, "METER" if kind in ("glb", "gltf") else "")
+    normals = None
+    if any(told) and len(faces) and faces.max() < len(mesh.vertex_attributes[_NORMALS]):
+        normals = np.array(mesh.vertex_attributes[_NORMALS], dtype=np.float64)[faces]
+    return MeshFile(vertices, faces, "METER" if kind in ("glb", "gltf") else "", normals)
 
 
 def _names_files(data: bytes) -> bool:

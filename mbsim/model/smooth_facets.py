@@ -17,10 +17,12 @@ import math
 import numpy as np
 
 from mbsim.model.elements import Array
-from mbsim.model.mesh import Faces, merge_vertices
+from mbsim.model.mesh import Faces, Marks, merge_vertices
 
 #: Faces that bend by more than this [degrees] meet in a real edge.
 CREASE = 30.0
+#: Normals that differ by less [degrees] are one.
+ALIKE = 1.0
 #: Triangles stand off the curved surface by at most this part of the mesh's size ...
 SAGITTA = 4e-6
 #: ... unless they would be more than this.
@@ -51,7 +53,28 @@ def _edges(faces: Faces) -> tuple[Faces, Faces, Faces]:
     return low, number.reshape(-1, 3), sides
 
 
-def corner_normals(vertices: Array, faces: Faces, crease: float = CREASE) -> Array:
+def smooth_by_normals(faces: Faces, normals: Array) -> Marks:
+    """Return for the edges (e,) of `_edges` whether normals say that both sides go on smoothly.
+
+    Parameters
+    ----------
+    faces : ndarray of int, shape (m, 3)
+    normals : ndarray, shape (m, 3, 3)
+        Of the corners of the faces, of any length; NaN says nothing.
+    """
+    unit = _units(normals).reshape(-1, 3)
+    _, _, sides = _edges(faces)
+    after = sides - sides % 3 + (sides + 1) % 3
+    alike = np.cos(np.radians(ALIKE))
+    low = (unit[sides[:, 0]] * unit[after[:, 1]]).sum(axis=1) > alike
+    high = (unit[after[:, 0]] * unit[sides[:, 1]]).sum(axis=1) > alike
+    both: Marks = low & high
+    return both
+
+
+def corner_normals(
+    vertices: Array, faces: Faces, crease: float = CREASE, told: Array | None = None
+) -> Array:
     """Return the normal at every corner of every face (m, 3, 3), one on both sides of no crease.
 
     Parameters
@@ -62,6 +85,8 @@ def corner_normals(vertices: Array, faces: Faces, crease: float = CREASE) -> Arr
         Triangles of a closed mesh, counter-clockwise seen from outside.
     crease : float
         Angle between faces above which their edge is sharp [degrees].
+    told : ndarray, shape (m, 3, 3), optional
+        Normals that the mesh came with: where those of both sides differ, an edge is sharp.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -76,6 +101,8 @@ def corner_normals(vertices: Array, faces: Faces, crease: float = CREASE) -> Arr
     face, at = sides // 3, sides % 3
     bend = (unit[face[:, 0]] * unit[face[:, 1]]).sum(axis=1)
     smooth = bend > math.cos(math.radians(crease))
+    if told is not None:
+        smooth &= smooth_by_normals(faces, told)
     f, g, k, m = face[smooth, 0], face[smooth, 1], at[smooth, 0], at[smooth, 1]
     # the low end of the edge is corner k of f and the corner after m of g
     rows = np.concatenate([3 * f + k, 3 * f + (k + 1) % 3])
@@ -123,7 +150,11 @@ def _control_points(vertices: Array, low: Faces, normals: Array, sides: Faces) -
 
 
 def smooth(
-    vertices: Array, faces: Faces, crease: float = CREASE, most: int = MOST_TRIANGLES
+    vertices: Array,
+    faces: Faces,
+    crease: float = CREASE,
+    most: int = MOST_TRIANGLES,
+    told: Array | None = None,
 ) -> tuple[Array, Faces]:
     """Return a closed mesh cut finer along the curved surface that its vertices lie on.
 
@@ -137,8 +168,10 @@ def smooth(
         Angle between faces above which their edge is sharp [degrees].
     most : int
         Triangles at most.
+    told : ndarray, shape (m, 3, 3), optional
+        Normals that the mesh came with, at the corners of its faces: see `corner_normals`.
     """
-    normals = corner_normals(vertices, faces, crease)
+    normals = corner_normals(vertices, faces, crease, told)
     low, edge_of, sides = _edges(faces)
     inner = _control_points(vertices, low, normals, sides)
     chord = vertices[low[:, 1]] - vertices[low[:, 0]]

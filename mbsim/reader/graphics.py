@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mbsim.errors import ModelError
 from mbsim.model import elements as el
 from mbsim.model.hull import polyhedron_of
-from mbsim.model.mesh import merge_vertices
+from mbsim.model.mesh import Faces, merge_vertices
 from mbsim.model.mesh_file import load_mesh
 from mbsim.reader import units
 from mbsim.reader.keywords import ENDS_TYPES, FACETS, fold, nearest
@@ -129,15 +129,14 @@ def _build_graphic(entry: Entry) -> None:
     marker_id = _marker_id(entry, shape)
     size = tuple(entry.get(name, 1.0) for name in shape.sizes)
     offset = [sum(f * s for f, s in zip(row, size, strict=True)) for row in shape.offset]
-    vertices, faces, file = _mesh(entry) if shape.shape == "MESH" else (None, None, "")
-
-    convex = None if vertices is None or faces is None else polyhedron_of(vertices, faces)
-    if entry.get("facets", "FLAT") == "FLAT" and entry.given("crease_angle"):
-        entry.note('has no effect without facets="SMOOTH"', "crease_angle")
-    elif vertices is not None and faces is not None and entry.get("facets", "FLAT") == "SMOOTH":
-        vertices, faces, curved = _smoothed(entry, vertices, faces)
-        # a polyhedron is known by its corners: what is curved is measured as patches
-        convex = None if curved else convex
+    vertices, faces, file, convex = None, None, "", None
+    if shape.shape == "MESH" and (mesh := _mesh(entry)) is not None:
+        vertices, faces, file = mesh.vertices, mesh.faces, mesh.file
+        convex = polyhedron_of(vertices, faces)
+        finer = _smoothed(entry, mesh)
+        if finer is not None:
+            # a polyhedron is known by its corners: what is curved is measured as patches
+            (vertices, faces), convex = finer, None
 
     id = entry.get("id")
     if id in entry.draft.display_graphics:
@@ -191,57 +190,75 @@ def _marker_id(entry: Entry, shape: Shape) -> int:
     return 0
 
 
-def _smoothed(
-    entry: Entry, vertices: el.Array, faces: npt.NDArray[np.int64]
-) -> tuple[el.Array, npt.NDArray[np.int64], bool]:
-    """Return a mesh with smooth facets, and whether any are curved."""
+class _Mesh(NamedTuple):
+    """A TriaMesh as its file or the deck has it, in the deck's unit of length."""
+
+    vertices: el.Array  # (n, 3)
+    faces: Faces  # (m, 3)
+    file: str = ""
+    normals: el.Array | None = None  # (m, 3, 3) see `MeshFile`
+
+
+def _smoothed(entry: Entry, mesh: _Mesh) -> tuple[el.Array, Faces] | None:
+    """Return vertices and faces of a mesh with smooth facets, None where it stays as it is."""
+    facets = entry.get("facets")
+    if facets == "FLAT" or (facets is None and mesh.normals is None):
+        if entry.given("crease_angle"):
+            entry.note('has no effect without facets="SMOOTH" or normals in file', "crease_angle")
+        return None
     from mbsim.model.mesh import solid_fault
     from mbsim.model.smooth_facets import CREASE, smooth
 
-    if solid_fault(vertices, faces):
-        return vertices, faces, False
-    finer, cut = smooth(vertices, faces, entry.get("crease_angle", CREASE))
-    if len(cut) == len(faces):
-        entry.note("no edge is smooth: all bend by more than crease_angle", "facets")
-        return vertices, faces, False
-    return finer, cut, True
+    if solid_fault(mesh.vertices, mesh.faces):
+        return None
+    crease, told = entry.get("crease_angle", CREASE), mesh.normals if facets is None else None
+    finer, cut = smooth(mesh.vertices, mesh.faces, crease, told=told)
+    if len(cut) == len(mesh.faces):
+        if facets is not None:
+            entry.note("no edge is smooth: all bend by more than crease_angle", "facets")
+        return None
+    if facets is None:
+        message = (
+            'its normals say where it is smooth, so it is rounded there; facets="FLAT" does not'
+        )
+        entry.note(message, "file")
+    return finer, cut
 
 
-def _mesh(entry: Entry) -> tuple[el.Array | None, npt.NDArray[np.int64] | None, str]:
-    """Return vertices, faces and file of a TriaMesh, from its file or its child elements."""
+def _mesh(entry: Entry) -> _Mesh | None:
+    """Return a TriaMesh from its file or its child elements, None with a fault."""
     children = {child.key: child for child in entry.node.children}
     if entry.given("file") == bool(children):
         both = "not both" if children else "one is needed"
         entry.fault(f'TriaMesh: file="..." or <Nodes> and <Faces>: {both}')
-        return None, None, ""
+        return None
     if not children:
         path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
         try:
-            vertices, faces, unit = load_mesh(path)
+            vertices, faces, unit, normals = load_mesh(path)
         except ModelError as error:
             entry.fault(str(error), "file")
-            return None, None, ""
+            return None
         scale = _scale(entry, unit)
         # an inch in metres is no round number: the factor is rounded once
-        return vertices if scale == 1.0 else vertices * scale, faces, str(path)
+        return _Mesh(vertices if scale == 1.0 else vertices * scale, faces, str(path), normals)
 
     if entry.given("length_unit"):
         entry.fault("is for a file; <Nodes> are in the deck's unit of length", "length_unit")
 
     if set(children) != {"nodes", "faces"} or len(entry.node.children) != 2:
         entry.fault("TriaMesh: needs one <Nodes> and one <Faces>")
-        return None, None, ""
+        return None
     nodes = _numbers(entry, children["nodes"], "numbers")
     indices = _numbers(entry, children["faces"], "zero-based vertex indices")
     if nodes is None or indices is None:
-        return None, None, ""
+        return None
     bad = (indices != np.floor(indices)) | (indices < 0) | (indices >= len(nodes))
     if bad.any():
         message = f"<Faces>: {indices[bad][0]:g} is no index of {len(nodes)} nodes (from 0)"
         entry.draft.fault(children["faces"].line, entry.label, message)
-        return None, None, ""
-    vertices, faces = merge_vertices(nodes, indices.astype(np.int64))
-    return vertices, faces, ""
+        return None
+    return _Mesh(*merge_vertices(nodes, indices.astype(np.int64)))
 
 
 def _scale(entry: Entry, unit: str) -> float:
@@ -326,7 +343,9 @@ POST_GRAPHIC = Statement(
             "",
             "the file's own, else the deck's",
         ),
-        "facets": Spec(keyword(FACETS), "SMOOTH: rounded between sharp edges", "", "FLAT"),
+        "facets": Spec(
+            keyword(FACETS), "SMOOTH: rounded between sharp edges", "", "by the file's normals"
+        ),
         "crease_angle": Spec(POSITIVE, "bend above which an edge is sharp", "deg", "30"),
     },
     _build_graphic,

@@ -105,10 +105,11 @@ ENERGIES = ("energy", "energy_step")
 #: A balance that is off by more than this part of the largest energy is told whatever explains it.
 COARSE = 0.02
 
-#: What is said of overlaps whose depth is not known.
-BEYOND_LAYERS = (
-    "meshes overlap deeper than the layer under their surface, first at time {time:.9g} at {who}: "
-    "what lies below the layer does not press, so the force is too small"
+#: What is said of overlaps whose force cannot be trusted.
+TOO_DEEP = (
+    "{i} and {j} go too deep into each other, first at time {time:.9g} at {who}: deeper than the "
+    "layer under a mesh's surface or than its wall, or nearly as deep as their middles; so deep "
+    "they are pushed too little or out on the other side: is the contact too soft?"
 )
 
 
@@ -191,10 +192,11 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
                 f"{says} at time {time:.9g}{at}: {entry.excess:.3g} times what tol explains"
             )
     for c, id in enumerate(system.contact_ids):
-        since = float(system.scene.log.contacts[c, codes.BEYOND_TIME])
+        since, *rows = system.scene.log.contacts[c, codes.BEYOND_TIME : codes.BEYOND_J + 1].tolist()
         if not math.isnan(since):
+            i, j = (_graphic_name(system, int(row)) for row in rows)
             who = element_name(system.model.file, "Force_Contact", id)
-            warnings.append(BEYOND_LAYERS.format(time=since, who=who))
+            warnings.append(TOO_DEEP.format(i=i, j=j, time=since, who=who))
     ids = [*system.contact_ids, None]
     works = [*kept.friction[:, codes.WORK_NOW], 0.0]
     shares = {
@@ -215,6 +217,14 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
             f"{kept.plan[codes.AUDIT_TOL]:g} explains: choose a smaller one"
         )
     return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
+
+
+def _graphic_name(system: System, row: int) -> str:
+    """Return the graphic of a row, with its body."""
+    id = system.graphic_ids[row]
+    body = system.model.markers[system.model.graphics[id].marker_id].body_id
+    file = system.model.file
+    return f"{element_name(file, 'Post_Graphic', id)} of {element_name(file, 'Body_Rigid', body)}"
 
 
 def _named(system: System, judged: Judged, row: int) -> str:

@@ -154,7 +154,10 @@ class Replay:
 
         scene = self.system.scene
         # laws may ask for expressions, and for what they kept
-        fill(scene, only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL, Hook.HOLD_BACK))
+        fill(
+            scene,
+            only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL, Hook.SPREAD, Hook.HOLD_BACK),
+        )
         if self.system.reader is not None:
             self.system.reader.open(scene)
         self._table = pack(scene)

@@ -98,12 +98,43 @@ def settle_contacts(
     hooks.must(problem.commit, t, y, f)
 
 
+def unknown_overlaps(system: System) -> list[str]:
+    """Return a line for each contact with an overlap at the start whose depth is not known.
+
+    Only the first such pair of a contact is named.
+    """
+    scene, model, pairs = system.scene, system.model, system.scene.pairs
+    faults = []
+    for c, beyond in enumerate(scene.work.beyond.tolist()):
+        if beyond == 0:
+            continue
+        pair, contact = beyond - 1, model.contacts[system.contact_ids[c]]
+        ids = (system.graphic_ids[row[pair]] for row in (pairs.graphic_i, pairs.graphic_j))
+        one, other = (
+            f"Post_Graphic[{id}] of Body_Rigid"
+            f"[{model.markers[model.graphics[id].marker_id].body_id}]"
+            for id in ids
+        )
+        where = f"{model.file}:{contact.source.line}: Force_Contact[{contact.id}]"
+        depth = scene.work.points[pairs.slot[pair] : pairs.last[pair], AT_DEPTH].max()
+        what = (
+            "overlap deeper than the layer under a mesh's surface, or than its wall,"
+            if depth > 0.0
+            else "lie one wholly inside the other"
+        )
+        faults.append(
+            f"{where}: {one} and {other} {what} at the start: how deep, and which way out, is not "
+            "known; move them apart or give --allow-overlap"
+        )
+    return faults
+
+
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     """Report shapes that overlap at the start; return a line for each that is too deep."""
     from mbsim.arrays.codes import ACTIVE
 
     scene, model = system.scene, system.model
-    faults = []
+    faults = unknown_overlaps(system)
     pairs = scene.pairs
     active = pairs.active[: pairs.count[ACTIVE]]
     slots = [s for pair in active for s in range(pairs.slot[pair], pairs.last[pair])]
@@ -126,7 +157,7 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
         between = f"Post_Graphic[{graphic_i}] and Post_Graphic[{graphic_j}]"
         log(f"{name}: {between} overlap by {depth:.6g} at the start, slot {s}")
         # half of the smaller shape, across its thinnest side
-        half = min(float(side.min()) for side in sides)
+        half = min(float(scene.graphics.width[row]) for row in rows)
         ignored = contact.ignore_penetration_larger_than
         limit = half if ignored is None else min(half, ignored)
         if depth > 0.1 * limit and s == pairs.slot[pair]:

@@ -29,7 +29,7 @@ def counters(scene: Scene, methods: Methods) -> dict[str, float]:
         "skipped_pairs": int(counters[codes.SKIPPED]),
         "pair_listings": int(counters[codes.LISTINGS]),
         "fcl_calls": int(counters[codes.FCL_CALLS]),
-        "beyond_layers": int(counters[codes.BEYOND_LAYERS]),
+        "too_deep": int(counters[codes.TOO_DEEP]),
         "normal_calls": int(counters[codes.NORMAL_CALLS]),
         "friction_calls": int(counters[codes.FRICTION_CALLS]),
         "python_calls": int(counters[codes.PYTHON_CALLS]),

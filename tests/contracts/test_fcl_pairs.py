@@ -105,7 +105,6 @@ class Asked:
             pairs=SimpleNamespace(kind=one, slot=one, graphic_i=one, graphic_j=one + 1),
             kinds=SimpleNamespace(slots=one + slots, swapped=one),
             work=SimpleNamespace(points=self.points, frames=self.frames, fcl=one),
-            state=SimpleNamespace(p=np.zeros((slots, 3)), touching=np.zeros(slots)),
         )
         self.detector = FclDetector(scene, graphics)
 

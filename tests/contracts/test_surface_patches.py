@@ -312,3 +312,40 @@ def test_nothing_jumps_along_a_way(kind, tori):
             largest = max(largest, float(np.abs(force[:3] - last[:3]).max()))
         last = force
     assert largest < (4e-5 if kind == "plane" else 1e-3)
+
+
+def test_a_sphere_among_more_points_than_slots_is_pressed_by_all():
+    # 20 posts around the ball's lower half, each with its own overlap
+    rng = np.random.default_rng(11)
+    angles = 2 * np.pi * np.arange(20) / 20
+    ways = np.column_stack([np.cos(angles), np.sin(angles), np.full(20, -0.6)]) / np.hypot(1, 0.6)
+    depths = rng.uniform(1e-4, 1e-3, 20)
+    vertices, faces = box(0.01, 0.01, 0.01)
+    parts = []
+    for n, depth in zip(ways, depths, strict=True):
+        x = np.cross(n, [0.0, 0.0, 1.0])
+        x /= np.linalg.norm(x)
+        axes = np.column_stack([x, np.cross(n, x), n])
+        parts.append(vertices @ axes.T + (0.1 + 0.005 - depth) * n)
+    posts = Meshed(np.vstack(parts), np.vstack([faces + 8 * k for k in range(20)]), layered=False)
+    size = np.array([0.1, 0.0, 0.0, 0.0])
+    at = (frame(np.zeros(3), SAME), size, frame(np.zeros(3), SAME), posts.size)
+    points = call("SPHERE-SURFACE", *at)
+    assert (points[:, 0] > 0.0).sum() == len(points) == 8
+    found = wrench(points)
+    assert found[:3] == pytest.approx(-(depths[:, None] * ways).sum(axis=0), abs=1e-12)
+    # all go through the centre, but for the middle of depths that differ
+    assert abs(found[3:]).max() < 1e-3 * 0.1 * depths.sum()
+
+
+def test_a_sphere_knows_a_wall_that_it_goes_through():
+    vertices, faces = box(0.5, 0.5, 0.01)
+    wall, upright = Meshed(vertices, faces, layered=False), frame(np.zeros(3), SAME)
+    points = np.zeros((PAIRS["SPHERE-SURFACE"].slots, POINT))
+    for radius in (0.002, 0.1):
+        size = np.array([radius, 0.0, 0.0, 0.0])
+        for depth in (0.1 * radius, 0.9 * min(radius, 0.01), radius + 0.003, radius + 0.0045):
+            at = frame(np.array([0.013, 0.02, 0.005 + radius - depth]), SAME)
+            arrays = (at, size, upright, wall.size, points)
+            count = entry("SPHERE-SURFACE")(*(a.ctypes.data for a in arrays))
+            assert (count < 0) == (depth > min(0.01, radius + 0.0036))

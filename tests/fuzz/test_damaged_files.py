@@ -345,7 +345,7 @@ def test_meshes(tmp_path: Path) -> None:
     makes.append(changed(tmp_path / "try", archives, archive_changed))
 
     def read(path: Path, chance: random.Random) -> None:
-        vertices, faces, _ = load_mesh(path)
+        vertices, faces, *_ = load_mesh(path)
         found = [*mesh_findings(vertices, faces), *crossing_findings(vertices, faces)]
         fault = solid_fault(vertices, faces)
         assert isinstance(fault, str)

@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from helpers.decks import GRAVITY, GROUND, run_deck
+from mbsim.errors import ModelError
 
 LARGEST = 'cnf_type="IMPACT" stiffness="1e6" exponent="1.5" damping="100" dmax="1e-4"'
 FIELD = (
@@ -38,15 +39,21 @@ def scene(i, j, law, x=0.0, z=0.0):
 
 
 def told(results):
-    return [line for line in results.audit.warnings if "deeper than the layer" in line]
+    return [line for line in results.audit.warnings if "too deep into each other" in line]
 
 
 @pytest.mark.parametrize("law", [LARGEST, FIELD])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_mesh_inside_of_another_one_is_told(law, turned, tmp_path):
     i, j, x = (TUBE, RING, -1.1) if turned else (RING, TUBE, 1.1)
-    run = run_deck(tmp_path, scene(i, j, law, x=x), 0.01, allow_overlap=True)
-    (line,) = told(run)
+    deck = scene(i, j, law, x=x)
+    with pytest.raises(ModelError) as refused:
+        run_deck(tmp_path, deck, 0.01)
+    (line,) = str(refused.value).splitlines()
+    assert "Force_Contact[301]: Post_Graphic[200] of Body_Rigid[2] and Post_Graphic[100] of" in line
+    assert "one wholly inside the other at the start" in line
+    (line,) = told(run_deck(tmp_path, deck, 0.01, allow_overlap=True))
+    assert line.startswith("Post_Graphic[200] of Body_Rigid[2] and Post_Graphic[100] of Body_Rigid")
     assert "first at time 0 at Force_Contact[301]" in line
 
 
@@ -57,15 +64,77 @@ def test_what_sinks_through_the_layer_is_told_when_it_does(tmp_path):
     run = run_deck(tmp_path, scene(RING, slab, soft, z=0.0602), 0.2)
     (line,) = told(run)
     assert "first at time 0 at" not in line
-    assert run.stats["beyond_layers"] > 0
+    assert run.stats["too_deep"] > 0
 
 
 @pytest.mark.parametrize("law", [LARGEST, FIELD])
 def test_what_lies_on_a_mesh_or_apart_in_its_box_is_not_told(law, tmp_path):
     slab = trimesh.creation.annulus(0.01, 0.3, 0.1, sections=32)
     run = run_deck(tmp_path, scene(RING, slab, law, z=0.0599999), 0.05)
-    assert run.stats["beyond_layers"] == 0
+    assert run.stats["too_deep"] == 0
     # in the bore of the tube: their boxes overlap, they do not
     run = run_deck(tmp_path, scene(RING, TUBE, law), 0.01)
     assert told(run) == []
     assert run["bodies/2/velocity"][-1, 2] == pytest.approx(-0.0981, rel=1e-6)
+
+
+def falling(shape, wall, stiffness, speed, z=0.03):
+    """A body of 1 kg that falls on a wall 2 mm thick."""
+    about = 'inertia_xx="0.001" inertia_yy="0.001" inertia_zz="0.001"'
+    return (
+        GROUND.partition('<Post_Graphic id="100"')[0]
+        + f'<Body_Rigid id="2" cg_id="20" mass="1" {about} v_ic_z="-{speed}" v_ic_z_flag="TRUE"/>'
+        + f'<Reference_Marker id="20" body_id="2" pos_z="{z}"/>'
+        + wall
+        + shape
+        + '<Force_Contact id="301" i_graphics_id="200" j_graphics_id="100" cnf_type="IMPACT" '
+        f'stiffness="{stiffness}" exponent="1" damping="0"/>'
+    )
+
+
+BALL = '<Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.02"/>'
+#: A plate with a hole beside the ball, 2 mm thick.
+PLATE = trimesh.creation.annulus(0.1, 0.3, 0.002, sections=32)
+PLATE.apply_translation([0.2, 0.0, 0.0])
+WALLS = {
+    "mesh": mesh(100, 10, PLATE),
+    "convex mesh": mesh(100, 10, trimesh.creation.box(extents=(0.3, 0.3, 0.002))),
+    "box": '<Post_Graphic id="100" type="BoxDefinedFromCenter" center_marker_id="10" '
+    'length_x="0.3" length_y="0.3" length_z="0.002"/>',
+}
+
+
+@pytest.mark.parametrize("wall", WALLS)
+@pytest.mark.parametrize("speed", [0.5, 50.0])
+def test_a_ball_that_passes_through_a_wall_is_told(wall, speed, tmp_path):
+    # 100 N/m over 0.02 m hold back 0.02 J of 0.125 J
+    run = run_deck(tmp_path, falling(BALL, WALLS[wall], 100.0, speed), 0.06 / speed, 0.001)
+    assert run["bodies/2/position"][-1, 2] < -0.02
+    (line,) = told(run)
+    assert line.startswith("Post_Graphic[200] of Body_Rigid[2] and Post_Graphic[100] of Body_Rigid")
+    since = float(line.partition("first at time ")[2].split()[0])
+    assert 0.009 <= since * speed * 1.1 <= 0.06
+
+
+@pytest.mark.parametrize("wall", WALLS)
+def test_a_ball_that_a_wall_throws_back_is_not_told(wall, tmp_path):
+    # 0.125 J in 1e6 N/m: 0.5 mm deep
+    run = run_deck(tmp_path, falling(BALL, WALLS[wall], 1e6, 0.5), 0.06, 0.001)
+    assert run["bodies/2/velocity"][-1, 2] == pytest.approx(0.5, rel=1e-3)
+    assert told(run) == []
+
+
+def test_a_box_that_passes_through_a_wall_is_told(tmp_path):
+    box = (
+        '<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20" '
+        'length_x="0.03" length_y="0.03" length_z="0.03"/>'
+    )
+    run = run_deck(tmp_path, falling(box, WALLS["mesh"], 10.0, 0.5), 0.12, 0.001)
+    assert run["bodies/2/position"][-1, 2] < -0.02
+    assert len(told(run)) == 1
+
+
+def test_a_ball_that_begins_in_a_wall_is_refused(tmp_path):
+    deck = falling(BALL, WALLS["mesh"], 1e6, 0.5, z=0.0185)
+    with pytest.raises(ModelError, match="or than its wall, at the start"):
+        run_deck(tmp_path, deck, 0.01)

@@ -291,3 +291,23 @@ def test_check_repair_of_a_mesh_in_the_deck(tmp_path: Path) -> None:
     found = CliRunner().invoke(main, ["check", str(path), "--repair"])
     assert found.exit_code == 0
     assert (tmp_path / "deck_7_repaired.obj").exists()
+
+
+def test_costly_pairs_are_told(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(3, 0.1)
+    (tmp_path / "ball.stl").write_bytes(ball.export(file_type="stl"))
+    text = added(
+        '<Post_Graphic id="6" type="TriaMesh" rm_id="20" file="ball.stl"/>'
+        '<Post_Graphic id="7" type="Ellipsoid" center_marker_id="10" x_scale="1" y_scale="1" '
+        'z_scale="1"/>'
+        '<Force_Contact id="8" i_graphics_id="6" j_graphics_id="7" cnf_type="IMPACT" '
+        'stiffness="1e5"/>'
+    )
+    path = tmp_path / "deck.xml"
+    path.write_text(text, encoding="utf-8")
+    found = CliRunner().invoke(main, ["check", str(path)])
+    assert found.exit_code == 0, found.output
+    assert "Force_Contact[8]: Post_Graphic[7] Post_Graphic[6]: closed form ELLIPSOID-MESH" in (
+        found.output
+    )
+    assert "costly, 1 pair: Post_Graphic[6] has 1920 edges" in found.output

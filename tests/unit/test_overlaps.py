@@ -26,10 +26,10 @@ def test_depths_of_rounding_are_not_told(depth, logged, told, faults):
     )
     scene = Some(
         pairs=pairs,
-        work=Some(points=points),
+        work=Some(points=points, beyond=np.zeros(1, dtype=int)),
         slots=Some(pair=one),
         kinds=Some(whole=np.zeros(1), step=np.ones(1, np.int64), contact=one),
-        graphics=Some(half=np.array([[0.5, 0.5, 0.5], [1.0, 1.0, 2.0]])),
+        graphics=Some(half=np.array([[0.5, 0.5, 0.5], [1.0, 1.0, 2.0]]), width=[0.5, 1.0]),
     )
     contact = Some(id=1, ignore_penetration_larger_than=None, source=Some(line=3))
     model = Some(contacts={1: contact}, file="deck.xml")

@@ -20,6 +20,13 @@ from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, COUPLE
 
 
 @jitable
+def keep_places(scene: Scene, pair: int) -> None:
+    """Let incidents that are no parts of a shape keep their slots."""
+    if scene.kinds.moves[scene.pairs.kind[pair]] == 1:
+        note_failure(scene, call_int(scene.world.hooks[Hook.SLOTS], (scene, pair)))
+
+
+@jitable
 def measure_pair(scene: Scene, pair: int) -> bool:
     """Run a pair's closed form into its rows of `points`; False where FCL has to do it."""
     pairs, kinds, work = scene.pairs, scene.kinds, scene.work
@@ -37,15 +44,14 @@ def measure_pair(scene: Scene, pair: int) -> bool:
             work.points[first:],
         ),
     )
-    if count < 0:
-        work.beyond[kinds.contact[kind]] = 1
+    if count < 0 and work.beyond[kinds.contact[kind]] == 0:
+        work.beyond[kinds.contact[kind]] = 1 + pair
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):
                 work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
-    if kinds.moves[kind] == 1:
-        note_failure(scene, call_int(scene.world.hooks[Hook.SLOTS], (scene, pair)))
+    keep_places(scene, pair)
     return True
 
 
@@ -107,5 +113,6 @@ def find_contacts(scene: Scene, y: F1) -> int:
         if code != 0:
             return code
         for k in range(waiting):
+            keep_places(scene, work.fcl[k])
             gather(scene, work.fcl[k])
     return 0

@@ -5,16 +5,22 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, V2, V3
+from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import sides
-from mbsim.geometry.catalog import AT_POINT
-from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT
+from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
+from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT
 
 # part of the friction that would stop a slip in one step, which a fixed-step method may use
 HELD_BACK = 0.25
+
+
+@jitable
+def trace(matrix: F2) -> float:
+    """Return the sum of the diagonal, which no axis of a positive matrix has more than."""
+    return matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
 
 
 @jitable
@@ -24,8 +30,7 @@ def yielding(scene: Scene, y: F1, b: int, p: V3) -> float:
     if b == len(bodies.mass):
         return 0.0
     arm = sub(p, position(scene, y, b))
-    inverse, square = bodies.inverse[b], dot(arm, arm)
-    return 1.0 / bodies.mass[b] + square * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+    return 1.0 / bodies.mass[b] + dot(arm, arm) * trace(bodies.inverse[b])
 
 
 @jitable
@@ -44,3 +49,12 @@ def hold_back(scene: Scene, y: F1, s: int, h: float, slip: V2) -> None:
     if force > most:
         for k in range(2):
             out[FORCE_X_OUT + k] *= most / force
+    if out[TORQUE_Z_OUT] != 0.0:
+        # so of the torque against spin, to the spin that it would stop
+        n, inverse = vector(scene.work.points[s, AT_NORMAL:]), 0.0
+        for b in (body[gi], body[gj]):
+            if b < len(scene.bodies.mass):
+                inverse += trace(scene.bodies.inverse[b])
+        w = sub(vector(scene.work.w[body[gi]]), vector(scene.work.w[body[gj]]))
+        most = HELD_BACK * abs(dot(w, n)) / (h * inverse)
+        out[TORQUE_Z_OUT] = max(-most, min(most, out[TORQUE_Z_OUT]))

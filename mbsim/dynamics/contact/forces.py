@@ -154,6 +154,12 @@ def stands_for_points(scene: Scene, s: int) -> bool:
 
 
 @jitable
+def is_patch(scene: Scene, s: int) -> bool:
+    """Return whether slot s is a patch, whose pressure has moments."""
+    return scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]] == REGION_ROWS
+
+
+@jitable
 def patch(scene: Scene, s: int) -> float:
     """Return the area of contact of slot s, 0 for a point."""
     return scene.work.slot[s, PATCH] if face_weight_of(scene, s) > 0.0 else 0.0
@@ -224,6 +230,8 @@ def friction(
         if code != 0:
             return code
         given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
+    if contacts.spreads[c] == 1 and is_patch(scene, s):
+        return call_int(scene.world.hooks[Hook.SPREAD], (scene, s, c))
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 
@@ -285,6 +293,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     rate = -dot(v, n)
     tx = tangent(scene, t, y, s, c, gi, bi, bj, n)
     ty = cross(n, tx)
+    for k in range(3):
+        work.t[s, k] = tx[k]
     slip = (dot(v, tx), dot(v, ty))
     spin_rates = (dot(w, tx), dot(w, ty), dot(w, n))
 
@@ -371,7 +381,6 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     row[DEPTH], row[RATE], row[NORMAL] = depth, rate, normal
     row[SLIP] = math.hypot(slip[0], slip[1])
     for k in range(3):
-        work.t[s, k] = tx[k]
         row[FORCE + k] = force[k]
         row[TORQUE + k] = torque[k]
     row[STORED], row[LOST] = stored, lost

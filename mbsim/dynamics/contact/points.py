@@ -12,7 +12,8 @@ from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
     AT_FAULT,
-    BEYOND_LAYERS,
+    BEYOND_I,
+    BEYOND_J,
     BEYOND_TIME,
     ENERGY_LOST,
     EVENT_ELEMENT,
@@ -23,6 +24,7 @@ from mbsim.arrays.codes import (
     LEAVE,
     REBOUND,
     SCALE_LENGTH,
+    TOO_DEEP,
     TOUCH,
     TOUCHES,
     USED_EVENTS,
@@ -46,6 +48,9 @@ from mbsim.dynamics.contact.forces import (
 )
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.laws.abi import ELASTIC, ENERGY
+
+#: Part of the way from touch to where their middles meet at which shapes are too deep.
+MIDDLE = 0.8
 
 
 @jitable
@@ -283,14 +288,31 @@ def forget_apart(scene: Scene, y: F1) -> None:
 
 
 @jitable
-def log_beyond(scene: Scene, t: float) -> None:
-    """Note the contacts whose meshes overlap deeper than their layer at the accepted point."""
-    for c in range(len(scene.work.beyond)):
-        if scene.work.beyond[c] == 0:
+def log_deep(scene: Scene, t: float) -> None:
+    """Note the contacts that are too deep at the accepted point for their force to be trusted.
+
+    A pair knows of meshes that they are deeper than their layer, or than the wall that a sphere
+    presses. Shapes of other pairs push each other out on the other side when they have passed each
+    other's middles: `MIDDLE` of the way is too deep.
+    """
+    graphics, hit, work = scene.graphics, scene.work.hit, scene.work
+    for k in range(hit[len(hit) - 1]):
+        gi, gj = sides(scene, hit[k])
+        c = contact_of(scene, hit[k])
+        way = graphics.width[gi] + graphics.width[gj]
+        kind = scene.pairs.kind[scene.slots.pair[hit[k]]]
+        told = scene.kinds.moves[kind] == 1 and scene.kinds.kernel[kind] != 0
+        known = told or work.points[hit[k], AT_DEPTH] <= MIDDLE * way
+        if not known and work.beyond[c] == 0:
+            work.beyond[c] = 1 + scene.slots.pair[hit[k]]
+    for c in range(len(work.beyond)):
+        if work.beyond[c] == 0:
             continue
-        scene.log.counters[BEYOND_LAYERS] += 1
-        if math.isnan(scene.log.contacts[c, BEYOND_TIME]):
-            scene.log.contacts[c, BEYOND_TIME] = t
+        scene.log.counters[TOO_DEEP] += 1
+        row, pair = scene.log.contacts[c], work.beyond[c] - 1
+        if math.isnan(row[BEYOND_TIME]):
+            row[BEYOND_TIME] = t
+            row[BEYOND_I], row[BEYOND_J] = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
 
 
 @jitable
@@ -299,7 +321,7 @@ def commit_incidents(scene: Scene, t: float, h: float, y: F1) -> int:
     state, work, pairs = scene.state, scene.work, scene.pairs
     old, new, last = state.hit, work.hit, len(work.hit) - 1
     changed = 0
-    log_beyond(scene, t)
+    log_deep(scene, t)
     for k in range(old[last]):
         pairs.touches[scene.slots.pair[old[k]]] = 0
         if work.touching[old[k]] == 0:

@@ -40,6 +40,9 @@ BLIND_JUMP, AT_ONCE = 0.1, 1e-4
 SEEN = 0.6
 #: The end of a damper's ramp that is met within this part of a step is as good as at its begin.
 AT_BEGIN = 0.02
+#: How much deeper a step may lead, over half of the thickness of both shapes: `points.log_deep`
+#: looks at ends of steps, and sees what passes within 0.4 of it.
+DEEPER = 0.3
 #: Part of the scene's length below which a depth is rounding.
 ROUNDING = 1e-13
 
@@ -192,12 +195,18 @@ def step_to_ramp(scene: Scene, f: F1, s: int, h: float) -> float:
 
 @jitable
 def longest_touching(scene: Scene, f: F1, h: float) -> float:
-    """Return how much of a step h may be tried so that no force bends sharply or ends within it."""
-    state, longest = scene.state, h
+    """Return how much of a step h may be tried so that no force bends sharply or ends within it.
+
+    What goes deeper does not leap through: ends of steps see that it is about to pass.
+    """
+    state, longest, thin = scene.state, h, scene.graphics.thin
     for k in range(state.hit[len(state.hit) - 1]):
         s = state.hit[k]
         if state.rate[s] < 0.0:
             longest = min(longest, step_to_leave(scene, f, s, longest))
+        elif state.rate[s] > 0.0:
+            gi, gj = sides(scene, s)
+            longest = min(longest, DEEPER * (thin[gi] + thin[gj]) / state.rate[s])
         longest = step_to_ramp(scene, f, s, longest)
     return longest
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import AT_FAULT, PRESS_BY_DEPTH, PRESS_BY_RATE, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import FaceSlopes, Hook, Memory
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
@@ -132,8 +132,10 @@ def friction_slopes(
         elif size == 0.0:
             size = PART
         kept = given[column]
+        # nothing presses with less than 0
+        low = max(0.0, kept - size) if column == PRESSED else kept - size
         for side in range(2):
-            given[column] = kept + (size if side == 0 else -size)
+            given[column] = kept + size if side == 0 else low
             code = ask_friction(scene, t, h, y, s, c, around, given)
             if code != 0:
                 return code
@@ -141,7 +143,7 @@ def friction_slopes(
                 if side == 0:
                     base[column, r] = out[r]
                 else:
-                    table[r, column] = (base[column, r] - out[r]) / (2.0 * size)
+                    table[r, column] = (base[column, r] - out[r]) / (kept + size - low)
         given[column] = kept
     return 0
 
@@ -393,5 +395,6 @@ def add_contacts_slopes(scene: Scene, T: Tangent, t: float, h: float, y: F1) -> 
     for k in range(hit[len(hit) - 1]):
         code = add_contact_slopes(scene, T, t, h, y, hit[k])
         if code != 0:
+            scene.work.diagnostics[AT_FAULT] = contact_of(scene, hit[k])
             return code
     return 0

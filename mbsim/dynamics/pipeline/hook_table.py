@@ -29,6 +29,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core import jit
 from mbsim.core.problem import HOOK
+from mbsim.geometry.catalog import REGION_ROWS
 
 _INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
 _COMPLEX = types.CPointer(types.complex128)
@@ -95,6 +96,11 @@ def _has_patches(scene: Scene, method: Method) -> bool:
 
 def _recalls(scene: Scene, method: Method) -> bool:
     return bool((scene.contacts.memory > 0).any())
+
+
+def _spreads(scene: Scene, method: Method) -> bool:
+    patches = scene.kinds.contact[scene.kinds.step == REGION_ROWS]
+    return bool(scene.contacts.spreads[patches].any())
 
 
 def _has_contact_slopes(scene: Scene, method: Method) -> bool:
@@ -288,6 +294,13 @@ TABLE = (
         _of("pipeline.contact_hooks", "recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
         "an answer, or less a code",
+    ),
+    Row(
+        Hook.SPREAD,
+        _INT(_INT, _INT, _INT),  # context, slot, contact
+        _spreads,
+        _of("pipeline.contact_hooks", "rub_patch_of"),
+        "asks a friction law all over a patch",
     ),
     Row(
         Hook.HOLD_BACK,

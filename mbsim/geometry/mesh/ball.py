@@ -27,6 +27,9 @@ from mbsim.model.surface import (
 #: of the mesh (3), and what is left of its weight.
 NEAR_NUMBERS = 8
 NEAR_POINT, NEAR_NORMAL, NEAR_WEIGHT = 1, 4, 7
+#: A wall's other side bends from its first by less than arccos of this; part of a way within which
+#: a triangle is where it begins; part of a wall that a layer would reach.
+SQUARE, AT_START, OF_WALL = 0.5, 1e-6, 0.36
 #: Parts of a triangle on which a point may be nearest: its edges, its corners, its face.
 ON_CORNER, ON_FACE = 3, 6
 
@@ -155,6 +158,67 @@ def measure_near(mesh: F1, t: int, c: V3, radius: float, row: F1, edges: F1) -> 
 
 
 @jitable
+def box_on_way(mesh: F1, at: int, p: V3, d: V3, reach: float) -> bool:
+    """Return whether the way from p along d, so long, meets the box whose numbers begin at `at`."""
+    first, last = 0.0, reach
+    for k in range(3):
+        low, high = mesh[at + k] - mesh[at + 3 + k] - p[k], mesh[at + k] + mesh[at + 3 + k] - p[k]
+        if d[k] == 0.0:
+            if low > 0.0 or high < 0.0:
+                return False
+            continue
+        a, b = low / d[k], high / d[k]
+        first, last = max(first, min(a, b)), min(last, max(a, b))
+    return first <= last
+
+
+@jitable
+def leaves_through(mesh: F1, at: int, p: V3, d: V3, reach: float) -> bool:
+    """Return whether the way from p along d, so long, goes out through a triangle, about square."""
+    n = vector(mesh[at + UNIT :])
+    slope = dot(d, n)
+    if slope < SQUARE:
+        return False
+    way = dot(sub(vector(mesh[at:]), p), n) / slope
+    if way <= AT_START * reach or way > reach:
+        return False
+    x = add(p, scale(way, d))
+    for k in range(3):
+        q, r = vector(mesh[at + 3 * k :]), vector(mesh[at + 3 * (k + 1 if k < 2 else 0) :])
+        if dot(cross(sub(r, q), sub(x, q)), n) < 0.0:
+            return False
+    return True
+
+
+@jitable
+def through_wall(mesh: F1, row: F1, radius: float) -> bool:
+    """Return whether a sphere overlaps a mesh by more than its wall, of width w, stands.
+
+    The depth is more than w, or the centre deeper than 0.36 w, as deep as a layer would be.
+    """
+    depth, n = row[0], vector(row[NEAR_NORMAL:])
+    reach = max(depth, (depth - radius) / OF_WALL)
+    p, d = vector(row[NEAR_POINT:]), scale(-1.0, n)
+    waiting = np.empty(WAITING, np.int64)
+    boxes, leaves = int(mesh[AT_BOXES]), 1 << int(mesh[LEVELS])
+    waiting[0], count = 1, 1
+    while count > 0:
+        count -= 1
+        node = waiting[count]
+        if not box_on_way(mesh, boxes + NODE * node, p, d, reach):
+            continue
+        if node < leaves:
+            waiting[count], waiting[count + 1] = 2 * node, 2 * node + 1
+            count += 2
+            continue
+        first, last = leaf_range(mesh, node)
+        for t in range(first, last):
+            if leaves_through(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * t, p, d, reach):
+                return True
+    return False
+
+
+@jitable
 def in_reach(mesh: F1, c: V3, radius: float, nearest: int, found: I1) -> tuple[F2, F2, I2]:
     """Return the triangles that a sphere reaches, the depths of their edges, those beyond.
 
@@ -217,8 +281,37 @@ def merge_points(rows: F2, links: F2, partners: I2) -> None:
 
 
 @jitable
+def press(row: F1) -> tuple[float, V3]:
+    """Return depth times weight of a point, and its normal of length 1."""
+    n = vector(row[NEAR_NORMAL:])
+    return row[0] * row[NEAR_WEIGHT], scale(1.0 / norm(n), n)
+
+
+@jitable
+def add_to_nearest(rows: F2, kept: int, lost: F1) -> None:
+    """Let the nearest of the points kept press as it and a lost one do, by a linear law."""
+    nearest, least = 0, math.inf
+    for k in range(kept):
+        away = norm(sub(vector(rows[k, NEAR_POINT:]), vector(lost[NEAR_POINT:])))
+        if away < least:
+            nearest, least = k, away
+    row = rows[nearest]
+    (a, n), (b, m) = press(row), press(lost)
+    both = add(scale(a, n), scale(b, m))
+    row[NEAR_WEIGHT] = norm(both) / row[0]
+    if row[NEAR_WEIGHT] == 0.0:
+        return
+    for k in range(3):
+        row[NEAR_POINT + k] += b / (a + b) * (lost[NEAR_POINT + k] - row[NEAR_POINT + k])
+        row[NEAR_NORMAL + k] = both[k]
+
+
+@jitable
 def strongest_points(rows: F2, most: int) -> int:
-    """Move the points of greatest weight times depth to the front; return how many count."""
+    """Move the points of greatest weight times depth to the front; return how many count.
+
+    What those behind press is added to the nearest of those in front.
+    """
     kept = 0
     while kept < min(most, len(rows)):
         best = kept
@@ -226,8 +319,11 @@ def strongest_points(rows: F2, most: int) -> int:
             if rows[k, 0] * rows[k, NEAR_WEIGHT] > rows[best, 0] * rows[best, NEAR_WEIGHT]:
                 best = k
         if rows[best, 0] * rows[best, NEAR_WEIGHT] <= LEAST * rows[0, 0]:
-            break
+            return kept
         for c in range(NEAR_NUMBERS):
             rows[kept, c], rows[best, c] = rows[best, c], rows[kept, c]
         kept += 1
+    for k in range(kept, len(rows)):
+        if rows[k, NEAR_WEIGHT] > 0.0:
+            add_to_nearest(rows, kept, rows[k])
     return kept

@@ -22,6 +22,7 @@ from mbsim.geometry.mesh.ball import (
     merge_points,
     nearest_triangle,
     strongest_points,
+    through_wall,
     triangles_near,
 )
 from mbsim.geometry.mesh.merging import (
@@ -201,7 +202,7 @@ def sphere_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2)
     _, nearest = nearest_triangle(mesh, c, edges)
     row = np.empty(NEAR_NUMBERS)
     measure_near(mesh, nearest, c, radius, row, edges)
-    count, least = 0, -0.0
+    count, least, known = 0, -0.0, 1
     rows = row.reshape(1, NEAR_NUMBERS)
     if row[0] > 0.0:
         found = np.empty(int(mesh[TRIANGLES]), np.int64)
@@ -209,6 +210,7 @@ def sphere_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2)
         rows, links, partners = in_reach(mesh, c, radius, nearest, found[:count])
         merge_points(rows, links, partners)
         count = strongest_points(rows, len(points))
+        known = -1 if through_wall(mesh, row, radius) else 1
     else:
         least = row[0]
     for k in range(len(points)):
@@ -219,4 +221,4 @@ def sphere_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2)
         depth = at[0] if k < count else least
         weight = at[NEAR_WEIGHT] if k < count else 1.0
         put_point(points[k], depth, add(p, scale(-0.5 * depth, n)), scale(1.0 / size, n), weight)
-    return len(points)
+    return known * len(points)

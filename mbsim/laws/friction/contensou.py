@@ -89,6 +89,7 @@ def disc_friction(v: float, w: float) -> V2:
         unit="L",
         usual="of the area",
     ),
+    of_area=True,
 )
 def contensou(
     inputs: FrictionInput, mu_dynamic: float, friction_trans_vel: float, patch_radius: float
