@@ -1,8 +1,8 @@
 """A closed triangle mesh packed with its tree of boxes, as the contact patches read it.
 
 One array holds all: a header, the boxes of a complete binary tree over the triangles, the
-triangles in the order of its leaves, and a mark for each triangle that the patches use while they
-work (it is -1 in between).
+triangles in the order of its leaves, a mark for each triangle that the patches use while they
+work (it is -1 in between), and for a mesh with a layer the oriented boxes of the same tree.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import numpy.typing as npt
 
 from mbsim.model.elements import Array
 from mbsim.model.mesh import Faces
+from mbsim.model.surface_tree import node_bounds, oriented_boxes, oriented_order
 
-#: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles and
-#: marks begin, length of the whole.
-HEADER = 6
-TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, LENGTH = range(HEADER)
+#: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
+#: marks and oriented boxes (`model.surface_tree`) begin, length of the whole.
+HEADER = 7
+TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, LENGTH = range(HEADER)
 #: Most triangles of a leaf.
 LEAF = 4
 #: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
@@ -41,7 +42,7 @@ def leaves_order(middles: Array, levels: int) -> Indices:
     count = len(middles)
     order = np.arange(count)
     for level in range(levels):
-        bounds = np.arange(2**level + 1) * count // 2**level
+        bounds = node_bounds(count, level)
         part = np.repeat(np.arange(2**level), np.diff(bounds))
         here = middles[order]
         low = np.minimum.reduceat(here, bounds[:-1], axis=0)
@@ -93,7 +94,9 @@ def _corner_normals(corners: Array, faces: Faces, units: Array) -> Array:
     return total[faces]
 
 
-def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
+def pack(
+    vertices: Array, faces: Faces, inner: Array | None = None, depth: Array | None = None
+) -> Array:
     """Return a closed mesh as one packed array.
 
     Parameters
@@ -102,23 +105,29 @@ def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
         Positions [L], shape axes.
     faces : ndarray of int, shape (m, 3)
         Triangles of a closed mesh, counter-clockwise seen from outside.
-    inner : ndarray, shape (n, 3)
-        The inner points of its layer (`model.surface_layer`) [L]; the vertices for a mesh that is
-        used without.
-    depth : ndarray, shape (n,)
+    inner : ndarray, shape (n, 3), optional
+        The inner points of its layer (`model.surface_layer`) [L]. Without them the mesh has no
+        layer and no oriented boxes: it can be used on planes and under spheres alone.
+    depth : ndarray, shape (n,), optional
         The depths of these [L].
     """
+    layered = inner is not None
+    inner = vertices if inner is None else inner
+    depth = np.zeros(len(vertices)) if depth is None else depth
     count = len(faces)
     levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0)))))
-    order = leaves_order(vertices[faces].mean(axis=1), levels)
-    place = np.empty(count, dtype=np.int64)
-    place[order] = np.arange(count)
-    beside = place[beyond_edges(faces)[order]]
-    ordered = faces[order]
-    corners, below = vertices[ordered], inner[ordered]
+    corners, below = vertices[faces], inner[faces]
     units = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(units, axis=1)
     units = units / np.where(length > 0.0, length, 1.0)[:, None]
+    if layered:
+        order = oriented_order(corners, below, units, levels)
+    else:
+        order = leaves_order(corners.mean(axis=1), levels)
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    beside, ordered = place[beyond_edges(faces)[order]], faces[order]
+    corners, below, units = corners[order], below[order], units[order]
 
     low, high = corners.min(axis=1), corners.max(axis=1)
     deep_low, deep_high = np.minimum(low, below.min(axis=1)), np.maximum(high, below.max(axis=1))
@@ -128,7 +137,10 @@ def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
         np.argsort(ordered, axis=1), beside, order[:, None], units,
         _corner_normals(corners, ordered, units).reshape(count, 9),
     ])  # fmt: skip
-    at = HEADER + np.cumsum([0, boxes.size, table.size, count])
-    head = [count, levels, *at]
-    packed: Array = np.concatenate([head, boxes.ravel(), table.ravel(), np.full(count, -1.0)])
+    oriented = oriented_boxes(corners, below, levels).ravel() if layered else np.zeros(0)
+    marks = np.full(count, -1.0)
+    at = HEADER + np.cumsum([0, boxes.size, table.size, count, oriented.size])
+    packed: Array = np.concatenate(
+        [[count, levels, *at], boxes.ravel(), table.ravel(), marks, oriented]
+    )
     return packed
