@@ -137,7 +137,7 @@ def pack(
         np.argsort(ordered, axis=1), beside, order[:, None], units,
         _corner_normals(corners, ordered, units).reshape(count, 9),
     ])  # fmt: skip
-    oriented = oriented_boxes(corners, below, levels).ravel() if layered else np.zeros(0)
+    oriented = oriented_boxes(corners, below, units, levels).ravel() if layered else np.zeros(0)
     marks = np.full(count, -1.0)
     at = HEADER + np.cumsum([0, boxes.size, table.size, count, oriented.size])
     packed: Array = np.concatenate(

@@ -91,24 +91,59 @@ def oriented_order(corners: Array, inner: Array, units: Array, levels: int) -> I
     return order
 
 
-def oriented_boxes(corners: Array, inner: Array, levels: int) -> Array:
+def _frames(corners: Array, units: Array, bounds: Indices, part: Indices) -> list[Array]:
+    """Return axes (k, 3, 3) that nodes may have: of spread, the mesh's own, upright on the side.
+
+    The last have the mean normal and, in its plane, the mesh's axis that is nearest to that of
+    most spread: a side of a prism is so boxed whatever triangles it is cut into.
+    """
+    spread = _node_axes(corners, bounds, part)
+    own = np.broadcast_to(np.eye(3), spread.shape)
+    normal = np.add.reduceat(units, bounds[:-1], axis=0)
+    length = np.linalg.norm(normal, axis=1)
+    normal /= np.where(length > 0.0, length, 1.0)[:, None]
+    along = np.eye(3)[np.abs(spread[:, 2]).argmax(axis=1)]
+    along -= (along * normal).sum(axis=1)[:, None] * normal
+    size = np.linalg.norm(along, axis=1)
+    along /= np.where(size > 0.0, size, 1.0)[:, None]
+    upright = np.stack([normal, np.cross(along, normal), along], axis=1)
+    fit = (length > 0.0) & (size > 0.1)
+    return [spread, own, np.where(fit[:, None, None], upright, spread)]
+
+
+def _boxes_along(
+    axes: Array, corners: Array, inner: Array, starts: Indices, part: Indices
+) -> Array:
+    """Return the rows of nodes that have these axes."""
+    outer = np.einsum("tij,tkj->tki", axes[part], corners)
+    both = np.concatenate([outer, np.einsum("tij,tkj->tki", axes[part], inner)], axis=1)
+    made = np.empty((len(axes), ORIENTED))
+    made[:, ROWS:THIN] = axes.reshape(-1, 9)
+    for at, points in ((THIN, outer), (DEEP, both)):
+        low = np.minimum.reduceat(points.min(axis=1), starts, axis=0)
+        high = np.maximum.reduceat(points.max(axis=1), starts, axis=0)
+        made[:, at : at + 3] = np.einsum("kij,ki->kj", axes, 0.5 * (low + high))
+        made[:, at + 3 : at + 6] = 0.5 * (high - low)
+    return made
+
+
+def oriented_boxes(corners: Array, inner: Array, units: Array, levels: int) -> Array:
     """Return the oriented boxes of all nodes, shape (2^(levels + 1), `ORIENTED`).
 
     Triangles are in the order of the leaves; node k of level l is row 2^l + k.
     """
-    count = len(corners)
     made = np.zeros((2 ** (levels + 1), ORIENTED))
     for level in range(levels + 1):
-        bounds = node_bounds(count, level)
-        nodes = made[2**level : 2 ** (level + 1)]
+        bounds = node_bounds(len(corners), level)
         part = np.repeat(np.arange(2**level), np.diff(bounds))
-        axes = _node_axes(corners, bounds, part)
-        nodes[:, ROWS:THIN] = axes.reshape(-1, 9)
-        outer = np.einsum("tij,tkj->tki", axes[part], corners)
-        both = np.concatenate([outer, np.einsum("tij,tkj->tki", axes[part], inner)], axis=1)
-        for at, points in ((THIN, outer), (DEEP, both)):
-            low = np.minimum.reduceat(points.min(axis=1), bounds[:-1], axis=0)
-            high = np.maximum.reduceat(points.max(axis=1), bounds[:-1], axis=0)
-            nodes[:, at : at + 3] = np.einsum("kij,ki->kj", axes, 0.5 * (low + high))
-            nodes[:, at + 3 : at + 6] = 0.5 * (high - low)
+        nodes, least = made[2**level : 2 ** (level + 1)], np.full(2**level, np.inf)
+        for axes in _frames(corners, units, bounds, part):
+            rows = _boxes_along(axes, corners, inner, bounds[:-1], part)
+            size = np.zeros(len(rows))
+            for at in (THIN, DEEP):
+                x, y, z = rows[:, at + 3 : at + 6].T
+                size += x * y + y * z + z * x
+            # of boxes that are as small the first, whatever rounding tells
+            smaller = size < least * (1.0 - 1e-9)
+            nodes[smaller], least[smaller] = rows[smaller], size[smaller]
     return made

@@ -13,15 +13,13 @@ import numpy as np
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import vector
-from mbsim.geometry.mesh.oriented import axes_between, have_room
+from mbsim.geometry.mesh.oriented import axes_between, extent, have_room, node_of
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
 from mbsim.geometry.mesh.prism import apart, piece_in_prism
 from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
 from mbsim.geometry.mesh.tree import WAITING, leaf_range
 from mbsim.model.surface import (
-    AT_BOXES,
-    AT_ORIENTED,
     AT_TRIANGLES,
     BESIDE,
     CORNER,
@@ -29,10 +27,9 @@ from mbsim.model.surface import (
     INNER,
     LEAF,
     LEVELS,
-    NODE,
     TRIANGLE,
 )
-from mbsim.model.surface_tree import DEEP, ORIENTED, THIN
+from mbsim.model.surface_tree import DEEP, THIN
 
 #: Which surface may be in which layer: I's in J's, J's in I's.
 I_IN_J, J_IN_I = 1, 2
@@ -65,40 +62,6 @@ def box_gap(a: F1, b: F1, pose: F1) -> float:
         out = max(0.0, abs(at - b[r]) - reach - b[3 + r])
         square += out * out
     return math.sqrt(square)
-
-
-@jitable
-def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
-    """Return a lower bound of the distance of two meshes: the least one of boxes of leaves."""
-    waiting, far = np.empty((4 * WAITING, 2), np.int64), np.empty(4 * WAITING)
-    waiting[0, 0], waiting[0, 1], far[0], many = 1, 1, 0.0, 1
-    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
-    best = math.inf
-    while many > 0 and best > 0.0:
-        many -= 1
-        i, j = waiting[many, 0], waiting[many, 1]
-        if far[many] >= best:
-            continue
-        if i >= leaves_i and j >= leaves_j:
-            best = far[many]
-            continue
-        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
-        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
-        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
-        of_i = i < leaves_i and (larger or j >= leaves_j)
-        for k in range(2):
-            a, b = (2 * i + k, j) if of_i else (i, 2 * j + k)
-            box_a = mesh_i[int(mesh_i[AT_BOXES]) + NODE * a :]
-            box_b = mesh_j[int(mesh_j[AT_BOXES]) + NODE * b :]
-            waiting[many + k, 0], waiting[many + k, 1] = a, b
-            far[many + k] = box_gap(box_a, box_b, pose)
-        if far[many] < far[many + 1]:
-            # the nearer one is looked at first, so it is put on last
-            for c in range(2):
-                waiting[many, c], waiting[many + 1, c] = waiting[many + 1, c], waiting[many, c]
-            far[many], far[many + 1] = far[many + 1], far[many]
-        many += 2
-    return best
 
 
 @jitable
@@ -174,8 +137,7 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
     while many > 0:
         many -= 1
         i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
-        box_i = mesh_i[int(mesh_i[AT_ORIENTED]) + ORIENTED * i :]
-        box_j = mesh_j[int(mesh_j[AT_ORIENTED]) + ORIENTED * j :]
+        box_i, box_j = node_of(mesh_i, i), node_of(mesh_j, j)
         axes = axes_between(box_i, box_j, pose)
         if ways & I_IN_J and not have_room(box_i, THIN, box_j, DEEP, axes, pose):
             ways -= I_IN_J
@@ -183,9 +145,7 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
             ways -= J_IN_I
         if ways == 0:
             continue
-        size_i = box_i[THIN + 3] + box_i[THIN + 4] + box_i[THIN + 5]
-        larger = size_i > box_j[THIN + 3] + box_j[THIN + 4] + box_j[THIN + 5]
-        if i < leaves_i and (larger or j >= leaves_j):
+        if i < leaves_i and (j >= leaves_j or extent(box_i) > extent(box_j)):
             for k in range(2):
                 waiting[many, 0], waiting[many, 1], waiting[many, 2] = 2 * i + k, j, ways
                 many += 1

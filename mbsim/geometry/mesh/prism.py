@@ -14,7 +14,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.record import BEYOND, MOST, SUMS, add_piece
-from mbsim.model.surface import CORNER, DEPTH, INNER, ORDER
+from mbsim.model.surface import DEPTH, INNER, ORDER
 
 #: What makes an edge of a polygon besides the triangle's own edges 0, 1, 2: the sides of the prism
 #: at the edges 0, 1, 2 of its triangle, the inner end, planes within the prism and its outside.

@@ -24,6 +24,7 @@ from mbsim.geometry.mesh.ball import (
     strongest_points,
     triangles_near,
 )
+from mbsim.geometry.mesh.distance import least_gap
 from mbsim.geometry.mesh.merging import (
     AT_NODE,
     MOST_PEAKS,
@@ -36,7 +37,6 @@ from mbsim.geometry.mesh.merging import (
 from mbsim.geometry.mesh.overlap import (
     box_gap,
     common_middle,
-    least_gap,
     nodes_of,
     partners_of,
 )
