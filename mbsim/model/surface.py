@@ -12,12 +12,15 @@ import numpy.typing as npt
 
 from mbsim.model.elements import Array
 from mbsim.model.mesh import Faces
-from mbsim.model.surface_tree import node_bounds, oriented_boxes, oriented_order
+from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, oriented_order
 
 #: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
-#: marks and oriented boxes (`model.surface_tree`) begin, length of the whole.
-HEADER = 7
-TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, LENGTH = range(HEADER)
+#: marks, oriented boxes (`model.surface_tree`) and the first triangles of leaves begin, length of
+#: the whole.
+HEADER = 8
+(TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, LENGTH) = range(
+    HEADER
+)
 #: Most triangles of a leaf.
 LEAF = 4
 #: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
@@ -33,40 +36,38 @@ CORNER, INNER, DEPTH, ORDER, BESIDE, NUMBER, UNIT, CORNER_NORMAL = 0, 9, 18, 21,
 Indices = npt.NDArray[np.int64]
 
 
-def leaves_order(middles: Array, levels: int) -> Indices:
-    """Return the triangles in the order of the leaves of a tree.
+def leaves_order(middles: Array, levels: int) -> tuple[Indices, Indices]:
+    """Return the triangles in the order of the leaves of a tree, and where leaves begin.
 
-    Node k of level l holds those from k m // 2^l to (k + 1) m // 2^l: halves along the longest
-    side of what it holds.
+    Each node is halved along the longest side of what it holds.
     """
     count = len(middles)
-    order = np.arange(count)
+    order: Indices = np.arange(count)
+    starts: Indices = np.arange(2**levels + 1) * count // 2**levels
     for level in range(levels):
-        bounds = node_bounds(count, level)
+        bounds = level_bounds(starts, levels, level)
         part = np.repeat(np.arange(2**level), np.diff(bounds))
         here = middles[order]
         low = np.minimum.reduceat(here, bounds[:-1], axis=0)
         high = np.maximum.reduceat(here, bounds[:-1], axis=0)
         longest = (high - low).argmax(axis=1)
         order = order[np.lexsort((here[np.arange(count), longest[part]], part))]
-    return order
+    return order, starts
 
 
-def _boxes(low: Array, high: Array, levels: int) -> Array:
+def _boxes(low: Array, high: Array, starts: Indices, levels: int) -> Array:
     """Return centre and half edges of the boxes of all nodes, shape (2^(levels + 1), 6)."""
-    count = len(low)
     made = np.zeros((2 ** (levels + 1), 6))
-    bounds = np.arange(2**levels) * count // 2**levels
-    low = np.minimum.reduceat(low, bounds, axis=0)
-    high = np.maximum.reduceat(high, bounds, axis=0)
-    for level in range(levels, -1, -1):
-        first = 2**level
-        made[first : 2 * first, :3] = 0.5 * (low + high)
+    made[:, 3:] = NOTHING
+    for level in range(levels + 1):
+        bounds = level_bounds(starts, levels, level)
+        held = np.flatnonzero(np.diff(bounds))
+        least = np.minimum.reduceat(low, bounds[held], axis=0)
+        most = np.maximum.reduceat(high, bounds[held], axis=0)
+        made[2**level + held, :3] = 0.5 * (least + most)
         # rounded outward
-        made[first : 2 * first, 3:] = 0.5 * (high - low) * (1.0 + 1e-15) + 1e-15 * np.abs(low)
-        if level:
-            low = np.minimum(low[::2], low[1::2])
-            high = np.maximum(high[::2], high[1::2])
+        outward = 0.5 * (most - least) * (1.0 + 1e-15) + 1e-15 * np.abs(least)
+        made[2**level + held, 3:] = outward
     return made
 
 
@@ -115,15 +116,16 @@ def pack(
     inner = vertices if inner is None else inner
     depth = np.zeros(len(vertices)) if depth is None else depth
     count = len(faces)
-    levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0)))))
+    # room for uneven cuts
+    levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0))))) + int(layered)
     corners, below = vertices[faces], inner[faces]
     units = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(units, axis=1)
     units = units / np.where(length > 0.0, length, 1.0)[:, None]
     if layered:
-        order = oriented_order(corners, below, units, levels)
+        order, starts = oriented_order(corners, below, units, levels, LEAF)
     else:
-        order = leaves_order(corners.mean(axis=1), levels)
+        order, starts = leaves_order(corners.mean(axis=1), levels)
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
     beside, ordered = place[beyond_edges(faces)[order]], faces[order]
@@ -131,16 +133,19 @@ def pack(
 
     low, high = corners.min(axis=1), corners.max(axis=1)
     deep_low, deep_high = np.minimum(low, below.min(axis=1)), np.maximum(high, below.max(axis=1))
-    boxes = np.hstack([_boxes(low, high, levels), _boxes(deep_low, deep_high, levels)])
+    boxes = np.hstack([
+        _boxes(low, high, starts, levels), _boxes(deep_low, deep_high, starts, levels)
+    ])  # fmt: skip
     table = np.hstack([
         corners.reshape(count, 9), below.reshape(count, 9), depth[ordered],
         np.argsort(ordered, axis=1), beside, order[:, None], units,
         _corner_normals(corners, ordered, units).reshape(count, 9),
     ])  # fmt: skip
-    oriented = oriented_boxes(corners, below, units, levels).ravel() if layered else np.zeros(0)
-    marks = np.full(count, -1.0)
-    at = HEADER + np.cumsum([0, boxes.size, table.size, count, oriented.size])
-    packed: Array = np.concatenate(
-        [[count, levels, *at], boxes.ravel(), table.ravel(), marks, oriented]
+    oriented = (
+        oriented_boxes(corners, below, units, starts, levels).ravel() if layered else np.zeros(0)
     )
+    marks = np.full(count, -1.0)
+    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts]
+    at = HEADER + np.cumsum([0, *map(len, parts)])
+    packed: Array = np.concatenate([[count, levels, *at], *parts])
     return packed

@@ -18,7 +18,7 @@ from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
 from mbsim.geometry.mesh.prism import apart, piece_in_prism
 from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
-from mbsim.geometry.mesh.tree import WAITING, leaf_range
+from mbsim.geometry.mesh.tree import WAITING
 from mbsim.model.surface import (
     AT_TRIANGLES,
     BESIDE,
@@ -29,12 +29,14 @@ from mbsim.model.surface import (
     LEVELS,
     TRIANGLE,
 )
-from mbsim.model.surface_tree import DEEP, THIN
+from mbsim.model.surface_tree import DEEP, FIRST, LAST, THIN
 
 #: Which surface may be in which layer: I's in J's, J's in I's.
 I_IN_J, J_IN_I = 1, 2
 #: Numbers of a triangle that the walk needs: corners, inner points, depths, order.
 PRISM = 24
+#: Nodes of so few triangles are looked at as leaves.
+FEW = 2
 #: Edges of a pair of triangles.
 EDGES = 6
 
@@ -145,18 +147,17 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
             ways -= J_IN_I
         if ways == 0:
             continue
-        if i < leaves_i and (j >= leaves_j or extent(box_i) > extent(box_j)):
+        first_i, last_i = int(box_i[FIRST]), int(box_i[LAST])
+        first_j, last_j = int(box_j[FIRST]), int(box_j[LAST])
+        ends_i = i >= leaves_i or last_i - first_i <= FEW
+        ends_j = j >= leaves_j or last_j - first_j <= FEW
+        if not (ends_i and ends_j):
+            of_i = not ends_i and (ends_j or extent(box_i) > extent(box_j))
             for k in range(2):
-                waiting[many, 0], waiting[many, 1], waiting[many, 2] = 2 * i + k, j, ways
+                waiting[many, 0], waiting[many, 1] = (2 * i + k, j) if of_i else (i, 2 * j + k)
+                waiting[many, 2] = ways
                 many += 1
             continue
-        if j < leaves_j:
-            for k in range(2):
-                waiting[many, 0], waiting[many, 1], waiting[many, 2] = i, 2 * j + k, ways
-                many += 1
-            continue
-        first_i, last_i = leaf_range(mesh_i, i)
-        first_j, last_j = leaf_range(mesh_j, j)
         for t in range(first_i, last_i):
             place_triangle(mesh_i, t, pose, True, origin, placed_i[t - first_i])
         for t in range(first_j, last_j):
