@@ -55,7 +55,9 @@ def test_the_transmission_error_is_that_of_springs_and_of_second_order():
     found = np.array(
         [
             [ahead_under_load(pair, angle) for angle in angles]
-            for pair in [[Meshed(*fewer_triangles(*part(z, n))) for z in (20, 30)] for n in (8, 16, 32)]
+            for pair in [
+                [Meshed(*fewer_triangles(*part(z, n))) for z in (20, 30)] for n in (8, 16, 32)
+            ]
         ]
     )
     steps = np.sqrt((np.diff(found, axis=0) ** 2).mean(axis=1))
