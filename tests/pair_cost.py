@@ -1,4 +1,4 @@
-"""Print what one call of a closed-form pair costs, at rest and apart, in a compiled loop."""
+"""Print what one call of a pair costs, of closed forms and of meshes, in a compiled loop."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import time
 import numpy as np
 from numba import njit
 
+from helpers.mesh_parts import gear
 from helpers.pairs import LYING, ROLLER, SIZES, SLAB, UPRIGHT, frame, turned
+from helpers.surfaces import PLANE, Meshed, sphere, torus
 from mbsim.compile_model.contacts import pair_address, region_address
 from mbsim.core.address import call_int
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
+from mbsim.model.flat_parts import fewer_triangles
+from mbsim.model.mesh import merge_vertices
 
 SHAPES = {
     **SIZES,
@@ -23,6 +27,7 @@ ORIGIN = frame(np.zeros(3), UPRIGHT)
 SIDE = frame(np.zeros(3), LYING)
 LEAN = turned((0.3, 1, 0), 1e-3)
 CALLS = 20_000
+MESHES = "SURFACE-SURFACE"
 CASES = [
     ("sphere on the side of a cylinder", "SPHERE-CYLINDER", frame([0.199, 0, 0], UPRIGHT), ORIGIN),
     ("box on plane", "BOX-PLANE", frame([0, 0, SLAB[1][2] - 1e-3], LEAN), ORIGIN),
@@ -55,15 +60,82 @@ def call_often(address, arrays, count):
     return total
 
 
-def cost_of(address, arrays):
+def cost_of(address, arrays, calls=CALLS):
     """Return the time of a call [ns]."""
     call_often(address, arrays, 10)
     times = []
     for _ in range(5):
         begin = time.perf_counter()
-        call_often(address, arrays, CALLS)
+        call_often(address, arrays, calls)
         times.append(time.perf_counter() - begin)
-    return min(times) / CALLS * 1e9
+    return min(times) / calls * 1e9
+
+
+def mesh_cases():
+    """Return label, pair, frame and size of both sides; and the meshes, whose memory these use."""
+    tori = Meshed(*torus(0.1, 0.03, 64, 32))
+    ball = Meshed(*sphere(0.1, 6), layered=False)
+    ring = Meshed(*torus(0.1, 0.03, 100, 50), layered=False)
+    pinion, wheel = (
+        Meshed(*fewer_triangles(*merge_vertices(*gear(teeth, 2.0, 10.0, points))))
+        for teeth, points in ((20, 60), (30, 40))
+    )
+    crossed = [frame([0.1, 0, 0.16 - depth], LYING) for depth in (5e-4, 3e-3)]
+    # 0.04 mm of backlash, and 4 um of depth on the line of action
+    facing = turned((0, 0, 1), np.pi / 30 + (0.04 + 0.004) / 30)
+    tiny = np.array([0.02, 0.0, 0.0])
+    return [
+        (
+            "two tori of 4096, crossed, 0.5 mm deep",
+            MESHES,
+            crossed[0],
+            tori.size,
+            ORIGIN,
+            tori.size,
+        ),
+        ("the same 3 mm deep", MESHES, crossed[1], tori.size, ORIGIN, tori.size),
+        (
+            "the same 50 mm apart",
+            MESHES,
+            frame([0.1, 0, 0.21], LYING),
+            tori.size,
+            ORIGIN,
+            tori.size,
+        ),
+        (
+            "gears of 10^4 each, in touch",
+            MESHES,
+            frame([50, 0, 0], facing),
+            wheel.size,
+            ORIGIN,
+            pinion.size,
+        ),
+        (
+            "ball of 81920 on a plane, 1 % below",
+            "SURFACE-PLANE",
+            frame([0, 0, 0.098], UPRIGHT),
+            ball.size,
+            *PLANE,
+        ),
+        (
+            "sphere on 10000",
+            "SPHERE-SURFACE",
+            frame([0.1499, 0, 0], UPRIGHT),
+            tiny,
+            ORIGIN,
+            ring.size,
+        ),
+    ], (tori, ball, ring, pinion, wheel)
+
+
+def print_meshes():
+    cases, _meshes = mesh_cases()
+    for label, name, *arrays in cases:
+        points = np.zeros((PAIRS[name].slots, POINT))
+        cost = cost_of(pair_address(PAIRS[name]), (*arrays, points), 50)
+        step = REGION_ROWS if PAIRS[name].patches else 1
+        touching = int((points[::step, 0] > 0.0).sum())
+        print(f"{label:38s}{cost / 1e3:8.1f} us, {touching} points touch")
 
 
 def main():
@@ -78,6 +150,7 @@ def main():
         cost = cost_of(pair_address(PAIRS[name]), arrays)
         touching = int((points[: PAIRS[name].slots, 0] > 0.0).sum())
         print(f"{label:34s}{cost:8.0f} ns, {touching} points touch{region}")
+    print_meshes()
 
 
 if __name__ == "__main__":

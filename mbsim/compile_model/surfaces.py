@@ -81,7 +81,7 @@ def packed(graphic: Graphic, layered: bool) -> Array:
     """Return a graphic as a packed surface (`model.surface`)."""
     vertices, faces = fewer_triangles(*triangles_of(graphic))
     if not layered:
-        return pack(vertices, faces, vertices, np.zeros(len(vertices)))
+        return pack(vertices, faces)
     from mbsim.model.surface_layer import layer
 
     return pack(vertices, faces, *layer(vertices, faces))

@@ -1,8 +1,8 @@
 """A closed triangle mesh packed with its tree of boxes, as the contact patches read it.
 
 One array holds all: a header, the boxes of a complete binary tree over the triangles, the
-triangles in the order of its leaves, and a mark for each triangle that the patches use while they
-work (it is -1 in between).
+triangles in the order of its leaves, a mark for each triangle that the patches use while they
+work (it is -1 in between), and for a mesh with a layer the oriented boxes of the same tree.
 """
 
 from __future__ import annotations
@@ -12,11 +12,15 @@ import numpy.typing as npt
 
 from mbsim.model.elements import Array
 from mbsim.model.mesh import Faces
+from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, oriented_order
 
-#: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles and
-#: marks begin, length of the whole.
-HEADER = 6
-TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, LENGTH = range(HEADER)
+#: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
+#: marks, oriented boxes (`model.surface_tree`) and the first triangles of leaves begin, length of
+#: the whole.
+HEADER = 8
+(TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, LENGTH) = range(
+    HEADER
+)
 #: Most triangles of a leaf.
 LEAF = 4
 #: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
@@ -32,40 +36,38 @@ CORNER, INNER, DEPTH, ORDER, BESIDE, NUMBER, UNIT, CORNER_NORMAL = 0, 9, 18, 21,
 Indices = npt.NDArray[np.int64]
 
 
-def leaves_order(middles: Array, levels: int) -> Indices:
-    """Return the triangles in the order of the leaves of a tree.
+def leaves_order(middles: Array, levels: int) -> tuple[Indices, Indices]:
+    """Return the triangles in the order of the leaves of a tree, and where leaves begin.
 
-    Node k of level l holds those from k m // 2^l to (k + 1) m // 2^l: halves along the longest
-    side of what it holds.
+    Each node is halved along the longest side of what it holds.
     """
     count = len(middles)
-    order = np.arange(count)
+    order: Indices = np.arange(count)
+    starts: Indices = np.arange(2**levels + 1) * count // 2**levels
     for level in range(levels):
-        bounds = np.arange(2**level + 1) * count // 2**level
+        bounds = level_bounds(starts, levels, level)
         part = np.repeat(np.arange(2**level), np.diff(bounds))
         here = middles[order]
         low = np.minimum.reduceat(here, bounds[:-1], axis=0)
         high = np.maximum.reduceat(here, bounds[:-1], axis=0)
         longest = (high - low).argmax(axis=1)
         order = order[np.lexsort((here[np.arange(count), longest[part]], part))]
-    return order
+    return order, starts
 
 
-def _boxes(low: Array, high: Array, levels: int) -> Array:
+def _boxes(low: Array, high: Array, starts: Indices, levels: int) -> Array:
     """Return centre and half edges of the boxes of all nodes, shape (2^(levels + 1), 6)."""
-    count = len(low)
     made = np.zeros((2 ** (levels + 1), 6))
-    bounds = np.arange(2**levels) * count // 2**levels
-    low = np.minimum.reduceat(low, bounds, axis=0)
-    high = np.maximum.reduceat(high, bounds, axis=0)
-    for level in range(levels, -1, -1):
-        first = 2**level
-        made[first : 2 * first, :3] = 0.5 * (low + high)
+    made[:, 3:] = NOTHING
+    for level in range(levels + 1):
+        bounds = level_bounds(starts, levels, level)
+        held = np.flatnonzero(np.diff(bounds))
+        least = np.minimum.reduceat(low, bounds[held], axis=0)
+        most = np.maximum.reduceat(high, bounds[held], axis=0)
+        made[2**level + held, :3] = 0.5 * (least + most)
         # rounded outward
-        made[first : 2 * first, 3:] = 0.5 * (high - low) * (1.0 + 1e-15) + 1e-15 * np.abs(low)
-        if level:
-            low = np.minimum(low[::2], low[1::2])
-            high = np.maximum(high[::2], high[1::2])
+        outward = 0.5 * (most - least) * (1.0 + 1e-15) + 1e-15 * np.abs(least)
+        made[2**level + held, 3:] = outward
     return made
 
 
@@ -93,7 +95,9 @@ def _corner_normals(corners: Array, faces: Faces, units: Array) -> Array:
     return total[faces]
 
 
-def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
+def pack(
+    vertices: Array, faces: Faces, inner: Array | None = None, depth: Array | None = None
+) -> Array:
     """Return a closed mesh as one packed array.
 
     Parameters
@@ -102,33 +106,46 @@ def pack(vertices: Array, faces: Faces, inner: Array, depth: Array) -> Array:
         Positions [L], shape axes.
     faces : ndarray of int, shape (m, 3)
         Triangles of a closed mesh, counter-clockwise seen from outside.
-    inner : ndarray, shape (n, 3)
-        The inner points of its layer (`model.surface_layer`) [L]; the vertices for a mesh that is
-        used without.
-    depth : ndarray, shape (n,)
+    inner : ndarray, shape (n, 3), optional
+        The inner points of its layer (`model.surface_layer`) [L]. Without them the mesh has no
+        layer and no oriented boxes: it can be used on planes and under spheres alone.
+    depth : ndarray, shape (n,), optional
         The depths of these [L].
     """
+    layered = inner is not None
+    inner = vertices if inner is None else inner
+    depth = np.zeros(len(vertices)) if depth is None else depth
     count = len(faces)
-    levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0)))))
-    order = leaves_order(vertices[faces].mean(axis=1), levels)
-    place = np.empty(count, dtype=np.int64)
-    place[order] = np.arange(count)
-    beside = place[beyond_edges(faces)[order]]
-    ordered = faces[order]
-    corners, below = vertices[ordered], inner[ordered]
+    # room for uneven cuts
+    levels = max(0, int(np.ceil(np.log2(max(count / LEAF, 1.0))))) + int(layered)
+    corners, below = vertices[faces], inner[faces]
     units = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(units, axis=1)
     units = units / np.where(length > 0.0, length, 1.0)[:, None]
+    if layered:
+        order, starts = oriented_order(corners, below, units, levels, LEAF)
+    else:
+        order, starts = leaves_order(corners.mean(axis=1), levels)
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    beside, ordered = place[beyond_edges(faces)[order]], faces[order]
+    corners, below, units = corners[order], below[order], units[order]
 
     low, high = corners.min(axis=1), corners.max(axis=1)
     deep_low, deep_high = np.minimum(low, below.min(axis=1)), np.maximum(high, below.max(axis=1))
-    boxes = np.hstack([_boxes(low, high, levels), _boxes(deep_low, deep_high, levels)])
+    boxes = np.hstack([
+        _boxes(low, high, starts, levels), _boxes(deep_low, deep_high, starts, levels)
+    ])  # fmt: skip
     table = np.hstack([
         corners.reshape(count, 9), below.reshape(count, 9), depth[ordered],
         np.argsort(ordered, axis=1), beside, order[:, None], units,
         _corner_normals(corners, ordered, units).reshape(count, 9),
     ])  # fmt: skip
-    at = HEADER + np.cumsum([0, boxes.size, table.size, count])
-    head = [count, levels, *at]
-    packed: Array = np.concatenate([head, boxes.ravel(), table.ravel(), np.full(count, -1.0)])
+    oriented = (
+        oriented_boxes(corners, below, units, starts, levels).ravel() if layered else np.zeros(0)
+    )
+    marks = np.full(count, -1.0)
+    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts]
+    at = HEADER + np.cumsum([0, *map(len, parts)])
+    packed: Array = np.concatenate([[count, levels, *at], *parts])
     return packed

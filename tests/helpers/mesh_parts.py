@@ -13,6 +13,9 @@ import numpy as np
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
+#: Part of the space between two teeth that a gear's foot takes at its root; a mating tip passes by.
+FOOT = 0.1
+
 
 def circle(radius: float, z: float, count: int) -> np.ndarray:
     """Return `count` points (count, 3) [L] on a circle about z."""
@@ -89,7 +92,8 @@ def gear(teeth: int, module: float, width: float, points: int, backlash: float =
     def inv(angle: np.ndarray | float) -> np.ndarray | float:
         return np.tan(angle) - angle
 
-    low = max(base, root)
+    # flanks of gears of 17 teeth and more touch above this
+    low = max(base, root) + 0.1 * module
     # equal steps of the roll angle: the chords' height above the flank is then nearly one
     roll = np.linspace(np.sqrt((low / base) ** 2 - 1.0), np.sqrt((tip / base) ** 2 - 1.0), points)
     angle = np.arctan(roll)
@@ -98,7 +102,7 @@ def gear(teeth: int, module: float, width: float, points: int, backlash: float =
     # the foot widens towards the root, as a fillet does
     space = np.pi / teeth - half[0]
     radii = np.concatenate([[root], flank, flank[::-1], [root]])
-    foot = half[0] + 0.3 * space
+    foot = half[0] + FOOT * space
     angles = np.concatenate([[-foot], -half, half[::-1], [foot]])
     turns = 2.0 * np.pi * np.arange(teeth) / teeth
     t = (turns[:, None] + angles).ravel()
@@ -200,8 +204,8 @@ def pawl(length: float, thick: float, width: float) -> Mesh:
 
 
 PARTS: dict[str, Callable[[], Mesh]] = {
-    "gear20.stl": lambda: gear(20, 2.0, 10.0, 8),
-    "gear30.stl": lambda: gear(30, 2.0, 10.0, 8),
+    "gear20.stl": lambda: gear(20, 2.0, 10.0, 60),
+    "gear30.stl": lambda: gear(30, 2.0, 10.0, 40),
     "ratchet_wheel.stl": lambda: ratchet(16, 40.0, 34.0, 10.0),
     "ratchet_pawl.stl": lambda: pawl(30.0, 6.0, 8.0),
     "bolt.stl": lambda: bolt(5.0, 20.0, 8.0, 6.0),

@@ -17,10 +17,8 @@ class Meshed:
 
     def __init__(self, vertices, faces, layered=True):
         self.vertices, self.faces = np.asarray(vertices, dtype=float), np.asarray(faces)
-        bare = (self.vertices, np.zeros(len(self.vertices)))
-        self.data = pack(
-            self.vertices, self.faces, *(layer(self.vertices, self.faces) if layered else bare)
-        )
+        made = layer(self.vertices, self.faces) if layered else ()
+        self.data = pack(self.vertices, self.faces, *made)
         self.size = np.array([0.0, 0.0, 0.0, self.data.ctypes.data])
 
     @property

@@ -647,6 +647,26 @@ def test_ratchet_holds():
     assert 2.9 < held[-1] < 3.0
 
 
+@pytest.mark.slow
+def test_ratchet_holds_for_ten_seconds():
+    results = run_model("ratchet.xml", end_time=10.0, print_interval=0.05)
+    teeth = results["requests/1/F2"][results["time"] > 0.5] * 16 / (2 * np.pi)
+    assert np.ptp(teeth) < 1e-9
+    assert np.abs(results["bodies/2/angular_velocity"][-1]).max() < 1e-9
+    load = results["contacts/301/force"][results["time"] > 0.5]
+    assert np.ptp(load, axis=0).max() < 1e-6 * np.abs(load).max()
+
+
+def test_gear_pair_starts_apart_and_is_loaded_one_way():
+    # mean ratio of speeds and transmission error: tests/integration/test_gear_pair.py
+    results = run_model("gear_pair.xml", end_time=1.5e-3)
+    depth = results["contacts/301/penetration"]
+    assert depth[0] == 0.0
+    # one or two pairs of flanks carry 1000 N mm on the base circle
+    force = 1000.0 / (30.0 * np.cos(np.deg2rad(20.0)))
+    assert 0.4 * force / 1e4 < depth[-1] < 1.1 * force / 1e4
+
+
 def test_balls_in_bowl():
     results = run_model("balls_in_bowl.xml")
     t = results["time"]

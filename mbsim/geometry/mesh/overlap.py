@@ -13,55 +13,32 @@ import numpy as np
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import vector
+from mbsim.geometry.mesh.oriented import axes_between, extent, have_room, node_of
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
-from mbsim.geometry.mesh.prism import above_or_below, piece_in_prism
+from mbsim.geometry.mesh.prism import apart, piece_in_prism
 from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
-from mbsim.geometry.mesh.tree import WAITING, leaf_range
+from mbsim.geometry.mesh.tree import WAITING
 from mbsim.model.surface import (
-    AT_BOXES,
     AT_TRIANGLES,
     BESIDE,
-    BOX,
     CORNER,
-    DEEP_BOX,
     DEPTH,
+    INNER,
     LEAF,
     LEVELS,
-    NODE,
     TRIANGLE,
 )
+from mbsim.model.surface_tree import DEEP, FIRST, LAST, THIN
 
 #: Which surface may be in which layer: I's in J's, J's in I's.
 I_IN_J, J_IN_I = 1, 2
 #: Numbers of a triangle that the walk needs: corners, inner points, depths, order.
 PRISM = 24
+#: Nodes of so few triangles are looked at as leaves.
+FEW = 2
 #: Edges of a pair of triangles.
 EDGES = 6
-
-
-@jitable
-def boxes_meet(a: F1, b: F1, pose: F1) -> bool:
-    """Return whether box a (six numbers, I's axes) and b (J's) meet, seen along their own axes.
-
-    `pose` is I in J's axes: origin, then the rotation by rows.
-    """
-    x, y, z = a[0], a[1], a[2]
-    u = pose[0] + pose[3] * x + pose[4] * y + pose[5] * z - b[0]
-    if abs(u) > abs(pose[3]) * a[3] + abs(pose[4]) * a[4] + abs(pose[5]) * a[5] + b[3]:
-        return False
-    v = pose[1] + pose[6] * x + pose[7] * y + pose[8] * z - b[1]
-    if abs(v) > abs(pose[6]) * a[3] + abs(pose[7]) * a[4] + abs(pose[8]) * a[5] + b[4]:
-        return False
-    w = pose[2] + pose[9] * x + pose[10] * y + pose[11] * z - b[2]
-    if abs(w) > abs(pose[9]) * a[3] + abs(pose[10]) * a[4] + abs(pose[11]) * a[5] + b[5]:
-        return False
-    for k in range(3):
-        along = abs(pose[3 + k] * u + pose[6 + k] * v + pose[9 + k] * w)
-        reach = abs(pose[3 + k]) * b[3] + abs(pose[6 + k]) * b[4] + abs(pose[9 + k]) * b[5]
-        if along > reach + a[3 + k]:
-            return False
-    return True
 
 
 @jitable
@@ -90,40 +67,6 @@ def box_gap(a: F1, b: F1, pose: F1) -> float:
 
 
 @jitable
-def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
-    """Return a lower bound of the distance of two meshes: the least one of boxes of leaves."""
-    waiting, far = np.empty((4 * WAITING, 2), np.int64), np.empty(4 * WAITING)
-    waiting[0, 0], waiting[0, 1], far[0], many = 1, 1, 0.0, 1
-    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
-    best = math.inf
-    while many > 0 and best > 0.0:
-        many -= 1
-        i, j = waiting[many, 0], waiting[many, 1]
-        if far[many] >= best:
-            continue
-        if i >= leaves_i and j >= leaves_j:
-            best = far[many]
-            continue
-        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
-        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
-        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
-        of_i = i < leaves_i and (larger or j >= leaves_j)
-        for k in range(2):
-            a, b = (2 * i + k, j) if of_i else (i, 2 * j + k)
-            box_a = mesh_i[int(mesh_i[AT_BOXES]) + NODE * a :]
-            box_b = mesh_j[int(mesh_j[AT_BOXES]) + NODE * b :]
-            waiting[many + k, 0], waiting[many + k, 1] = a, b
-            far[many + k] = box_gap(box_a, box_b, pose)
-        if far[many] < far[many + 1]:
-            # the nearer one is looked at first, so it is put on last
-            for c in range(2):
-                waiting[many, c], waiting[many + 1, c] = waiting[many + 1, c], waiting[many, c]
-            far[many], far[many + 1] = far[many + 1], far[many]
-        many += 2
-    return best
-
-
-@jitable
 def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F1) -> None:
     """Write corners, inner points, depths and order of a triangle in J's axes from `origin`."""
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
@@ -141,9 +84,9 @@ def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F
 
 
 @jitable
-def corners_of(prism: F1) -> tuple[V3, V3, V3]:
-    """Return the corners of a placed triangle."""
-    return (vector(prism[CORNER:]), vector(prism[CORNER + 3 :]), vector(prism[CORNER + 6 :]))
+def corners_of(prism: F1, at: int) -> tuple[V3, V3, V3]:
+    """Return the corners of a placed triangle, or its inner points."""
+    return (vector(prism[at:]), vector(prism[at + 3 :]), vector(prism[at + 6 :]))
 
 
 @jitable
@@ -156,17 +99,14 @@ def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, wo
         node[k] = 0.0
     for k in range(EDGES):
         values[k] = other[k] = 0.0
-    if ways & I_IN_J:
-        tri = corners_of(a)
-        if not above_or_below(b, tri):
-            piece_in_prism(b, tri, 1.0, node, values, work)
-    if ways & J_IN_I:
-        tri = corners_of(b)
-        if not above_or_below(a, tri):
-            piece_in_prism(a, tri, -1.0, node, other, work)
-            for k in range(3):
-                values[k] = max(values[k], other[3 + k])
-                values[3 + k] = max(values[3 + k], other[k])
+    of_a, of_b = corners_of(a, CORNER), corners_of(b, CORNER)
+    if ways & I_IN_J and not apart(of_b, corners_of(b, INNER), of_a):
+        piece_in_prism(b, of_a, 1.0, node, values, work)
+    if ways & J_IN_I and not apart(of_a, corners_of(a, INNER), of_b):
+        piece_in_prism(a, of_b, -1.0, node, other, work)
+        for k in range(3):
+            values[k] = max(values[k], other[3 + k])
+            values[3 + k] = max(values[3 + k], other[k])
     return node[PEAK] > 0.0
 
 
@@ -199,27 +139,25 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
     while many > 0:
         many -= 1
         i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
-        box_i = mesh_i[int(mesh_i[AT_BOXES]) + NODE * i :]
-        box_j = mesh_j[int(mesh_j[AT_BOXES]) + NODE * j :]
-        if ways & I_IN_J and not boxes_meet(box_i[BOX:], box_j[DEEP_BOX:], pose):
+        box_i, box_j = node_of(mesh_i, i), node_of(mesh_j, j)
+        axes = axes_between(box_i, box_j, pose)
+        if ways & I_IN_J and not have_room(box_i, THIN, box_j, DEEP, axes, pose):
             ways -= I_IN_J
-        if ways & J_IN_I and not boxes_meet(box_i[DEEP_BOX:], box_j[BOX:], pose):
+        if ways & J_IN_I and not have_room(box_i, DEEP, box_j, THIN, axes, pose):
             ways -= J_IN_I
         if ways == 0:
             continue
-        larger = box_i[3] + box_i[4] + box_i[5] > box_j[3] + box_j[4] + box_j[5]
-        if i < leaves_i and (larger or j >= leaves_j):
+        first_i, last_i = int(box_i[FIRST]), int(box_i[LAST])
+        first_j, last_j = int(box_j[FIRST]), int(box_j[LAST])
+        ends_i = i >= leaves_i or last_i - first_i <= FEW
+        ends_j = j >= leaves_j or last_j - first_j <= FEW
+        if not (ends_i and ends_j):
+            of_i = not ends_i and (ends_j or extent(box_i) > extent(box_j))
             for k in range(2):
-                waiting[many, 0], waiting[many, 1], waiting[many, 2] = 2 * i + k, j, ways
+                waiting[many, 0], waiting[many, 1] = (2 * i + k, j) if of_i else (i, 2 * j + k)
+                waiting[many, 2] = ways
                 many += 1
             continue
-        if j < leaves_j:
-            for k in range(2):
-                waiting[many, 0], waiting[many, 1], waiting[many, 2] = i, 2 * j + k, ways
-                many += 1
-            continue
-        first_i, last_i = leaf_range(mesh_i, i)
-        first_j, last_j = leaf_range(mesh_j, j)
         for t in range(first_i, last_i):
             place_triangle(mesh_i, t, pose, True, origin, placed_i[t - first_i])
         for t in range(first_j, last_j):

@@ -14,7 +14,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.record import BEYOND, MOST, SUMS, add_piece
-from mbsim.model.surface import CORNER, DEPTH, INNER, ORDER
+from mbsim.model.surface import DEPTH, INNER, ORDER
 
 #: What makes an edge of a polygon besides the triangle's own edges 0, 1, 2: the sides of the prism
 #: at the edges 0, 1, 2 of its triangle, the inner end, planes within the prism and its outside.
@@ -142,15 +142,31 @@ def piece_in_prism(
 
 
 @jitable
-def above_or_below(prism: F1, tri: tuple[V3, V3, V3]) -> bool:
-    """Return whether a triangle lies wholly on one side of a prism: above it or deeper."""
-    a, b, c = vector(prism[CORNER:]), vector(prism[CORNER + 3 :]), vector(prism[CORNER + 6 :])
-    n = cross(sub(b, a), sub(c, a))
-    high = max(dot(n, sub(tri[0], a)), dot(n, sub(tri[1], a)), dot(n, sub(tri[2], a)))
-    low = min(dot(n, sub(tri[0], a)), dot(n, sub(tri[1], a)), dot(n, sub(tri[2], a)))
-    if low >= 0.0:
+def range_of(n: V3, tri: tuple[V3, V3, V3], origin: V3) -> tuple[float, float]:
+    """Return the least and the largest height of three points above an origin."""
+    a, b, c = dot(n, sub(tri[0], origin)), dot(n, sub(tri[1], origin)), dot(n, sub(tri[2], origin))
+    return min(a, b, c), max(a, b, c)
+
+
+@jitable
+def apart(outer: tuple[V3, V3, V3], inner: tuple[V3, V3, V3], tri: tuple[V3, V3, V3]) -> bool:
+    """Return whether a triangle has no area in a prism, by one of five directions.
+
+    They are the normals of both triangles and, in the plane of the prism's, those of its edges.
+    """
+    n = cross(sub(outer[1], outer[0]), sub(outer[2], outer[0]))
+    low, high = range_of(n, tri, outer[0])
+    if low >= 0.0 or high <= min(0.0, range_of(n, inner, outer[0])[0]):
         return True
-    deepest = 0.0
+    n_tri = cross(sub(tri[1], tri[0]), sub(tri[2], tri[0]))
+    low, high = range_of(n_tri, outer, tri[0])
+    if low >= 0.0 or high <= 0.0:
+        inner_low, inner_high = range_of(n_tri, inner, tri[0])
+        if min(low, inner_low) >= 0.0 or max(high, inner_high) <= 0.0:
+            return True
     for k in range(3):
-        deepest = min(deepest, dot(n, sub(vector(prism[INNER + 3 * k :]), a)))
-    return high <= deepest
+        start = outer[k]
+        out = cross(sub(outer[k + 1 if k < 2 else 0], start), n)
+        if range_of(out, tri, start)[0] >= max(0.0, range_of(out, inner, start)[1]):
+            return True
+    return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.model.surface import LEVELS, TRIANGLES
+from mbsim.model.surface import AT_LEAVES, LEVELS
 
 #: Nodes that wait at once: more than a tree of 2^52 leaves has levels.
 WAITING = 64
@@ -13,9 +13,8 @@ WAITING = 64
 @jitable
 def leaf_range(mesh: F1, node: int) -> tuple[int, int]:
     """Return the first triangle of a leaf and the first behind it."""
-    levels, count = int(mesh[LEVELS]), int(mesh[TRIANGLES])
-    k = node - (1 << levels)
-    return (k * count) >> levels, ((k + 1) * count) >> levels
+    at = int(mesh[AT_LEAVES]) + node - (1 << int(mesh[LEVELS]))
+    return int(mesh[at]), int(mesh[at + 1])
 
 
 @jitable

@@ -25,6 +25,7 @@ from mbsim.geometry.mesh.ball import (
     through_wall,
     triangles_near,
 )
+from mbsim.geometry.mesh.distance import least_gap
 from mbsim.geometry.mesh.merging import (
     AT_NODE,
     MOST_PEAKS,
@@ -37,7 +38,6 @@ from mbsim.geometry.mesh.merging import (
 from mbsim.geometry.mesh.overlap import (
     box_gap,
     common_middle,
-    least_gap,
     nodes_of,
     partners_of,
 )

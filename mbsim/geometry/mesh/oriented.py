@@ -1,0 +1,102 @@
+"""Whether oriented boxes of two meshes have room in common (`model.surface_tree`)."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.core.arrays import F1, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, dot, sub, vector
+from mbsim.model.surface import AT_ORIENTED
+from mbsim.model.surface_tree import ORIENTED, THIN
+
+#: Boxes have nothing in common where they do so by less than this part of their half edges: flush
+#: sides have no depth in each other, whatever rounding tells.
+FLUSH = 1e-13
+
+
+@jitable
+def place(pose: F1, p: V3) -> V3:
+    """Return a point of I's axes in J's; `pose` is I in J's axes: origin, rotation by rows."""
+    return add(vector(pose), turn(pose, p))
+
+
+@jitable
+def turn(pose: F1, d: V3) -> V3:
+    """Return a vector of I's axes in J's."""
+    return (dot(vector(pose[3:]), d), dot(vector(pose[6:]), d), dot(vector(pose[9:]), d))
+
+
+@jitable
+def node_of(mesh: F1, k: int) -> F1:
+    """Return the numbers of a node's oriented boxes, and what follows them."""
+    return mesh[int(mesh[AT_ORIENTED]) + ORIENTED * k :]
+
+
+@jitable
+def extent(node: F1) -> float:
+    """Return half the sum of the edges of the box around a node's triangles."""
+    return node[THIN + 3] + node[THIN + 4] + node[THIN + 5]
+
+
+@jitable
+def sizes(d: V3) -> V3:
+    """Return the absolute components of a vector."""
+    return (abs(d[0]), abs(d[1]), abs(d[2]))
+
+
+@jitable
+def axes_between(a: F1, b: F1, pose: F1) -> tuple[V3, V3, V3]:
+    """Return the axes of node a (of I) in those of node b (of J)."""
+    x, y, z = turn(pose, vector(a)), turn(pose, vector(a[3:])), turn(pose, vector(a[6:]))
+    u, v, w = vector(b), vector(b[3:]), vector(b[6:])
+    return (
+        (dot(u, x), dot(v, x), dot(w, x)),
+        (dot(u, y), dot(v, y), dot(w, y)),
+        (dot(u, z), dot(v, z), dot(w, z)),
+    )
+
+
+@jitable
+def offset(a: F1, at_a: int, b: F1, at_b: int, pose: F1) -> V3:
+    """Return the way from the centre of a box of node b to one of node a, in the axes of b."""
+    off = sub(place(pose, vector(a[at_a:])), vector(b[at_b:]))
+    return (dot(vector(b), off), dot(vector(b[3:]), off), dot(vector(b[6:]), off))
+
+
+@jitable
+def box_distance(a: F1, at_a: int, b: F1, at_b: int, pose: F1) -> float:
+    """Return a lower bound of the distance of two boxes: along an axis of one; 0 if none parts."""
+    axes, off = axes_between(a, b, pose), offset(a, at_a, b, at_b, pose)
+    half_a, half_b = vector(a[at_a + 3 :]), vector(b[at_b + 3 :])
+    x, y, z = sizes(axes[0]), sizes(axes[1]), sizes(axes[2])
+    gap = max(0.0, abs(dot(axes[0], off)) - half_a[0] - dot(x, half_b))
+    gap = max(gap, abs(dot(axes[1], off)) - half_a[1] - dot(y, half_b))
+    gap = max(gap, abs(dot(axes[2], off)) - half_a[2] - dot(z, half_b))
+    square = 0.0
+    for k in range(3):
+        reach = half_a[0] * x[k] + half_a[1] * y[k] + half_a[2] * z[k]
+        out = max(0.0, abs(off[k]) - reach - half_b[k])
+        square += out * out
+    return max(gap, math.sqrt(square))
+
+
+@jitable
+def have_room(a: F1, at_a: int, b: F1, at_b: int, axes: tuple[V3, V3, V3], pose: F1) -> bool:
+    """Return whether two boxes of nodes a and b overlap, seen along the axes of both.
+
+    `at_a`, `at_b` tell which box; `axes` are those of a in those of b.
+    """
+    off = offset(a, at_a, b, at_b, pose)
+    half_a, half_b = vector(a[at_a + 3 :]), vector(b[at_b + 3 :])
+    flush = FLUSH * (half_a[0] + half_a[1] + half_a[2] + half_b[0] + half_b[1] + half_b[2])
+    x, y, z = sizes(axes[0]), sizes(axes[1]), sizes(axes[2])
+    for k in range(3):
+        reach = half_a[0] * x[k] + half_a[1] * y[k] + half_a[2] * z[k]
+        if abs(off[k]) >= reach + half_b[k] - flush:
+            return False
+    return (
+        abs(dot(axes[0], off)) < half_a[0] + dot(x, half_b) - flush
+        and abs(dot(axes[1], off)) < half_a[1] + dot(y, half_b) - flush
+        and abs(dot(axes[2], off)) < half_a[2] + dot(z, half_b) - flush
+    )

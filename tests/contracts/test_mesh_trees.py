@@ -1,0 +1,160 @@
+"""Trees of boxes over meshes and their layers: nothing that touches is passed over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from helpers.mesh_parts import bolt, gear
+from helpers.pairs import random_rotation
+from helpers.surfaces import Meshed, angle, box, call, incidents, torus
+from mbsim.geometry.mesh.distance import least_gap, triangle_distance
+from mbsim.geometry.mesh.oriented import axes_between, box_distance, have_room
+from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
+from mbsim.geometry.mesh.polygon import CORNERS
+from mbsim.geometry.mesh.prism import apart, piece_in_prism
+from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
+from mbsim.geometry.mesh.tree import leaf_range
+from mbsim.geometry.pairs.surface import pose_of
+from mbsim.model.flat_parts import fewer_triangles
+from mbsim.model.mesh import merge_vertices
+from mbsim.model.surface import (
+    AT_BOXES,
+    AT_ORIENTED,
+    AT_TRIANGLES,
+    INNER,
+    LEAF,
+    LEVELS,
+    NODE,
+    TRIANGLE,
+)
+from mbsim.model.surface_tree import DEEP, FIRST, LAST, ORIENTED, ROWS, THIN
+
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+)
+MESHES = {
+    "tetrahedron": TETRAHEDRON,
+    "box": box(0.3, 0.2, 0.1),
+    "angle": angle(),
+    "torus": torus(0.1, 0.03, 16, 8),
+    "gear": merge_vertices(*gear(20, 2.0, 10.0, 6)),
+    "bolt": merge_vertices(*bolt(5.0, 20.0, 8.0, 6.0)),
+}
+
+
+def random_pose(rng, size):
+    return np.concatenate([size * rng.normal(size=3), random_rotation(rng).ravel()])
+
+
+@pytest.mark.parametrize("layered", [True, False])
+@pytest.mark.parametrize("name", list(MESHES))
+def test_boxes_hold_what_their_nodes_do(name, layered):
+    mesh = Meshed(*MESHES[name], layered=layered)
+    data, count = mesh.data, len(mesh.faces)
+    levels, slack = int(data[LEVELS]), 1e-12 * np.ptp(mesh.vertices)
+    table = data[int(data[AT_TRIANGLES]) :][: count * TRIANGLE].reshape(count, TRIANGLE)
+    outer, inner = table[:, :INNER].reshape(-1, 3, 3), table[:, INNER:18].reshape(-1, 3, 3)
+    found = []
+    for k in range(2**levels):
+        first, last = leaf_range(data, 2**levels + k)
+        assert 0 <= last - first <= LEAF
+        found += range(first, last)
+        node = 2**levels + k
+        while node > 0 and first < last:
+            row = data[int(data[AT_BOXES]) + NODE * node :][:NODE]
+            for at, points in ((0, outer), (6, inner), (6, outer)):
+                away = np.abs(points[first:last] - row[at : at + 3]) - row[at + 3 : at + 6]
+                assert away.max() < slack
+            if layered:
+                row = data[int(data[AT_ORIENTED]) + ORIENTED * node :][:ORIENTED]
+                axes = row[ROWS:THIN].reshape(3, 3)
+                assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-12)
+                assert row[FIRST] <= first
+                assert row[LAST] >= last
+                for at, points in ((THIN, outer), (DEEP, inner), (DEEP, outer)):
+                    off = (points[first:last] - row[at : at + 3]) @ axes.T
+                    assert (np.abs(off) - row[at + 3 : at + 6]).max() < slack
+            node //= 2
+    assert found == list(range(count))
+
+
+def random_node(rng):
+    thin = [*rng.normal(size=3), *rng.uniform(0.0, 1.0, size=3)]
+    return np.array([*random_rotation(rng).ravel(), *thin, *thin, 0.0, 0.0])
+
+
+def test_boxes_with_a_common_point_have_room():
+    rng = np.random.default_rng(1)
+    shared = 0
+    for _ in range(300):
+        a, b, pose = random_node(rng), random_node(rng), random_pose(rng, 0.5)
+        room = have_room(a, THIN, b, THIN, axes_between(a, b, pose), pose)
+        distance = box_distance(a, THIN, b, THIN, pose)
+        assert (distance == 0.0) == room
+        own = (2.0 * rng.random((400, 3)) - 1.0) * a[THIN + 3 : DEEP]
+        points = a[THIN : THIN + 3] + own @ a[:9].reshape(3, 3)
+        placed = pose[:3] + points @ pose[3:].reshape(3, 3).T
+        off = np.abs((placed - b[THIN : THIN + 3]) @ b[:9].reshape(3, 3).T) - b[THIN + 3 : DEEP]
+        if (off.max(axis=1) < 0.0).any():
+            shared += 1
+            assert room
+        # no point of a is nearer to b than the bound
+        assert np.linalg.norm(np.maximum(off, 0.0), axis=1).min() >= distance - 1e-12
+    assert shared > 20
+
+
+def test_the_bound_of_two_triangles_is_no_more_than_their_distance():
+    rng = np.random.default_rng(2)
+    weights = rng.dirichlet(np.ones(3), size=60)
+    parted = 0
+    for _ in range(300):
+        p, q = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)) + np.eye(3)[0]
+        bound = triangle_distance(tuple(map(tuple, p)), tuple(map(tuple, q)))
+        apart_by = np.linalg.norm((weights @ p)[:, None] - (weights @ q)[None], axis=2).min()
+        assert 0.0 <= bound <= apart_by
+        parted += bound > 0.0
+        # a corner of one within the other: they meet
+        met = np.vstack([q[:2], weights[0] @ p])
+        assert triangle_distance(tuple(map(tuple, p)), tuple(map(tuple, met))) < 1e-12
+    assert parted > 50
+
+
+def test_what_is_told_apart_has_no_piece():
+    rng = np.random.default_rng(3)
+    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    mesh = Meshed(*torus(0.1, 0.03, 16, 8))
+    at = int(mesh.data[AT_TRIANGLES])
+    told = pieces = 0
+    for _ in range(1500):
+        t = rng.integers(len(mesh.faces))
+        prism = mesh.data[at + TRIANGLE * t :][:24]
+        outer, inner = prism[:9].reshape(3, 3), prism[9:18].reshape(3, 3)
+        centre = np.vstack([outer, inner]).mean(axis=0)
+        tri = centre + 0.03 * rng.normal(size=(1, 3)) + 0.02 * rng.normal(size=(3, 3))
+        corners = tuple(map(tuple, tri))
+        node, values = np.zeros(PATCH_NUMBERS), np.zeros(6)
+        piece_in_prism(prism, corners, 1.0, node, values, work)
+        pieces += node[PEAK] > 0.0
+        if apart(tuple(map(tuple, outer)), tuple(map(tuple, inner)), corners):
+            told += 1
+            assert node[PEAK] < 1e-15
+    assert told > 200
+    assert pieces > 100
+
+
+@pytest.mark.parametrize("name", ["box", "angle", "gear"])
+def test_flush_parts_have_no_incident_and_a_gap_is_found(name):
+    """A copy beside the part, its flat side against the part's; then a thousandth away."""
+    vertices, faces = fewer_triangles(*MESHES[name])
+    mesh = Meshed(vertices, faces)
+    size = float(np.ptp(vertices[:, 2]))
+    upright = np.eye(3).ravel()
+    still = np.concatenate([np.zeros(3), upright])
+    for gap in (0.0, 1e-3 * size):
+        beside = np.concatenate([[0.0, 0.0, size + gap], upright])
+        points = call("SURFACE-SURFACE", beside, mesh.size, still, mesh.size)
+        assert len(incidents(points)[0]) == 0
+        assert -points[0, 0] == pytest.approx(gap, rel=1e-9)
+        assert least_gap(mesh.data, mesh.data, pose_of(beside, still)) == pytest.approx(gap)
