@@ -386,7 +386,7 @@ class Runner:
             last = self.stage == len(self.settings.stages) - 1
             self.sensing.begin(output_times(simulation, last), stage.h_max)
         self._look_ahead(stage, fresh)
-        # a resumed run stands there too, where the one before it was ended before it went on for good
+        # a resumed run stands there too, where the one before it had not gone on for good
         if self.stage == 0 and not method.counts[scheme.STEPS] and self.methods.may_begin_anew:
             self._first = self.checkpoint()
             self.recorder.mark()
