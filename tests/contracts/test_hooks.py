@@ -52,6 +52,7 @@ CASES = [
     *((Hook.CONTACTS, what, "bowling_ball", "DOPRI5") for what in Contacts),
     (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
     (Hook.SLOTS, None, "angle", "DOPRI5"),
+    (Hook.SPREAD, None, "angle", "DOPRI5"),
     (Hook.TILTING, None, "contensou_disc", "DOPRI5"),
     *((Hook.RECALL, what, "lugre_stick_slip", "DOPRI5") for what in Recall),
     (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),

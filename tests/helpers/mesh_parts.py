@@ -203,6 +203,31 @@ def pawl(length: float, thick: float, width: float) -> Mesh:
     return prism_of(outline, [[0, 1, 4], [1, 2, 4], [2, 3, 4]], 0.5 * width)
 
 
+def octahedron(radius: float) -> Mesh:
+    """Return a regular octahedron, its corners on the axes."""
+    vertices = radius * np.array(
+        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float
+    )
+    upper = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]])
+    lower = upper[:, ::-1].copy()
+    lower[lower == 4] = 5
+    return vertices, np.concatenate([upper, lower])
+
+
+def hexagon_ring(flat: float, hole: float, height: float, count: int = 24) -> Mesh:
+    """Return a six-sided ring about z, the origin in its middle: a nut without a thread."""
+    low, high = -0.5 * height, 0.5 * height
+    return bands(
+        [
+            polygon(6, flat, low, count),
+            polygon(6, flat, high, count),
+            circle(hole, high, count),
+            circle(hole, low, count),
+        ],
+        closed=True,
+    )
+
+
 PARTS: dict[str, Callable[[], Mesh]] = {
     "gear20.stl": lambda: gear(20, 2.0, 10.0, 60),
     "gear30.stl": lambda: gear(30, 2.0, 10.0, 40),
@@ -212,6 +237,9 @@ PARTS: dict[str, Callable[[], Mesh]] = {
     "plate.stl": lambda: plate(40.0, 5.5, 8.0),
     "bowl.stl": lambda: bowl(100.0, 5.0, 64, 16),
     "disc_cam.stl": lambda: cam(30.0, 10.0, 10.0, 360),
+    "pile_angle.stl": lambda: angle_piece(16.0, 8.0, 14.0),
+    "pile_ring.stl": lambda: hexagon_ring(14.0, 7.0, 10.0),
+    "pile_octahedron.stl": lambda: octahedron(14.0),
     "angle_piece.stl": lambda: angle_piece(30.0, 10.0, 20.0),
 }
 
