@@ -109,13 +109,12 @@ def thickness(surface: Array, need: Need) -> float:
     for p, n in zip(corners[begins].mean(axis=1), unit[begins], strict=True):
         slope = -unit @ n
         out = slope > SQUARE
-        triangle = corners[out]
-        way = ((triangle[:, 0] - p) * unit[out]).sum(axis=1) / slope[out]
+        first, second, third = corners[out].swapaxes(0, 1)
+        way = ((first - p) * unit[out]).sum(axis=1) / slope[out]
         x = p - way[:, None] * n
         hit = way > 0.0
-        for k in range(3):
-            edge = triangle[:, (k + 1) % 3] - triangle[:, k]
-            hit &= (np.cross(edge, x - triangle[:, k]) * unit[out]).sum(axis=1) >= 0.0
+        for begin, end in ((first, second), (second, third), (third, first)):
+            hit &= (np.cross(end - begin, x - begin) * unit[out]).sum(axis=1) >= 0.0
         least = min(least, float(way[hit].min(initial=math.inf)))
     return 0.5 * least
 

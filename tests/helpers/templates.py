@@ -11,6 +11,8 @@ class Template(NamedTuple):
     place: str  # in the package; none where it holds lines for files that are there
     files: int
     lines: tuple[tuple[str, ...], ...] = ()  # file, what stands there, what shall, and so on
+    #: File and line by which the package registers one of this name already; it is not counted.
+    instead_of: tuple[str, str] | None = None
 
 
 TEMPLATES = {
@@ -19,7 +21,11 @@ TEMPLATES = {
     "joint": Template("joints/kinds/pin_in_slot.py", 1),
     "force": Template("forces/kinds/tether.py", 1),
     "scalar_force": Template("forces/kinds/cubic_spring.py", 1),
-    "pair": Template("geometry/pairs/ellipsoid_mesh.py", 1),
+    "pair": Template(
+        "geometry/pairs/ellipsoid_mesh.py",
+        1,
+        instead_of=("geometry/pairs/round_mesh.py", '@pair("ELLIPSOID", "MESH", slots=1)\n'),
+    ),
     "integrator": Template(
         "integrators/heun.py",
         2,

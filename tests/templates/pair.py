@@ -1,4 +1,4 @@
-"""An ellipsoid on the faces of a convex mesh, which FCL does without this file.
+"""An ellipsoid on the faces of a convex mesh, in place of the search for their least overlap.
 
     depth = min over faces (b - n.c + h(n))      h(n) = |A n|, A the semi-axes
 

@@ -12,12 +12,13 @@ from helpers.pile_decks import sets, shape_graphic, solid
 from mbsim import read_model
 from mbsim.compile_model import surfaces
 from mbsim.compile_model.pairing import plan_pairs
+from mbsim.compile_model.surfaces import Need
 from mbsim.model.elements import Graphic
 
 LAW = {"stiffness": 1e5, "exponent": 1, "damping": 100.0, "dmax": 1e-4}
 
 
-def needed(folder: Path, shapes: list[str], **law: object) -> dict[int, bool]:
+def needed(folder: Path, shapes: list[str], **law: object) -> dict[int, Need]:
     """Return what is needed as triangles where bodies of those shapes lie beside each other."""
     text = GROUND
     ids = []
@@ -33,7 +34,7 @@ def needed(folder: Path, shapes: list[str], **law: object) -> dict[int, bool]:
 def test_meshes_among_boxes_have_a_layer_where_both_are_triangles(tmp_path: Path) -> None:
     shapes = ["MESH", "BOX", "MESH"]
     found = needed(tmp_path, shapes, contact_depth="FIELD")
-    assert found == {200: True, 300: True, 400: True}
+    assert found == {200: Need.LAYER, 300: Need.LAYER, 400: Need.LAYER}
     assert needed(tmp_path, shapes[1:2] * 3) == {}
 
 

@@ -18,9 +18,9 @@ HELD_BACK = 0.25
 
 
 @jitable
-def trace(matrix: F2) -> float:
+def trace(S: F2) -> float:
     """Return the sum of the diagonal, which no axis of a positive matrix has more than."""
-    return matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
+    return S[0, 0] + S[1, 1] + S[2, 2]
 
 
 @jitable

@@ -81,7 +81,7 @@ def spread_of(scene: Scene, s: int) -> Root:
 
 
 @jitable
-def rub_patch(scene: Scene, s: int, c: int) -> int:
+def ask_over_patch(scene: Scene, s: int, c: int) -> int:
     """Ask the friction law of contact c all over the patch in slot s; return its code.
 
     `law_in` is filled for its centre, and stays. Forces, and the torque about the centre, are left

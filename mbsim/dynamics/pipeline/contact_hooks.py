@@ -16,7 +16,7 @@ from mbsim.dynamics.contact.memory import commit_memory, keep, remember
 from mbsim.dynamics.contact.patch_slots import keep_slots
 from mbsim.dynamics.contact.peaks import watch_end, watch_inside
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents
-from mbsim.dynamics.contact.spreading import rub_patch
+from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
 from mbsim.dynamics.events.step_limits import longest_step
@@ -97,9 +97,9 @@ def damp_contact(context: int, s: int, t: float, normal: float, a: Pointer) -> i
     return damp_tilting(scene, t, vector_at(a, scene.rows.y.shape[1]), s, normal)
 
 
-def rub_patch_of(context: int, s: int, c: int) -> int:
+def friction_of_patch(context: int, s: int, c: int) -> int:
     """What the friction law of contact c does all over the patch in slot s."""
-    return rub_patch(view(context, Scene), s, c)
+    return ask_over_patch(view(context, Scene), s, c)
 
 
 def recall_friction(context: int, what: int, s: int, t: float, a: Pointer, anew: int) -> int:

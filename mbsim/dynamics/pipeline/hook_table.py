@@ -5,8 +5,7 @@ means; `fill` puts the addresses into `World.hooks`, and nothing else does, but 
 which is Python (`run.simulation`). What a scene lacks is neither imported nor compiled.
 
 y, dy (n,) are pointers to doubles, t is a double, all else int64; `context` is the packed scene.
-Requests are those of `arrays.hooks`. Entries that share most of what they compile are one hook with
-requests: each C function costs 0.2 to 0.4 s to compile for itself.
+Entries that share most of what they compile are one hook with requests (`arrays.hooks`).
 
 A result is 0, or a `Code`, unless the row says otherwise: an answer is >= 0, or less a code. Every
 caller looks at it: it returns the code, or notes it (`arrays.hooks.note_failure`), and the hook
@@ -131,8 +130,8 @@ def _needs_jets(scene: Scene, method: Method) -> bool:
 
 
 def _has_applied(scene: Scene, method: Method) -> bool:
-    driven = len(scene.states.program) > 0 or bool((scene.world.weight >= 0).any())
-    return len(scene.applied.form) > 0 or driven
+    acts = len(scene.applied.form) > 0 or len(scene.states.program) > 0
+    return acts or bool((scene.world.weight >= 0).any())
 
 
 def _applied(scene: Scene) -> Callable[..., Any]:
@@ -299,7 +298,7 @@ TABLE = (
         Hook.SPREAD,
         _INT(_INT, _INT, _INT),  # context, slot, contact
         _spreads,
-        _of("pipeline.contact_hooks", "rub_patch_of"),
+        _of("pipeline.contact_hooks", "friction_of_patch"),
         "asks a friction law all over a patch",
     ),
     Row(
