@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,7 +85,24 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     metavar="N",
     help="Write the contact problem of every N-th step, FCLIB files in DIR/fclib.",
 )
+@click.option("--profile", is_flag=True, help="Print where the time went.")
 def command(
+    model: str,
+    output: Path | None,
+    overrides: tuple[str, ...],
+    progress: str,
+    as_json: bool,
+    profile: bool,
+    **options: Any,
+) -> None:
+    """Run MODEL and write DIR/<model>.h5, .csv (requests) and .log."""
+    from mbsim.core.profile import profiling
+
+    with profiling(time.process_time()) if profile else nullcontext():
+        _run(model, output, overrides, progress, as_json, **options)
+
+
+def _run(
     model: str,
     output: Path | None,
     overrides: tuple[str, ...],
@@ -92,13 +110,15 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Run MODEL and write DIR/<model>.h5, .csv (requests) and .log."""
+    """Run a deck, and print how it ended."""
     from mbsim.cli.messages import warn
+    from mbsim.core.profile import part
     from mbsim.errors import Interrupted, PluginError, SolverError
     from mbsim.reader.xml import read_model
     from mbsim.results.files import prepare_directory
 
-    deck = read_model(model, overrides)
+    with part("read"):
+        deck = read_model(model, overrides)
     warn(deck.warnings)
     directory = Path(deck.name) if output is None else output
     # before anything is compiled: half a minute is too long to hear of a full disk
@@ -131,6 +151,10 @@ def command(
             _print_json(results, result_file)
         else:
             _print_summary(results, result_file)
+        if not as_json and "profile_loop_s" in results.stats:
+            from mbsim.cli.profile import print_profile
+
+            print_profile(results.stats)
 
 
 def _say(text: str) -> None:

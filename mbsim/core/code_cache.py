@@ -30,7 +30,7 @@ from numba.core.caching import (
     _CacheLocator,
 )
 
-from mbsim.core import linking, processors
+from mbsim.core import linking, processors, profile
 from mbsim.errors import ModelError
 
 _BEGAN = time.time()
@@ -227,6 +227,10 @@ class CodeCache(FunctionCache):
         self._on_miss = on_miss
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        with profile.part("load"):
+            return self._loaded(sig, target_context)
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
         key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
         files = self._impl.locator.files
         data = None if any(map(_changed_once, files)) else self._find(key)

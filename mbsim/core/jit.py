@@ -23,7 +23,7 @@ from numba.core.ccallback import CFunc
 from numba.extending import register_jitable
 
 import mbsim.core.address  # noqa: F401  (compiled forms of core.memory)
-from mbsim.core import linking
+from mbsim.core import linking, profile
 from mbsim.core.code_cache import CodeCache, cache_root, is_known, source_digest
 from mbsim.core.jitable import take_marked
 
@@ -59,11 +59,15 @@ class _Watch(event.Listener):
         self._depth = 0
         self._began = 0.0
         self._collects = False
+        self._counts: profile.Profile | None = None
 
     def on_start(self, happened: Any) -> None:
         global on_first_compile
         if self._depth == 0:
             self._began = time.perf_counter()
+            self._counts = profile.running
+            if self._counts is not None:
+                self._counts.enter("compile")
             self._collects = gc.isenabled()
             gc.disable()  # the compiler's million small objects are looked through again and again
             if on_first_compile is not None:
@@ -78,9 +82,13 @@ class _Watch(event.Listener):
             if self._collects:
                 gc.enable()
             compile_seconds += time.perf_counter() - self._began
+            if self._counts is not None:
+                self._counts.leave()
 
 
-event.register("numba:run_pass", _Watch())
+_watch = _Watch()
+event.register("numba:run_pass", _watch)
+event.register("numba:compile", _watch)  # around the passes, and what Python calls is linked there
 
 
 class _NotKeptError(Exception):
@@ -163,7 +171,8 @@ def address(py_func: Callable[..., Any], signature: Any) -> int:
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
     try:
-        made.compile()
+        with profile.part("compile"):  # loading counts as such
+            made.compile()
     except _NotKeptError:
         return NOT_YET
     _kept[key] = made

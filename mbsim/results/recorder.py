@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
+from mbsim.core import profile
 from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
@@ -362,6 +363,9 @@ class Recorder:
         }
         self._store.complete()
         judged = to_attributes(audit) if audit is not None else {}
+        if profile.running is not None:
+            # up to here: what follows cannot be part of what it writes
+            stats = {**stats, **profile.running.stats()}
         self._store.update(values=peaks, attributes={"stats": stats, **judged})
         if self.earlier and not self.shown:
             # else a kill would leave this run's .csv and log beside the earlier one's file

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core import profile
 from mbsim.errors import Interrupted, ModelError
 from mbsim.run import checkpoint, statistics
 from mbsim.run.divergence import Pace
 from mbsim.run.failures import fail, give_up
 from mbsim.run.hook_calls import HookCalls
+from mbsim.run.options import Notify, Progress
 from mbsim.run.settings import Settings, Stage, output_times
 
 if TYPE_CHECKING:
@@ -42,10 +44,6 @@ def next_budget(budget: int, done: int, elapsed: float) -> int:
     """
     wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
     return int(min(max(wanted, 1.0), 4.0 * budget))
-
-
-Progress = Callable[[float, float, float], None]
-Notify = Callable[[str], None]
 
 
 class Runner:
@@ -79,6 +77,8 @@ class Runner:
                 Methods(system, settings.integrator, start, timed),
             )
         )
+        if profile.running is not None:
+            self._advance = profile.running.loop(self._advance)
         self._warn_of_states()
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
@@ -124,17 +124,10 @@ class Runner:
         from mbsim.run.start import assemble_model, settle_contacts
 
         t, method, log = self._first_time(), self.method, self.log.line
-        assemble_model(self.system, self.hooks, t, method.y, log, self.tell)
-        settle_contacts(
-            self.system,
-            self.hooks,
-            self.settings,
-            method.y,
-            method.k[0],
-            allow_overlap,
-            log,
-            self.tell,
-        )
+        with profile.part("start"):
+            assemble_model(self.system, self.hooks, t, method.y, log, self.tell)
+            given = method.y, method.k[0], allow_overlap, log, self.tell
+            settle_contacts(self.system, self.hooks, self.settings, *given)
 
     def _first_time(self) -> float:
         """Return when the first Simulate begins."""
@@ -152,6 +145,7 @@ class Runner:
         from mbsim.compile_model.changes import apply
 
         apply(self.system.scene, self.changes[self.stage])
+        self.methods.time_scene()
         if self.system.reader is not None:
             self.system.reader.open(self.system.scene)
         before = self.settings.stages[self.stage - 1].simulation.changes if self.stage else ()
@@ -274,7 +268,8 @@ class Runner:
         """Let signals wait while something is written."""
         self.storing = True
         try:
-            yield
+            with profile.part("storing"):
+                yield
         finally:
             self.storing = False
 

@@ -11,7 +11,7 @@ import numpy as np
 from mbsim.arrays.codes import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
-from mbsim.core import jit
+from mbsim.core import jit, profile
 from mbsim.dynamics.bodies import configuration
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
@@ -106,7 +106,8 @@ class Methods:
 
     def bind(self) -> None:
         """Bind the method that memory names."""
-        self.problem, self._tangent, (self.steps, self._workspace) = jit.planned(self._bound)
+        with profile.part("build"):
+            self.problem, self._tangent, (self.steps, self._workspace) = jit.planned(self._bound)
 
     def _bound(self) -> tuple[Problem, Any, tuple[scheme.Steps, Any]]:
         """Return the problem, what its linearisation lives in, and the method bound to it."""
@@ -117,10 +118,22 @@ class Methods:
             from mbsim.dynamics.pipeline.problem import implicit_hooks
 
             problem, linearised = implicit_hooks(self.system.scene, problem, running.pair)
+        self.time_scene()
+        if profile.running is not None:
+            from mbsim.run.hook_profile import time_problem
+
+            problem = time_problem(problem, profile.running.hooks)
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
         return problem, linearised, bind(running, problem, self.arrays, probe)
+
+    def time_scene(self) -> None:
+        """Let the scene's hooks and laws be timed where a profile runs."""
+        if profile.running is not None:
+            from mbsim.run.hook_profile import time_scene
+
+            time_scene(self.system.scene, profile.running.hooks)
 
     def saved(self) -> dict[str, Any]:
         """Return what a running implicit method keeps beside its arrays, by name."""

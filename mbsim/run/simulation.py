@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbsim import __version__
+from mbsim.core.profile import part, profiling
 from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
-from mbsim.run.loop import Notify, Progress, Runner
+from mbsim.run.loop import Runner
+from mbsim.run.options import Notify, Options, Progress
 from mbsim.run.settings import Settings, output_rows, settle
 
 if TYPE_CHECKING:
@@ -89,6 +91,7 @@ def simulate(
     plugin_timeout: float | None = None,
     progress: Progress | None = None,
     notify: Notify | None = None,
+    profile: bool = False,
 ) -> Results:
     """Run a model and return its results.
 
@@ -129,12 +132,38 @@ def simulate(
         Called with time, step and end time [T] now and then.
     notify : callable, optional
         Called with lines for the user.
+    profile : bool
+        Count where the time goes: ``profile_*`` of `Results.stats`.
 
     Raises
     ------
     ModelError, SolverError, PluginError, ResultsError, Interrupted
         What was recorded up to there is kept.
     """
+    options = Options(
+        end_time=end_time,
+        print_interval=print_interval,
+        integrator=integrator,
+        tol=tol,
+        plugins=tuple(plugins),
+        output=output,
+        resume=resume,
+        detector=detector,
+        interpret_plugins=interpret_plugins,
+        allow_overlap=allow_overlap,
+        dump_fclib=dump_fclib,
+        signals=tuple(signals),
+        scripts=scripts,
+        plugin_timeout=plugin_timeout,
+        progress=progress,
+        notify=notify,
+    )
+    with profiling() if profile else nullcontext():
+        return _run(model, options)
+
+
+def _run(model: Model, options: Options) -> Results:
+    """Run a model; see `simulate`."""
     from mbsim.compile_model.build import build
     from mbsim.core import jit
     from mbsim.plugins.permission import no_scripts
@@ -143,35 +172,42 @@ def simulate(
     from mbsim.results.resume import completed
 
     began = time.perf_counter()
-    settings = settle(model, end_time, print_interval, integrator, tol)
-    tell = notify or (lambda line: None)
+    settings = settle(
+        model, options.end_time, options.print_interval, options.integrator, options.tol
+    )
+    tell = options.notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
         "compiling what this model needs (a quarter of a minute to one); later runs load it"
     )
     jit.compiled = jit.expected = 0
     jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
     compiled_before = jit.compile_seconds
-    files = [Path(file) for file in plugins]
+    files = [Path(file) for file in options.plugins]
     for file in files:
         if not file.is_file():
             raise ModelError(f"--plugin {file}: no such file")
-    folder = None if output is None else Path(output)
-    if resume and folder is not None and (whole := completed(model, folder, tell)) is not None:
+    folder = None if options.output is None else Path(options.output)
+    if (
+        options.resume
+        and folder is not None
+        and (whole := completed(model, folder, tell)) is not None
+    ):
         return whole
     said: list[str] = []
-    with no_scripts(not scripts):
-        system = build(model, files, interpret_plugins, detector, said.append)
+    with no_scripts(not options.scripts), part("build"):
+        how = options.interpret_plugins, options.detector
+        system = build(model, files, *how, said.append)
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
-    attributes = _attributes(system, settings, detector, files, interpret_plugins)
-    attributes["signals"] = "\n".join(signals)
-    recorder = Recorder(system, attributes, folder, resume, settings, signals)
+    attributes = _attributes(system, settings, options.detector, files, options.interpret_plugins)
+    attributes["signals"] = "\n".join(options.signals)
+    recorder = Recorder(system, attributes, folder, options.resume, settings, options.signals)
     try:
         recorder.check_room(output_rows(settings))
     except ModelError:
         recorder.abandon()
         raise
-    log = RunLog(system, attributes, recorder.directory, resume)
+    log = RunLog(system, attributes, recorder.directory, options.resume)
     for note in (*said, *settings.notes):
         log.line(note)
     if system.user_laws or system.subroutines or system.posts:
@@ -179,17 +215,18 @@ def simulate(
 
         host.log = log.line
     status = "failed"
-    runner = Runner(system, settings, recorder, log, tell, changes)
+    with part("build"):
+        runner = Runner(system, settings, recorder, log, tell, changes)
     with _stoppable(runner):
         try:
-            with _limited(system, plugin_timeout, tell):
-                if resume:
+            with _limited(system, options.plugin_timeout, tell):
+                if options.resume:
                     _goes_on(runner)
                 else:
-                    runner.start(allow_overlap)
-                if dump_fclib is not None:
-                    runner.dump_every(dump_fclib, resume)
-                runner.run(progress, resume)
+                    runner.start(options.allow_overlap)
+                if options.dump_fclib is not None:
+                    runner.dump_every(options.dump_fclib, options.resume)
+                runner.run(options.progress, options.resume)
                 recorder.end()
                 runner.storing = True
             status = "finished"
@@ -226,7 +263,8 @@ def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Result
     `wall` and `compiled` are the seconds of the call, and of its compiling.
     """
     system = runner.system
-    runner.recorder.take()
+    with part("storing"):
+        runner.recorder.take()
     stats = runner.stats(wall, compiled)
     audit = runner.audit()
     for warning in audit.warnings if audit is not None else ():
@@ -239,7 +277,8 @@ def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Result
     if runner.dump is not None and status == "finished":
         runner.tell(f"{runner.dump.written} contact problems in {runner.dump.folder}")
     try:
-        return _keep(runner, status, stats, audit, close_log)
+        with part("storing"):
+            return _keep(runner, status, stats, audit, close_log)
     except ResultsError:
         if not log.closed and (runner.recorder.shown or not runner.recorder.earlier):
             with suppress(ResultsError):

@@ -1,0 +1,32 @@
+"""What a run is asked for, beside the model: the options of `mbsim run` and of `simulate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+Progress = Callable[[float, float, float], None]
+Notify = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """As `simulation.simulate` says of its arguments of these names."""
+
+    end_time: float | None = None
+    print_interval: float | None = None
+    integrator: str | None = None
+    tol: float | None = None
+    plugins: tuple[str | Path, ...] = ()
+    output: str | Path | None = None
+    resume: bool = False
+    detector: str = "auto"
+    interpret_plugins: bool = False
+    allow_overlap: bool = False
+    dump_fclib: int | None = None
+    signals: tuple[str, ...] = ()
+    scripts: bool = True
+    plugin_timeout: float | None = None
+    progress: Progress | None = None
+    notify: Notify | None = None
