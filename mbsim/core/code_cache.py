@@ -29,12 +29,14 @@ from numba.core.caching import (
     IndexDataCacheFile,
     _CacheLocator,
 )
+from numba.core.runtime.nrt import rtsys
 
 from mbsim.core import linking, processors, profile
 from mbsim.errors import ModelError
 
 _BEGAN = time.time()
 PACKAGE = Path(__file__).resolve().parent.parent
+_PACKAGE = str(PACKAGE)
 _IMPORT = re.compile(
     r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
 )
@@ -132,24 +134,28 @@ def shipped() -> tuple[tuple[Path, str], ...]:
 
 
 @functools.cache
-def _imports(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+def _imports(file: str) -> tuple[bytes, tuple[str, ...]]:
     """Return the digest of a file and the project files that it imports."""
-    text = path.read_bytes()
+    text = Path(file).read_bytes()
     found = []
     for module, names, plain in _IMPORT.findall(text.decode("utf-8")):
         parts = (module or plain).split(".")[1:]
-        candidates = [parts] + [[*parts, name] for name in re.findall(r"\w+", names)]
-        for candidate in candidates:
-            file = PACKAGE.joinpath(*candidate).with_suffix(".py") if candidate else None
-            if file is not None and file.is_file():
-                found.append(file)
+        for candidate in [parts] + [[*parts, name] for name in re.findall(r"\w+", names)]:
+            if candidate and _is_there(other := os.path.join(_PACKAGE, *candidate) + ".py"):
+                found.append(other)
     return hashlib.sha256(text).digest(), tuple(found)
 
 
-def _reached(files: list[Path]) -> dict[Path, bytes]:
-    """Return the digests of `files` and of every project file they reach through imports."""
-    reached: dict[Path, bytes] = {}
-    waiting = [file.resolve() for file in files]
+_is_there = functools.cache(os.path.isfile)
+
+
+def _reached(files: list[Path]) -> dict[str, bytes]:
+    """Return the digests of `files` and of every project file they reach through imports.
+
+    Names are plain text: a scene asks this of hundreds of files for each of its roots.
+    """
+    reached: dict[str, bytes] = {}
+    waiting = [str(file.resolve()) for file in files]
     while waiting:
         file = waiting.pop()
         if file not in reached:
@@ -158,20 +164,25 @@ def _reached(files: list[Path]) -> dict[Path, bytes]:
     return reached
 
 
-def source_digest(files: list[Path]) -> str:
-    """Return a digest of `files` and of every project file they reach through imports."""
+def _digest(reached: dict[str, bytes]) -> str:
     # names too: a file that moves changes what its callers mean
-    lines = sorted(file.name.encode() + digest for file, digest in _reached(files).items())
+    lines = sorted(os.path.basename(file).encode() + one for file, one in reached.items())
     return hashlib.sha256(b"".join(lines)).hexdigest()[:24]
 
 
-def _changed(file: Path) -> bool:
+def source_digest(files: list[Path]) -> str:
+    """Return a digest of `files` and of every project file they reach through imports."""
+    return _digest(_reached(files))
+
+
+def _changed(file: str) -> bool:
     """Return whether a file of the package was changed since this process began."""
     try:
-        found = file.stat()
+        found = os.stat(file)
     except OSError:
         return True
-    return PACKAGE in file.parents and max(found.st_mtime, found.st_ctime) > _BEGAN
+    ours = file.startswith(_PACKAGE + os.sep)
+    return ours and max(found.st_mtime, found.st_ctime) > _BEGAN
 
 
 _changed_once = functools.cache(_changed)
@@ -187,8 +198,9 @@ class _ContentLocator(_CacheLocator):
     """A folder named by content."""
 
     def __init__(self, files: list[Path]) -> None:
-        self.files = tuple(_reached(files))
-        self.digest = source_digest(files)
+        reached = _reached(files)
+        self.files = tuple(reached)
+        self.digest = _digest(reached)
 
     def get_cache_path(self) -> str:
         return str(trusted_root() / _VERSION / self.digest)
@@ -225,6 +237,18 @@ class CodeCache(FunctionCache):
     def __init__(self, py_func: Callable[..., Any], on_miss: Callable[[str], None]) -> None:
         super().__init__(py_func)  # type: ignore[no-untyped-call]
         self._on_miss = on_miss
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is stored, without what only compiling needs: half a second of imports.
+
+        Stored code is complete but for Numba's reference counts; the compiler loads the rest
+        itself. A Numba that this was not tried with is asked as it asks itself.
+        """
+        if numba.__version__ not in linking.TESTED:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         with profile.part("load"):

@@ -45,9 +45,15 @@ _missing: list[str] | None = None  # names, while roots are counted
 _planning = False
 
 
+_installed = False
+
+
 def _register() -> None:
-    """Tell Numba of the functions marked since the last compilation."""
-    linking.install()
+    """Tell Numba of the functions marked since the last compilation: what is loaded needs none."""
+    global _installed
+    if not _installed:
+        linking.install()
+        _installed = True
     for function in take_marked():
         register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
 
@@ -101,6 +107,7 @@ def _about_to_compile(name: str) -> None:
     if _missing is not None:
         _missing.append(name)
         raise _NotKeptError
+    _register()
     total += 1
     compiled += 1
     expected = max(expected, compiled)
@@ -138,10 +145,12 @@ def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     It runs without Python's lock, so that another thread may write meanwhile. What stands elsewhere
     is not cached: Numba would keep it while the arrays that it looks at change.
     """
-    _register()
+    linking.install_library()
     made: Any = numba.njit(error_model="numpy", nogil=True)(py_func)
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
+    else:
+        _register()
     return cast(Callable[..., Any], made)
 
 
@@ -165,11 +174,13 @@ def address(py_func: Callable[..., Any], signature: Any) -> int:
     key = py_func, signature
     if key in _kept:
         return int(_kept[key].address)
-    _register()
+    linking.install_library()
     typed = sigutils.normalize_signature(signature)
     made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy"})
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
+    else:
+        _register()
     try:
         with profile.part("compile"):  # loading counts as such
             made.compile()

@@ -18,8 +18,6 @@ import numba
 from numba.core import codegen, environment
 from numba.core.registry import cpu_target
 
-from mbsim.core import numba_costs, plain_code
-
 #: Versions of Numba whose private methods are as this module takes them to be.
 TESTED = ("0.68.1",)
 
@@ -45,6 +43,8 @@ class RootLibrary(codegen.JITCodeLibrary):
 
     def add_ir_module(self, ir_module: Any) -> None:
         """Take what was lowered, without what nobody uses of it."""
+        from mbsim.core import plain_code
+
         plain_code.leave_out_unused(ir_module)
         super().add_ir_module(ir_module)  # type: ignore[no-untyped-call]
 
@@ -137,7 +137,18 @@ def _callers_first(root: Any) -> Iterator[Any]:
 
 
 def install() -> None:
-    """Make Numba link in this way for the rest of the process, if its version was tested."""
+    """Make Numba compile and link in this way for the rest of the process, if it was tested."""
+    if POLICY == "all":
+        return
+    install_library()
+    from mbsim.core import numba_costs, plain_code
+
+    numba_costs.install()
+    plain_code.install()
+
+
+def install_library() -> None:
+    """Let code that is stored be loaded as it was linked; compiling asks for `install`."""
     if POLICY == "all":
         return
     generator = cpu_target.target_context.codegen()
@@ -151,5 +162,3 @@ def install() -> None:
 
     generator._library_class = RootLibrary
     generator.set_env = set_where_emitted
-    numba_costs.install()
-    plain_code.install()
