@@ -21,8 +21,14 @@ from mbsim.plugins.source.script import CFFSUB, Script, Scripts, user_function
 from mbsim.plugins.source.shared_library import Library, address_of, choose, friction, sees_x
 from mbsim.plugins.types import UserFriction
 
+#: Why compiled code is not taken, or "", by all that its probes depend on: the text, the numbers
+#: that its module holds, function, parameters, contact and states. A process that runs a model many
+#: times asks once.
+_verdicts: dict[tuple[Any, ...], tuple[int, str]] = {}
 #: Numbers that a friction function of the user may keep at most.
 STATES_MAX = 64
+#: Verdicts that are kept.
+VERDICTS_MOST = 4096
 
 
 def load_friction(
@@ -195,13 +201,26 @@ def _compiled(
     """Return the address of compiled code that has passed the probes, or 0 and the reason."""
     if script.text is None:
         return 0, "a .pyc has no source"
+    numbers = tuple((k, repr(v)) for k, v in script.values.items() if isinstance(v, int | float))
+    twin = user(0, "probe")
+    key = script.text, numbers, name, par.tobytes(), twin.element, twin.states
+    if key not in _verdicts:
+        if len(_verdicts) >= VERDICTS_MOST:
+            _verdicts.clear()
+        _verdicts[key] = _probed(script, script.text, name, par, twin)
+    return _verdicts[key]
+
+
+def _probed(
+    script: Script, text: str, name: str, par: npt.NDArray[np.float64], twin: UserFriction
+) -> tuple[int, str]:
+    """Compile a function and hold it against its `twin`, which is interpreted: as `_compiled`."""
     # here and not above: `import mbsim.plugins` must not load Numba
     from mbsim.laws.abi import DFLAG, FRICTION_INPUTS
     from mbsim.plugins.compile.compiled import compile_friction
     from mbsim.plugins.compile.probe import disagreement
 
-    twin = user(0, "probe")
-    address, reason = compile_friction(script.text, script.values, name, len(par), twin.states)
+    address, reason = compile_friction(text, script.values, name, len(par), twin.states)
     if reason:
         return 0, reason
 
@@ -210,8 +229,6 @@ def _compiled(
         return twin.call(a[0], par, *given, state=a[FRICTION_INPUTS:], area=a[11])
 
     # a place that the text does not read needs no probe
-    read = [reads_parameter(script.text, name, position) for position in (4, 5, 6, 9)]
-    reason = disagreement(
-        address, call, par, script.text, script.values, twin.element, read, twin.states
-    )
+    read = [reads_parameter(text, name, position) for position in (4, 5, 6, 9)]
+    reason = disagreement(address, call, par, text, script.values, twin.element, read, twin.states)
     return (0, reason) if reason else (address, "")

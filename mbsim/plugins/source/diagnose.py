@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 
 from mbsim.plugins import slip
@@ -206,7 +207,12 @@ def _indentation(lines: list[str]) -> tuple[list[str], list[tuple[int, str]]]:
     return mended, faults
 
 
-def lint(text: str, name: str, with_state: bool = False) -> list[str]:
+#: What is found in a text is kept, for a process that runs one model many times.
+_KEPT = 256
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def lint(text: str, name: str, with_state: bool = False) -> tuple[str, ...]:
     """Return warnings on a script that Python accepts, each with its line."""
     found: list[tuple[int, str]] = []
     for node in ast.parse(text).body:
@@ -219,9 +225,11 @@ def lint(text: str, name: str, with_state: bool = False) -> list[str]:
             found += zeros + [item for item in wrong if item[0] not in known]
             found += slip.unguarded_divisions(node)
     # two divisions of one line are one warning
-    return [f"line {line}: {what}" for line, what in dict.fromkeys(sorted(found, key=_line))]
+    lines_of = dict.fromkeys(sorted(found, key=_line))
+    return tuple(f"line {line}: {what}" for line, what in lines_of)
 
 
+@functools.lru_cache(maxsize=_KEPT)
 def reads_parameter(text: str, name: str, position: int) -> bool:
     """Return whether a function reads its parameter at `position`; True if the text cannot tell."""
     tree = ast.parse(text)

@@ -1,0 +1,86 @@
+"""What a run that finds its code compiled must not import: start-up is time that a user waits."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import mbsim
+from helpers.folders import MODELS
+from mbsim.core import jit
+from mbsim.plugins import friction
+
+#: Needed by other scenes, by pictures, or while something is compiled.
+UNNEEDED = (
+    "fcl",
+    "lark",
+    "latex2mathml",
+    "markdown_it",
+    "matplotlib",
+    "mbsim.core.numba_costs",
+    "mbsim.core.plain_code",
+    "mbsim.core.clocked",
+    "mbsim.dynamics.linearization.mechanism",
+    "mbsim.fclib",
+    "mbsim.manual",
+    "mbsim.plugins.compile",
+    "mbsim.reader.adm",
+    "numba.cuda",
+    "numba.np.arraymath",
+    "numba.np.linalg",
+    "rich",
+    "scipy.linalg",
+    "scipy.sparse",
+    "trimesh",
+)
+#: What `check` does without as well.
+OF_RUNS = ("h5py", "llvmlite", "numba", "scipy", "mbsim.dynamics", "mbsim.integrators.driver")
+
+CALL = """
+import json, sys
+from mbsim.cli.main import main
+try:
+    main()
+finally:
+    print(json.dumps(sorted(sys.modules)), file=sys.stderr)
+"""
+
+
+def modules(*command):
+    """Return the modules that a command imports."""
+    done = subprocess.run(
+        [sys.executable, "-c", CALL, *map(str, command)], capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stderr.splitlines()[-1])
+
+
+def those_of(found, names):
+    """Return what was imported of packages and modules."""
+    return [one for one in found if any(f"{one}.".startswith(f"{name}.") for name in names)]
+
+
+def test_a_run_that_finds_its_code_imports_nothing_else(tmp_path):
+    run = ("run", MODELS / "drop_m.xml", "-o", tmp_path, "--end-time", "0.1")
+    modules(*run)  # compiles what is not there
+    assert those_of(modules(*run), UNNEEDED) == []
+
+
+def test_check_needs_no_compiler():
+    assert those_of(modules("check", MODELS / "drop_m.xml"), UNNEEDED + OF_RUNS) == []
+
+
+def test_a_subroutine_is_compiled_and_probed_once_a_process(monkeypatch):
+    model = mbsim.read_model(MODELS / "bowling_ball.xml")
+    with mbsim.simulate(model, end_time=0.05) as first:
+        place = first["bodies/2/position"]
+
+    def never(*given):
+        raise AssertionError("probed once more")
+
+    monkeypatch.setattr(friction, "_probed", never)
+    compiled = jit.total
+    heavier = mbsim.read_model(MODELS / "bowling_ball.xml", ("Body_Rigid[2].mass=6",))
+    with mbsim.simulate(heavier, end_time=0.05), mbsim.simulate(model, end_time=0.05) as last:
+        assert (last["bodies/2/position"] == place).all()
+    assert jit.total == compiled
