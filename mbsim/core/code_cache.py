@@ -22,6 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import numba
 from numba.core.caching import (
     CompileResultCacheImpl,
@@ -29,7 +30,7 @@ from numba.core.caching import (
     IndexDataCacheFile,
     _CacheLocator,
 )
-from numba.core.runtime.nrt import rtsys
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 
 from mbsim.core import linking, processors, profile
 from mbsim.errors import ModelError
@@ -229,6 +230,13 @@ class _ByContent(CompileResultCacheImpl):
     _locator_classes: Any = (_ContentLocator,)
 
 
+@functools.cache
+def _name_runtime() -> None:
+    """Name the functions that stored code may call: Numba does so where it compiles its own."""
+    for name, address in _nrt_python.c_helpers.items():
+        llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 class CodeCache(FunctionCache):
     """Numba's cache of one function, in the user's folder and in shipped ones."""
 
@@ -246,7 +254,7 @@ class CodeCache(FunctionCache):
         """
         if numba.__version__ not in linking.TESTED:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        rtsys.initialize(target_context)
+        _name_runtime()
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
