@@ -20,6 +20,7 @@ COMMANDS = {
     "check": "mbsim.cli.check",
     "info": "mbsim.cli.info",
     "plot": "mbsim.cli.plot",
+    "view": "mbsim.cli.view",
     "bench": "mbsim.cli.bench",
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",

@@ -108,8 +108,15 @@ def plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, np.ndarray) and value.dtype.names:
         # fixed-length bytes as text, so that events["kind"] == "touch" works
-        fields = [(name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names]
-        return value.astype(fields)
+        found = {name: value[name] for name in value.dtype.names}
+        for name, column in found.items():
+            if column.dtype.kind == "S":
+                found[name] = np.char.decode(column, "utf-8", "replace")
+        types = [(name, each.dtype, each.shape[value.ndim :]) for name, each in found.items()]
+        table = np.empty(value.shape, dtype=types)
+        for name, column in found.items():
+            table[name] = column
+        return table
     return value
 
 
