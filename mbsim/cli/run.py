@@ -67,6 +67,12 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     help="Record these only, e.g. bodies/2/position, 'contacts/*/force', joints; may be repeated. "
     "Time, events and the deck's requests are always there.  [default: everything]",
 )
+@click.option(
+    "--contact-points",
+    is_flag=True,
+    help="Record every point of contact with its force, slip speed and area, as `mbsim view` shows "
+    "them.",
+)
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option(
     "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."

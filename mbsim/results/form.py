@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 #: Groups of a result file that have members or attributes of a known form.
 _GROUPS = ("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state")
+_GROUPS += ("graphics", "contact_points")
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")

@@ -27,7 +27,7 @@ Value = str | float | int
 #: Rows of a chunk where nobody knows how many there will be: events, points of contact.
 _FEW = 256
 #: Datasets that do not have a row an output time.
-_UNKNOWN = ("events", "state/incidents")
+_UNKNOWN = ("events", "state/incidents", "contact_points/")
 #: All rows of a run that take no more than this [bytes] are stored without chunks.
 _SMALL = 1 << 12
 #: Most bytes, as in the file, of indices that HDF5 keeps in memory while it writes.
@@ -219,7 +219,7 @@ class Store:
 
     def _make(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
         """Make a dataset for rows like these, without any."""
-        likely = min(self.rows, self.rows_at_once) if name not in _UNKNOWN else _FEW
+        likely = min(self.rows, self.rows_at_once) if not name.startswith(_UNKNOWN) else _FEW
         file.create_dataset(
             name,
             (0, *rows.shape[1:]),

@@ -85,6 +85,7 @@ def simulate(
     allow_overlap: bool = False,
     dump_fclib: int | None = None,
     signals: Sequence[str] = (),
+    contact_points: bool = False,
     scripts: bool = True,
     plugin_timeout: float | None = None,
     progress: Progress | None = None,
@@ -121,6 +122,8 @@ def simulate(
     signals : sequence of str
         Names or patterns of what to record, ``bodies/2/position``, ``contacts/*/force``,
         ``joints``, beside time, events and requests; default: everything.
+    contact_points : bool
+        Record every point of contact with its force, slip speed and area as well.
     scripts : bool
         False refuses a model that needs users' code, that of `plugins` included.
     plugin_timeout : float, optional
@@ -136,6 +139,7 @@ def simulate(
         What was recorded up to there is kept.
     """
     from mbsim.compile_model.build import build
+    from mbsim.compile_model.scratch import with_points
     from mbsim.core import jit
     from mbsim.plugins.permission import no_scripts
     from mbsim.results.log import RunLog
@@ -164,7 +168,9 @@ def simulate(
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
     attributes = _attributes(system, settings, detector, files, interpret_plugins)
-    attributes["signals"] = "\n".join(signals)
+    attributes["signals"] = "\n".join((*signals, *(["contact_points"] if contact_points else [])))
+    if contact_points:
+        system.scene = system.scene._replace(rows=with_points(system.scene.rows))
     recorder = Recorder(system, attributes, folder, resume, settings, signals)
     try:
         recorder.check_room(output_rows(settings))

@@ -11,6 +11,7 @@ import numpy as np
 from mbsim.results.names import order
 from mbsim.results.units import ACCELERATION, FORCE, POSITION, SPIN, TIME, VELOCITY, Quantity
 from mbsim.view.arrows import arrows, dots
+from mbsim.view.colours import FIXED, PALETTE
 from mbsim.view.channels import bytes_apart, channels, shortened
 from mbsim.view.motion import Poses
 from mbsim.view.packing import MOST_STEPS, pack, planes, quantised
@@ -52,7 +53,7 @@ def run_data(scene: Scene, room: int = ROOM, asked: Sequence[str] = ()) -> RunDa
     asked : sequence of str
         Names of signals whose curves come first.
     """
-    rows, off = _rows(scene)
+    rows, off = view_rows(scene)
     arrays, poses = _poses(scene, rows)
     touching = dots(scene, rows)
     forces = arrows(scene, rows, touching)
@@ -94,7 +95,7 @@ def scene_centre(scene: Scene) -> np.ndarray[Any, Any]:
     return np.round(0.5 * (p[0].min(axis=0) + p[0].max(axis=0)), 6)
 
 
-def _rows(scene: Scene) -> tuple[np.ndarray[Any, Any], float]:
+def view_rows(scene: Scene) -> tuple[np.ndarray[Any, Any], float]:
     """Return the rows to keep, and by how much positions are off at any row, of the size."""
     n, bodies = scene.poses.p.shape[:2]
     rounding = 0.5 * 3**0.5 * _STEP + 2.0 * _TURN * float((scene.reach).max(initial=0.0)) / scene.size
@@ -128,7 +129,7 @@ def _poses(scene: Scene, rows: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     }
 
 
-def _label(row: Any) -> str:
+def label_of(row: Any) -> str:
     """Return the label of a row of a table that may have none."""
     return str(row["label"]) if "label" in (row.dtype.names or ()) else ""
 
@@ -161,13 +162,15 @@ def _about(scene: Scene) -> dict[str, Any]:
         "gravity": scene.gravity.tolist(),
         "up": scene.up.tolist(),
         "size": scene.size,
+        "palette": list(PALETTE),
+        "fixed": FIXED,
         "bodies": [
             {"id": id, "label": label} for id, label in zip(scene.body_ids, scene.labels, strict=True)
         ],
         "shapes": [
             {
                 "id": int(shape["id"]),
-                "label": _label(shape),
+                "label": label_of(shape),
                 "shape": str(shape["shape"]),
                 "body": column.get(int(shape["body"]), -1),
                 "body_id": int(shape["body"]),
@@ -175,7 +178,7 @@ def _about(scene: Scene) -> dict[str, Any]:
             for shape in scene.shapes
         ],
         "markers": [
-            [int(m["id"]), column.get(int(m["body"]), -1), _label(m)] for m in scene.markers
+            [int(m["id"]), column.get(int(m["body"]), -1), label_of(m)] for m in scene.markers
         ],
         "connections": [
             {

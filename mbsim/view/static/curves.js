@@ -134,7 +134,7 @@ mbsim.Curves = (function () {
       const width = canvas.clientWidth || 290, height = canvas.clientHeight || 112;
       canvas.width = width * ratio;
       canvas.height = height * ratio;
-      const pen = canvas.getContext("2d");
+      const pen = canvas.getContext("2d", { willReadFrequently: true });
       pen.scale(ratio, ratio);
       let low = Infinity, high = -Infinity;
       const lines = [];

@@ -73,7 +73,7 @@ mbsim.extras = (function () {
         for (let row = 0; row < this.run.rows; row += 1) { points.set(this.run.positionAt(row, body, at), 3 * row); }
         const geometry = new THREE.BufferGeometry();
         geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-        const color = mbsim.shapes.COLORS[body % mbsim.shapes.COLORS.length];
+        const color = mbsim.shapes.bodyColor(this.run, body);
         const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color, transparent: true, opacity: 0.9 }));
         line.frustumCulled = false;
         this.paths.add(line);

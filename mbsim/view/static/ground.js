@@ -114,5 +114,10 @@ mbsim.ground = (function () {
     return { x: x.toArray(), y: new THREE.Vector3().crossVectors(z, x).toArray(), z: z.toArray() };
   }
 
-  return { gridMaterial, polygon, planesOf, cornersOf, frameOf };
+  // How far a point is behind a plane.
+  function depthOf(plane, at) {
+    return dot(plane.p, plane.z) - dot(at, plane.z);
+  }
+
+  return { depthOf, gridMaterial, polygon, planesOf, cornersOf, frameOf };
 })();

@@ -13,81 +13,64 @@ mbsim.Stage = (function () {
     return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
   }
 
-  // Centre and radius of what moves, over rows; of all bodies together, and around their centre.
-  function extent(run) {
-    const bodies = run.bodies.length, reach = new Float64Array(bodies);
+  // A box along the axes around all shapes, markers and centres of moving bodies at the time that
+  // `run` shows, and around those of what stands still.
+  function boxOf(run, fixed) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    const fixed = [];
+    const matrix = new Float32Array(16);
+    const add = (middle, half) => {
+      for (let c = 0; c < 3; c += 1) {
+        low[c] = Math.min(low[c], middle[c] - half[c]);
+        high[c] = Math.max(high[c], middle[c] + half[c]);
+      }
+    };
     run.about.shapes.forEach((shape, k) => {
-      if (shape.shape === "PLANE") { return; }
+      if (shape.shape === "PLANE" || (shape.body < 0) !== fixed) { return; }
+      const { middle, half } = mbsim.localBox(run, k);
       const pose = run.arrays.shape_pose.subarray(7 * k, 7 * k + 7);
-      const far = radiusOf(run, k);
-      if (shape.body >= 0) {
-        reach[shape.body] = Math.max(reach[shape.body], Math.hypot(pose[0], pose[1], pose[2]) + far);
-      } else {
-        fixed.push({ p: [0, 1, 2].map((c) => pose[c] - run.about.centre[c]), far });
-      }
+      mbsim.shapes.fill(matrix, 0, run, shape.body, pose, [1, 1, 1]);
+      const at = [0, 1, 2].map((c) => matrix[12 + c] + matrix[c] * middle[0] + matrix[4 + c] * middle[1] + matrix[8 + c] * middle[2]);
+      add(at, [0, 1, 2].map((c) => Math.abs(matrix[c]) * half[0] + Math.abs(matrix[4 + c]) * half[1] + Math.abs(matrix[8 + c]) * half[2]));
     });
-    for (let k = 0; k < run.about.markers.length; k += 1) {
-      const [, body] = run.about.markers[k];
-      if (body < 0) { continue; }
-      const pose = run.arrays.marker_pose.subarray(7 * k, 7 * k + 3);
-      reach[body] = Math.max(reach[body], Math.hypot(pose[0], pose[1], pose[2]));
-    }
-    const every = Math.max(1, Math.floor(run.rows / 80));
-    const at = [0, 0, 0], ways = [];
-    let together = 0;
-    for (let row = 0; row < run.rows; row += every) {
-      const middle = [0, 0, 0];
-      const here = { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] };
-      for (let body = 0; body < bodies; body += 1) {
-        run.positionAt(row, body, at);
-        for (let c = 0; c < 3; c += 1) {
-          here.low[c] = Math.min(here.low[c], at[c] - reach[body]);
-          here.high[c] = Math.max(here.high[c], at[c] + reach[body]);
+    if (!fixed) {
+      for (let body = 0; body < run.bodies.length; body += 1) { add(run.p.subarray(3 * body, 3 * body + 3), [0, 0, 0]); }
+      const at = [0, 0, 0];
+      for (const connection of run.about.connections.slice(0, 2000)) {
+        for (const marker of [connection.i, connection.j]) {
+          if (marker < 0 || run.about.markers[marker][1] < 0) { continue; }
+          const p = run.arrays.marker_pose.subarray(7 * marker, 7 * marker + 3);
+          add(run.place(run.about.markers[marker][1], p[0], p[1], p[2], at), [0, 0, 0]);
         }
-        if (bodies <= 200 || body % Math.ceil(bodies / 200) === 0) { ways.push([...at]); }
-      }
-      for (let c = 0; c < 3; c += 1) {
-        middle[c] = 0.5 * (here.low[c] + here.high[c]);
-        low[c] = Math.min(low[c], here.low[c]);
-        high[c] = Math.max(high[c], here.high[c]);
-      }
-      together = Math.max(together, 0.5 * Math.hypot(...[0, 1, 2].map((c) => here.high[c] - here.low[c])));
-    }
-    const moving = 0.5 * Math.hypot(...[0, 1, 2].map((c) => high[c] - low[c]));
-    for (const { p, far } of fixed) {
-      if (far > 2.5 * moving && moving > 0) { continue; } // a floor, say
-      for (let c = 0; c < 3; c += 1) {
-        low[c] = Math.min(low[c], p[c] - far);
-        high[c] = Math.max(high[c], p[c] + far);
       }
     }
-    const middle = [0, 1, 2].map((c) => 0.5 * (low[c] + high[c]));
-    const radius = 0.5 * Math.hypot(...[0, 1, 2].map((c) => high[c] - low[c])) || run.about.size || 1;
-    return { middle, radius, low, high, together: together || radius, ways, reach };
+    return { low, high };
   }
 
-  function radiusOf(run, k) {
-    const [a, b, c] = run.arrays.shape_size.subarray(7 * k, 7 * k + 3);
-    switch (run.about.shapes[k].shape) {
-      case "SPHERE": return a;
-      case "ELLIPSOID": return Math.max(a, b, c);
-      case "BOX": return 0.5 * Math.hypot(a, b, c);
-      case "CYLINDER": return Math.hypot(a, b / 2);
-      case "FRUSTUM": return Math.hypot(Math.max(a, b), c / 2);
-      case "MESH": {
-        const mesh = run.arrays.shape_looks[3 * k + 2];
-        const [vertex, vertices] = run.arrays.meshes.subarray(4 * mesh, 4 * mesh + 2);
-        run.vertexData = run.vertexData || mbsim.unpack.together(run.arrays.vertices, Float32Array);
-        let far = 0;
-        for (let v = 3 * vertex; v < 3 * (vertex + vertices); v += 3) {
-          far = Math.max(far, Math.hypot(run.vertexData[v], run.vertexData[v + 1], run.vertexData[v + 2]));
-        }
-        return far;
-      }
-      default: return 0;
+  const halfOf = (low, high) => [0, 1, 2].map((c) => 0.5 * (high[c] - low[c]));
+
+  // Boxes of what moves over all rows: where it gets to, and how large it is at once.
+  function extent(run) {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    const together = [0, 0, 0], ways = [];
+    const every = Math.max(1, Math.floor(run.rows / 60)), stride = Math.ceil(run.bodies.length / 200);
+    const merge = (box) => {
+      for (let c = 0; c < 3; c += 1) { low[c] = Math.min(low[c], box.low[c]); high[c] = Math.max(high[c], box.high[c]); }
+    };
+    for (let row = 0; row < run.rows; row += every) {
+      run.set(run.time[row]);
+      const box = boxOf(run, false), half = halfOf(box.low, box.high);
+      merge(box);
+      for (let c = 0; c < 3; c += 1) { together[c] = Math.max(together[c], half[c]); }
+      for (let body = 0; body < run.bodies.length; body += stride) { ways.push([...run.p.subarray(3 * body, 3 * body + 3)]); }
     }
+    run.set(run.start);
+    const moving = Math.hypot(...halfOf(low, high)), fixed = boxOf(run, true);
+    // a floor that is far larger is no part of what is looked at
+    const near = fixed.low[0] <= fixed.high[0] && Math.hypot(...halfOf(fixed.low, fixed.high)) <= 2.5 * moving;
+    if (near) { merge(fixed); }
+    const half = halfOf(low, high);
+    const radius = Math.hypot(...half) || run.about.size || 1;
+    return { middle: [0, 1, 2].map((c) => 0.5 * (low[c] + high[c])), half, radius, low, high, together, largeFloor: !near, ways };
   }
 
   // The horizontal direction along which points are spread most.
@@ -105,7 +88,7 @@ mbsim.Stage = (function () {
 
   class Stage {
     constructor(canvas, run) {
-      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
       this.renderer.shadowMap.enabled = true;
       this.renderer.shadowMap.type = THREE.PCFShadowMap;
       this.renderer.toneMapping = THREE.NeutralToneMapping;
@@ -132,12 +115,13 @@ mbsim.Stage = (function () {
 
     measure(run) {
       this.extent = extent(run);
+      const { radius } = this.extent, together = Math.hypot(...this.extent.together) || radius;
       // bodies that stay near each other and go far are followed
-      this.follows = this.extent.together < 0.42 * this.extent.radius;
-      this.view = this.follows ? Math.max(3.2 * this.extent.together, 0.06 * this.extent.radius) : this.extent.radius;
-      const far = this.extent.radius + this.view;
+      this.follows = together < 0.3 * radius;
+      this.view = this.follows ? Math.max(2.2 * together, 0.03 * radius) : radius;
+      this.half = this.follows ? this.extent.together.map((x) => 1.6 * x) : this.extent.half;
       this.camera.near = this.view / 200;
-      this.camera.far = 40 * far;
+      this.camera.far = 40 * (radius + this.view);
       const box = 1.5 * this.view;
       Object.assign(this.sun.shadow.camera, { left: -box, right: box, top: box, bottom: -box, near: 0.1 * this.view, far: 9 * this.view });
       this.sun.shadow.camera.updateProjectionMatrix();
@@ -158,7 +142,10 @@ mbsim.Stage = (function () {
       for (const plane of this.planes) {
         const corners = mbsim.ground.cornersOf(plane, this.planes, middle, reach);
         if (corners.length < 3) { continue; }
-        this.floors.push(mbsim.ground.polygon(plane, corners, mbsim.ground.gridMaterial(look)));
+        const material = mbsim.ground.gridMaterial(look);
+        // what passes behind a plane, as through a guide, stays in sight
+        if (this.extent.ways.some((at) => mbsim.ground.depthOf(plane, at) > 0)) { Object.assign(material, { opacity: 0.35, depthWrite: false }); }
+        this.floors.push(mbsim.ground.polygon(plane, corners, material));
       }
       if (!this.floors.length) {
         const plane = { ...mbsim.ground.frameOf(this.up), p: [...middle] };
@@ -167,7 +154,7 @@ mbsim.Stage = (function () {
           const corner = [0, 1, 2].map((c) => ((k >> c) & 1 ? high : low)[c] - middle[c]);
           lowest = Math.min(lowest, corner[0] * this.up[0] + corner[1] * this.up[1] + corner[2] * this.up[2]);
         }
-        for (let c = 0; c < 3; c += 1) { plane.p[c] += (lowest - 0.02 * radius) * this.up[c]; }
+        for (let c = 0; c < 3; c += 1) { plane.p[c] += (lowest - 0.03 * this.view) * this.up[c]; }
         const corners = mbsim.ground.cornersOf({ ...plane, bounds: [0, 0, 0, 0] }, [], middle, reach);
         this.floors.push(mbsim.ground.polygon(plane, corners, mbsim.ground.gridMaterial(look)));
       }
@@ -208,8 +195,14 @@ mbsim.Stage = (function () {
     }
 
     look(direction, target) {
-      const half = Math.min(this.camera.fov, this.camera.fov * Math.max(0.4, this.camera.aspect)) * Math.PI / 360;
-      const distance = 1.02 * this.view / Math.sin(half);
+      // as near as the box of what is looked at allows
+      const sight = new THREE.Vector3().crossVectors(new THREE.Vector3(...this.up), direction);
+      if (sight.lengthSq() < 1e-9) { sight.set(direction.y, direction.z, direction.x); }
+      sight.normalize();
+      const above = new THREE.Vector3().crossVectors(direction, sight);
+      const wide = (axis) => Math.abs(axis.x) * this.half[0] + Math.abs(axis.y) * this.half[1] + Math.abs(axis.z) * this.half[2];
+      const slope = Math.tan(this.camera.fov * Math.PI / 360);
+      const distance = wide(direction) + Math.max(1.3 * wide(above) / slope, 1.12 * wide(sight) / (slope * (this.free || this.camera.aspect)), 0.2 * this.view);
       this.controls.target.copy(target);
       this.camera.position.copy(target).addScaledVector(direction, distance);
       this.camera.updateProjectionMatrix();

@@ -55,7 +55,8 @@ mbsim.View = (function () {
         const group = new THREE.Group();
         group.scale.setScalar(run.factor.length);
         group.position.set(...[0, 1, 2].map((c) => run.about.centre[c] * run.factor.length - first.about.centre[c]));
-        const look = k > 0 ? { ghost: true, tint: TINT } : {};
+        const wide = 0.012 * this.stage.view / run.factor.length;
+        const look = k > 0 ? { wide, ghost: true, tint: TINT } : { wide, floor: this.stage.extent.largeFloor, cell: this.stage.cell };
         run.shapes = new mbsim.shapes.Shapes(run, group, look);
         run.contacts = new mbsim.Contacts(run, group, this.stage.view / run.factor.length);
         run.extras = new mbsim.extras.Extras(run, group, this.stage.view / run.factor.length);
@@ -388,6 +389,7 @@ mbsim.View = (function () {
     frame() {
       const width = this.root.clientWidth, height = this.root.clientHeight;
       const free = width > 760 && !this.root.classList.contains("folded") && !this.root.classList.contains("still");
+      this.stage.free = (free ? width - 332 : width) / height;
       if (free) { this.stage.camera.setViewOffset(width + 332, height, 332, 0, width, height); } else { this.stage.camera.clearViewOffset(); }
       this.changed = true;
     }
@@ -461,13 +463,17 @@ mbsim.View = (function () {
       return [0, 1, 2].map((c) => run.p[3 * k + c] + run.about.centre[c]);
     }
 
-    // For pictures: a time without controls, drawn.
+    // For pictures: the scene at a time as a PNG's data address; the page stays without controls.
     still(time) {
-      this.root.classList.add("still");
-      this.pause();
-      this.frame();
+      if (!this.root.classList.contains("still")) {
+        this.root.classList.add("still");
+        this.pause();
+        this.frame();
+        this.goHome();
+      }
       this.setTime(time);
       this.draw();
+      return this.canvas.toDataURL("image/png");
     }
   }
 
