@@ -73,6 +73,7 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     help="Record every point of contact with its force, slip speed and area, as `mbsim view` shows "
     "them.",
 )
+@click.option("--report", is_flag=True, help="Write DIR/<model>-report.html too.")
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option(
     "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
@@ -96,6 +97,7 @@ def command(
     overrides: tuple[str, ...],
     progress: str,
     as_json: bool,
+    report: bool,
     **options: Any,
 ) -> None:
     """Run MODEL and write DIR/<model>.h5, .csv (requests) and .log."""
@@ -131,12 +133,25 @@ def command(
             if display:
                 display.stop()
             _report_failure(result_file, error, as_json)
+            if report and result_file.is_file():
+                _report(result_file)
             raise
     with results:
         if as_json:
             _print_json(results, result_file)
         else:
             _print_summary(results, result_file)
+    if report:
+        _report(result_file)
+
+
+def _report(result_file: Path) -> None:
+    """Write the report of a run beside its results."""
+    from mbsim.cli.report import write_report
+
+    target = result_file.with_name(f"{result_file.stem}-report.html")
+    write_report(result_file, target)
+    _say(f"{target}: {target.stat().st_size / 1e6:.2f} MB")
 
 
 def _say(text: str) -> None:

@@ -277,7 +277,7 @@ mbsim.shapes = (function () {
         listOf(own, shape.body).push({ p: [...run.arrays.shape_pose.subarray(7 * k, 7 * k + 3)], far: 1.02 * mbsim.radiusOf(run, k) });
       });
       for (const [body, shapes] of own) {
-        if (shapes.length > 1 && shapes.length <= 24) { listOf(ends, body).push(...shapes.map((shape) => shape.p)); }
+        if (shapes.length <= 24) { listOf(ends, body).push(...shapes.map((shape) => shape.p)); }
       }
       for (const connection of run.about.connections) {
         for (const marker of [connection.i, connection.j]) {
