@@ -183,5 +183,7 @@ def _size(text: str) -> tuple[int, int]:
 
     found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
     if found is None or max(int(found[1]), int(found[2])) > _LARGEST:
-        raise ModelError(f"--size {text}: must be WIDTHxHEIGHT in pixels, each from 10 to {_LARGEST}")
+        raise ModelError(
+            f"--size {text}: must be WIDTHxHEIGHT in pixels, each from 10 to {_LARGEST}"
+        )
     return int(found[1]), int(found[2])

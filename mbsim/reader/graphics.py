@@ -164,7 +164,7 @@ def _build_graphic(entry: Entry) -> None:
 
 
 def _color(entry: Entry) -> tuple[int, int, int] | None:
-    """Return red, green and blue of ``color="r:g:b"``, None with a note where it is no such text."""
+    """Return red, green and blue of ``color="r:g:b"``, None with a note for another text."""
     text = entry.get("color", "")
     parts = [part.strip() for part in text.split(":")]
     if len(parts) == 3 and all(part.isascii() and part.isdigit() for part in parts):

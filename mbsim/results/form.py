@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     import h5py
 
 #: Groups of a result file that have members or attributes of a known form.
-_GROUPS = ("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state")
-_GROUPS += ("graphics", "contact_points")
+_GROUPS = (
+    *("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state"),
+    *("graphics", "contact_points"),
+)
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")

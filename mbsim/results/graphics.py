@@ -67,13 +67,13 @@ def about_graphics(model: Model, placement: Placement) -> dict[str, float]:
     return {**dict(zip(names, map(float, gravity.g), strict=True)), "size": placement.L}
 
 
-def _with_labels(fields: Sequence[Any], rows: Sequence[Any], elements: Any) -> Table:
+def _with_labels(fields: list[Any], rows: list[Any], elements: Any) -> Table:
     """Return a table of rows that begin with an id, with the deck's labels as UTF-8."""
     labels = [elements[row[0]].label.encode("utf-8", "backslashreplace") for row in rows]
     width = max(map(len, labels), default=0)
     if not width:
         return np.array(rows, dtype=fields)
-    kept = [(*row, label) for row, label in zip(rows, labels, strict=True)]
+    kept: list[Any] = [(*row, label) for row, label in zip(rows, labels, strict=True)]
     return np.array(kept, dtype=[*fields, ("label", f"S{width}")])
 
 
@@ -153,7 +153,7 @@ class _Meshes:
         return self._rows[key]
 
     def tables(self) -> dict[str, Table]:
-        """Return vertices (n, 3), faces (m, 3) of indices within their mesh, and where it begins."""
+        """Return vertices (n, 3), faces (m, 3) that count within their mesh, where each begins."""
         if not self._vertices:
             return {}
         counts = [(len(v), len(f)) for v, f in zip(self._vertices, self._faces, strict=True)]

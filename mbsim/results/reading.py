@@ -216,7 +216,9 @@ class Results:
         rows = len(file["time"]) if "time" in file else 0
         for name, item in self._stored().items():
             # /state is the solver's own, in its own layout; points are not one a row
-            if not name.startswith(("state/", "contact_points/")) and _is_signal(item, item.shape, rows):
+            if not name.startswith(("state/", "contact_points/")) and _is_signal(
+                item, item.shape, rows
+            ):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
         shapes = {
             stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}

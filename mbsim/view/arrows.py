@@ -125,8 +125,8 @@ def _resultants(scene: Scene, rows: Table, at: Dots) -> Arrows:
         # the line of the force on which its torque about the centre is the one given
         base = cg + np.cross(force, torque) / square[:, None]
         base = _moved(base, force / np.sqrt(square)[:, None], k, at)
-        area = f"contacts/{id}/area"
-        areas = np.asarray(results[area])[rows][k] if area in results else np.zeros(len(k))
+        name = f"contacts/{id}/area"
+        areas = np.asarray(results[name])[rows][k] if name in results else np.zeros(len(k))
         found.append((k, base, force, slip[k], areas, np.full(len(k), id)))
         if sum(len(part[0]) for part in found) > MOST:
             break
@@ -157,7 +157,7 @@ def _moved(base: Array, along: Array, k: Table, at: Dots) -> Array:
         Rows of the view.
     at : Dots
     """
-    made = base.copy()
+    made: Array = base.copy()
     for m, row in enumerate(k):
         points = at.point[at.first[row] : at.first[row + 1]]
         if not len(points):

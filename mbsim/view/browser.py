@@ -66,7 +66,9 @@ class Page:
 
     def __init__(self, address: str) -> None:
         parts = urlsplit(address)
-        self._socket = socket.create_connection((parts.hostname, parts.port), _ANSWER)
+        self._socket = socket.create_connection(
+            (str(parts.hostname), int(parts.port or 80)), _ANSWER
+        )
         key = base64.b64encode(os.urandom(16)).decode()
         self._socket.sendall(
             (

@@ -76,7 +76,7 @@ def _ordered(scene: Scene, asked: Sequence[str]) -> list[str]:
     wanted = []
     for name in asked:
         if is_pattern(name):
-            wanted += matching(name, signals)
+            wanted += matching(name, dict.fromkeys(signals, 1))
         else:
             whole = name.strip("/")
             wanted.append(whole if whole in signals else whole.rpartition("/")[0])

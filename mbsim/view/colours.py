@@ -12,7 +12,7 @@ FIXED = 0x9AA4AD
 
 
 def colour_of(given: int, body: int) -> int:
-    """Return the colour of a shape: what the deck gives, else that of its body's index (-1: none)."""
+    """Return what the deck gives, else the colour of the body's index (-1: it stands still)."""
     if given >= 0:
         return given
     return FIXED if body < 0 else PALETTE[body % len(PALETTE)]

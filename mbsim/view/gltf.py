@@ -37,7 +37,7 @@ class _Writer:
         self.parts: dict[str, list[Any]] = {
             name: [] for name in ("bufferViews", "accessors", "meshes", "materials", "nodes")
         }
-        self._meshes: dict[Any, int] = {}
+        self._meshes: dict[Any, Any] = {}
         self._materials: dict[int, int] = {}
 
     def add(self, kind: str, item: Any) -> int:
@@ -82,7 +82,7 @@ class _Writer:
     def mesh(self, key: Any, colour: int, vertices: Array, faces: Table, ball: bool) -> int:
         """Return the mesh of some triangles in a colour; those of a key are stored once."""
         if key not in self._meshes:
-            made = {
+            made: dict[str, Any] = {
                 "attributes": {"POSITION": self.accessor(vertices.astype("<f4"), _VERTICES, True)},
                 "indices": self.accessor(faces.astype("<u4").reshape(-1), _INDICES),
             }
@@ -93,7 +93,8 @@ class _Writer:
         if (key, colour) not in self._meshes:
             primitive = {**self._meshes[key], "material": self.material(colour)}
             self._meshes[key, colour] = self.add("meshes", {"primitives": [primitive]})
-        return self._meshes[key, colour]
+        index: int = self._meshes[key, colour]
+        return index
 
 
 def glb(scene: Scene) -> bytes:
@@ -203,9 +204,7 @@ def _animation(writer: _Writer, scene: Scene, nodes: list[int], second: float) -
         q = scene.poses.q[rows, k][:, [1, 2, 3, 0]].astype("<f4")
         for path, table in (("translation", p), ("rotation", q)):
             samplers.append({"input": at, "output": writer.accessor(table)})
-            channels.append(
-                {"sampler": len(samplers) - 1, "target": {"node": node, "path": path}}
-            )
+            channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
     return {"name": "motion", "samplers": samplers, "channels": channels}
 
 

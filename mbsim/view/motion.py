@@ -22,7 +22,7 @@ def continuous(q: Array) -> Array:
         return q
     turned = (q[1:] * q[:-1]).sum(axis=2) < 0.0
     signs = np.where(np.cumsum(turned, axis=0) % 2 == 1, -1.0, 1.0)
-    found = q.copy()
+    found: Array = q.copy()
     found[1:] *= signs[:, :, None]
     return found
 

@@ -110,7 +110,8 @@ def from_planes(data: Table, count: int, order: int, rows: int, columns: int) ->
     found = np.where(values % 2 == 1, -(values + 1) // 2, values // 2)
     for _ in range(order):
         found = np.cumsum(found, axis=1)
-    return found.T.astype(np.int32)
+    whole: Table = found.T.astype(np.int32)
+    return whole
 
 
 def text_of(data: bytes) -> str:

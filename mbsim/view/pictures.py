@@ -59,9 +59,7 @@ class Camera:
         shown = seconds / speed if speed else min(max(seconds, _SHORT), _LONG)
         count = max(2, round(rate * shown))
         if count > MOST_FRAMES:
-            raise ModelError(
-                f"{count} frames are more than {MOST_FRAMES}: take a higher --speed"
-            )
+            raise ModelError(f"{count} frames are more than {MOST_FRAMES}: take a higher --speed")
         return [first + (last - first) * k / (count - 1) for k in range(count)]
 
     def frames(self, times: list[float]) -> Iterator[bytes]:

@@ -1,4 +1,4 @@
-"""A run as one HTML page: its motion, curves, contacts, audit, settings, and what it was made of."""
+"""A run as one HTML page: motion, curves, contacts, audit, settings, and what it was made of."""
 
 from __future__ import annotations
 

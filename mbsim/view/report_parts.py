@@ -16,7 +16,16 @@ from mbsim.model.elements import Model
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS
 from mbsim.results.quantities import quantity_of
 from mbsim.results.reading import Results
-from mbsim.results.units import ENERGY, TIME, Quantity, UnitSystem
+from mbsim.results.units import (
+    ENERGY,
+    FORCE,
+    POSITION,
+    TIME,
+    TORQUE,
+    VELOCITY,
+    Quantity,
+    UnitSystem,
+)
 from mbsim.view.plot_svg import Curve, drawn
 
 #: Rows of a table, and pictures of curves, at most.
@@ -28,7 +37,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "h5py", "python-fcl", "trimesh")
 def number(value: Any) -> str:
     """Return a number for reading, a dash where there is none."""
     if value is None or (isinstance(value, float) and not np.isfinite(value)):
-        return "–"
+        return "-"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -102,7 +111,7 @@ def requests(results: Results) -> Iterator[str]:
     if len(ids) > MOST_PICTURES:
         yield f'<p class="note">and {len(ids) - MOST_PICTURES} requests more</p>'
     if not ids:
-        yield '<p class="note">The deck asks for no request; speeds and contact forces are shown.</p>'
+        yield '<p class="note">The deck has no request: speeds and contact forces are shown.</p>'
         for group, signal in (("bodies", "velocity"), ("contacts", "force")):
             names = [f"{group}/{id}/{signal}" for id in results.ids(group)[:8]]
             names = [name for name in names if name in results]
@@ -144,7 +153,8 @@ def _figure(curves: Sequence[Curve], quantity: Quantity, units: UnitSystem, titl
 
 
 def contacts(results: Results) -> str:
-    """Return what contacts did: largest values of the run, first touch, touches, friction's work."""
+    """Return what contacts did: largest values of the run, touches, work of friction."""
+    units = UnitSystem.of(results.attributes)
     events, audit = results["events"], results.audit
     rows = []
     for id in results.ids("contacts"):
@@ -160,11 +170,17 @@ def contacts(results: Results) -> str:
                 *(number(peak) if peak is None else peak for peak in peaks),
                 touch[0] if touch else "never",
                 len(touch),
-                share.friction if share is not None else "–",
+                share.friction if share is not None else "-",
             ]
         )
-    head = ("contact", "largest force", "deepest", "fastest slip", "first touch", "touches")
-    return table((*head, "work of friction"), rows) or "<p>The deck has no contacts.</p>"
+    quantities = (FORCE, POSITION, VELOCITY, TIME)
+    force, length, speed, time = (units.text(quantity) for quantity in quantities)
+    head = (
+        *("contact", f"largest force [{force}]", f"deepest [{length}]"),
+        *(f"fastest slip [{speed}]", f"first touch [{time}]", "touches"),
+        f"work of friction [{units.text(ENERGY)}]",
+    )
+    return table(head, rows) or "<p>The deck has no contacts.</p>"
 
 
 def connections(results: Results) -> str:
@@ -181,7 +197,9 @@ def connections(results: Results) -> str:
             kind = str(results.attribute(name, "type") or "")
             label = f"{group.one} {id} {results.label(name)}".rstrip()
             rows.append([label, kind, *(number(x) if x is None else x for x in largest)])
-    return table(("element", "type", "largest force", "largest torque"), rows)
+    units = UnitSystem.of(results.attributes)
+    force, torque = units.text(FORCE), units.text(TORQUE)
+    return table(("element", "type", f"force [{force}]", f"torque [{torque}]"), rows)
 
 
 def energy(results: Results) -> str:
@@ -196,11 +214,13 @@ def energy(results: Results) -> str:
         signs = {"work_of_motions": -1.0}
         total = sum(signs.get(name, 1.0) * results[f"energy/{name}"] for name in there)
         if len(there) >= 3:
-            off = _curve(results, "change of kinetic + potential + dissipated - work", total - total[0])
+            off = _curve(
+                results, "change of kinetic + potential + dissipated - work", total - total[0]
+            )
             parts.append(_figure([off], Quantity("Balance", force=1, length=1), units, ""))
     if audit is not None:
         rows = [
-            [name.replace("_", " "), e.value, e.allowed, e.time, e.element or "–"]
+            [name.replace("_", " "), e.value, e.allowed, e.time, e.element or "-"]
             for name, e in audit.entries.items()
         ]
         parts.append(table(("judged by", "largest", "allowed", "at time", "element"), rows))

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.model.elements import Array
 from mbsim.results.names import order
 from mbsim.results.units import ACCELERATION, FORCE, POSITION, SPIN, TIME, VELOCITY, Quantity
 from mbsim.view.arrows import arrows, dots
-from mbsim.view.colours import FIXED, PALETTE
 from mbsim.view.channels import bytes_apart, channels, shortened
+from mbsim.view.colours import FIXED, PALETTE
 from mbsim.view.motion import Poses
 from mbsim.view.packing import MOST_STEPS, pack, planes, quantised
 from mbsim.view.scene import Scene
@@ -78,27 +79,27 @@ def run_data(scene: Scene, room: int = ROOM, asked: Sequence[str] = ()) -> RunDa
     warnings = list(scene.warnings)
     if off > TOLERANCE:
         warnings.append(
-            f"rows are left out for size: between those shown, positions are off by up to {off:.2g} "
-            "of the scene's size"
+            f"rows are left out for size: between those shown, positions are off by up to "
+            f"{off:.2g} of the scene's size"
         )
     if touching.left_out:
         warnings.append(f"{touching.left_out} points of contact are left out for size")
     about["warnings"] = warnings
-    return RunData(
-        pack(about, arrays), len(rows), len(scene.time), off, curves.left_out, warnings
-    )
+    return RunData(pack(about, arrays), len(rows), len(scene.time), off, curves.left_out, warnings)
 
 
-def scene_centre(scene: Scene) -> np.ndarray[Any, Any]:
+def scene_centre(scene: Scene) -> Array:
     """Return the point that positions in a pack are counted from, (3,) [L]."""
     p = scene.poses.p
-    return np.round(0.5 * (p[0].min(axis=0) + p[0].max(axis=0)), 6)
+    middle: Array = 0.5 * (p[0].min(axis=0) + p[0].max(axis=0))
+    return middle
 
 
 def view_rows(scene: Scene) -> tuple[np.ndarray[Any, Any], float]:
     """Return the rows to keep, and by how much positions are off at any row, of the size."""
     n, bodies = scene.poses.p.shape[:2]
-    rounding = 0.5 * 3**0.5 * _STEP + 2.0 * _TURN * float((scene.reach).max(initial=0.0)) / scene.size
+    reach = float(scene.reach.max(initial=0.0)) / scene.size
+    rounding = 0.5 * 3**0.5 * _STEP + 2.0 * _TURN * reach
     if n * bodies <= _FEW:
         return np.arange(n), rounding
     share = 0.5 * TOLERANCE
@@ -165,7 +166,8 @@ def _about(scene: Scene) -> dict[str, Any]:
         "palette": list(PALETTE),
         "fixed": FIXED,
         "bodies": [
-            {"id": id, "label": label} for id, label in zip(scene.body_ids, scene.labels, strict=True)
+            {"id": id, "label": label}
+            for id, label in zip(scene.body_ids, scene.labels, strict=True)
         ],
         "shapes": [
             {
@@ -191,9 +193,7 @@ def _about(scene: Scene) -> dict[str, Any]:
             }
             for c in sorted(scene.connections, key=lambda c: order(f"{c['group']}/{c['id']}"))
         ],
-        "events": [
-            [float(e["time"]), str(e["kind"]), int(e["element"])] for e in events[:_EVENTS]
-        ],
+        "events": [[float(e["time"]), str(e["kind"]), int(e["element"])] for e in events[:_EVENTS]],
     }
 
 

@@ -12,7 +12,6 @@ from mbsim.errors import MbsimError, ModelError
 from mbsim.model.elements import Array
 from mbsim.results.form import plain
 from mbsim.results.graphics import CONNECTION, MARKER, NONE, SHAPE, about_graphics, graphics_of
-from mbsim.results.motion import rotate
 from mbsim.results.reading import Results
 from mbsim.results.units import UnitSystem
 from mbsim.view.motion import Poses, continuous
@@ -24,7 +23,7 @@ _DOT = 0.01
 
 @dataclass
 class Scene:
-    """A run to look at. Poses are global, of the cg marker; lengths are in the units of the deck."""
+    """A run to look at: poses are global, of the cg marker, lengths in the units of the deck."""
 
     name: str
     results: Results
@@ -106,7 +105,9 @@ def read_scene(results: Results) -> Scene:
     good = np.isfinite(p).all(axis=(1, 2)) & np.isfinite(q).all(axis=(1, 2))
     warnings = []
     if not good.all():
-        warnings.append(f"{int((~good).sum())} rows with positions that are no numbers are left out")
+        warnings.append(
+            f"{int((~good).sum())} rows with positions that are no numbers are left out"
+        )
         time, p, q = time[good], p[good], q[good]
         if not len(time):
             raise ModelError(f"{results.path}: no row has positions that are numbers")
@@ -173,18 +174,3 @@ def _tables(
     }
     told = f"the file has no shapes ({why}): each body is shown as a small ball"
     return tables, {"size": size}, [told]
-
-
-def marker_points(scene: Scene, rows: Table) -> dict[int, Array]:
-    """Return where markers are at rows (m,), global, (m, 3) each, by id."""
-    column = {id: k for k, id in enumerate(scene.body_ids)}
-    found = {}
-    for marker in scene.markers:
-        k = column.get(int(marker["body"]))
-        p = np.asarray(marker["position"], dtype=np.float64)
-        if k is None:
-            found[int(marker["id"])] = np.broadcast_to(p, (len(rows), 3))
-        else:
-            arm = np.broadcast_to(p, (len(rows), 3))
-            found[int(marker["id"])] = scene.poses.p[rows, k] + rotate(scene.poses.q[rows, k], arm)
-    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from mbsim.model.elements import Array
 from mbsim.view.motion import Poses, between
@@ -11,7 +12,7 @@ from mbsim.view.motion import Poses, between
 _LONGEST = 512
 
 
-def kept_rows(time: Array, poses: Poses, reach: Array, tolerance: float) -> np.ndarray[int, np.dtype[np.int64]]:
+def kept_rows(time: Array, poses: Poses, reach: Array, tolerance: float) -> npt.NDArray[np.int64]:
     """Return the rows to keep, in order, the first and the last among them.
 
     Between two kept rows positions and quaternions change linearly with time. No point of a body,
