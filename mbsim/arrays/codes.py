@@ -260,6 +260,9 @@ INC_STICKING = INC_MEMORY + 3
 # entries of `Work.best`, of a pair: contact, energy at touch, the force behind it, inverse mass
 BEST_CONTACT, BEST_ENERGY, BEST_FORCE, BEST_INVERSE = range(4)
 
+# columns of `Rows.points`: force on I's body, slip speed, area of a region, row of `Contacts`
+POINT_FORCE, POINT_SLIP, POINT_AREA, POINT_CONTACT, POINT_COLUMNS = 0, 3, 4, 5, 6
+
 # entries of `World.scale`
 SCALE_LENGTH, SCALE_SPEED, SCALE_ENERGY, TOLERANCE = range(4)
 

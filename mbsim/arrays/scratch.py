@@ -112,5 +112,6 @@ class Rows(NamedTuple):
     value: F2  # (rows, values) expressions of requests
     incident_count: I1  # (rows,)
     incidents: F2  # (capacity, INC_MEMORY + most) slot, p, n, t, X, depth, ...: see codes
+    points: F2  # (capacity, POINT_COLUMNS) beside `incidents`; no rows where nobody asked for them
     events: F2  # (capacity, 4) time, kind, contact, slot
     used: tags.State[I1]  # (3,) rows, incidents, events

@@ -20,6 +20,8 @@ COMMANDS = {
     "check": "mbsim.cli.check",
     "info": "mbsim.cli.info",
     "plot": "mbsim.cli.plot",
+    "view": "mbsim.cli.view",
+    "report": "mbsim.cli.report",
     "bench": "mbsim.cli.bench",
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",

@@ -68,6 +68,13 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     help="Record these only, e.g. bodies/2/position, 'contacts/*/force', joints; may be repeated. "
     "Time, events and the deck's requests are always there.  [default: everything]",
 )
+@click.option(
+    "--contact-points",
+    is_flag=True,
+    help="Record every point of contact with its force, slip speed and area, as `mbsim view` shows "
+    "them.",
+)
+@click.option("--report", is_flag=True, help="Write DIR/<model>-report.html too.")
 @click.option("--interpret-plugins", is_flag=True, help="Do not compile user subroutines.")
 @click.option(
     "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
@@ -92,6 +99,7 @@ def command(
     overrides: tuple[str, ...],
     progress: str,
     as_json: bool,
+    report: bool,
     profile: bool,
     **options: Any,
 ) -> None:
@@ -99,7 +107,7 @@ def command(
     from mbsim.core.profile import profiling
 
     with profiling(time.process_time()) if profile else nullcontext():
-        _run(model, output, overrides, progress, as_json, **options)
+        _run(model, output, overrides, progress, as_json, report, **options)
 
 
 def _run(
@@ -108,6 +116,7 @@ def _run(
     overrides: tuple[str, ...],
     progress: str,
     as_json: bool,
+    report: bool,
     **options: Any,
 ) -> None:
     """Run a deck, and print how it ended."""
@@ -145,6 +154,8 @@ def _run(
             if display:
                 display.stop()
             _report_failure(result_file, error, as_json)
+            if report and result_file.is_file():
+                _report(result_file)
             raise
     with results:
         if as_json:
@@ -155,6 +166,17 @@ def _run(
             from mbsim.cli.profile import print_profile
 
             print_profile(results.stats)
+    if report:
+        _report(result_file)
+
+
+def _report(result_file: Path) -> None:
+    """Write the report of a run beside its results."""
+    from mbsim.cli.report import write_report
+
+    target = result_file.with_name(f"{result_file.stem}-report.html")
+    write_report(result_file, target)
+    _say(f"{target}: {target.stat().st_size / 1e6:.2f} MB")
 
 
 def _say(text: str) -> None:

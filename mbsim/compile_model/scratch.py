@@ -166,6 +166,11 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
     return work
 
 
+def with_points(rows: Rows) -> Rows:
+    """Return the tables with room for force and slip of every incident."""
+    return rows._replace(points=np.zeros((len(rows.incidents), codes.POINT_COLUMNS)))
+
+
 def empty_rows(n: Sizes) -> Rows:
     """Return the tables in which compiled code leaves its output rows."""
     ns = n.slots
@@ -187,6 +192,7 @@ def empty_rows(n: Sizes) -> Rows:
         incidents=np.zeros(
             (min(rows * ns, 2 * ns + INCIDENTS), codes.INC_MEMORY + n.memory + n.region)
         ),
+        points=np.zeros((0, codes.POINT_COLUMNS)),
         events=np.zeros((events, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

@@ -145,6 +145,10 @@ class Graphic:
     mesh_file: str = field(default="", metadata=NO_RESULT)
     hull: Array | None = None  # of a convex mesh: its polyhedron, packed as in model.hull
     is_material_inside: bool = True
+    # how pictures show it: red, green, blue from 0 to 255; xmin, xmax, ymin, ymax of a plane
+    color: tuple[int, int, int] | None = field(default=None, metadata=NO_RESULT)
+    hidden: bool = field(default=False, metadata=NO_RESULT)
+    bounds: tuple[float, ...] = field(default=(), metadata=NO_RESULT)
     source: Source = Source()
 
 

@@ -155,9 +155,32 @@ def _build_graphic(entry: Entry) -> None:
         mesh_file=file,
         hull=convex,
         is_material_inside=entry.get("is_material_inside", True),
+        color=_color(entry),
+        hidden=entry.get("hidden", False),
+        bounds=_bounds(entry),
         source=entry.source,
     )
     entry.register(entry.draft.graphics, graphic)
+
+
+def _color(entry: Entry) -> tuple[int, int, int] | None:
+    """Return red, green and blue of ``color="r:g:b"``, None with a note for another text."""
+    text = entry.get("color", "")
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) == 3 and all(part.isascii() and part.isdigit() for part in parts):
+        red, green, blue = (int(part) for part in parts)
+        if max(red, green, blue) <= 255:
+            return red, green, blue
+    if text.strip():
+        entry.note("pictures take r:g:b, each from 0 to 255; another colour is shown", "color")
+    return None
+
+
+def _bounds(entry: Entry) -> tuple[float, ...]:
+    """Return the bounds of a plane's picture, nothing where the deck does not give all four."""
+    if not all(entry.given(name) for name in _BOUNDS):
+        return ()
+    return tuple(float(entry.get(name, 0.0)) for name in _BOUNDS)
 
 
 def _check_attributes(entry: Entry, shape: Shape) -> None:
@@ -298,7 +321,6 @@ def _numbers(entry: Entry, node: Node, what: str) -> el.Array | None:
     return values.reshape(-1, 3)
 
 
-_PICTURE = "pictures are not written"
 _ABOUT_TYPE = "shape: Sphere, BoxDefinedFromCenter, Plane, ..."
 _ABOUT_RADII = {
     "bottom_radius": "radius of a frustum at its marker",
@@ -308,8 +330,8 @@ _COMMON = {
     "id": NAMED["id"],
     "type": Spec(TEXT, _ABOUT_TYPE, required=True),
     "label": NAMED["label"],
-    "color": Spec(TEXT, note=_PICTURE),
-    "hidden": Spec(FLAG, note=_PICTURE),
+    "color": Spec(TEXT, "colour in pictures, r:g:b, each from 0 to 255", "", "by its body"),
+    "hidden": Spec(FLAG, "TRUE: pictures show it only when asked to", "", "FALSE"),
     "refinement_level": Spec(REAL, note="closed forms and meshes are used as they are"),
     "is_material_inside": Spec(FLAG, "FALSE (a cavity) is refused in a contact", "", "TRUE"),
 }

@@ -20,7 +20,7 @@ Tables = dict[str, Table]
 EVENT_KINDS = np.array([b"touch", b"leave", b"stick", b"slip", b"sensor"], dtype="S8")
 EVENT = np.dtype([("time", "<f8"), ("kind", "S8"), ("element", "<i8")])
 #: Tables of a block that do not have a row an output time.
-_NOT_A_ROW = ("incidents", "events")
+_NOT_A_ROW = ("incidents", "points", "events")
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Block:
     value: Table
     incident_count: Table
     incidents: Table
+    points: Table
     events: Table
 
     @property
@@ -71,7 +72,8 @@ class Gathered:
 
     def take(self, rows: int, incidents: int, events: int) -> Block:
         """Add the first rows that the pipeline has left, and return what was added."""
-        counts = {"incidents": incidents, "events": events}
+        points = incidents if len(self._system.scene.rows.points) else 0
+        counts = {"incidents": incidents, "points": points, "events": events}
         added = []
         for name, first in self._ends.items():
             end = first + counts.get(name, rows)
@@ -176,6 +178,7 @@ def first_rows(block: Block, rows: int) -> Block:
         "incidents": int(block.incident_count[:rows].sum()),
         "events": int(np.searchsorted(events[:, EVENT_TIME], until, side="right")),
     }
+    counts["points"] = counts["incidents"] if len(block.points) else 0
     return Block(*(getattr(block, f.name)[: counts.get(f.name, rows)] for f in fields(Block)))
 
 

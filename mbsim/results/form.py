@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     import h5py
 
 #: Groups of a result file that have members or attributes of a known form.
-_GROUPS = ("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state")
+_GROUPS = (
+    *("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state"),
+    *("graphics", "contact_points"),
+)
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")
@@ -108,8 +111,15 @@ def plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, np.ndarray) and value.dtype.names:
         # fixed-length bytes as text, so that events["kind"] == "touch" works
-        fields = [(name, value.dtype[name].str.replace("|S", "<U")) for name in value.dtype.names]
-        return value.astype(fields)
+        found = {name: value[name] for name in value.dtype.names}
+        for name, column in found.items():
+            if column.dtype.kind == "S":
+                found[name] = np.char.decode(column, "utf-8", "replace")
+        types = [(name, each.dtype, each.shape[value.ndim :]) for name, each in found.items()]
+        table = np.empty(value.shape, dtype=types)
+        for name, column in found.items():
+            table[name] = column
+        return table
     return value
 
 

@@ -72,7 +72,9 @@ class Location(NamedTuple):
 #: Attributes that have a text for each column.
 _LISTS = ("columns", "measures")
 #: Groups of other things than elements.
-_NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests")
+_NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "graphics")
+#: What `keys` leaves out: what a run goes on from, and what pictures are made of.
+_NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
 class Results:
@@ -159,7 +161,10 @@ class Results:
 
     @_reads
     def keys(self) -> list[str]:
-        """Names of all signals and tables, sorted as numbers where they are; no checkpoint."""
+        """Names of all signals and tables, sorted as numbers where they are.
+
+        Without the checkpoint, and without what only pictures need.
+        """
         return sorted((*self._stored(), *self._columnwise()), key=order)
 
     def _stored(self) -> dict[str, h5py.Dataset]:
@@ -171,7 +176,7 @@ class Results:
 
         def note(name: str, item: Any) -> None:
             group, _, last = name.rpartition("/")
-            if not isinstance(item, h5py.Dataset) or name.startswith("checkpoint/"):
+            if not isinstance(item, h5py.Dataset) or name.startswith(_NO_KEYS):
                 return
             # of a group whose elements stand side by side `_columnwise` gives the names
             if "/" in group or not last or f"{group}/id" not in file:
@@ -210,8 +215,10 @@ class Results:
         file, found = self._open(), {}
         rows = len(file["time"]) if "time" in file else 0
         for name, item in self._stored().items():
-            # /state is the solver's own, in its own layout
-            if not name.startswith("state/") and _is_signal(item, item.shape, rows):
+            # /state is the solver's own, in its own layout; points are not one a row
+            if not name.startswith(("state/", "contact_points/")) and _is_signal(
+                item, item.shape, rows
+            ):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
         shapes = {
             stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}

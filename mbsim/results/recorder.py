@@ -25,6 +25,7 @@ from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
+from mbsim.results.graphics import about_graphics, graphics_of
 from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
@@ -139,9 +140,11 @@ class Recorder:
             self._store.shorten(partial(length_of, self._written))
         self._store.update(
             values={} if resume else facts_of(system, self._asked),
+            constants={} if resume else graphics_of(system.model, system.placement),
             attributes={
                 "/": {**settings, "status": "running"},
                 **({} if resume else without_rows(system)),
+                **({} if resume else {"graphics": about_graphics(system.model, system.placement)}),
             },
             remove=["stats", "audit"],
         )

@@ -16,6 +16,11 @@ from mbsim.arrays.codes import (
     CONTACT_INCIDENTS,
     CONTACT_SLIP,
     CONTACT_TORQUE,
+    INC_POINT,
+    POINT_AREA,
+    POINT_CONTACT,
+    POINT_FORCE,
+    POINT_SLIP,
 )
 from mbsim.results.blocks import Block, Table, events_table, nothing
 from mbsim.results.elements import GROUPS, acting, facts
@@ -27,6 +32,10 @@ from mbsim.results.watch import energies
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+
+
+#: The group of points of contact, see `_points`.
+POINTS = "contact_points"
 
 
 def groups(system: System) -> dict[str, list[int]]:
@@ -83,6 +92,8 @@ def length_of(written: Sequence[int], name: str) -> int:
     """Return how long a dataset is of which so many rows, incidents and events are written."""
     rows, incidents, events = written
     others = {"events": events, "state/incidents": incidents, "state/incident_offsets": rows + 1}
+    if name.startswith(f"{POINTS}/"):
+        return rows + 1 if name == f"{POINTS}/offsets" else incidents
     return others.get(name, rows)
 
 
@@ -92,6 +103,7 @@ def names_of(system: System) -> list[str]:
     return [
         name
         for stored, _ in signals(system, nothing(system), SignalFilter())
+        if not stored.startswith(f"{POINTS}/")
         for group, _, signal in [stored.partition("/")]
         for name in (
             [f"{group}/{id}/{signal}" for id in stacked[group]]
@@ -153,7 +165,23 @@ def signals(
         # row k has incidents[offsets[k] : offsets[k + 1]]
         yield "state/incident_offsets", np.append(0, ends) if first else ends
         yield "state/incidents", block.incidents
+    if len(system.scene.rows.points):
+        yield from _points(system, block, incidents, first)
     yield "events", events_table(block.events)
+
+
+def _points(
+    system: System, block: Block, incidents: int, first: bool
+) -> Iterator[tuple[str, Table]]:
+    """Yield where bodies touch and the forces there; row k has offsets[k] to offsets[k + 1]."""
+    ends = incidents + np.cumsum(block.incident_count, dtype=np.int64)
+    yield f"{POINTS}/offsets", np.append(0, ends) if first else ends
+    points, ids = block.points, np.array([*system.contact_ids, 0], dtype=np.int64)
+    yield f"{POINTS}/contact", ids[points[:, POINT_CONTACT].astype(np.int64)]
+    yield f"{POINTS}/position", block.incidents[:, INC_POINT : INC_POINT + 3]
+    yield f"{POINTS}/force", points[:, POINT_FORCE : POINT_FORCE + 3]
+    yield f"{POINTS}/slip_speed", points[:, POINT_SLIP]
+    yield f"{POINTS}/area", points[:, POINT_AREA]
 
 
 def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Table]]:

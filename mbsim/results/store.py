@@ -27,7 +27,7 @@ Value = str | float | int
 #: Rows of a chunk where nobody knows how many there will be: events, points of contact.
 _FEW = 256
 #: Datasets that do not have a row an output time.
-_UNKNOWN = ("events", "state/incidents")
+_UNKNOWN = ("events", "state/incidents", "contact_points/")
 #: All rows of a run that take no more than this [bytes] are stored without chunks.
 _SMALL = 1 << 12
 #: Most bytes, as in the file, of indices that HDF5 keeps in memory while it writes.
@@ -142,6 +142,7 @@ class Store:
         self,
         rows: Mapping[str, Table] | None = None,
         values: Mapping[str, Any] | None = None,
+        constants: Mapping[str, Table] | None = None,
         attributes: Mapping[str, Mapping[str, Any]] | None = None,
         remove: Iterable[str] = (),
         last: bool = False,
@@ -154,6 +155,8 @@ class Store:
             Rows to add to the datasets of these names, made at their first rows.
         values : mapping
             Datasets to write whole, in the place of those of their names.
+        constants : mapping
+            Datasets that are written once, compressed where they are not small.
         attributes : mapping of mapping
             Attributes of datasets and of groups, which are made if they are not there.
         remove : iterable of str
@@ -179,6 +182,9 @@ class Store:
             self._growing = self._growing or bool(rows)
             for name, value in (values or {}).items():
                 self._put(file, name, np.asarray(value))
+            for name, table in (constants or {}).items():
+                how = {"compression": "gzip", "shuffle": True} if table.nbytes > _SMALL else {}
+                file.create_dataset(name, data=table, **how)
             for name, facts in attributes.items():
                 if name != "/" and name not in file:
                     file.create_group(name)
@@ -213,7 +219,7 @@ class Store:
 
     def _make(self, file: h5py.File, name: str, rows: Table, growing: bool) -> None:
         """Make a dataset for rows like these, without any."""
-        likely = min(self.rows, self.rows_at_once) if name not in _UNKNOWN else _FEW
+        likely = min(self.rows, self.rows_at_once) if not name.startswith(_UNKNOWN) else _FEW
         file.create_dataset(
             name,
             (0, *rows.shape[1:]),

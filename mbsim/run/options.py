@@ -26,6 +26,7 @@ class Options:
     allow_overlap: bool = False
     dump_fclib: int | None = None
     signals: tuple[str, ...] = ()
+    contact_points: bool = False
     scripts: bool = True
     plugin_timeout: float | None = None
     progress: Progress | None = None

@@ -87,6 +87,7 @@ def simulate(
     allow_overlap: bool = False,
     dump_fclib: int | None = None,
     signals: Sequence[str] = (),
+    contact_points: bool = False,
     scripts: bool = True,
     plugin_timeout: float | None = None,
     progress: Progress | None = None,
@@ -124,6 +125,8 @@ def simulate(
     signals : sequence of str
         Names or patterns of what to record, ``bodies/2/position``, ``contacts/*/force``,
         ``joints``, beside time, events and requests; default: everything.
+    contact_points : bool
+        Record every point of contact with its force, slip speed and area as well.
     scripts : bool
         False refuses a model that needs users' code, that of `plugins` included.
     plugin_timeout : float, optional
@@ -153,6 +156,7 @@ def simulate(
         allow_overlap=allow_overlap,
         dump_fclib=dump_fclib,
         signals=tuple(signals),
+        contact_points=contact_points,
         scripts=scripts,
         plugin_timeout=plugin_timeout,
         progress=progress,
@@ -165,6 +169,7 @@ def simulate(
 def _run(model: Model, options: Options) -> Results:
     """Run a model; see `simulate`."""
     from mbsim.compile_model.build import build
+    from mbsim.compile_model.scratch import with_points
     from mbsim.core import jit
     from mbsim.plugins.permission import no_scripts
     from mbsim.results.log import RunLog
@@ -200,7 +205,10 @@ def _run(model: Model, options: Options) -> Results:
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
     attributes = _attributes(system, settings, options.detector, files, options.interpret_plugins)
-    attributes["signals"] = "\n".join(options.signals)
+    recorded = (*options.signals, *(["contact_points"] if options.contact_points else []))
+    attributes["signals"] = "\n".join(recorded)
+    if options.contact_points:
+        system.scene = system.scene._replace(rows=with_points(system.scene.rows))
     recorder = Recorder(system, attributes, folder, options.resume, settings, options.signals)
     try:
         recorder.check_room(output_rows(settings))

@@ -79,6 +79,7 @@ def fake_system_of(model: Model) -> Any:
         value=np.zeros((CAPACITY, len(values))),
         incident_count=np.zeros(CAPACITY, dtype=np.int64),
         incidents=np.zeros((CAPACITY, 14)),
+        points=np.zeros((0, codes.POINT_COLUMNS)),
         events=np.zeros((CAPACITY, 4)),
         used=np.zeros(3, dtype=np.int64),
     )

@@ -31,6 +31,10 @@ from mbsim.arrays.codes import (
     NOISE_TORQUE,
     OF_DAMPERS,
     OF_MOTIONS,
+    POINT_AREA,
+    POINT_CONTACT,
+    POINT_FORCE,
+    POINT_SLIP,
     POTENTIAL,
     STORED_ENERGY,
     USED_EVENTS,
@@ -151,6 +155,16 @@ def fill_contacts(scene: Scene, y: F1, row: F1) -> None:
 
 
 @jitable
+def fill_point(scene: Scene, s: int, row: F1) -> None:
+    """Write the force in slot s on I's body, its slip speed, area and contact."""
+    slot = scene.work.slot[s]
+    for j in range(3):
+        row[POINT_FORCE + j] = slot[FORCE + j]
+    row[POINT_SLIP], row[POINT_AREA] = slot[SLIP], patch(scene, s)
+    row[POINT_CONTACT] = contact_of(scene, s)
+
+
+@jitable
 def fill_incidents(scene: Scene, h: float, y: F1) -> int:
     """Append the incident table of this row, evaluated with `h`; return the number of incidents."""
     rows, work, state = scene.rows, scene.work, scene.state
@@ -191,6 +205,8 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
             # what equations hold, the law can tell only from here
             for j in range(2):
                 row[INC_STICKING + j] = work.sticking_force[s, j]
+        if len(rows.points) > 0:
+            fill_point(scene, s, rows.points[k])
         k += 1
     rows.used[USED_INCIDENTS] = k
     return k - first

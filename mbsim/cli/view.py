@@ -1,0 +1,189 @@
+"""`mbsim view`: the motion of result files in 3D, as a page for a browser."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mbsim.cli.messages import counted, echo
+
+if TYPE_CHECKING:
+    from mbsim.view.run_data import RunData
+
+#: Largest side of a picture [pixels].
+_LARGEST = 8192
+
+
+@click.command("view")
+@click.argument(
+    "files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RESULT.h5..."
+)
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="FILE.html",
+    help="The page.  [default: <result>.html, where no other file is asked for]",
+)
+@click.option(
+    "--signals",
+    multiple=True,
+    metavar="NAME",
+    help="Show these curves first, e.g. contacts/301/force; may be repeated.",
+)
+@click.option("--serve", is_flag=True, help="Serve the page on this machine while runs go on.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), metavar="N", help="For --serve.  [default: a free one]"
+)
+@click.option("--png", type=click.Path(path_type=Path), metavar="FILE", help="Write a picture.")
+@click.option(
+    "--gif", type=click.Path(path_type=Path), metavar="FILE", help="Write an animated picture."
+)
+@click.option("--mp4", type=click.Path(path_type=Path), metavar="FILE", help="Write a film.")
+@click.option(
+    "--gltf",
+    type=click.Path(path_type=Path),
+    metavar="FILE.glb",
+    help="Write the motion for other programs (one result file).",
+)
+@click.option("--time", type=float, metavar="T", help="Of --png.  [default: half of the run]")
+@click.option(
+    "--speed",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="X",
+    help="Of --gif and --mp4, in times real time.  [default: for 2.5 to 20 s]",
+)
+@click.option(
+    "--size",
+    default="1280x720",
+    show_default=True,
+    metavar="WxH",
+    help="Of pictures, in pixels.",
+)
+@click.option(
+    "--theme", type=click.Choice(["light", "dark"]), help="Of the page.  [default: the reader's]"
+)
+def command(files: tuple[Path, ...], output: Path | None, serve: bool, **options: object) -> None:
+    """Write the motion of RESULT.h5 as one HTML page that any browser shows, without a network.
+
+    Two result files are shown over each other, in the units of the first.
+    """
+    from mbsim.errors import ModelError
+
+    if len(files) > 2:
+        raise ModelError("one or two result files are shown, the second over the first")
+    asked = _Asked(files, output, **options)  # type: ignore[arg-type]
+    if serve:
+        asked.serve()
+    else:
+        asked.write()
+
+
+class _Asked:
+    """What the options ask for."""
+
+    def __init__(
+        self,
+        files: tuple[Path, ...],
+        output: Path | None,
+        signals: tuple[str, ...],
+        port: int | None,
+        png: Path | None,
+        gif: Path | None,
+        mp4: Path | None,
+        gltf: Path | None,
+        size: str,
+        **rest: object,
+    ) -> None:
+        self.files, self.output, self.signals, self.port = files, output, signals, port
+        self.png, self.gif, self.mp4, self.gltf = png, gif, mp4, gltf
+        self.size = _size(size)
+        self.rest = rest
+
+    def serve(self) -> None:
+        """Serve the page until Ctrl-C."""
+        from mbsim.errors import ModelError
+        from mbsim.view.serve import HOST, Served, server
+
+        if any((self.output, self.png, self.gif, self.mp4, self.gltf)):
+            raise ModelError("--serve writes no files: leave out -o, --png, --gif, --mp4, --gltf")
+        served = Served(self.files, self.signals)
+        with server(served, self.port or 0) as made:
+            echo(f"http://{HOST}:{made.server_port}/ shows {', '.join(map(str, self.files))}")
+            echo("Ctrl-C ends it", err=True)
+            try:
+                made.serve_forever()
+            except KeyboardInterrupt:
+                echo("", err=True)
+
+    def write(self) -> None:
+        """Write the files that are asked for."""
+        from mbsim.cli.messages import warn
+        from mbsim.errors import ModelError
+        from mbsim.results.curves import names_of
+        from mbsim.results.opening import read_apart
+        from mbsim.view.pictures import check_tools, make
+
+        pictures = {"png": self.png, "gif": self.gif, "mp4": self.mp4}
+        check_tools(**pictures)
+        if self.gltf is not None and len(self.files) > 1:
+            raise ModelError("--gltf takes one result file")
+        text, packs = read_apart(self._read, *self.files)
+        warn(line for pack in packs for line in pack.warnings)
+        if self.gltf is not None:
+            echo(f"{self.gltf}: {self.gltf.stat().st_size / 1e6:.2f} MB")
+        if any(pictures.values()):
+            time, speed = self.rest["time"], self.rest["speed"]
+            make(text, self.size, **pictures, time=time, speed=speed)  # type: ignore[arg-type]
+            for file in filter(None, pictures.values()):
+                echo(f"{file}: {file.stat().st_size / 1e6:.2f} MB")
+        if self.output is not None or not any((*pictures.values(), self.gltf)):
+            from mbsim.view.page import write
+
+            target = self.output or Path("-over-".join(names_of(list(self.files))) + ".html")
+            write(target, text)
+            echo(f"{target}: {_rows(packs)}, {target.stat().st_size / 1e6:.2f} MB")
+
+    def _read(self) -> tuple[str, list[RunData]]:
+        """Return the page and its packs; write the glTF, which needs the numbers as well."""
+        from mbsim.results.reading import open_results
+        from mbsim.view.gltf import write_glb
+        from mbsim.view.page import factors, packs_of, page, title_of
+        from mbsim.view.scene import read_scene
+
+        with ExitStack() as stack:
+            scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
+            if self.gltf is not None:
+                write_glb(scenes[0], self.gltf)
+            packs = packs_of(scenes, self.signals)
+            settings = {"factors": factors(scenes), "signals": list(self.signals)}
+            if self.rest["theme"]:
+                settings["theme"] = self.rest["theme"]
+            return page(title_of(scenes), settings, packs), packs
+
+
+def _rows(packs: Sequence[RunData]) -> str:
+    """Return how many rows are shown of those of each file."""
+    return " and ".join(
+        counted(pack.rows, "rows")
+        if pack.rows == pack.rows_of_file
+        else f"{pack.rows} of {counted(pack.rows_of_file, 'rows')}"
+        for pack in packs
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Return width and height of a text like 1280x720."""
+    from mbsim.errors import ModelError
+
+    found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
+    if found is None or max(int(found[1]), int(found[2])) > _LARGEST:
+        raise ModelError(
+            f"--size {text}: must be WIDTHxHEIGHT in pixels, each from 10 to {_LARGEST}"
+        )
+    return int(found[1]), int(found[2])

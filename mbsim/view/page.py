@@ -1,0 +1,112 @@
+"""The view as one HTML file that needs no other: library, scripts, style and packs within it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from mbsim.errors import ResultsError
+from mbsim.results.units import POSITION, TIME
+from mbsim.view.packing import text_of
+from mbsim.view.run_data import ROOM, RunData, run_data
+from mbsim.view.scene import Scene
+
+_STATIC = Path(__file__).parent / "static"
+#: Our scripts in the order in which they need each other.
+_SCRIPTS = (
+    *("unpack", "run", "shapes", "ground", "stage", "contacts", "extras", "curves", "view"),
+    "start",
+)
+#: Makes the view of a page that is nothing else.
+_MOUNT = """
+window.mbsimReady = mbsim.start(document.getElementById("view")).then(function (view) {
+  window.mbsimView = view;
+  return view;
+});
+"""
+
+
+def static(name: str) -> str:
+    """Return the text of a file that is shipped beside this module."""
+    return (_STATIC / name).read_text(encoding="utf-8")
+
+
+def library() -> str:
+    """Return three.js as one script that defines THREE, its licence before it."""
+    licence = static("three.LICENSE.txt").strip()
+    return f"/*\n{licence}\n*/\n{static('three.min.js').strip()}"
+
+
+def scripts() -> str:
+    """Return our scripts as one."""
+    parts = [static(f"{name}.js") for name in _SCRIPTS]
+    return '"use strict";\nconst mbsim = {};\n' + "\n".join(parts)
+
+
+def factors(scenes: Sequence[Scene]) -> list[dict[str, float]]:
+    """Return what lengths and times of each run are multiplied with to be those of the first."""
+    first = scenes[0].units
+    return [
+        {
+            "length": scene.units.factor_to(first, POSITION),
+            "time": scene.units.factor_to(first, TIME),
+        }
+        for scene in scenes
+    ]
+
+
+def packs_of(scenes: Sequence[Scene], asked: Sequence[str] = ()) -> list[RunData]:
+    """Return the packs of runs that are shown over each other."""
+    return [run_data(scene, ROOM // len(scenes), asked) for scene in scenes]
+
+
+def pack_elements(packs: Sequence[RunData]) -> str:
+    """Return packs as elements that a page's script reads."""
+    return "\n".join(
+        f'<script type="application/octet-stream" data-pack="{k}">{text_of(pack.data)}</script>'
+        for k, pack in enumerate(packs)
+    )
+
+
+def page(
+    title: str, settings: Mapping[str, Any], packs: Sequence[RunData] = (), connect: str = "'none'"
+) -> str:
+    """Return the whole page.
+
+    Parameters
+    ----------
+    title : str
+        Of the page; what comes from decks is escaped here.
+    settings : mapping
+        What the script is told: `factors`, `signals`, `theme`, `live`.
+    packs : sequence of RunData
+        Runs that are within the page.
+    connect : str
+        From where the page may ask for more, as its security policy has it.
+    """
+    return static("view.html").format(
+        title=escape(title),
+        connect=connect,
+        style=static("view.css"),
+        settings=escape(json.dumps(settings)),
+        body=static("body.html"),
+        packs=pack_elements(packs),
+        library=library(),
+        script=scripts() + _MOUNT,
+    )
+
+
+def title_of(scenes: Sequence[Scene]) -> str:
+    """Return what the page of these runs is called."""
+    return " and ".join(scene.name for scene in scenes)
+
+
+def write(file: Path, text: str) -> None:
+    """Write a page; ResultsError where the file cannot be written."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ResultsError(f"{file}: {error.strerror}") from None
