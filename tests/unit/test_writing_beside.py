@@ -80,12 +80,12 @@ def test_no_rows_follow_those_that_failed(
     with monkeypatch.context() as patch:
         patch.setattr(ChunkWriter, "add", failing(ChunkWriter.add, call, error))
         expected = TypeError if isinstance(error, TypeError) else ResultsError
-        with pytest.raises(expected, match="memory|HDF5 fails|wrong"):
+        with pytest.raises(expected, match=r"memory|HDF5 fails|wrong"):
             go_on(recorder, 10)
     # as `simulate` does behind a failure
     recorder.take()
     recorder.flush(checkpoint(0))
-    with pytest.raises(ResultsError, match="memory|HDF5 fails|wrong"):
+    with pytest.raises(ResultsError, match=r"memory|HDF5 fails|wrong"):
         close(recorder, "failed")
     assert numbers(tmp_path) == ("running", list(range(10)))
     again = recorder_of(tmp_path, resume=True)
