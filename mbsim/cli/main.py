@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -60,7 +63,12 @@ class Commands(click.Group):
         for name in ("stdout", "stderr"):
             if getattr(sys, name) is None:
                 setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
-        return super().main(*args, **options)
+        with _messages_may_be_lost():
+            try:
+                return super().main(*args, **options)
+            except OSError as error:  # before a subcommand begins
+                _no_output(error)
+                sys.exit(ResultsError.exit_code)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the subcommand; a message and the exit code of the class for every MbsimError."""
@@ -82,9 +90,7 @@ class Commands(click.Group):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             ctx.exit(0)
         except OSError as error:
-            # files of ours raise MbsimError: this is standard output, on a full disk say
-            echo(f"mbsim: error: standard output: {error.strerror}", err=True)
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _no_output(error)
             ctx.exit(ResultsError.exit_code)
         except MemoryError:
             echo("mbsim: error: there is not enough memory", err=True)
@@ -92,6 +98,46 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             echo("mbsim: error: interrupted", err=True)
             ctx.exit(Interrupted.exit_code)
+
+
+class _Messages(io.FileIO):
+    """Standard error as bytes; what it does not take is lost."""
+
+    def write(self, data: Any) -> int:
+        """Write bytes."""
+        try:
+            return super().write(data) or 0
+        except OSError:
+            return len(data)
+
+
+@contextlib.contextmanager
+def _messages_may_be_lost() -> Iterator[None]:
+    """Let a command go on where nobody can read its messages: its standard error is on a full disk.
+
+    Only the process's own; what another has put in its place is left alone.
+    """
+    plain = sys.stderr
+    if plain is not sys.__stderr__:
+        yield
+        return
+    raw = _Messages(plain.fileno(), "w", closefd=False)
+    sys.stderr = io.TextIOWrapper(
+        io.BufferedWriter(raw), plain.encoding, plain.errors, line_buffering=True
+    )
+    try:
+        yield
+    finally:
+        sys.stderr.flush()
+        sys.stderr = plain
+
+
+def _no_output(error: OSError) -> None:
+    """Say why standard output cannot be written; files of ours raise `MbsimError`."""
+    echo(f"mbsim: error: standard output: {error.strerror}", err=True)
+    # nothing is left to flush to it
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 #: Pages named below a message; more would hide it.

@@ -27,8 +27,13 @@ class Background:
             except BaseException as error:
                 self._failure = error
 
-        self._thread = threading.Thread(target=do, name="mbsim-writer")
-        self._thread.start()
+        thread = threading.Thread(target=do, name="mbsim-writer")
+        try:
+            thread.start()
+        except (RuntimeError, MemoryError):
+            do()  # a system that gives no more threads: it is done before the loop goes on
+        else:
+            self._thread = thread
 
     def wait(self) -> None:
         """Wait until nothing is being done; raise what the last piece of work raised, once."""

@@ -15,6 +15,8 @@ _LOCK_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os
 def problem(path: Path, error: BaseException) -> ResultsError:
     """Return what went wrong with a result file, in one line."""
     reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        reason = "there is not enough memory"
     return ResultsError(f"{path}: results cannot be written: {reason or type(error).__name__}")
 
 

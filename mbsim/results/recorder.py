@@ -430,9 +430,11 @@ class Recorder:
         self._given += rows
 
         def write() -> None:
-            self._look(block, first)
-            self._put(block)
-            self._store.sum_ahead()
+            # these rows are nowhere else: none may follow where this fails
+            with self._store.writing():
+                self._look(block, first)
+                self._put(block)
+                self._store.sum_ahead()
 
         self._background.begin(write)
 

@@ -32,6 +32,8 @@ _UNKNOWN = ("events", "state/incidents", "contact_points/")
 _SMALL = 1 << 12
 #: Most bytes, as in the file, of indices that HDF5 keeps in memory while it writes.
 _INDEX_BYTES = 1 << 19
+#: What a disk, HDF5 or a lack of memory raises.
+_OUTSIDE = (OSError, RuntimeError, MemoryError)
 #: Room that stays free beside rows for tables, the log and HDF5's own.
 _SPARE = 1 << 18
 
@@ -72,23 +74,33 @@ class Store:
         except OSError as error:
             self.broken = True
             raise problem(target, error) from None
-        with self._writing():
+        with self.writing():
             self._part = PartFile(target, resume)
             self.file = _opened(self._part, "r+" if resume else "w")
 
     @contextlib.contextmanager
-    def _writing(self) -> Iterator[h5py.File]:
-        """Turn failures to write into one `ResultsError` that names the file."""
+    def writing(self) -> Iterator[h5py.File]:
+        """Turn failures to write into one `ResultsError` that names the file.
+
+        Whatever is raised in it, nothing is written any more: some datasets may have rows that
+        others lack, and rows that were to be written may be nowhere else.
+        """
+        if self.broken:
+            yield self.file
+            return
         try:
             yield self.file
-            if self._part is not None:
+            if self._part is not None and not self.broken:
                 self._part.check()
-        except (OSError, RuntimeError, ValueError, KeyError) as error:
-            first = self._part.failure if self._part is not None else None
-            if first is None and isinstance(error, (ValueError, KeyError)):
+        except Exception as error:
+            if self.broken or isinstance(error, ResultsError):
+                self.abandon()
                 raise
+            first = self._part.failure if self._part is not None else None
             self.abandon()
             self.failure = problem(self.target or Path("memory"), first or error)
+            if first is None and not isinstance(error, _OUTSIDE):
+                raise
             raise self.failure from None
 
     def abandon(self) -> None:
@@ -124,7 +136,7 @@ class Store:
                 item.resize(length(name), axis=0)
 
         self._writers.clear()
-        with self._writing() as file:
+        with self.writing() as file:
             file.visititems(shortened)
 
     def _unlock(self) -> None:
@@ -169,10 +181,10 @@ class Store:
         rows, attributes = rows or {}, attributes or {}
         if attributes and self._changed and self._part is not None and self._before is None:
             # HDF5 puts texts where it remembers room: only while the file is open
-            with self._writing():
+            with self.writing():
                 self._reopen({name: writer.rest for name, writer in self._writers.items()})
         self._changed = True
-        with self._writing() as file:
+        with self.writing() as file:
             for name in remove:
                 if name in file:
                     del file[name]
@@ -194,13 +206,13 @@ class Store:
     def sum_ahead(self) -> None:
         """Make the checksums of what is written by now."""
         if not self.broken and self._part is not None:
-            with self._writing():
+            with self.writing():
                 self._part.sum_ahead()
 
     def complete(self) -> None:
         """Write all rows that are held back; none follow, but behind a publication."""
         if not self.broken:
-            with self._writing() as file:
+            with self.writing() as file:
                 for writer in self._writers.values():
                     writer.complete()
                 file.flush()
@@ -250,7 +262,7 @@ class Store:
         """
         if self.broken or self._part is None:
             return
-        with self._writing() as file:
+        with self.writing() as file:
             file.flush()
             self._part.mark()
         rests = {name: writer.rest for name, writer in self._writers.items()}
@@ -264,7 +276,7 @@ class Store:
             self.mark()
         assert self._before is not None
         self.complete()
-        with self._writing() as file:
+        with self.writing() as file:
             file.close()
             self._part.publish()
             # what HDF5 knew of the file is wrong now
@@ -289,7 +301,7 @@ class Store:
         self.complete()
         if self._part is None:
             return self.file
-        with self._writing() as file:
+        with self.writing() as file:
             self._writers.clear()
             file.close()
             self._part.publish(last=True)

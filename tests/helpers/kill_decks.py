@@ -127,11 +127,11 @@ def sensors(folder: Path) -> Case:
     return written(folder, model, both), ["--tol", "1e-9"]
 
 
-def broadphase(folder: Path, method: str, end: float) -> Case:
+def broadphase(folder: Path, method: str, end: float, interval: float = 0.002) -> Case:
     """Return a pile of 64 balls, whose near pairs are looked for, as it falls apart."""
     places = block(4, 0.201, z=0.101, jitter=0.02, seed=3)
     text = pile(places, stiffness=1e5, exponent=1.5, damping=100.0, dmax=1e-4, **COULOMB)
-    return written(folder, text + GRAVITY, transient(end, 0.002)), ["--integrator", method]
+    return written(folder, text + GRAVITY, transient(end, interval)), ["--integrator", method]
 
 
 def meshes(folder: Path, end: float = 25.0, **law: object) -> Case:
@@ -186,6 +186,8 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "sensors": sensors,
     "broadphase": partial(broadphase, method="AUTO", end=0.2),
     "broadphase, VERLET": partial(broadphase, method="VERLET", end=1.5),
+    # rows of many blocks, which are written beside the loop
+    "broadphase, many rows": partial(broadphase, method="VERLET", end=0.8, interval=0.0004),
     "meshes": meshes,
     "meshes, FIELD": partial(meshes, end=4.0, contact_depth="FIELD"),
     "meshes, VOLUME": partial(meshes, end=4.0, **VOLUME),

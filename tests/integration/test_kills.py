@@ -34,6 +34,7 @@ from helpers.ends import (
 )
 from helpers.kill_decks import CASES
 from mbsim.results.reading import open_results
+from mbsim.results.recorder import BUFFER_BYTES
 
 KILLS = int(os.environ.get("MBSIM_KILLS", "25"))
 SEED = int(os.environ.get("MBSIM_KILL_SEED", "1"))
@@ -49,6 +50,9 @@ class Straight:
         self.whole = self._timed()
         with open_results(next(self.out.glob("*.h5"))) as results:
             compiled = results.stats["compile_s"]
+            size = sum(results[name].nbytes for name in results.signals())
+        #: How many writes there are until a run is killed; of a long one blocks are on their way.
+        self.writes = [20, 40] + [150, 300, 600, 1200] * (size > 2 * BUFFER_BYTES)
         if compiled > 0.1 * self.whole:
             self.whole = self._timed()
 
@@ -118,7 +122,7 @@ def test_a_killed_run_goes_on_bit_for_bit(
             if how == "result":
                 after *= 0.25  # as long as runs take after their first flush
             elif how != "time":
-                at = chance.choice([1, 2, 3, 5, 8, 12] + [20, 40] * (how == "bytes"))
+                at = chance.choice([1, 2, 3, 5, 8, 12] + whole.writes * (how == "bytes"))
             code, said = run_until(whole.line(out, *more), after, changes=changes, at=at)
             if changes is not None:
                 changes.close()

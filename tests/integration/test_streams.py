@@ -33,6 +33,30 @@ def test_closed_streams_do_not_get_a_result_files_bytes(tmp_path: Path, closed: 
         assert len(results["bodies/2/position"]) == len(results["time"])
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("run deck.xml -o out 2>/dev/full", 0),
+        ("run deck.xml -o out >/dev/full 2>/dev/full", 5),
+        ("run nothing.xml 2>/dev/full", 2),
+        ("run --nonsense 2>/dev/full", 2),
+        ("check deck.xml >/dev/full 2>/dev/full", 5),
+        ("--help >/dev/full", 5),
+        ("run --help >/dev/full 2>/dev/full", 5),
+    ],
+)
+def test_streams_on_a_full_disk(tmp_path: Path, line: str, code: int) -> None:
+    """Messages that nobody can read end no run; results that cannot be printed are told."""
+    write_deck(tmp_path, BOUNCE, end_time=0.02)
+    done = shell(f"{CLI} {line}", tmp_path)
+    assert done.returncode == code
+    assert b"Traceback" not in done.stderr
+    if "deck.xml -o" in line:
+        with open_results(tmp_path / "out/deck.h5") as results:
+            assert results.status == "finished"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="names that are no text")
 def test_a_file_name_that_is_no_text(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, BOUNCE, end_time=0.02)
