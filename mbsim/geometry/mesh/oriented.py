@@ -24,6 +24,17 @@ def place(pose: F1, p: V3) -> V3:
 
 
 @jitable
+def place_back(pose: F1, p: V3) -> V3:
+    """Return a point of J's axes in I's."""
+    d = sub(p, vector(pose))
+    return (
+        pose[3] * d[0] + pose[6] * d[1] + pose[9] * d[2],
+        pose[4] * d[0] + pose[7] * d[1] + pose[10] * d[2],
+        pose[5] * d[0] + pose[8] * d[1] + pose[11] * d[2],
+    )
+
+
+@jitable
 def turn(pose: F1, d: V3) -> V3:
     """Return a vector of I's axes in J's."""
     return (dot(vector(pose[3:]), d), dot(vector(pose[6:]), d), dot(vector(pose[9:]), d))
