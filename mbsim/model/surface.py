@@ -11,15 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.model.elements import Array
-from mbsim.model.mesh import Faces
+from mbsim.model.mesh import Faces, joined
 from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, oriented_order
 
 #: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
-#: marks, oriented boxes (`model.surface_tree`) and the first triangles of leaves begin, length of
-#: the whole.
-HEADER = 8
-(TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, LENGTH) = range(
-    HEADER
+#: marks, oriented boxes (`model.surface_tree`), the first triangles of leaves and those of shells
+#: (what hangs together through edges) begin, length of the whole. Behind the first triangles of
+#: shells stands the shell of each triangle.
+HEADER = 9
+(TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, AT_SHELLS, LENGTH) = (
+    range(HEADER)
 )
 #: Most triangles of a leaf.
 LEAF = 4
@@ -145,7 +146,9 @@ def pack(
         oriented_boxes(corners, below, units, starts, levels).ravel() if layered else np.zeros(0)
     )
     marks = np.full(count, -1.0)
-    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts]
+    shell = joined(np.repeat(np.arange(count), 3), beside.ravel(), count)
+    shells = np.concatenate([np.unique(shell, return_index=True)[1], shell])
+    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells]
     at = HEADER + np.cumsum([0, *map(len, parts)])
     packed: Array = np.concatenate([[count, levels, *at], *parts])
     return packed

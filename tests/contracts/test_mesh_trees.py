@@ -9,7 +9,8 @@ from helpers.mesh_parts import bolt, gear
 from helpers.pairs import random_rotation
 from helpers.surfaces import Meshed, angle, box, call, incidents, torus
 from mbsim.geometry.mesh.distance import least_gap, triangle_distance
-from mbsim.geometry.mesh.oriented import axes_between, box_distance, have_room
+from mbsim.geometry.mesh.oriented import I_IN_J, J_IN_I, box_distance, ways_between
+from mbsim.geometry.mesh.overlap import EDGES, PRISM, measure_pair_of, nodes_of, place_triangle
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
 from mbsim.geometry.mesh.prism import apart, piece_in_prism
@@ -90,9 +91,10 @@ def test_boxes_with_a_common_point_have_room():
     shared = 0
     for _ in range(300):
         a, b, pose = random_node(rng), random_node(rng), random_pose(rng, 0.5)
-        room = have_room(a, THIN, b, THIN, axes_between(a, b, pose), pose)
+        room = ways_between(a, b, I_IN_J | J_IN_I, pose)
+        assert room in (0, I_IN_J | J_IN_I)
         distance = box_distance(a, THIN, b, THIN, pose)
-        assert (distance == 0.0) == room
+        assert (distance == 0.0) == (room > 0)
         own = (2.0 * rng.random((400, 3)) - 1.0) * a[THIN + 3 : DEEP]
         points = a[THIN : THIN + 3] + own @ a[:9].reshape(3, 3)
         placed = pose[:3] + points @ pose[3:].reshape(3, 3).T
@@ -103,6 +105,43 @@ def test_boxes_with_a_common_point_have_room():
         # no point of a is nearer to b than the bound
         assert np.linalg.norm(np.maximum(off, 0.0), axis=1).min() >= distance - 1e-12
     assert shared > 20
+
+
+def test_each_way_asks_for_the_boxes_of_its_own():
+    """Nodes that stand beside each other with thin boxes apart and one deep box over the other."""
+    upright, pose = np.eye(3).ravel(), np.concatenate([[1.0, 0.0, 0.0], np.eye(3).ravel()])
+    thin, deep = [0.0, 0.0, 0.0, 0.4, 1.0, 1.0], [0.0, 0.0, 0.0, 0.7, 1.0, 1.0]
+    plain = np.array([*upright, *thin, *thin, 0.0, 0.0])
+    layered = np.array([*upright, *thin, *deep, 0.0, 0.0])
+    assert ways_between(plain, plain, I_IN_J | J_IN_I, pose) == 0
+    assert ways_between(plain, layered, I_IN_J | J_IN_I, pose) == I_IN_J
+    assert ways_between(layered, plain, I_IN_J | J_IN_I, pose) == J_IN_I
+    assert ways_between(layered, layered, I_IN_J | J_IN_I, pose) == I_IN_J | J_IN_I
+    assert ways_between(layered, layered, J_IN_I, pose) == J_IN_I
+
+
+@pytest.mark.parametrize("name", ["box", "angle", "torus"])
+def test_the_walk_finds_all_pairs_of_triangles_that_overlap(name):
+    mesh, rng = Meshed(*MESHES[name]), np.random.default_rng(4)
+    count, size = len(mesh.faces), float(np.ptp(mesh.vertices, axis=0).min())
+    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    a, b = np.empty(PRISM), np.empty(PRISM)
+    node, values, other = np.empty(PATCH_NUMBERS), np.empty(EDGES), np.empty(EDGES)
+    found = 0
+    # the torus has 256 triangles: some of them will do
+    for _ in range(2 if name == "torus" else 10):
+        pose, origin = random_pose(rng, 0.4 * size), (0.1 * size, 0.0, 0.0)
+        many, nodes, _, pairs = nodes_of(mesh.data, mesh.data, pose, origin)
+        told = {tuple(pair): k for k, pair in enumerate(pairs[:many].astype(int).tolist())}
+        for i in range(0, count, 3 if name == "torus" else 1):
+            place_triangle(mesh.data, i, pose, True, origin, a)
+            for j in range(count):
+                place_triangle(mesh.data, j, pose, False, origin, b)
+                if measure_pair_of(a, b, I_IN_J | J_IN_I, node, values, other, work):
+                    if node[PEAK] > 1e-13 * size:
+                        assert nodes[told[i, j]] == pytest.approx(node, rel=1e-12, abs=1e-18)
+                        found += 1
+    assert found > 30
 
 
 def test_the_bound_of_two_triangles_is_no_more_than_their_distance():

@@ -349,3 +349,23 @@ def test_a_sphere_knows_a_wall_that_it_goes_through():
             arrays = (at, size, upright, wall.size, points)
             count = entry("SPHERE-SURFACE")(*(a.ctypes.data for a in arrays))
             assert (count < 0) == (depth > min(0.01, radius + 0.0036))
+
+
+@pytest.mark.parametrize("pair", ["SURFACE-SURFACE", "FIELD-FIELD"])
+@pytest.mark.parametrize("first", ["small", "large"])
+@pytest.mark.parametrize("touches", [False, True])
+def test_a_shell_inside_of_another_mesh_is_told_beside_one_that_is_not(pair, first, touches):
+    """Two small boxes of one mesh: one in the core of a block, one beside it or in its surface."""
+    (vertices, faces), block = box(0.02, 0.02, 0.02), Meshed(*box(0.4, 0.4, 0.4))
+    other = [0.0, 0.0, 0.209 if touches else 0.3]
+    told = []
+    for inside in ([0.5, 0.0, 0.0], [0.0, 0.0, 0.0]):
+        two = Meshed(
+            np.vstack([vertices + other, vertices + inside]), np.vstack([faces, faces + 8])
+        )
+        still, points = frame(np.zeros(3), SAME), np.zeros((PAIRS[pair].slots, POINT))
+        i, j = (two, block) if first == "small" else (block, two)
+        arrays = (still, i.size, still, j.size, points)
+        told.append(entry(pair)(*(a.ctypes.data for a in arrays)) < 0)
+        assert (points[:, 0].max() > 0.0) == touches
+    assert told == [False, True]

@@ -12,8 +12,17 @@ import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import vector
-from mbsim.geometry.mesh.oriented import axes_between, extent, have_room, node_of
+from mbsim.core.rotation import dot, sub, vector
+from mbsim.geometry.mesh.oriented import (
+    FLUSH,
+    I_IN_J,
+    J_IN_I,
+    extent,
+    node_of,
+    place,
+    turn,
+    ways_between,
+)
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
 from mbsim.geometry.mesh.prism import apart, piece_in_prism
@@ -31,12 +40,12 @@ from mbsim.model.surface import (
 )
 from mbsim.model.surface_tree import DEEP, FIRST, LAST, THIN
 
-#: Which surface may be in which layer: I's in J's, J's in I's.
-I_IN_J, J_IN_I = 1, 2
 #: Numbers of a triangle that the walk needs: corners, inner points, depths, order.
 PRISM = 24
 #: Nodes of so few triangles are looked at as leaves.
 FEW = 2
+#: Numbers of a placed box: centre, axes by rows, half edges.
+PLACED_BOX = 15
 #: Edges of a pair of triangles.
 EDGES = 6
 
@@ -90,6 +99,66 @@ def corners_of(prism: F1, at: int) -> tuple[V3, V3, V3]:
 
 
 @jitable
+def place_boxes(node: F1, pose: F1, moves: bool, origin: V3, boxes: F2) -> None:
+    """Write both boxes of a node in J's axes from `origin`: centre, axes by rows, half edges."""
+    for k in range(2):
+        at, box = THIN + (DEEP - THIN) * k, boxes[k]
+        c = vector(node[at:])
+        c = sub(place(pose, c) if moves else c, origin)
+        box[0], box[1], box[2] = c[0], c[1], c[2]
+        # what is flush with a side of a box is outside of it
+        flush = FLUSH * (node[at + 3] + node[at + 4] + node[at + 5])
+        for r in range(3):
+            u = vector(node[3 * r :])
+            if moves:
+                u = turn(pose, u)
+            box[3 + 3 * r], box[4 + 3 * r], box[5 + 3 * r] = u[0], u[1], u[2]
+            box[12 + r] = node[at + 3 + r] - flush
+
+
+@jitable
+def reaches(prism: F1, points: int, box: F1) -> bool:
+    """Return whether a placed triangle (3 points), or its prism (6), reaches into a placed box."""
+    c = vector(box)
+    for r in range(3):
+        u, least, most = vector(box[3 + 3 * r :]), math.inf, -math.inf
+        for k in range(0, 3 * points, 3):
+            height = dot(u, sub(vector(prism[k:]), c))
+            least, most = min(least, height), max(most, height)
+        if least >= box[12 + r] or most <= -box[12 + r]:
+            return False
+    return True
+
+
+@jitable
+def place_leaf(
+    mesh: F1,
+    node: F1,
+    pose: F1,
+    moves: bool,
+    origin: V3,
+    ways: int,
+    boxes: F2,
+    placed: F2,
+    kept: I1,
+) -> None:
+    """Place the triangles of a leaf; `kept` gets the ways in which each one may meet another leaf.
+
+    `boxes` are those of the other leaf.
+    """
+    thin, deep = (I_IN_J, J_IN_I) if moves else (J_IN_I, I_IN_J)
+    first = int(node[FIRST])
+    for t in range(first, int(node[LAST])):
+        prism = placed[t - first]
+        place_triangle(mesh, t, pose, moves, origin, prism)
+        kept[t - first] = 0
+        if ways & thin and reaches(prism, 3, boxes[1]):
+            kept[t - first] |= thin
+        if ways & deep and reaches(prism, 6, boxes[0]):
+            kept[t - first] |= deep
+
+
+@jitable
 def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2) -> bool:
     """Fill the node of triangles a of I and b of J; return whether there is any piece.
 
@@ -127,11 +196,9 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
     count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
     pairs = np.empty((64, 2))
     work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
-    placed_i, placed_j, other = (
-        np.empty((LEAF + 1, PRISM)),
-        np.empty((LEAF + 1, PRISM)),
-        np.empty(EDGES),
-    )
+    placed_i, placed_j = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM))
+    kept_i, kept_j = np.empty(LEAF + 1, np.int64), np.empty(LEAF + 1, np.int64)
+    other, boxes = np.empty(EDGES), np.empty((2, PLACED_BOX))
     waiting = np.empty((4 * WAITING, 3), np.int64)
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 1, 1, I_IN_J | J_IN_I
     many = 1
@@ -140,11 +207,7 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
         many -= 1
         i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
         box_i, box_j = node_of(mesh_i, i), node_of(mesh_j, j)
-        axes = axes_between(box_i, box_j, pose)
-        if ways & I_IN_J and not have_room(box_i, THIN, box_j, DEEP, axes, pose):
-            ways -= I_IN_J
-        if ways & J_IN_I and not have_room(box_i, DEEP, box_j, THIN, axes, pose):
-            ways -= J_IN_I
+        ways = ways_between(box_i, box_j, ways, pose)
         if ways == 0:
             continue
         first_i, last_i = int(box_i[FIRST]), int(box_i[LAST])
@@ -158,17 +221,20 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
                 waiting[many, 2] = ways
                 many += 1
             continue
-        for t in range(first_i, last_i):
-            place_triangle(mesh_i, t, pose, True, origin, placed_i[t - first_i])
-        for t in range(first_j, last_j):
-            place_triangle(mesh_j, t, pose, False, origin, placed_j[t - first_j])
+        place_boxes(box_j, pose, False, origin, boxes)
+        place_leaf(mesh_i, box_i, pose, True, origin, ways, boxes, placed_i, kept_i)
+        place_boxes(box_i, pose, True, origin, boxes)
+        place_leaf(mesh_j, box_j, pose, False, origin, ways, boxes, placed_j, kept_j)
         for a in range(first_i, last_i):
             for b in range(first_j, last_j):
+                both = kept_i[a - first_i] & kept_j[b - first_j]
+                if both == 0:
+                    continue
                 if count == len(nodes):
                     nodes, values = grown(nodes, count), grown(values, count)
                     pairs = grown(pairs, count)
                 if measure_pair_of(
-                    placed_i[a - first_i], placed_j[b - first_j], ways, nodes[count],
+                    placed_i[a - first_i], placed_j[b - first_j], both, nodes[count],
                     values[count], other, work,
                 ):  # fmt: skip
                     pairs[count, 0], pairs[count, 1] = a, b

@@ -24,6 +24,7 @@ from mbsim.geometry.pairs.surface import (
     far_apart,
     pose_of,
     surface_of,
+    swallowed,
     without_pieces,
 )
 from mbsim.geometry.polyhedron import to_global
@@ -67,7 +68,7 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
-    known = 1
+    known = -1 if swallowed(mesh_i, mesh_j, pairs[:count], pose) else 1
     for k in range(count):
         # what is below the layer does not press: forces keep their potential, and are too small
         if nodes[k, BEYOND] > 0.0:

@@ -35,6 +35,7 @@ from mbsim.geometry.mesh.merging import (
     strongest,
     write_points,
 )
+from mbsim.geometry.mesh.oriented import place, place_back
 from mbsim.geometry.mesh.overlap import (
     box_gap,
     common_middle,
@@ -43,9 +44,11 @@ from mbsim.geometry.mesh.overlap import (
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.mesh.record import BEYOND, PEAK
+from mbsim.geometry.mesh.tree import box_square
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import (
     AT_BOXES,
+    AT_SHELLS,
     AT_TRIANGLES,
     DEPTH,
     HEADER,
@@ -132,26 +135,34 @@ def in_core(mesh: F1, c: V3) -> bool:
 
 
 @jitable
-def swallowed(mesh_i: F1, mesh_j: F1, pose: F1) -> bool:
-    """Return whether one of two meshes lies in the core of the other one, below its layer.
+def shell_within(mesh: F1, side: int, pairs: F2, other: F1, pose: F1) -> bool:
+    """Return whether a shell of a mesh lies in the core of another mesh, below its layer.
 
-    It is asked where no piece of surface lies in a layer: then all of a mesh is inside or outside.
+    All of a shell is inside or outside where no piece of it is in a layer. `pairs` are those of
+    triangles that have pieces; the mesh's own are in column `side`. `pose` is that of I in J's
+    axes; the mesh is I for side 0, J for side 1.
     """
-    p = vector(mesh_i[int(mesh_i[AT_TRIANGLES]) :])
-    c = (
-        pose[0] + pose[3] * p[0] + pose[4] * p[1] + pose[5] * p[2],
-        pose[1] + pose[6] * p[0] + pose[7] * p[1] + pose[8] * p[2],
-        pose[2] + pose[9] * p[0] + pose[10] * p[1] + pose[11] * p[2],
+    at = int(mesh[AT_SHELLS])
+    count = int(mesh[LENGTH]) - at - int(mesh[TRIANGLES])
+    for shell in range(count):
+        p = vector(mesh[int(mesh[AT_TRIANGLES]) + TRIANGLE * int(mesh[at + shell]) :])
+        p = place(pose, p) if side == 0 else place_back(pose, p)
+        inside = box_square(other, int(other[AT_BOXES]) + NODE, p) == 0.0
+        for k in range(len(pairs)):
+            if not inside or int(mesh[at + count + int(pairs[k, side])]) == shell:
+                inside = False
+                break
+        if inside and in_core(other, p):
+            return True
+    return False
+
+
+@jitable
+def swallowed(mesh_i: F1, mesh_j: F1, pairs: F2, pose: F1) -> bool:
+    """Return whether a shell of one of two meshes lies in the core of the other one."""
+    return shell_within(mesh_i, 0, pairs, mesh_j, pose) or shell_within(
+        mesh_j, 1, pairs, mesh_i, pose
     )
-    if in_core(mesh_j, c):
-        return True
-    p = sub(vector(mesh_j[int(mesh_j[AT_TRIANGLES]) :]), vector(pose))
-    c = (
-        pose[3] * p[0] + pose[6] * p[1] + pose[9] * p[2],
-        pose[4] * p[0] + pose[7] * p[1] + pose[10] * p[2],
-        pose[5] * p[0] + pose[8] * p[1] + pose[11] * p[2],
-    )
-    return in_core(mesh_i, c)
 
 
 @jitable
@@ -160,7 +171,7 @@ def without_pieces(mesh_i: F1, mesh_j: F1, pose: F1, frame_j: F1, points: F2) ->
 
     Within each other, a distance of 0: the pair is looked at again at every step.
     """
-    if swallowed(mesh_i, mesh_j, pose):
+    if swallowed(mesh_i, mesh_j, np.empty((0, 2)), pose):
         return -far_apart(0.0, frame_j, points)
     return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
 
@@ -179,10 +190,11 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
     if count == 0:
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
+    pairs = pairs[:count]
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
     count = merge(nodes[:count], values[:count], partners, peaks)
-    known = 1
+    known = -1 if swallowed(mesh_i, mesh_j, pairs, pose) else 1
     for k in range(count):
         patch = nodes[int(peaks[k, AT_NODE])]
         if patch[BEYOND] > AT_END * patch[PEAK]:
