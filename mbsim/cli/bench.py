@@ -116,7 +116,7 @@ def _draw(options: Options, done: Report, output: Path) -> list[str]:
 
 def _as_json(done: Report, output: Path, pictures: list[str]) -> dict[str, object]:
     """Return the report as JSON has it; what is no number is null."""
-    from mbsim.results.reading import finite
+    from mbsim.results.form import finite
 
     return {
         "machine": done.machine,

@@ -68,8 +68,8 @@ def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]
     """Return what a deck describes."""
     from mbsim.compile_model.pairing import plan_pairs
     from mbsim.model.placement import place
+    from mbsim.results.form import finite
     from mbsim.results.log import counts, pair_texts, title, units_text
-    from mbsim.results.reading import finite
 
     placement = place(model)
     plans = plan_pairs(model)
@@ -230,7 +230,8 @@ def _largest(results: Results) -> dict[str, Any]:
 def _about_results(results: Results) -> dict[str, Any]:
     """Return what a result file holds."""
     from mbsim.results.audit import facts
-    from mbsim.results.reading import end_state, finite
+    from mbsim.results.form import finite
+    from mbsim.results.reading import end_state
 
     audit = results.audit
     time, largest = results["time"], _largest(results)

@@ -42,7 +42,8 @@ def command(
     from mbsim.errors import ModelError
     from mbsim.plugins.permission import no_scripts
     from mbsim.results.files import replace_text
-    from mbsim.results.reading import finite, open_results
+    from mbsim.results.form import finite
+    from mbsim.results.reading import open_results
     from mbsim.run.replay import request
 
     if output is not None and as_json:

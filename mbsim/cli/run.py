@@ -210,7 +210,8 @@ def _print_json(results: Results, result_file: Path) -> None:
     """Print the documented JSON object."""
     from mbsim.cli.messages import print_json
     from mbsim.results.audit import facts
-    from mbsim.results.reading import end_state, finite
+    from mbsim.results.form import finite
+    from mbsim.results.reading import end_state
 
     time, audit = results["time"], results.audit
     print_json(

@@ -18,14 +18,17 @@ import numpy as np
 
 from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError, ResultsError
-from mbsim.results.curves import Curve, Panel, Picture
+from mbsim.results.curves import Curve, Panel, Picture, components
 from mbsim.results.files import sync
-from mbsim.results.units import INCIDENTS
+from mbsim.results.quantities import quantity_of
+from mbsim.results.units import INCIDENTS, TIME, UnitSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+
+    from mbsim.results.reading import Results
 
 SUFFIXES = (".png", ".svg")
 
@@ -76,13 +79,13 @@ def _style() -> Iterator[None]:
         yield
 
 
-def need_matplotlib() -> None:
-    """Raise `ModelError` unless matplotlib is there."""
+def need_matplotlib(what: str = "plot") -> None:
+    """Raise `ModelError`, which names what needs it, unless matplotlib is there."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
         raise ModelError(
-            "plot needs matplotlib, which is not installed: pip install matplotlib"
+            f"{what} needs matplotlib, which is not installed: pip install matplotlib"
         ) from None
 
 
@@ -124,6 +127,30 @@ def draw(picture: Picture) -> Figure:
             axes[-1].margins(x=0.03)
         _write_around(figure, heading, shouted, foot)
     return figure
+
+
+def draw_signals(results: Results, names: Sequence[str], ax: Axes | None = None) -> Axes:
+    """Draw signals over time on axes in the user's own style, new ones of pyplot if not given."""
+    need_matplotlib("results.plot")
+    from matplotlib import pyplot
+
+    if not names:
+        raise ModelError("results.plot needs the name of a signal; results.signals() has all")
+    system = UnitSystem.of(results.attributes)
+    wanted = [each for name in names for each in components(results, name)]
+    axes = pyplot.subplots()[1] if ax is None else ax
+    quantities = [quantity_of(results, each.dataset, each.column) for each in wanted]
+    alike = len(set(quantities)) == 1
+    for each, quantity in zip(wanted, quantities, strict=True):
+        unit = system.text(quantity)
+        label = each.name if alike or not unit else f"{each.name} [{unit}]"
+        axes.plot(results["time"], results[each.name], label=_plain(label))
+    axes.set_xlabel(f"Time [{system.text(TIME)}]")
+    unit = system.text(quantities[0]) if alike else ""
+    if alike:
+        axes.set_ylabel(_plain(f"{quantities[0].name} [{unit}]" if unit else quantities[0].name))
+    axes.legend()
+    return axes
 
 
 def _write_around(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,3 +147,14 @@ def texts_of(item: Any, name: str, value: Any) -> list[str]:
     if not texts or len(found) != item.shape[-1]:
         raise ValueError(f"{name} of {item.name} is no text for each column")
     return list(found)
+
+
+def finite(value: Any) -> Any:
+    """Return a value for JSON, which has no infinity and no NaN: null in their place."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return finite(value.tolist()) if isinstance(value, (np.ndarray, np.generic)) else value

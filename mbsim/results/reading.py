@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import functools
-import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.errors import MbsimError, ResultsError, UnknownSignal
+from mbsim.errors import ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
+from mbsim.results.damage import DAMAGE, reads, said_of
 from mbsim.results.form import (
     FACTS,
     check_members,
@@ -24,6 +23,7 @@ from mbsim.results.form import (
     texts_of,
     values_of,
 )
+from mbsim.results.mapping import SignalMapping
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 from mbsim.results.opening import opened_file
 
@@ -31,35 +31,8 @@ if TYPE_CHECKING:
     import h5py
 
 
-#: What h5py raises where a file is damaged, and numpy where datasets are not of their form.
-_DAMAGE = (
-    *(OSError, RuntimeError, MemoryError),
-    *(KeyError, ValueError, TypeError, IndexError, AttributeError),
-)
 #: A column of a run's .csv, and how names for `mbsim request` begin.
 _CSV_COLUMN, _OF_REQUEST = re.compile(r"(\d+)\.(F[1-8])"), re.compile(r"Force_Contact\[\d+\]\.")
-_Read = TypeVar("_Read", bound=Callable[..., Any])
-
-
-def _reads(method: _Read) -> _Read:
-    """Turn what h5py raises of a damaged file into one `ResultsError` that names the file."""
-
-    @functools.wraps(method)
-    def reading(self: Results, *arguments: Any) -> Any:
-        try:
-            return method(self, *arguments)
-        except MbsimError:
-            raise
-        except _DAMAGE as error:
-            raise ResultsError(f"{self._where}: {_damage(error)}") from None
-
-    return cast(_Read, reading)
-
-
-def _damage(error: BaseException) -> str:
-    """Return what to say of a file that h5py cannot read."""
-    text = " ".join(str(error.args[0] if error.args else error).split())
-    return f"cannot be read, the file is damaged: {text or type(error).__name__}"
 
 
 class Location(NamedTuple):
@@ -77,7 +50,7 @@ _NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "
 _NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
-class Results:
+class Results(SignalMapping):
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
@@ -86,12 +59,19 @@ class Results:
     """
 
     def __init__(self, file: h5py.File, path: Path | None) -> None:
-        self._file = file
         self.path = path
+        self._read_from(file)
+
+    def _read_from(self, file: h5py.File) -> None:
+        """Look at this file from here on."""
+        self._file = file
         # once they were looked up
         self._signals: dict[str, int] | None = None
         self._ids: dict[str, list[int]] | None = None
         self._table: dict[str, Location] | None = None
+
+    def _itself(self) -> Results:
+        return self
 
     def __enter__(self) -> Results:
         return self
@@ -114,13 +94,40 @@ class Results:
         """Let go of the file; results in memory are gone then."""
         self._file.close()
 
+    @property
+    def closed(self) -> bool:
+        """Whether the file was let go of."""
+        return not self._file
+
+    def refresh(self) -> int:
+        """Look at what a run that goes on has published since; return how many rows are new.
+
+        Results in memory stay as they are.
+        """
+        before = len(self["time"]) if "time" in self else 0
+        if self.path is None:
+            return 0
+        found = open_results(self.path)
+        self._file.close()
+        self._read_from(found._file)
+        return (len(self["time"]) if "time" in self else 0) - before
+
+    @reads
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy in another process open the file anew; results in memory take it along."""
+        if self.path is not None:
+            return open_results, (str(self.path.absolute()),)
+        file = self._open()
+        file.flush()
+        return from_bytes, (file.id.get_file_image(),)
+
     def _open(self) -> h5py.File:
         if not self._file:
             raise ResultsError(f"{self.path or 'results in memory'}: the results are closed")
         return self._file
 
     @property
-    @_reads
+    @reads
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file: version, model, units, settings, status."""
         return facts_of(self._open())
@@ -136,7 +143,7 @@ class Results:
         return str(self.attributes.get("status", "unknown"))
 
     @property
-    @_reads
+    @reads
     def stats(self) -> dict[str, Any]:
         """Counters and times of the run; empty if it was killed."""
         if "stats" not in self._open():
@@ -144,7 +151,7 @@ class Results:
         return facts_of(self._open()["stats"])
 
     @property
-    @_reads
+    @reads
     def audit(self) -> Audit | None:
         """What the run found out about itself; None if it was killed, or never took a step."""
         file = self._open()
@@ -159,7 +166,7 @@ class Results:
         file["audit"].visititems(note)
         return from_attributes(found)
 
-    @_reads
+    @reads
     def keys(self) -> list[str]:
         """Names of all signals and tables, sorted as numbers where they are.
 
@@ -207,7 +214,7 @@ class Results:
             }
         return self._ids
 
-    @_reads
+    @reads
     def signals(self) -> dict[str, int]:
         """Return what has a value at every output time: names, sorted -> numbers of columns."""
         if self._signals is not None:
@@ -253,14 +260,14 @@ class Results:
             raise UnknownSignal(self._missing(name, signals))
         whole = found[0] if found[0] in signals else found[0].rpartition("/")[0]
         if whole not in signals:
-            raise UnknownSignal(f"{self._where}: {name} is no signal over time{self._there()}")
+            raise UnknownSignal(f"{self.place}: {name} is no signal over time{self._there()}")
         return found
 
     def label(self, name: str) -> str:
         """Return what the deck calls a body, contact or request: ``bodies/2``; else nothing."""
         return str(self.attribute(name, "label") or "")
 
-    @_reads
+    @reads
     def attribute(self, name: str, attribute: str) -> Any:
         """Return an attribute of a dataset or group, or a fact of an element; None if it has none.
 
@@ -287,12 +294,12 @@ class Results:
         return text_of(item, attribute, value) if attribute in FACTS else plain(value)
 
     @property
-    @_reads
+    @reads
     def has_checkpoint(self) -> bool:
         """Whether a run can go on from here."""
         return "checkpoint" in self._open()
 
-    @_reads
+    @reads
     def tables(self, group: str) -> dict[str, Any]:
         """Return all datasets under a group as arrays, by their names in it."""
         import h5py
@@ -306,7 +313,7 @@ class Results:
         self._open()[group].visititems(note)
         return found
 
-    @_reads
+    @reads
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
         there = self._columns().get(group, ())
@@ -329,7 +336,7 @@ class Results:
             raise UnknownSignal(self._missing(name, self.keys()))
         return self._values(*found)
 
-    @_reads
+    @reads
     def _values(self, location: Location, part: str | None) -> Any:
         """Return a signal or a part of it."""
         dataset = self._open()[location.stored]
@@ -341,7 +348,7 @@ class Results:
         values = plain(values_of(dataset, tuple(index)))
         return np.linalg.norm(values, axis=1) if part == "mag" else values
 
-    @_reads
+    @reads
     def _find(self, name: str) -> tuple[Location, str | None] | None:
         """Return where a name is stored and the part of it asked for."""
         whole = name.strip("/")
@@ -376,7 +383,7 @@ class Results:
             return None
         return Location(f"{group}/{last}", ids.index(int(id)))
 
-    @_reads
+    @reads
     def last(self, group: str, signal: str) -> dict[int, Any]:
         """Return the last row of a signal of all elements of a group, by id."""
         ids = self._columns().get(group)
@@ -389,7 +396,8 @@ class Results:
         return dict(zip(ids, last_row(table), strict=True)) if len(table) else {}
 
     @property
-    def _where(self) -> str:
+    def place(self) -> str:
+        """Where the results are, in words."""
         return str(self.path or "results in memory")
 
     def _missing(self, name: str, known: Iterable[str]) -> str:
@@ -406,19 +414,19 @@ class Results:
         }
         if depth and (inside or isinstance(self._open().get(asked), h5py.Group)):
             there = ", ".join(sorted(inside, key=order)[:12]) or "nothing"
-            return f"{self._where}: {name} is a group, not a signal; it has {there}"
+            return f"{self.place}: {name} is a group, not a signal; it has {there}"
         signals = self.signals()
         whole, _, part = asked.rpartition("/")
         if whole in signals and not is_pattern(part):
             parts = ", ".join(parts_of(signals[whole])) or "no parts"
-            return f"{self._where}: no signal {name!r}; {whole} has {parts}"
+            return f"{self.place}: no signal {name!r}; {whole} has {parts}"
         column = _CSV_COLUMN.fullmatch(asked)
         written = f"requests/{column[1]}/{column[2]}" if column else ""
         near = [written] if written and written in self else nearest(asked, known)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         if _OF_REQUEST.match(asked):
             hint = "; names with Force_Contact[ID]. are for mbsim request"
-        return f"{self._where}: no signal {name!r}{hint}{self._there()}"
+        return f"{self.place}: no signal {name!r}{hint}{self._there()}"
 
     def _there(self) -> str:
         """Return all signals, with ids taken together, as the end of a message."""
@@ -430,17 +438,6 @@ def _is_signal(item: Any, shape: tuple[int, ...], rows: int) -> bool:
     if shape[:1] != (rows,) or item.dtype.kind not in "iuf" or len(shape) > 2:
         return False
     return (1 if len(shape) == 1 else shape[1]) in (1, *PARTS)
-
-
-def finite(value: Any) -> Any:
-    """Return a value for JSON, which has no infinity and no NaN: null in their place."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(item) for item in value]
-    return finite(value.tolist()) if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def open_results(path: str | Path) -> Results:
@@ -471,13 +468,20 @@ def open_results(path: str | Path) -> Results:
         if ours:
             check_members(opened)
             facts_of(opened)
-    except _DAMAGE as error:
+    except DAMAGE as error:
         opened.close()
-        raise ResultsError(f"{file}: {_damage(error)}") from None
+        raise ResultsError(f"{file}: {said_of(error)}") from None
     if not ours:
         opened.close()
         raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
     return Results(opened, file)
+
+
+def from_bytes(image: bytes) -> Results:
+    """Return results in memory from the bytes of their file."""
+    import h5py
+
+    return Results(h5py.File(h5py.h5f.open_file_image(image)), None)
 
 
 def end_state(results: Results) -> dict[str, dict[str, list[float]]]:

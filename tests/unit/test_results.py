@@ -19,8 +19,9 @@ from helpers.minimal_deck import added
 from mbsim.arrays import codes
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results import recorder as recorder_module
+from mbsim.results.form import finite
 from mbsim.results.log import MOST_LINES, RunLog
-from mbsim.results.reading import Results, finite, open_results
+from mbsim.results.reading import Results, open_results
 from mbsim.results.recorder import Recorder
 from mbsim.results.store import Store
 from mbsim.results.watch import Watch
