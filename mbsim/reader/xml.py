@@ -114,7 +114,7 @@ def _as_it_is(fault: Fault) -> Fault:
 
 def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
     """Read the XML deck `data` into the draft; faults go there too."""
-    root = parse(data, draft.file)
+    root = parse(data, draft.file, draft.note)
     sections = list(_find_sections(root, draft))
     apply_overrides(sections, overrides)
 

@@ -302,6 +302,8 @@ def settle(
         if motionsolve:
             h_max = min(h_max, simulation.print_interval)
         h_min, h0_max = said("h_min") or 0.0, said("h0_max") or 0.0
+        # the first step is no shorter than the shortest; 0 is none given
+        h0_max = max(h0_max, h_min) if h0_max else 0.0
         stages.append(Stage(simulation, chosen, h_max, h_min, h0_max, who))
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")
