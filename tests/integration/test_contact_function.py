@@ -40,6 +40,6 @@ def test_functions_at_output_rows_are_those_of_the_result_file(tmp_path: Path) -
         assert np.abs(wanted).max() > 1.0
         np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
     # the form of three arguments: its second is an index, 1 the deepest penetration
-    depth = results["contacts/301/depth"]
+    depth = results["contacts/301/penetration"]
     assert depth.max() > 0.0
     np.testing.assert_allclose(results["requests/4"][:, 0], depth, rtol=1e-12)

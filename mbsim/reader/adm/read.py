@@ -27,6 +27,7 @@ _ATTRIBUTES = {
         "j_floating_marker_id": "JFLOAT",
         "joint_id": "JOINT",
     },
+    **{"i_graphics_id": "IGEOM", "j_graphics_id": "JGEOM"},
     **{"expr": "FUNCTION", "motion_type": "direction"},
     **{f"{name}_expression": name.upper() for name in ("fx", "fy", "fz", "tx", "ty", "tz")},
     **{f"expr{k}": f"F{k}" for k in range(1, 9)},
@@ -63,8 +64,9 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
     first = {"units": 0, "part": 1}
     for node in sorted(nodes, key=lambda node: first.get(node.key, 2)):
         _read_statement(node, draft)
-    draft.broken = {(BY_KEY[fold(name)].xml, id) for name, id in draft.broken}
+    draft.broken = {(_XML_NAMES.get(name, name), id) for name, id in draft.broken}
     draft.broken |= {(_XML_NAMES[name], int(id)) for name, id in _named(draft.puzzling)}
+    draft.faults = [in_words(fault) for fault in draft.faults]
     draft.faults.sort(key=lambda fault: fault.line)
 
 

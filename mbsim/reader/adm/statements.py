@@ -14,6 +14,7 @@ from mbsim.reader.adm.bodies import (
     build_primitive,
     build_units,
 )
+from mbsim.reader.adm.contacts import CONTACT, GRAPHICS
 from mbsim.reader.adm.control import (
     COMPARE,
     FORMULATIONS,
@@ -367,7 +368,8 @@ STATEMENTS = (
         | {"INTERPOLATE": ("INTERPOLATE", "ON")},
         xml="Param_Transient",
     ),
-    _output_only("GRAPHICS", "no picture is drawn"),
+    GRAPHICS,
+    CONTACT,
     _output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     _output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     AdmStatement("END"),
