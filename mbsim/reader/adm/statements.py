@@ -11,6 +11,7 @@ from mbsim.reader.adm.bodies import (
     build_marker,
     build_motion,
     build_part,
+    build_point_mass,
     build_primitive,
     build_units,
 )
@@ -25,12 +26,14 @@ from mbsim.reader.adm.control import (
     SENSOR_FLAGS,
     build_array,
     build_differential,
+    build_equilibrium,
     build_integrator,
     build_request,
     build_sensor,
     build_spline,
     build_variable,
 )
+from mbsim.reader.adm.couplers import COUPLER, GEAR
 from mbsim.reader.adm.declare import (
     ANGLE,
     ANY,
@@ -67,6 +70,10 @@ from mbsim.reader.statement import Spec
 
 _NOT_BUILT = "is documented but not built yet"
 _HARMLESS = "has no effect in mbsim"
+_OWN_SEARCH = (
+    "has no effect: mbsim's own search goes on until forces balance to rounding; "
+    "IMBALANCE and MAXIT bound it"
+)
 _ID = {"id": Spec(ID, required=True)}
 _MARKERS = {"I": Spec(ID, required=True), "J": Spec(ID, required=True)}
 
@@ -158,17 +165,34 @@ STATEMENTS = (
         xml="Body_Rigid",
     ),
     AdmStatement(
+        "POINT_MASS",
+        {
+            **_ID,
+            "MASS": Spec(POSITIVE, required=True),
+            "CM": Spec(ID, required=True),
+            "QG": Spec(numbers(3)),
+            "REULER": Spec(angles(3)),
+            "ZG": Spec(numbers(3)),
+            "XG": Spec(numbers(3)),
+            **{name: Spec(REAL) for name in ("VX", "VY", "VZ")},
+            "EXACT": Spec(ANY, note="all parts stay where the deck puts them, if joints allow it"),
+        },
+        build_point_mass,
+        xml="Body_Point",
+    ),
+    AdmStatement(
         "MARKER",
         {
             **_ID,
-            "PART": Spec(ID, required=True),
+            "PART": Spec(ID),
+            "POINT_MASS": Spec(ID),
             "QP": Spec(numbers(3)),
             "REULER": Spec(angles(3)),
             "ZP": Spec(numbers(3)),
             "XP": Spec(numbers(3)),
             "USEXP": _TRUE,
             "FLOATING": _TRUE,
-            **{name: Spec(refused=_NOT_BUILT) for name in ("POINT_MASS", "FLEX_BODY", "NODE_ID")},
+            **{name: Spec(refused=_NOT_BUILT) for name in ("FLEX_BODY", "NODE_ID")},
         },
         build_marker,
         words={"USEXP": ("USEXP", "TRUE"), "FLOATING": ("FLOATING", "TRUE")},
@@ -196,6 +220,8 @@ STATEMENTS = (
         words=_words("TYPE", *_PRIMITIVES),
         xml="Constraint_Jprim",
     ),
+    COUPLER,
+    GEAR,
     AdmStatement(
         "GCON",
         {
@@ -368,8 +394,28 @@ STATEMENTS = (
         | {"INTERPOLATE": ("INTERPOLATE", "ON")},
         xml="Param_Transient",
     ),
+    AdmStatement(
+        "EQUILIBRIUM",
+        {
+            "MAXIT": Spec(COUNT),
+            "IMBALANCE": Spec(POSITIVE),
+            **{
+                name: Spec(ANY, note=_OWN_SEARCH)
+                for name in (
+                    *("ALIMIT", "TLIMIT", "ERROR", "STABILITY", "PATTERN", "METHOD"),
+                    *("DYNAMIC", "STATIC", "GLOBAL_DAMPING", "KINETIC_ENERGY_ERROR"),
+                    *("ACCELERATION_ERROR", "SETTLING_TIME", "DYNAMIC_SETTLING_TIME"),
+                )
+            },
+        },
+        build_equilibrium,
+        words={"STATIC": ("STATIC", "TRUE"), "DYNAMIC": ("DYNAMIC", "TRUE")},
+        xml="Param_Static",
+    ),
     GRAPHICS,
     CONTACT,
+    _output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
+    _output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
     _output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     _output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     AdmStatement("END"),
