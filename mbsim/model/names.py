@@ -38,7 +38,7 @@ def element_name(file: str, statement: str, id: int) -> str:
     Parameters
     ----------
     file : str
-        The deck, an Adams deck where it ends in ``.adm``.
+        The deck, an Adams deck where it ends in ``.adm`` or ``.acf``.
     statement : str
         The XML's name of the statement: ``Body_Rigid``.
     id : int
@@ -54,4 +54,9 @@ def element_name(file: str, statement: str, id: int) -> str:
 
 def is_adams(file: str) -> bool:
     """Return whether a deck is one of Adams, by its name."""
-    return file.lower().endswith(".adm")
+    return file.lower().endswith(".adm") or is_commands(file)
+
+
+def is_commands(file: str) -> bool:
+    """Return whether a file holds Adams' commands, by its name."""
+    return file.lower().endswith(".acf")

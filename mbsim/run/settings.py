@@ -137,7 +137,7 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
     for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
         if source is None or source.integr_tol is None:
             continue
-        where = f"{model.file}:{source.source.line}"
+        where = f"{source.source.file or model.file}:{source.source.line}"
         if adams:
             # the reader has made it of ERROR
             name, said, chosen = "tol", f"1e-5 of INTEGRATOR/ERROR ({where})", source.integr_tol

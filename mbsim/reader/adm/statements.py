@@ -91,7 +91,7 @@ def _everything(node: Node) -> bool:
     return True
 
 
-def _output_only(name: str, what: str) -> AdmStatement:
+def output_only(name: str, what: str) -> AdmStatement:
     """Return a statement that cannot change motion, so that its arguments are not looked at."""
     return AdmStatement(name, note=what, any_attribute=_everything)
 
@@ -414,10 +414,10 @@ STATEMENTS = (
     ),
     GRAPHICS,
     CONTACT,
-    _output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
-    _output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
-    _output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
-    _output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
+    output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
+    output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
+    output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
+    output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     AdmStatement("END"),
 )
 BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
