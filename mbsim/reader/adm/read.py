@@ -63,7 +63,7 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
     apply_overrides([section], overrides, _known_attributes)
 
     # parts first: their markers are given in their frames; gears follow from markers and joints
-    turn = {"units": 0, "part": 1, "pointmass": 1, "coupler": 3, "gear": 3}
+    turn = {"units": 0, "part": 1, "pointmass": 1, "coupler": 3, "gear": 3, "friction": 3}
     for node in sorted(nodes, key=lambda node: turn.get(node.key, 2)):
         _read_statement(node, draft)
     hold_points(draft)

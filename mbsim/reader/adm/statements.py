@@ -51,6 +51,7 @@ from mbsim.reader.adm.forces import (
     build_spring,
     build_vector,
 )
+from mbsim.reader.adm.friction import FRICTION
 from mbsim.reader.adm.marker_forces import marker_forces
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
@@ -414,6 +415,7 @@ STATEMENTS = (
     ),
     GRAPHICS,
     CONTACT,
+    FRICTION,
     output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
     output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
     output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
