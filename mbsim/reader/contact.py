@@ -248,7 +248,9 @@ FORCE_CONTACT = Statement(
             "AUTO",
         ),
         "enable_sphere_to_mesh": Spec(
-            keyword(spellings(TRUE="", AUTO=""), spellings(FALSE=""), "spheres are not tessellated"),
+            keyword(
+                spellings(TRUE="", AUTO=""), spellings(FALSE=""), "spheres are not tessellated"
+            ),
             "spheres touch meshes as spheres",
             "",
             "AUTO",

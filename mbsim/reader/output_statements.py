@@ -23,7 +23,7 @@ def _output(name: str, note: str, attributes: dict[str, Spec]) -> Statement:
 
 
 def _parse_bound(text: str) -> float | bool:
-    """Return a number, or TRUE or FALSE: the documentation of dzero says that, its text a number."""
+    """Return a number, or TRUE or FALSE, of which dzero is documented as one."""
     if text.lower() in ("true", "false"):
         return bool(FLAG.parse(text))
     return float(NOT_NEGATIVE.parse(text))
@@ -66,7 +66,8 @@ H3D_OUTPUT = _output(
         **_flags(switch_on="whether an H3D file is written"),
         "increment": Spec(COUNT, "every how many rows"),
         "format_option": Spec(
-            keyword(spellings(AUTO="", MODAL="", NODAL="", NODALG="")), "how flexible bodies are kept"
+            keyword(spellings(AUTO="", MODAL="", NODAL="", NODALG="")),
+            "how flexible bodies are kept",
         ),
         "stress_option": Spec(_STRESSES, "stresses of flexible bodies"),
         "strain_option": Spec(_STRESSES, "strains of flexible bodies"),

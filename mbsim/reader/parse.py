@@ -163,7 +163,9 @@ def _with_blanks(text: str, note: Callable[[int, str], None]) -> str:
     if found is None:
         return text
     kind = unicodedata.name(found.group(), "blank").lower()
-    note(text.count("\n", 0, found.start()) + 1, f"a {kind} (U+{ord(found.group()):04X}) is a blank")
+    note(
+        text.count("\n", 0, found.start()) + 1, f"a {kind} (U+{ord(found.group()):04X}) is a blank"
+    )
     return _ODD_BLANKS.sub(" ", text)
 
 

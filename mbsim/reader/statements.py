@@ -27,7 +27,6 @@ from mbsim.reader.statement import Statement
 from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
 from mbsim.reader.variable import REFERENCE_VARIABLE
 
-
 STATEMENTS = (
     PARAM_UNIT,
     BODY_RIGID,

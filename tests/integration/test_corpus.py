@@ -1,7 +1,7 @@
 """Decks of practice, each with a reference of its own: it runs to that, or is refused by name.
 
-A deck of tests/corpus/ says in its comments what it is held against, a closed form or a number of an
-independent integration:
+A deck of tests/corpus/ says in its comments what it is held against, a closed form or a number of
+an independent integration:
 
     check: REQUEST.COLUMN at TIME = VALUE within TOLERANCE
     run: end_time=T print_interval=DT      of a deck that says neither
@@ -33,7 +33,9 @@ def decks(pattern: re.Pattern[str]) -> list[Any]:
     """Return the decks whose comments have something, as parameters."""
     files = sorted(p for p in CORPUS.iterdir() if p.suffix in (".xml", ".adm", ".acf"))
     return [
-        pytest.param(path, id=path.name) for path in files if pattern.search(path.read_text("utf-8"))
+        pytest.param(path, id=path.name)
+        for path in files
+        if pattern.search(path.read_text("utf-8"))
     ]
 
 

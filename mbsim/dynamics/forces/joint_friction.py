@@ -10,8 +10,8 @@ T the reaction on I, r the radius of pin or ball:
 | SCREW_FRICTION | both: (r w_z, v_z)   | abs(F across z)                  |
 | BALL_FRICTION  | r w                  | abs(F)                           |
 
-and beside by the preload and, each where its arm is given, abs(T across z)/arm, abs(F along z)
-friction_arm/r of TURN_FRICTION and abs(T along z)/reaction_arm of SLIDE_FRICTION. The law's force f < 0
+and beside by the preload and, each where its arm is given, abs(T across z)/arm, of TURN_FRICTION
+abs(F along z) friction_arm/r, of SLIDE_FRICTION abs(T along z)/reaction_arm. The law's force f < 0
 along the slip, of speed s, is a wrench on I, and its opposite on J; together they do f s.
 
 With f all friction forces and g(f) what the law makes of the reactions under them, f = g(f) is

@@ -119,10 +119,12 @@ def deck_of(data: bytes, path: Path) -> Path:
         If it names none, or one that is not there.
     """
     lines = data.decode("utf-8", "replace").splitlines()
-    named = [(k, match.group(1)) for k, line in enumerate(lines, 1) if (match := _MODEL.match(line))]
+    named = [
+        (k, match.group(1)) for k, line in enumerate(lines, 1) if (match := _MODEL.match(line))
+    ]
     first = next(((k, line.strip()) for k, line in enumerate(lines, 1) if line.strip()), (1, ""))
     line, name = named[0] if named else first
-    if not name or "/" in name.strip("./") and not named:
+    if not name or ("/" in name.strip("./") and not named):
         raise DeckError([Fault(str(path), line, "", "no FILE/MODEL=name: which deck is run?")])
     deck = Path(name if name.lower().endswith(".adm") else f"{name}.adm")
     deck = deck if deck.is_absolute() else path.parent / deck

@@ -1,8 +1,8 @@
 """FRICTION of an Adams deck: friction in a joint, read as Force_JointFriction is.
 
-With R the pin's or ball's radius the friction torque of a revolute joint is
-mu (R |F across| + R |T across|/BENDING_REACTION_ARM + FRICTION_ARM |F along|), the friction force of
-a translational one mu (|F across| + |T across|/INITIAL_OVERLAP + |T along|/REACTION_ARM).
+With R the radius of the pin or ball the friction torque of a revolute joint is
+mu (R |F across| + R |T across|/BENDING_REACTION_ARM + FRICTION_ARM |F along|), the friction force
+of a translational one mu (|F across| + |T across|/INITIAL_OVERLAP + |T along|/REACTION_ARM).
 """
 
 from __future__ import annotations
@@ -101,7 +101,9 @@ def _preload(entry: Entry, type: str) -> dict[str, str]:
         return {}
     mu = entry.get("MU_DYNAMIC", 0.0)
     if mu == 0.0 or entry.get("MU_STATIC", mu) != mu:
-        entry.fault(f"is built where MU_STATIC and MU_DYNAMIC are one number > 0; {mu:g} here", name)
+        entry.fault(
+            f"is built where MU_STATIC and MU_DYNAMIC are one number > 0; {mu:g} here", name
+        )
         return {}
     radius = entry.get(_RADII[type][0], _DEFAULT) if type in _RADII else 1.0
     return {"preload": repr(size / (mu * radius))}
@@ -128,7 +130,10 @@ FRICTION = AdmStatement(
                 *("REACTION_ARM", "INITIAL_OVERLAP"),
             )
         },
-        **{name: Spec(NOT_NEGATIVE) for name in ("FRICTION_FORCE_PRELOAD", "FRICTION_TORQUE_PRELOAD")},
+        **{
+            name: Spec(NOT_NEGATIVE)
+            for name in ("FRICTION_FORCE_PRELOAD", "FRICTION_TORQUE_PRELOAD")
+        },
         "OVERLAP_DELTA": Spec(
             keyword(spellings(CONSTANT=""), spellings(INCREASE="", DECREASE="")), note="is so"
         ),

@@ -1,4 +1,4 @@
-"""An Adams statement read as the XML statement that it stands for: one reader, one set of checks."""
+"""An Adams statement read as the XML statement that it stands for: one set of checks."""
 
 from __future__ import annotations
 
