@@ -25,7 +25,7 @@ up to five numbers:
 | STATE              | offset in y                                                           |
 | SENSED             | row of `Sensors`                                                      |
 | ELEMENT            | 0 a connection, 1 an applied force, 2 a contact, its row, jflag,      |
-|                    | comp, marker k                                                        |
+|                    | comp (9 is the depth of a contact), marker k                          |
 | SPLINE             | first curve, how many, order of the derivative; x and z are the two   |
 |                    | topmost jets                                                          |
 | USER               | row of `Users`, which of its results, 1 to call it; so does result 0  |
@@ -51,6 +51,8 @@ ROW, COUNT, STATE_AT = 1, 1, 1
 RESULT, CALLS = 2, 3
 KIND, ELEMENT_ROW, JFLAG, COMPONENT, SEEN_BY = range(1, 6)
 FIRST_CURVE, CURVES, ORDER = range(1, 4)
+#: As a component of a contact: its deepest penetration.
+DEEPEST = 9
 #: As an axis of accelerations: their magnitude.
 MAGNITUDE = 3
 

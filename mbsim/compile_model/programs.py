@@ -14,6 +14,7 @@ from mbsim.compile_model.instructions import (
     ACCELERATION,
     ANGLE,
     CLOSING,
+    DEEPEST,
     DISTANCE,
     ELEMENT,
     INCLUDED,
@@ -39,7 +40,7 @@ from mbsim.compile_model.splines import SplineTable
 from mbsim.errors import DeckError, Fault
 from mbsim.expressions import elementary
 from mbsim.expressions.elementary import CODES, NUMBER, TIME
-from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
+from mbsim.expressions.functions import CONTACT_BY_INDEX, FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
 from mbsim.model.elements import ArrayOfNumbers, Differential, Spline, Variable
@@ -386,6 +387,8 @@ class _Compiler:
             i, j, k = (self.marker(node, position) for position in range(3))
             return Instruction(NET, (i, 0 if j == i else j, k, 1 + _COMPONENTS.index(node.name)))
         element = (FUNCTIONS[node.name].args[0], self.number(node, 0))
+        if node.name == CONTACT_BY_INDEX:
+            return Instruction(ELEMENT, (0, DEEPEST, self.marker(node, 2)), element=element)
         rows = (self.number(node, 1), self.number(node, 2), self.marker(node, 3))
         return Instruction(ELEMENT, rows, element=element)
 

@@ -30,7 +30,8 @@ class Function(NamedTuple):
 
     An argument is a ``number`` (any expression), a ``marker``, the id of an element (its
     statement's name), or one of ``jflag``, ``comp``, ``parameter``, ``measure``, ``iord``,
-    ``place``, whose values are in `CHOICES`. `call` is how it is written, `about` its value.
+    ``index``, ``place``, whose values are in `CHOICES`. `call` is how it is written, `about` its
+    value.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Function(NamedTuple):
 CHOICES = {
     "jflag": (0, 1),
     "comp": (1, 8),
+    "index": (1, 1),
     "parameter": (1, 4),
     "measure": (27, 27),
     "iord": (0, 2),
@@ -271,7 +273,23 @@ for _name in FORCES:
 _put(Kind.VARIABLE, "VARIABLE", None, "id", VARVAL="value of a Reference_Variable")
 _put(Kind.VARIABLE, "DIFF", None, "id", DIF1="z' of a Control_Diff")
 _put(Kind.STATE, "DIFF", None, "id", DIF="z of a Control_Diff")
-_element("CONTACT", CONTACT="of all points of a contact; torque about the cg of the body")
+_put(
+    Kind.FORCE,
+    "CONTACT jflag comp marker",
+    4,
+    "id, jflag, comp, k",
+    CONTACT="of all points of a contact; torque about the cg of the body",
+)
+#: What `CONTACT(id, index, k)` is in the table: a name that no deck can write.
+CONTACT_BY_INDEX = "CONTACT(3)"
+FUNCTIONS[CONTACT_BY_INDEX] = Function(
+    "CONTACT",
+    ("CONTACT", "index", "marker"),
+    3,
+    Kind.FORCE,
+    "CONTACT(id, index, k)",
+    "deepest penetration of a contact for index 1 [L]; k says nothing of a number",
+)
 _put(
     Kind.TABLE,
     "number number SPLINE iord",

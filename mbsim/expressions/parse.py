@@ -13,7 +13,13 @@ import math
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from mbsim.expressions.functions import CHOICES, CONSTANTS, FUNCTIONS, Function
+from mbsim.expressions.functions import (
+    CHOICES,
+    CONSTANTS,
+    CONTACT_BY_INDEX,
+    FUNCTIONS,
+    Function,
+)
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time
 
 if TYPE_CHECKING:
@@ -27,6 +33,10 @@ LONGEST_CHAIN = 400
 
 _VALUES = {"PI": math.pi, "RTOD": 180.0 / math.pi, "DTOR": math.pi / 180.0}
 _SIGNS = {"PLUS": "ADD", "MINUS": "SUB", "TIMES": "MUL", "OVER": "DIV"}
+_WHY = {
+    "index": " in CONTACT(id, index, rm), the deepest penetration; other results are not built. "
+    "Forces are CONTACT(id, jflag, comp, rm), rm 0 for global axes",
+}
 _ORDINALS = ("first", "second", "third", "fourth")
 
 GRAMMAR = r"""
@@ -149,6 +159,8 @@ class _Builder:
                     "':' stands only after the first argument of IF", _column(sign)
                 )
         parts = given[1::2]
+        if name == "CONTACT" and len(parts) == FUNCTIONS[CONTACT_BY_INDEX].least:
+            name = CONTACT_BY_INDEX
         _check_arguments(FUNCTIONS[name], [part.node for part in parts], column)
         made = _call(name, parts, column)
         return _nested(made, made, column)
@@ -248,7 +260,7 @@ def _check_arguments(function: Function, args: list[Node], column: int) -> None:
             low, high = CHOICES[kind]
             if not (whole and isinstance(arg, Number) and low <= arg.value <= high):
                 allowed = f"{low}" if low == high else f"{low} to {high}"
-                raise ExpressionError(f"{which} must be {allowed}", column)
+                raise ExpressionError(f"{which} must be {allowed}{_WHY.get(kind, '')}", column)
         elif not whole:
             what = "a marker" if kind == "marker" else f"a {kind}"
             raise ExpressionError(f"{which} must be the id of {what}, a whole number", column)

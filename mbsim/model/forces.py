@@ -106,7 +106,9 @@ class JointFriction:
     """Force_JointFriction: a friction law in a joint, pressed by the joint's own reaction.
 
     Normal force: the reaction across the free axis (of SPHERICAL all of it) + `preload` + the
-    reaction torque across that axis over `bending_reaction_arm`, where that is > 0.
+    reaction torque across that axis over `bending_reaction_arm`, where that is > 0. `friction_arm`
+    is where the force along the axis of REVOLUTE rubs, `reaction_arm` where the torque about the
+    axis of TRANSLATIONAL presses.
     """
 
     id: int
@@ -121,13 +123,16 @@ class JointFriction:
     ball_radius: float | None = None  # SPHERICAL [L]
     preload: float = 0.0  # [F]
     bending_reaction_arm: float = 0.0  # [L]
+    friction_arm: float = 0.0  # REVOLUTE [L]
+    reaction_arm: float = 0.0  # TRANSLATIONAL [L]
     source: Source = Source()
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """Radius, preload, arm: the order of `dynamics.forces.joint_friction`."""
+        """Radius, preload, arms: the order of `dynamics.forces.joint_friction`."""
         radius = self.pin_radius or self.ball_radius or 0.0
-        return radius, self.preload, self.bending_reaction_arm
+        arms = self.bending_reaction_arm, self.friction_arm, self.reaction_arm
+        return radius, self.preload, *arms
 
 
 @dataclass(frozen=True)

@@ -274,6 +274,11 @@ def _frictions(model: Model) -> Iterator[Fault]:
             given = f'bending_reaction_arm="{friction.bending_reaction_arm:g}"'
             message = f"{given}: {of}, which bears no torque"
             yield _fault(source, name, message)
+        for attribute, type in (("friction_arm", "REVOLUTE"), ("reaction_arm", "TRANSLATIONAL")):
+            value = getattr(friction, attribute)
+            if value > 0.0 and joint.type != type:
+                message = f'{attribute}="{value:g}": {of}; belongs to {type}'
+                yield _fault(source, name, message)
 
 
 def _limits(model: Model) -> Iterator[Fault]:

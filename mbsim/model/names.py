@@ -11,6 +11,10 @@ ADAMS = {
     "Constraint_Joint": "JOINT",
     "Constraint_Jprim": "JPRIM",
     "Constraint_General": "GCON",
+    "Constraint_Coupler": "COUPLER",
+    "Post_Graphic": "GRAPHICS",
+    "Force_Contact": "CONTACT",
+    "Force_JointFriction": "FRICTION",
     "Motion_Joint": "MOTION",
     "Motion_Marker": "MOTION",
     **{FORCES[name].statement: adams.name for name in FORCES if (adams := FORCES[name].adams)},
@@ -34,7 +38,7 @@ def element_name(file: str, statement: str, id: int) -> str:
     Parameters
     ----------
     file : str
-        The deck, an Adams deck where it ends in ``.adm``.
+        The deck, an Adams deck where it ends in ``.adm`` or ``.acf``.
     statement : str
         The XML's name of the statement: ``Body_Rigid``.
     id : int
@@ -50,4 +54,9 @@ def element_name(file: str, statement: str, id: int) -> str:
 
 def is_adams(file: str) -> bool:
     """Return whether a deck is one of Adams, by its name."""
-    return file.lower().endswith(".adm")
+    return file.lower().endswith(".adm") or is_commands(file)
+
+
+def is_commands(file: str) -> bool:
+    """Return whether a file holds Adams' commands, by its name."""
+    return file.lower().endswith(".acf")

@@ -54,4 +54,5 @@ class Simulation:
     gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
     static: Static = Static()
     changes: tuple[Change, ...] = ()  # all that stood before it in <Command>
+    later: bool = False  # STATIC after another of the same statement, at its own start_time
     source: Source = Source()

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 from mbsim.expressions import Expression
 from mbsim.model import elements as el
-from mbsim.reader.keywords import ANALYSIS_NOT_BUILT, ANALYSIS_TYPES
+from mbsim.reader.keywords import ANALYSIS_NOT_BUILT, ANALYSIS_TYPES, spellings
 from mbsim.reader.kinds import (
     COUNT,
     FLAG,
@@ -21,6 +21,7 @@ from mbsim.reader.kinds import (
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _MAX_ROWS = 1e8  # more output rows than this is a slip of the pen, and no disk holds them
+_MAX_STATICS = 10_000  # equilibria of one Simulate, each an analysis of its own
 _OUTPUTS = ("num_steps", "print_interval")
 
 
@@ -59,10 +60,12 @@ def _build_transient(entry: Entry) -> None:
     if "integrator_type" in given:
         given["integrator_type"] = given["integrator_type"].upper()
     transient = el.Transient(**given, source=entry.source)
-    for low, high in (("h_min", "h_max"), ("h_min", "h0_max")):
-        a, b = getattr(transient, low), getattr(transient, high)
-        if a is not None and b is not None and a > b:
-            entry.fault(f"must not be larger than {high} ({b:g})", low)
+    h_min, h_max, h0_max = transient.h_min, transient.h_max, transient.h0_max
+    if h_min is not None and h_max is not None and h_min > h_max:
+        entry.fault(f"must not be larger than h_max ({h_max:g})", "h_min")
+    if h_min is not None and h0_max is not None and h_min > h0_max:
+        # MotionSolve's own defaults are so: 1e-6 and 1e-8
+        entry.note("is less than h_min: the first step is h_min at most", "h0_max")
     if not draft.in_command:
         if draft.transient is not None:
             line = draft.transient.source.line
@@ -106,7 +109,7 @@ def _build_timeless(entry: Entry) -> None:
     if kind == "ASSEMBLY":
         unused: tuple[str, ...] = ("start_time", "end_time", "duration", *_OUTPUTS)
     else:
-        unused = ("end_time", "duration", *_OUTPUTS)
+        unused = ("end_time", *_OUTPUTS)
     for name in (*unused, "print_increment"):
         if entry.given(name):
             entry.note(f"has no effect with analysis_type {kind}, which takes no time", name)
@@ -117,23 +120,54 @@ def _build_timeless(entry: Entry) -> None:
             entry.fault(message, "start_time")
             return
         now = entry.get("start_time")
-    simulation = el.Simulation(
+    draft.simulations.append(_at_once(entry, kind, now))
+
+
+def _at_once(entry: Entry, kind: str, time: float, later: bool = False) -> el.Simulation:
+    """Return an analysis of one time."""
+    draft = entry.draft
+    return el.Simulation(
         kind,
-        now,
-        now,
+        time,
+        time,
         1.0,
         draft.command_transient,
         draft.command_gravity,
         draft.static,
         draft.changes,
+        later,
         entry.source,
     )
-    draft.simulations.append(simulation)
+
+
+def _lasts(entry: Entry) -> bool:
+    """Return whether an analysis of type Static is asked for over a span of time."""
+    now = entry.draft.simulations[-1].end_time if entry.draft.simulations else 0.0
+    start = entry.get("start_time", now)
+    return entry.given("duration") or entry.get("end_time", start) != start
+
+
+def _build_quasi_static(entry: Entry) -> None:
+    """Add an equilibrium at each output time from the start to the end."""
+    span = _span(entry)
+    if span is None:
+        return
+    start, end, interval = span
+    count = round((end - start) / interval)
+    count += count * interval < (end - start) * (1.0 - 1e-9)
+    if count > _MAX_STATICS:
+        entry.fault(f"gives {count} equilibria from {start:g} to {end:g}; {_MAX_STATICS} at most")
+        return
+    times = [start + k * interval for k in range(count)] + [end]
+    entry.draft.simulations += [
+        _at_once(entry, "STATIC", time, later=k > 0) for k, time in enumerate(times)
+    ]
 
 
 def _build_static(entry: Entry) -> None:
     """Set how equilibria are found from here on."""
-    given = {name: entry.get(name) for name in ("max_num_iter", "imbalance") if entry.given(name)}
+    names = {"max_num_iter": "max_num_iter", "max_imbalance": "imbalance"}
+    given = {field: entry.get(name) for name, field in names.items() if entry.given(name)}
     entry.draft.static = replace(entry.draft.static, **given, source=entry.source)
 
 
@@ -142,26 +176,17 @@ def _build_simulate(entry: Entry) -> None:
     draft = entry.draft
     if not entry.given("analysis_type"):
         entry.note("not given; taken as TRANSIENT", "analysis_type")
-    if entry.get("analysis_type") in ("ASSEMBLY", "STATIC"):
+    kind = entry.get("analysis_type")
+    if kind == "ASSEMBLY" or (kind == "STATIC" and not _lasts(entry)):
         _build_timeless(entry)
         return
-    times = _times(entry)
-    outputs = [name for name in _OUTPUTS if entry.given(name)]
-    refused = [name for name in ("print_increment", "print_array_id") if entry.given(name)]
-    if len(outputs) + len(refused) != 1:
-        what = ", ".join(outputs + refused) or "none"
-        entry.fault(f"exactly one of num_steps and print_interval is needed; {what} given")
+    if kind == "STATIC":
+        _build_quasi_static(entry)
         return
-    if times is None or refused or entry.get(outputs[0]) is None:
+    span = _span(entry)
+    if span is None:
         return
-    start, end = times
-    interval = entry.get("print_interval")
-    if interval is None:
-        interval = (end - start) / entry.get("num_steps")
-    if not interval * _MAX_ROWS > end - start:
-        rows = f"more than {_MAX_ROWS:.0e} output rows from {start:g} to {end:g}"
-        entry.fault(f"gives {rows}", outputs[0])
-        return
+    start, end, interval = span
     simulation = el.Simulation(
         analysis_type=entry.get("analysis_type", "TRANSIENT"),
         start_time=start,
@@ -173,6 +198,28 @@ def _build_simulate(entry: Entry) -> None:
         source=entry.source,
     )
     draft.simulations.append(simulation)
+
+
+def _span(entry: Entry) -> tuple[float, float, float] | None:
+    """Return start, end and time between output rows, None with a fault where they are none."""
+    times = _times(entry)
+    outputs = [name for name in _OUTPUTS if entry.given(name)]
+    refused = [name for name in ("print_increment", "print_array_id") if entry.given(name)]
+    if len(outputs) + len(refused) != 1:
+        what = ", ".join(outputs + refused) or "none"
+        entry.fault(f"exactly one of num_steps and print_interval is needed; {what} given")
+        return None
+    if times is None or refused or entry.get(outputs[0]) is None:
+        return None
+    start, end = times
+    interval: float | None = entry.get("print_interval")
+    if interval is None:
+        interval = (end - start) / entry.get("num_steps")
+    if not interval * _MAX_ROWS > end - start:
+        rows = f"more than {_MAX_ROWS:.0e} output rows from {start:g} to {end:g}"
+        entry.fault(f"gives {rows}", outputs[0])
+        return None
+    return start, end, interval
 
 
 def _build_stop(entry: Entry) -> None:
@@ -188,9 +235,9 @@ _UNUSED = {
     "dae_alg_tol_factor": POSITIVE,
     "dae_index": COUNT,
     "dae_constr_tol": POSITIVE,
-    "dae_corrector_maxit": COUNT,
+    "dae_corrector_maxit": POSITIVE,  # both are documented as real
     "dae_corrector_minit": NOT_NEGATIVE,
-    "dae_vel_ctrl": TEXT,
+    "dae_vel_ctrl": FLAG,
     "dae_jacob_eval": NOT_NEGATIVE,
     "dae_eval_expiry": NOT_NEGATIVE,
     "dae_jacob_init": NOT_NEGATIVE,
@@ -214,17 +261,23 @@ PARAM_TRANSIENT = Statement(
     about="method, tolerance and step lengths",
 )
 _ITS_OWN = (
-    "is not honoured: the search goes on until rounding allows no better; "
-    "imbalance and max_num_iter bound it"
+    "has no effect: mbsim's own search goes on until forces balance to rounding; "
+    "max_imbalance and max_num_iter bound it"
 )
+_METHODS = keyword(spellings(MKEAM="", FIM_S="", FIM_D=""))
 PARAM_STATIC = Statement(
     "Param_Static",
     {
         "max_num_iter": Spec(COUNT, "most iterations", "", "300", alias="maxit"),
-        "imbalance": Spec(POSITIVE, "largest force left over", "F", "1e-10 of the weight"),
+        "max_imbalance": Spec(
+            POSITIVE, "largest force left over", "F", "1e-10 of the weight", alias="imbalance"
+        ),
+        "method": Spec(_METHODS, note=_ITS_OWN),
+        "max_error": Spec(POSITIVE, note=_ITS_OWN, alias="error"),
+        "max_ke_tol": Spec(POSITIVE, note=_ITS_OWN, alias="kinetic_energy_error"),
         **{
-            name: Spec(TEXT, refused=_ITS_OWN)
-            for name in ("error", "kinetic_energy_error", "stability", "method")
+            name: Spec(NOT_NEGATIVE, note=_ITS_OWN)
+            for name in ("max_dq_tol", "stability", "compliance_delta")
         },
     },
     _build_static,
@@ -265,7 +318,7 @@ SIMULATE = Statement(
     _build_simulate,
     in_model=False,
     in_command=True,
-    about="one analysis: transient, static or assembly",
+    about="one analysis: transient, static, quasi-static or assembly",
 )
 STOP = Statement(
     "Stop", {}, _build_stop, in_model=False, in_command=True, note="the deck ends here"

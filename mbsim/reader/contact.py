@@ -247,7 +247,15 @@ FORCE_CONTACT = Statement(
             "",
             "AUTO",
         ),
-        "contact_stability_2d": Spec(REAL, refused=_NOT_BUILT),
+        "enable_sphere_to_mesh": Spec(
+            keyword(
+                spellings(TRUE="", AUTO=""), spellings(FALSE=""), "spheres are not tessellated"
+            ),
+            "spheres touch meshes as spheres",
+            "",
+            "AUTO",
+        ),
+        "contact_stability_2d": Spec(REAL, note="is for contact of curves; these are shapes"),
         # ours: an incident a contact point, or one for all that two graphics touch with
         "contact_points": Spec(
             keyword(spellings(POINTS="", REGION="")), "one point each, or one in all", "", "POINTS"
@@ -276,8 +284,8 @@ FORCE_CONTACT = Statement(
             NOT_NEGATIVE, "Young's modulus of J, HERTZ, VOLUME", "F/L^2", "rigid"
         ),
         # ours: what Hertz's theory needs beside the moduli
-        "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ, VOLUME"),
-        "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ, VOLUME"),
+        "i_poisson_ratio": Spec(RATIO, "Poisson's ratio of I, HERTZ, VOLUME", "", "0 with VOLUME"),
+        "j_poisson_ratio": Spec(RATIO, "Poisson's ratio of J, HERTZ, VOLUME", "", "0 with VOLUME"),
         "i_radius": Spec(POSITIVE, "radius of I where they touch", "L", "the graphic's"),
         "j_radius": Spec(POSITIVE, "radius of J where they touch", "L", "the graphic's"),
         "i_layer_depth": Spec(POSITIVE, "depth of the elastic layer of I, VOLUME", "L"),

@@ -49,6 +49,7 @@ class Draft:
     static: el.Static = field(default_factory=el.Static)
     simulations: list[el.Simulation] = field(default_factory=list)
     compatibility: str = ""
+    more: bytes = b""  # of another file that says what is run
     in_command: bool = False  # the section being read
 
     # what the statements of <Command> read so far have set for the next Simulate
@@ -63,6 +64,7 @@ class Draft:
     broken: set[tuple[str, int]] = field(default_factory=set)
     warnings: list[str] = field(default_factory=list)
     note_lines: dict[str, list[int]] = field(default_factory=dict)
+    note_files: dict[str, str] = field(default_factory=dict)
 
     def fault(self, line: int, element: str, message: str) -> None:
         """Add one fault."""
@@ -75,11 +77,12 @@ class Draft:
     def note(self, line: int, message: str) -> None:
         """Add what is accepted and not acted on; equal notes are joined into one."""
         self.note_lines.setdefault(message, []).append(line)
+        self.note_files.setdefault(message, self.file)
 
     def notes(self) -> tuple[str, ...]:
         """Return the notes, each once, with the first lines on which it applies."""
         joined = []
         for message, lines in self.note_lines.items():
             more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
-            joined.append(f"{self.file}:{lines[0]}{more}: {message}")
+            joined.append(f"{self.note_files[message]}:{lines[0]}{more}: {message}")
         return tuple(joined)

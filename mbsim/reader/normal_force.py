@@ -117,7 +117,10 @@ def _check_material(entry: Entry, side: str, law: str) -> None:
         return
     if entry.get(modulus) == 0.0:
         entry.fault(f"must be a number > 0 with {law}", modulus)
-    if not entry.given(ratio):
+    if not entry.given(ratio) and law == "VOLUME":
+        # as MotionSolve has it: one modulus, of the layer between what holds its sides
+        entry.note(f"not given; taken as 0: {modulus} is the stiffness of the layer", ratio)
+    elif not entry.given(ratio):
         entry.fault(f"{ratio}: missing; {law} needs it beside {modulus}, > -1 and <= 0.5")
 
 

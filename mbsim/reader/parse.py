@@ -8,8 +8,9 @@ by a second scan of the text, which is known to be well formed by then.
 from __future__ import annotations
 
 import re
+import unicodedata
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from lxml import etree
@@ -32,6 +33,8 @@ _ENCODINGS = {
     "windows-1252": "cp1252",
     "utf-16": "utf-16",
 }
+#: Blanks that XML takes for letters.
+_ODD_BLANKS = re.compile("[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
 _DECLARATION = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)[\"']")
 _BEFORE_ROOT = re.compile(r"(?:\s+|<!--.*?-->|<\?.*?\?>)*", re.DOTALL)
 _TAG = re.compile(
@@ -77,7 +80,11 @@ class Node:
         return None
 
 
-def parse(data: bytes, file: str) -> Node:
+def _ignore(line: int, message: str) -> None:
+    return None
+
+
+def parse(data: bytes, file: str, note: Callable[[int, str], None] = _ignore) -> Node:
     """Return the root of the deck `data`.
 
     Parameters
@@ -86,6 +93,8 @@ def parse(data: bytes, file: str) -> Node:
         The whole deck.
     file : str
         The deck's name for messages.
+    note : callable, optional
+        Is told the line and what was read in place of what stands there.
 
     Raises
     ------
@@ -96,7 +105,7 @@ def parse(data: bytes, file: str) -> Node:
     """
     if len(data) > MAX_BYTES:
         raise ModelError(f"{file}: larger than {MAX_BYTES // 2**20} MiB, the limit of a deck")
-    text = _decode(data, file)
+    text = _with_blanks(_decode(data, file), note)
     start = _BEFORE_ROOT.match(text)
     if start and text.startswith("<!DOCTYPE", start.end()):
         line = text.count("\n", 0, start.end()) + 1
@@ -146,6 +155,18 @@ def _decode(data: bytes, file: str) -> str:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise _refused(file, line, "not a text file: it holds a NUL character")
     return text
+
+
+def _with_blanks(text: str, note: Callable[[int, str], None]) -> str:
+    """Return the text with a blank for every blank of another kind, as web pages have them."""
+    found = _ODD_BLANKS.search(text)
+    if found is None:
+        return text
+    kind = unicodedata.name(found.group(), "blank").lower()
+    note(
+        text.count("\n", 0, found.start()) + 1, f"a {kind} (U+{ord(found.group()):04X}) is a blank"
+    )
+    return _ODD_BLANKS.sub(" ", text)
 
 
 def _to_nodes(root: etree._Element, text: str, file: str) -> Node:

@@ -19,21 +19,13 @@ from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.output_statements import OUTPUT_STATEMENTS
+from mbsim.reader.param_simulation import PARAM_SIMULATION
 from mbsim.reader.parse import Node
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
 from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
 from mbsim.reader.variable import REFERENCE_VARIABLE
-
-
-def _everything(node: Node) -> bool:
-    return True
-
-
-def _output_only(name: str, what: str) -> Statement:
-    """Return a statement that cannot change motion, so that its attributes are not looked at."""
-    return Statement(name, in_command=True, note=what, any_attribute=_everything)
-
 
 STATEMENTS = (
     PARAM_UNIT,
@@ -42,6 +34,7 @@ STATEMENTS = (
     POST_GRAPHIC,
     FORCE_CONTACT,
     FORCE_GRAVITY,
+    PARAM_SIMULATION,
     PARAM_TRANSIENT,
     PARAM_STATIC,
     CONSTRAINT_JOINT,
@@ -59,9 +52,7 @@ STATEMENTS = (
     POST_REQUEST,
     SIMULATE,
     STOP,
-    _output_only("ResOutput", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
-    _output_only("H3DOutput", "no H3D file is written"),
-    _output_only("Messaging", "the log is mbsim's own; it sets nothing"),
+    *OUTPUT_STATEMENTS,
 )
 BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 
@@ -75,7 +66,7 @@ _DOCUMENTED = (
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
     "Param_Linear "
-    "Param_Simulation Reference_DeformCurve "
+    "Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_String "
     "Sensor_Evaluate Sensor_Proximity UserProgramControl"

@@ -13,7 +13,7 @@ from mbsim.core.stored import read_regular
 from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
-from mbsim.model.names import is_adams
+from mbsim.model.names import is_adams, is_commands
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
@@ -32,8 +32,8 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     Parameters
     ----------
     path : path-like
-        The deck: an Adams deck where it ends in .adm, else an XML file with <Model> and
-        <Command> parts under any root.
+        The deck: an Adams deck where it ends in .adm, an Adams command file with its deck where
+        it ends in .acf, else an XML file with <Model> and <Command> parts under any root.
     overrides : sequence of str, optional
         ``Element[id].attribute=value``, set in the deck before it is read.
 
@@ -54,7 +54,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     data = _read_bytes(deck)
     draft, said_so = _read_draft(path, data, overrides)
     complete_motions(draft)
-    model = _to_model(draft, deck, hashlib.sha256(data).hexdigest())
+    model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
     faults, warnings = check_model(model, known)
     for simulation in model.simulations:
@@ -76,12 +76,28 @@ def _read_draft(
         from mbsim.reader.adm.draft import AdmDraft
         from mbsim.reader.adm.read import fill, in_words
 
+        if is_commands(deck.name):
+            return _read_commands(path, data, overrides), in_words
         adams = AdmDraft(str(path), deck.absolute().parent)
         fill(data, adams, overrides)
         return adams, in_words
     draft = Draft(str(path), deck.absolute().parent)
     _fill(data, draft, overrides)
     return draft, _as_it_is
+
+
+def _read_commands(path: str | PathLike[str], data: bytes, overrides: Sequence[str]) -> Draft:
+    """Return the deck that an Adams command file runs, with its analyses."""
+    from mbsim.reader.adm.commands import deck_of, run_commands
+    from mbsim.reader.adm.draft import AdmDraft
+    from mbsim.reader.adm.read import fill
+
+    deck = deck_of(data, Path(path))
+    of_deck = _read_bytes(deck)
+    draft = AdmDraft(str(deck), deck.absolute().parent, more=of_deck)
+    fill(of_deck, draft, overrides)
+    run_commands(data, str(path), draft)
+    return draft
 
 
 def read_graphics(path: str | PathLike[str], overrides: Sequence[str] = ()) -> list[el.Graphic]:
@@ -114,7 +130,7 @@ def _as_it_is(fault: Fault) -> Fault:
 
 def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
     """Read the XML deck `data` into the draft; faults go there too."""
-    root = parse(data, draft.file)
+    root = parse(data, draft.file, draft.note)
     sections = list(_find_sections(root, draft))
     apply_overrides(sections, overrides)
 

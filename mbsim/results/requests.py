@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbsim.expressions import Expression
-from mbsim.expressions.functions import FUNCTIONS
+from mbsim.expressions.functions import CONTACT_BY_INDEX, FUNCTIONS
 from mbsim.expressions.tree import Call, Number
 from mbsim.model.elements import Array, Request
 from mbsim.model.placement import MarkerPlace
@@ -18,7 +18,7 @@ from mbsim.results.motion import Motion, matrices
 
 #: What functions of the language measure.
 _MEASURES = {
-    "displacement": ("DM", "DX", "DY", "DZ"),
+    "displacement": ("DM", "DX", "DY", "DZ", CONTACT_BY_INDEX),
     "angle": ("AX", "AY", "AZ", "PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL", "INCANG"),
     "velocity": ("VM", "VR", "VX", "VY", "VZ"),
     "angular_velocity": ("WM", "WX", "WY", "WZ"),

@@ -306,6 +306,8 @@ class Runner:
         method, simulation = self.method, stage.simulation
         if self.stage > 0:
             # a sensor may have ended the one before early
+            if simulation.later:
+                method.memory[scheme.TIME] = simulation.start_time
             now = float(method.memory[scheme.TIME])
             simulation = replace(simulation, start_time=now)
         self.sensing.begin(output_times(simulation, self._keeps_end()), stage.h_max)

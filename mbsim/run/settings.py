@@ -137,7 +137,7 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
     for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
         if source is None or source.integr_tol is None:
             continue
-        where = f"{model.file}:{source.source.line}"
+        where = f"{source.source.file or model.file}:{source.source.line}"
         if adams:
             # the reader has made it of ERROR
             name, said, chosen = "tol", f"1e-5 of INTEGRATOR/ERROR ({where})", source.integr_tol
@@ -302,6 +302,8 @@ def settle(
         if motionsolve:
             h_max = min(h_max, simulation.print_interval)
         h_min, h0_max = said("h_min") or 0.0, said("h0_max") or 0.0
+        # the first step is no shorter than the shortest; 0 is none given
+        h0_max = max(h0_max, h_min) if h0_max else 0.0
         stages.append(Stage(simulation, chosen, h_max, h_min, h0_max, who))
     if motionsolve:
         notes.append(f"compatibility MOTIONSOLVE: h_max = {stages[0].h_max:g}")

@@ -240,13 +240,13 @@ def test_a_bound_on_iterations_ends_the_search(tmp_path):
         run(tmp_path, model, '<Param_Static max_num_iter="3"/>' + STATIC)
 
 
-def test_attributes_without_meaning_here_are_refused(tmp_path):
+def test_what_does_not_exist_is_refused(tmp_path):
     """By name, with the line."""
     from mbsim.errors import DeckError
 
     model = GROUND + sphere(1.0) + contact(1, 200, 100) + GRAVITY
-    with pytest.raises(DeckError, match='Param_Static: stability="1e-10": is not honoured'):
-        run(tmp_path, model, '<Param_Static stability="1e-10"/>' + STATIC)
+    with pytest.raises(DeckError, match='Param_Static: method="NEWTON": must be one of MKEAM'):
+        run(tmp_path, model, '<Param_Static method="NEWTON"/>' + STATIC)
     with pytest.raises(DeckError, match="LINEAR"):
         run(tmp_path, model, '<Simulate analysis_type="Linear"/>')
 

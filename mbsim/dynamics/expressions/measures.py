@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from mbsim.arrays.codes import USED_ROWS, VECTOR_FORCE
 from mbsim.arrays.scene import Scene
+from mbsim.compile_model.instructions import DEEPEST
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.angles import nearest_turn
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point, marker_velocity
-from mbsim.dynamics.contact.forces import FORCE, TORQUE, contact_of, sides
+from mbsim.dynamics.contact.forces import DEPTH, FORCE, TORQUE, contact_of, sides
 from mbsim.expressions.elementary import arc_tangent2, constant, over, root, times
 from mbsim.geometry.catalog import AT_POINT
 
@@ -311,18 +312,21 @@ def floats(scene: Scene, applied: int, row: int) -> bool:
 
 @jitable
 def contact_force(scene: Scene, y: F1, contact: int, jflag: int, k: int, comp: int) -> float:
-    """Return a component of all incidents of a contact: force, torque about the body's cg."""
-    work = scene.work
+    """Return a component of all incidents: force, torque about the body's cg; DEEPEST: depth."""
+    work, deepest = scene.work, 0.0
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for h in range(work.hit[len(work.hit) - 1]):
         s = work.hit[h]
         if contact_of(scene, s) == contact:
             values, point = work.slot[s], work.points[s]
+            deepest = max(deepest, values[DEPTH])
             graphic = sides(scene, s)[jflag]
             push = vector(values[FORCE : FORCE + 3])
             arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[graphic]))
             force = add(force, push)
             torque = add(torque, add(cross(arm, push), vector(values[TORQUE : TORQUE + 3])))
+    if comp == DEEPEST:
+        return deepest
     sign = 1.0 if jflag == 0 else -1.0
     return component(scene, scale(sign, force), scale(sign, torque), k, comp)
 

@@ -10,7 +10,8 @@ T the reaction on I, r the radius of pin or ball:
 | SCREW_FRICTION | both: (r w_z, v_z)   | abs(F across z)                  |
 | BALL_FRICTION  | r w                  | abs(F)                           |
 
-and beside by the preload and, where an arm is given, abs(T across z)/arm. The law's force f < 0
+and beside by the preload and, each where its arm is given, abs(T across z)/arm, of TURN_FRICTION
+abs(F along z) friction_arm/r, of SLIDE_FRICTION abs(T along z)/reaction_arm. The law's force f < 0
 along the slip, of speed s, is a wrench on I, and its opposite on J; together they do f s.
 
 With f all friction forces and g(f) what the law makes of the reactions under them, f = g(f) is
@@ -51,7 +52,7 @@ from mbsim.laws.abi import FORCE_X_OUT, NFORCE_IN, TIME_IN, XDOT_IN
 # columns of `Work.joint_friction`: wrench on I of a unit force (force 3, torque 3), then
 SPEED, FORCE, MISS = 6, 7, 8
 # entries of `Applied.par`
-RADIUS, PRELOAD, ARM = range(3)
+RADIUS, PRELOAD, ARM, AXIAL_ARM, TWIST_ARM = range(5)
 
 
 #: Friction has settled when it changes by less than this part of the largest.
@@ -100,10 +101,15 @@ def press(scene: Scene, f: int) -> float:
     if applied.form[f] == BALL_FRICTION:
         return norm(force) + preload
     z = marker_axis(scene, applied.j[f], 2)
-    bend = 0.0
+    torque = (reaction[at + 3], reaction[at + 4], reaction[at + 5])
+    beside, par = preload, applied.par[f]
     if arm > 0.0:
-        bend = across((reaction[at + 3], reaction[at + 4], reaction[at + 5]), z) / arm
-    return across(force, z) + preload + bend
+        beside += across(torque, z) / arm
+    if par[AXIAL_ARM] > 0.0:
+        beside += abs(dot(force, z)) * par[AXIAL_ARM] / par[RADIUS]
+    if par[TWIST_ARM] > 0.0:
+        beside += abs(dot(torque, z)) / par[TWIST_ARM]
+    return across(force, z) + beside
 
 
 @jitable

@@ -21,7 +21,7 @@ _FORMS = {
 
 #: Attributes of MotionSolve's own friction, with its stiction and its other ways to be pressed.
 _NOT_BUILT = (
-    *("friction_arm", "reaction_arm", "initial_overlap", "overlap_delta", "torque_preload"),
+    *("initial_overlap", "overlap_delta", "torque_preload"),
     *("force_preload", "max_stiction_deform", "bristle_stiffness", "damping_effects"),
     *("viscous_effects", "inactive", "effect", "inputs"),
 )
@@ -40,6 +40,8 @@ _ATTRIBUTES = (
     _radius("ball_radius", "radius of the ball; SPHERICAL needs it"),
     Parameter("preload", about="presses beside the reaction", unit="F"),
     Parameter("bending_reaction_arm", about="arm of the torque that presses", unit="L"),
+    Parameter("friction_arm", about="arm at which the axial force rubs, REVOLUTE", unit="L"),
+    Parameter("reaction_arm", about="arm of the torque about z, TRANSLATIONAL", unit="L"),
 )
 
 
@@ -59,7 +61,7 @@ force(
     table="joint_frictions",
     reading=Reading(_ATTRIBUTES, _read),
     changes="mu_static mu_dynamic stiction_trans_vel friction_trans_vel pin_radius ball_radius "
-    "preload bending_reaction_arm",
+    "preload bending_reaction_arm friction_arm reaction_arm",
     refused=dict.fromkeys(_NOT_BUILT, "is documented but not built yet"),
     about="Coulomb friction in a joint, pressed by its reaction",
 )

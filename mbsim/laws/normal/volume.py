@@ -44,8 +44,9 @@ def layers_stiffness(
         (i_elastic_modulus, i_poisson_ratio, i_layer_depth),
         (j_elastic_modulus, j_poisson_ratio, j_layer_depth),
     ):
-        if modulus is not None and ratio is not None and layer is not None:
-            compliance += layer / constrained_modulus(modulus, ratio)
+        if modulus is not None and layer is not None:
+            # the one modulus that MotionSolve has of a layer is its own
+            compliance += layer / constrained_modulus(modulus, ratio or 0.0)
             depth += layer
     stiffness: float = depth ** (1.0 - exponent) / compliance
     return stiffness

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mbsim.model import elements as el
 from mbsim.model.frames import GLOBAL
 from mbsim.reader import units
-from mbsim.reader.adm.draft import draft_of, frame_of, require
+from mbsim.reader.adm.draft import AdmDraft, draft_of, frame_of, require
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.kinds import ID
 from mbsim.reader.statement import Entry
@@ -67,6 +69,49 @@ def build_part(entry: Entry) -> None:
     entry.register(entry.draft.bodies, body)
 
 
+def build_point_mass(entry: Entry) -> None:
+    """Add a point mass: a body that cannot turn, whose moments of inertia move nothing."""
+    id, draft = entry.get("id", 0), entry.draft
+    frame = frame_of(entry, "QG", "ZG", "XG")
+    body = el.Body(
+        id=id,
+        mass=entry.get("MASS"),
+        inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+        cg_id=entry.get("CM"),
+        v_ic=(entry.get("VX", 0.0), entry.get("VY", 0.0), entry.get("VZ", 0.0)),
+        v_given=_given(entry, "V"),
+        source=entry.source,
+    )
+    draft_of(entry).parts[id] = frame
+    draft_of(entry).points[id] = entry.source
+    entry.register(draft.bodies, body)
+
+
+def hold_points(draft: AdmDraft) -> None:
+    """Keep point masses from turning: each is a body with ORIENTATION to ground."""
+    ground = next((body.id for body in draft.bodies.values() if body.is_ground), None)
+    for id, source in draft.points.items():
+        marker = draft.markers.get(draft.bodies[id].cg_id or 0)
+        if marker is None:
+            continue
+        if ground is None:
+            message = "a point mass needs a ground part, PART/id, GROUND, in the deck"
+            draft.fault(source.line, f"POINT_MASS[{id}]", message)
+            return
+        there = max(draft.markers) + 1
+        draft.markers[there] = replace(marker, id=there, body_id=ground)
+        held = max(draft.primitives, default=0) + 1
+        draft.primitives[held] = el.Joint(
+            id=held,
+            type="ORIENTATION",
+            label=f"POINT_MASS/{id}",
+            i_marker_id=marker.id,
+            j_marker_id=there,
+            is_primitive=True,
+            source=source,
+        )
+
+
 def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
     """Return which components of a velocity the deck gives."""
     x, y, z = (entry.given(f"{kind}{axis}") for axis in "XYZ")
@@ -76,11 +121,21 @@ def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
 def build_marker(entry: Entry) -> None:
     """Add a marker, whose place in its part becomes one in the global frame."""
     frame = frame_of(entry, "QP", "ZP", "XP", not entry.get("USEXP", False))
-    part = draft_of(entry).parts.get(entry.get("PART", 0), GLOBAL)
+    owners = entry.those(("PART", "POINT_MASS"))
+    if len(owners) != 1:
+        what = "give one, not both" if owners else f"missing; must be {ID.allowed}"
+        entry.fault(f"PART or POINT_MASS: {what}")
+        return
+    owner = entry.get(owners[0], 0)
+    points = draft_of(entry).points
+    if owners[0] == "POINT_MASS" and owner not in points:
+        known = ", ".join(map(str, points)) or "none"
+        entry.fault(f"there is no such point mass; the deck has {known}", "POINT_MASS")
+    part = draft_of(entry).parts.get(owner, GLOBAL)
     p = part.p + part.R @ frame.p
     marker = el.Marker(
         id=entry.get("id", 0),
-        body_id=entry.get("PART", 0),
+        body_id=owner,
         pos=(float(p[0]), float(p[1]), float(p[2])),
         R=part.R @ frame.R,
         source=entry.source,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from mbsim.model import elements as el
 from mbsim.reader.adm.draft import require
 from mbsim.reader.adm.subroutine import function_or_user
+from mbsim.reader.adm.translate import read_as
+from mbsim.reader.command import PARAM_STATIC
 from mbsim.reader.controls import add_sensor
 from mbsim.reader.kinds import ID
 from mbsim.reader.statement import Entry
@@ -125,3 +127,8 @@ def build_integrator(entry: Entry) -> None:
         h0_max=entry.get("HINIT"),
         source=entry.source,
     )
+
+
+def build_equilibrium(entry: Entry) -> None:
+    """Set how equilibria are found."""
+    read_as(entry, PARAM_STATIC, {"MAXIT": "max_num_iter", "IMBALANCE": "max_imbalance"})

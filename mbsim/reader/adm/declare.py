@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from mbsim.reader.kinds import EXPRESSION, TEXT, USER, BadValueError, Kind, parse_real
+from mbsim.reader.kinds import EXPRESSION, IDS, TEXT, USER, BadValueError, Kind, parse_real
 from mbsim.reader.statement import Statement
 
 _DEGREES = re.compile(r"(.*\d\.?)[dD]")
@@ -24,12 +24,20 @@ class Value(Enum):
     FUNCTION = 3
 
 
+def _is_read(text: str) -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class AdmStatement(Statement):
-    """A statement: `words` stand alone and mean (attribute, value); `xml` is its name there."""
+    """A statement: `words` stand alone and mean (attribute, value); `xml` is its name there.
+
+    `opaque` tells of a statement's text whether its arguments are not looked at.
+    """
 
     words: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     xml: str = ""
+    opaque: Callable[[str], bool] = _is_read
 
     def names(self) -> list[str]:
         """Return the names that stand before ``=``."""
@@ -62,6 +70,11 @@ def _parse_items(text: str, angles: bool, counts: tuple[int, ...]) -> tuple[floa
     if len(words) not in counts:
         raise BadValueError
     return tuple((parse_angle if angles else parse_real)(word) for word in words)
+
+
+def _parse_ids(text: str) -> tuple[int, ...]:
+    found: tuple[int, ...] = IDS.parse(text)
+    return found
 
 
 def numbers(*counts: int) -> Kind:
@@ -100,6 +113,7 @@ def _parse_routine(text: str) -> str:
 
 EXPRESSION_OR_USER = Kind("an expression, or USER(number, number, ...)", _parse_either)
 ROUTINE = Kind("a function's name, or FILE.py::NAME", _parse_routine)
+IDS_BY_COMMAS = Kind(f"ids {LIST}", _parse_ids)
 ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
 ANY = Kind(f"items {LIST}", str)
 NUMBERS = Kind(f"numbers {LIST}", _parse_numbers)

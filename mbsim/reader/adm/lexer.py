@@ -108,7 +108,7 @@ def to_node(raw: Raw, statements: Mapping[str, AdmStatement], fault: Fault) -> N
     if id:
         node.attributes.append(Attribute("id", str(int(id)) if len(id) < 19 else id, node.line))
     statement = statements.get(fold(node.tag))
-    if statement is not None and not statement.any_attribute(node):
+    if statement is not None and not (statement.any_attribute(node) or statement.opaque(raw.text)):
         _Arguments(raw, head.end(), node, statement, fault).read()
     return node
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from mbsim.errors import DeckError, Fault, ModelError
+from mbsim.reader.adm.bodies import hold_points
 from mbsim.reader.adm.draft import AdmDraft
 from mbsim.reader.adm.lexer import split_statements, to_node
 from mbsim.reader.adm.statements import BY_KEY, NOT_BUILT, STATEMENTS
@@ -15,6 +16,7 @@ from mbsim.reader.parse import MAX_BYTES, Node
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
 _NAMES["Motion_Marker"] = "MOTION"
+_NAMES["Body_Rigid"] = "PART"
 _NAMES["Force_Vector_TwoBody"] = "GFORCE"
 _XML_NAMES = {statement.name: statement.xml for statement in STATEMENTS if statement.xml}
 # what the checks of the whole model call attributes, in the words of this deck
@@ -27,6 +29,7 @@ _ATTRIBUTES = {
         "j_floating_marker_id": "JFLOAT",
         "joint_id": "JOINT",
     },
+    **{"i_graphics_id": "IGEOM", "j_graphics_id": "JGEOM"},
     **{"expr": "FUNCTION", "motion_type": "direction"},
     **{f"{name}_expression": name.upper() for name in ("fx", "fy", "fz", "tx", "ty", "tz")},
     **{f"expr{k}": f"F{k}" for k in range(1, 9)},
@@ -59,12 +62,14 @@ def fill(data: bytes, draft: AdmDraft, overrides: Sequence[str]) -> None:
     section = Node("deck", 1, children=nodes)
     apply_overrides([section], overrides, _known_attributes)
 
-    # parts first: their markers are given in their frames
-    first = {"units": 0, "part": 1}
-    for node in sorted(nodes, key=lambda node: first.get(node.key, 2)):
+    # parts first: their markers are given in their frames; gears follow from markers and joints
+    turn = {"units": 0, "part": 1, "pointmass": 1, "coupler": 3, "gear": 3, "friction": 3}
+    for node in sorted(nodes, key=lambda node: turn.get(node.key, 2)):
         _read_statement(node, draft)
-    draft.broken = {(BY_KEY[fold(name)].xml, id) for name, id in draft.broken}
+    hold_points(draft)
+    draft.broken = {(_XML_NAMES.get(name, name), id) for name, id in draft.broken}
     draft.broken |= {(_XML_NAMES[name], int(id)) for name, id in _named(draft.puzzling)}
+    draft.faults = [in_words(fault) for fault in draft.faults]
     draft.faults.sort(key=lambda fault: fault.line)
 
 

@@ -11,9 +11,11 @@ from mbsim.reader.adm.bodies import (
     build_marker,
     build_motion,
     build_part,
+    build_point_mass,
     build_primitive,
     build_units,
 )
+from mbsim.reader.adm.contacts import CONTACT, GRAPHICS
 from mbsim.reader.adm.control import (
     COMPARE,
     FORMULATIONS,
@@ -24,12 +26,14 @@ from mbsim.reader.adm.control import (
     SENSOR_FLAGS,
     build_array,
     build_differential,
+    build_equilibrium,
     build_integrator,
     build_request,
     build_sensor,
     build_spline,
     build_variable,
 )
+from mbsim.reader.adm.couplers import COUPLER, GEAR
 from mbsim.reader.adm.declare import (
     ANGLE,
     ANY,
@@ -47,6 +51,7 @@ from mbsim.reader.adm.forces import (
     build_spring,
     build_vector,
 )
+from mbsim.reader.adm.friction import FRICTION
 from mbsim.reader.adm.marker_forces import marker_forces
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
@@ -66,6 +71,10 @@ from mbsim.reader.statement import Spec
 
 _NOT_BUILT = "is documented but not built yet"
 _HARMLESS = "has no effect in mbsim"
+_OWN_SEARCH = (
+    "has no effect: mbsim's own search goes on until forces balance to rounding; "
+    "IMBALANCE and MAXIT bound it"
+)
 _ID = {"id": Spec(ID, required=True)}
 _MARKERS = {"I": Spec(ID, required=True), "J": Spec(ID, required=True)}
 
@@ -83,7 +92,7 @@ def _everything(node: Node) -> bool:
     return True
 
 
-def _output_only(name: str, what: str) -> AdmStatement:
+def output_only(name: str, what: str) -> AdmStatement:
     """Return a statement that cannot change motion, so that its arguments are not looked at."""
     return AdmStatement(name, note=what, any_attribute=_everything)
 
@@ -157,17 +166,34 @@ STATEMENTS = (
         xml="Body_Rigid",
     ),
     AdmStatement(
+        "POINT_MASS",
+        {
+            **_ID,
+            "MASS": Spec(POSITIVE, required=True),
+            "CM": Spec(ID, required=True),
+            "QG": Spec(numbers(3)),
+            "REULER": Spec(angles(3)),
+            "ZG": Spec(numbers(3)),
+            "XG": Spec(numbers(3)),
+            **{name: Spec(REAL) for name in ("VX", "VY", "VZ")},
+            "EXACT": Spec(ANY, note="all parts stay where the deck puts them, if joints allow it"),
+        },
+        build_point_mass,
+        xml="Body_Point",
+    ),
+    AdmStatement(
         "MARKER",
         {
             **_ID,
-            "PART": Spec(ID, required=True),
+            "PART": Spec(ID),
+            "POINT_MASS": Spec(ID),
             "QP": Spec(numbers(3)),
             "REULER": Spec(angles(3)),
             "ZP": Spec(numbers(3)),
             "XP": Spec(numbers(3)),
             "USEXP": _TRUE,
             "FLOATING": _TRUE,
-            **{name: Spec(refused=_NOT_BUILT) for name in ("POINT_MASS", "FLEX_BODY", "NODE_ID")},
+            **{name: Spec(refused=_NOT_BUILT) for name in ("FLEX_BODY", "NODE_ID")},
         },
         build_marker,
         words={"USEXP": ("USEXP", "TRUE"), "FLOATING": ("FLOATING", "TRUE")},
@@ -195,6 +221,8 @@ STATEMENTS = (
         words=_words("TYPE", *_PRIMITIVES),
         xml="Constraint_Jprim",
     ),
+    COUPLER,
+    GEAR,
     AdmStatement(
         "GCON",
         {
@@ -367,9 +395,31 @@ STATEMENTS = (
         | {"INTERPOLATE": ("INTERPOLATE", "ON")},
         xml="Param_Transient",
     ),
-    _output_only("GRAPHICS", "no picture is drawn"),
-    _output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
-    _output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
+    AdmStatement(
+        "EQUILIBRIUM",
+        {
+            "MAXIT": Spec(COUNT),
+            "IMBALANCE": Spec(POSITIVE),
+            **{
+                name: Spec(ANY, note=_OWN_SEARCH)
+                for name in (
+                    *("ALIMIT", "TLIMIT", "ERROR", "STABILITY", "PATTERN", "METHOD"),
+                    *("DYNAMIC", "STATIC", "GLOBAL_DAMPING", "KINETIC_ENERGY_ERROR"),
+                    *("ACCELERATION_ERROR", "SETTLING_TIME", "DYNAMIC_SETTLING_TIME"),
+                )
+            },
+        },
+        build_equilibrium,
+        words={"STATIC": ("STATIC", "TRUE"), "DYNAMIC": ("DYNAMIC", "TRUE")},
+        xml="Param_Static",
+    ),
+    GRAPHICS,
+    CONTACT,
+    FRICTION,
+    output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
+    output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
+    output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
+    output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     AdmStatement("END"),
 )
 BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
