@@ -314,6 +314,8 @@ class Store:
             return None
         self.complete()
         if self._part is None:
+            # a dataset opened anew reads chunks as they were stored; one that stays open may not
+            self._writers.clear()
             return self.file
         with self.writing() as file:
             self._writers.clear()
