@@ -116,7 +116,7 @@ def _messages_may_be_lost() -> Iterator[None]:
     Only the process's own; what another has put in its place is left alone.
     """
     plain = sys.stderr
-    if plain is None or plain is not sys.__stderr__:
+    if plain is not sys.__stderr__ or plain is None:
         yield
         return
     raw = _Messages(plain.fileno(), "w", closefd=False)
