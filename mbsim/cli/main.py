@@ -118,17 +118,17 @@ def _messages_may_be_lost() -> Iterator[None]:
     Only the process's own; what another has put in its place is left alone.
     """
     plain = sys.stderr
-    if plain is not sys.__stderr__:
+    if plain is not sys.__stderr__ or plain is None:
         yield
         return
     raw = _Messages(plain.fileno(), "w", closefd=False)
-    sys.stderr = io.TextIOWrapper(
+    sys.stderr = heard = io.TextIOWrapper(
         io.BufferedWriter(raw), plain.encoding, plain.errors, line_buffering=True
     )
     try:
         yield
     finally:
-        sys.stderr.flush()
+        heard.flush()
         sys.stderr = plain
 
 

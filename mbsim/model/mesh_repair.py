@@ -101,12 +101,14 @@ def mend(vertices: Array, faces: Faces) -> Mended:
     faces = _turn(vertices, faces, done)
     faces = _fill(vertices, faces, done)
     faces = _turn(vertices, faces, done)
+    # of what is left: vertices that no triangle has say nothing of its size
+    used, index = np.unique(faces, return_inverse=True)
+    vertices, faces = vertices[used], index.reshape(-1, 3).astype(np.int64)
     fault = solid_fault(vertices, faces)
     if fault:
         tried = f" after this: {'; '.join(done)}" if done else ""
         raise ModelError(f"cannot be mended: {fault}{tried}")
-    used, index = np.unique(faces, return_inverse=True)
-    return Mended(vertices[used], index.reshape(-1, 3).astype(np.int64), done)
+    return Mended(vertices, faces, done)
 
 
 def _merge(vertices: Array, faces: Faces, done: list[str]) -> Faces:

@@ -47,6 +47,17 @@ class Block:
         return np.hstack(parts) if len(parts) > 1 else (parts or [self.joint])[0]
 
 
+@dataclass(frozen=True)
+class Mark:
+    """What a recorder goes back to: rows gathered and what was written by then."""
+
+    rows: Block
+    written: list[int]
+    given: int
+    started: bool
+    watch: dict[str, Table]
+
+
 class Gathered:
     """Rows taken so far, in tables that go to whoever writes them.
 
@@ -135,19 +146,23 @@ class Gathered:
 
     def take_back(self, tables: Tables) -> None:
         """Let tables whose rows are written be filled anew, where they are no larger than usual."""
-        # while AUTO may go back to the begin of a run its rows are kept, and tables grow
+        # tables of contact points and events may have grown beyond that
         self._spare |= {
             name: table for name, table in tables.items() if len(table) < 2 * self._usual
         }
 
-    @property
-    def ends(self) -> dict[str, int]:
-        """How many rows each table has."""
-        return dict(self._ends)
+    def copied(self) -> Block:
+        """Return all rows that are there, which stay as they are whatever becomes of these."""
+        return Block(*(self._tables[name][:end].copy() for name, end in self._ends.items()))
 
-    def shorten(self, ends: dict[str, int]) -> None:
-        """Let go of the rows behind those ends."""
-        self._ends = dict(ends)
+    def restore(self, block: Block) -> None:
+        """Let the rows of a block be all that are there."""
+        for name in self._ends:
+            rows = getattr(block, name)
+            self._ends[name] = 0
+            self._make_room(name, len(rows))
+            self._tables[name][: len(rows)] = rows
+            self._ends[name] = len(rows)
 
 
 def row_bytes(system: System) -> int:

@@ -18,7 +18,16 @@ from mbsim.core.machine import free_memory
 from mbsim.errors import ModelError, ResultsError
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.background import Background
-from mbsim.results.blocks import Block, Gathered, Table, Tables, first_rows, nothing, row_bytes
+from mbsim.results.blocks import (
+    Block,
+    Gathered,
+    Mark,
+    Table,
+    Tables,
+    first_rows,
+    nothing,
+    row_bytes,
+)
 from mbsim.results.chunks import LONG
 from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
@@ -110,7 +119,7 @@ class Recorder:
         self._gathered = Gathered(system, self._block, self._block >= LONG)
         self._background = Background()
         self._free: Tables = {}  # those of the rows that are written in the background
-        self._mark: dict[str, int] | None = None  # where rows end that are the run's for sure
+        self._mark: Mark | None = None
         self._written = [0, 0, 0]  # output rows, incidents and events in the file so far
         self._given = 0  # output rows in the file, or on their way there
         self._started = False  # whether state/incident_offsets has its first 0
@@ -123,7 +132,7 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        settings: dict[str, Value] = {**attributes, **self._identity.digests}
+        self._settings: dict[str, Value] = {**attributes, **self._identity.digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -131,25 +140,30 @@ class Recorder:
         self.shown = False
         self.earlier = self._target is not None and not resume and self._target.exists()
         if resume:
-            self.checkpoint = self._resumed(settings)
+            self.checkpoint = self._resumed()
         self._given = self._written[0]
         self._store = Store(self._target, resume)
         self._store.rows_at_once = self._block
+        self._begin_file(resume)
+
+    def _begin_file(self, resume: bool) -> None:
+        """Write what a file says without rows."""
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        self._store.update(
-            values={} if resume else facts_of(system, self._asked),
-            constants={} if resume else graphics_of(system.model, system.placement),
-            attributes={
-                "/": {**settings, "status": "running"},
-                **({} if resume else without_rows(system)),
-                **({} if resume else {"graphics": about_graphics(system.model, system.placement)}),
-            },
-            remove=["stats", "audit"],
-        )
+        new: dict[str, Any] = {}
+        if not resume:
+            model, placement = self.system.model, self.system.placement
+            new["values"] = facts_of(self.system, self._asked)
+            new["constants"] = graphics_of(model, placement)
+            new["attributes"] = {
+                **without_rows(self.system),
+                "graphics": about_graphics(model, placement),
+            }
+        attributes = {"/": {**self._settings, "status": "running"}, **new.pop("attributes", {})}
+        self._store.update(**new, attributes=attributes, remove=["stats", "audit"])
 
-    def _resumed(self, settings: Mapping[str, Value]) -> dict[str, Table]:
+    def _resumed(self) -> dict[str, Table]:
         """Return the checkpoint to go on from, after comparing what it was made with."""
         if self._target is None:
             raise ModelError("resume: there is no folder with results to go on from")
@@ -162,7 +176,7 @@ class Recorder:
                         f"--resume: {self._target}: has no checksums: it is of an earlier version, "
                         "or damaged; start without --resume"
                     )
-                check_same(self._target, results, settings, self._identity)
+                check_same(self._target, results, self._settings, self._identity)
                 tables = results.tables("checkpoint")
                 if results.attribute("checkpoint", "sha256") != digest(tables):
                     raise ModelError(
@@ -217,8 +231,6 @@ class Recorder:
         rows.used[:] = 0
         if self._posts is not None:
             self._posts.take(block.time, block.contact, block.incident_count, block.incidents)
-        if self._mark is not None:
-            return
         # the same rows at once, however often the loop comes back
         while self._gathered.rows >= (wanted := self._block - self._given % self._block):
             self._hand_over(wanted)
@@ -226,8 +238,11 @@ class Recorder:
             self._hand_over(self._gathered.rows)
 
     def mark(self) -> None:
-        """Write no rows taken from here on until `settle`: `go_back` may drop them."""
-        self._mark = self._gathered.ends
+        """Remember what there is: until `settle`, `go_back` may drop what is taken from here on."""
+        self._background.wait()
+        rows = self._gathered.copied()
+        written = list(self._written)
+        self._mark = Mark(rows, written, self._given, self._started, self.watch.saved())
 
     def settle(self) -> None:
         """Let the rows taken since `mark` be those of the run."""
@@ -235,10 +250,20 @@ class Recorder:
 
     def go_back(self) -> None:
         """Drop the rows taken since `mark`, and those that wait to be taken."""
-        if self._mark is not None:
-            self._gathered.shorten(self._mark)
-        self._mark = None
+        mark, self._mark = self._mark, None
         self.system.scene.rows.used[:] = 0
+        if mark is None:
+            return
+        self._background.wait()
+        given, self._given = self._given, mark.given
+        self._written, self._started = mark.written, mark.started
+        self._gathered.restore(mark.rows)
+        self._watched = len(mark.rows.time)
+        self._watch.restore(dict(mark.watch))
+        if given != mark.given and not self._store.broken:
+            resume = bool(self.checkpoint)
+            self._store.begin_anew(resume)
+            self._begin_file(resume)
 
     def end(self) -> None:
         """Tell the users' CONTACTPOSTs that the run has reached its end."""

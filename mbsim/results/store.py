@@ -47,8 +47,6 @@ class Store:
     """
 
     def __init__(self, target: Path | None, resume: bool = False) -> None:
-        import h5py
-
         self.target = target
         self.broken = False
         self.failure: ResultsError | None = None
@@ -63,8 +61,7 @@ class Store:
         self._lock: RunLock | None = None
         self.file: h5py.File | None = None
         if target is None:
-            name = f"mbsim-{uuid.uuid4().hex}"
-            self.file = h5py.File(name, "w", driver="core", backing_store=False, block_size=1 << 20)
+            self.file = _in_memory()
             return
         try:
             self._lock = RunLock(target)
@@ -74,9 +71,32 @@ class Store:
         except OSError as error:
             self.broken = True
             raise problem(target, error) from None
+        self._open(target, resume)
+
+    def _open(self, target: Path, resume: bool) -> None:
+        """Open a part file, empty or with what `target` holds."""
         with self.writing():
             self._part = PartFile(target, resume)
             self.file = _opened(self._part, "r+" if resume else "w")
+
+    def begin_anew(self, resume: bool) -> None:
+        """Drop all that was written since this was made; nothing was published since."""
+        if self.broken:
+            return
+        self._writers.clear()
+        self._growing = self._changed = resume
+        self._before = None
+        assert self.file is not None
+        if self.target is None:
+            self.file.close()
+            self.file = _in_memory()
+            return
+        assert self._part is not None
+        self._part.close()
+        # what HDF5 still has to write goes nowhere
+        with contextlib.suppress(OSError, RuntimeError, ValueError):
+            self.file.close()
+        self._open(self.target, resume)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[h5py.File]:
@@ -300,6 +320,8 @@ class Store:
             return None
         self.complete()
         if self._part is None:
+            # a dataset opened anew reads chunks as they were stored; one that stays open may not
+            self._writers.clear()
             return self.file
         with self.writing() as file:
             self._writers.clear()
@@ -308,6 +330,14 @@ class Store:
         self.broken = True  # there is nothing left to write to
         self._unlock()
         return None
+
+
+def _in_memory() -> h5py.File:
+    """Open a file that is kept in memory."""
+    import h5py
+
+    name = f"mbsim-{uuid.uuid4().hex}"
+    return h5py.File(name, "w", driver="core", backing_store=False, block_size=1 << 20)
 
 
 def _opened(part: PartFile, mode: str) -> h5py.File:

@@ -195,5 +195,7 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "balls in a bowl": of_models("balls_in_bowl", "--end-time", "0.6"),
     "ratchet": of_models("ratchet", "--end-time", "0.3", "--print-interval", "0.001"),
     "cam from a mesh": of_models("cam_from_stl"),
+    "gear pair": of_models("gear_pair", "--end-time", "0.004", "--print-interval", "0.0001"),
+    "mixed pile": of_models("mixed_pile", "--end-time", "0.03", "--print-interval", "0.0005"),
     "some signals": some_signals,
 }

@@ -138,6 +138,19 @@ def sheet() -> Mesh:
     return np.column_stack([x, y, np.zeros(25)]), faces
 
 
+def far_corner() -> Mesh:
+    """Return a cube with a corner so far away that all others are one beside it."""
+    corners = 0.5 * np.array(
+        [(-1, -1, -1), (-1, -1, 1), (-1, 1, -1), (-1, 1, 1), (0, -1, -1), (1, -1, -1),
+         (1, -1, 1), (1, 0, 0), (1, 1, -1), (1, 1, 1)]
+    )  # fmt: skip
+    faces = np.array(
+        [(2, 4, 1), (6, 2, 1), (5, 4, 3), (3, 6, 1), (2, 10, 4), (7, 2, 6),
+         (7, 10, 2), (4, 10, 3), (9, 6, 3), (3, 10, 9), (9, 8, 0), (10, 7, 9)]
+    )  # fmt: skip
+    return np.vstack([[-8e6, 8e31, -0.5], corners]), faces
+
+
 def both_sides(mesh: Mesh) -> Mesh:
     return mesh[0], np.vstack([mesh[1], mesh[1][:, ::-1]])
 
@@ -150,8 +163,9 @@ def both_sides(mesh: Mesh) -> Mesh:
         (both_sides(sheet()), "an open sheet is no solid"),
         ((BOX[0], np.delete(BOX[1], [0, 1], axis=0)), "a hole of 4 edges is 1 wide"),
         ((BOX[0], BOX[1][:0]), "no triangles"),
+        (far_corner(), "shells enclose nothing"),
     ],
-    ids=["moebius", "sheet", "doubled sheet", "open box", "nothing"],
+    ids=["moebius", "sheet", "doubled sheet", "open box", "nothing", "far corner"],
 )
 def test_what_cannot_be_mended_is_refused(mesh: Mesh, words: str) -> None:
     assert solid_fault(*mesh)

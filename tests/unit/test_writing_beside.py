@@ -160,3 +160,46 @@ def test_a_loop_faster_than_the_disk_waits(tmp_path: Path, monkeypatch: pytest.M
     assert len(asked) == ROWS // BLOCK
     assert most < BLOCK
     assert numbers(tmp_path) == ("finished", list(range(ROWS)))
+
+
+@pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("output", ["folder", "memory"])
+def test_rows_that_are_dropped_again_are_not_kept_in_memory(
+    tmp_path: Path, output: str, resume: bool
+) -> None:
+    """They are written like others, and the file begins anew without them."""
+    system = fake_system(tmp_path / "deck")
+    folder = tmp_path if output == "folder" else None
+    if resume and folder is None:
+        pytest.skip("nothing to go on from")
+    if resume:
+        first = Recorder(system, SETTINGS, folder)
+        add_rows(system, 0, 1)
+        first.take()
+        first.flush(checkpoint(0))
+        first.abandon()
+    recorder = Recorder(system, SETTINGS, folder, resume=resume)
+    if not resume:
+        add_rows(system, 0, 1)
+        recorder.take()
+    recorder.mark()
+    before = recorder.watch.saved()
+    for k in range(1000, 1000 + ROWS, 5):
+        add_rows(system, k, 5)
+        recorder.take()
+        assert recorder._gathered.rows < BLOCK
+    add_rows(system, 2000, 3)
+    recorder.go_back()
+    assert {name: table.tolist() for name, table in recorder.watch.saved().items()} == {
+        name: table.tolist() for name, table in before.items()
+    }
+    for first_row in range(1, ROWS):
+        add_rows(system, first_row, 1, events=False)
+        recorder.take()
+    results = recorder.close("finished", {}, system.scene.log.contacts)
+    with results:
+        assert results["bodies/2/position/x"].tolist() == list(range(ROWS))
+        assert results["state/incident_offsets"].tolist()[-1] == len(results["state/incidents"])
+        assert results["events"]["time"].max() < 1.0
+    if folder:
+        assert not [path for path in folder.iterdir() if path.name.startswith(".")]
