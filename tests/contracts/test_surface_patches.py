@@ -19,6 +19,14 @@ from helpers.surfaces import (
     wrench,
 )
 from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS
+from mbsim.geometry.mesh.merging import (
+    MOST_PEAKS,
+    NORMAL,
+    PEAK_NUMBERS,
+    PLACE,
+    SURFACE,
+    strongest,
+)
 
 SAME = np.eye(3)
 
@@ -369,3 +377,43 @@ def test_a_shell_inside_of_another_mesh_is_told_beside_one_that_is_not(pair, fir
         told.append(entry(pair)(*(a.ctypes.data for a in arrays)) < 0)
         assert (points[:, 0].max() > 0.0) == touches
     assert told == [False, True]
+
+
+def test_nothing_jumps_where_peaks_are_more_than_slots():
+    """Nine and more peaks of random depths and directions, which go up and down one by one."""
+    rng = np.random.default_rng(6)
+    speed, phase = rng.uniform(0.5, 2.0, 12), rng.uniform(0.0, 6.0, 12)
+    place = rng.normal(size=(12, 3))
+    away = rng.normal(size=(12, 3)) + np.array([0.0, 0.0, 2.0])
+    last, ranks, largest = None, set(), 0.0
+    for t in np.linspace(0.0, 3.0, 3001):
+        peaks = np.zeros((12, PEAK_NUMBERS))
+        peaks[:, 0] = np.maximum(0.0, 1.0 + np.sin(speed * t + phase) - 0.2)
+        peaks[:, 1] = peaks[:, 0] > 0.0
+        peaks[:, PLACE : PLACE + 3], peaks[:, NORMAL : NORMAL + 3], peaks[:, SURFACE] = (
+            place,
+            away,
+            1,
+        )
+        ranks.add(tuple(np.argsort(-peaks[:, 0])[:9]))
+        unit = away / np.linalg.norm(away, axis=1)[:, None]
+        whole, area = (peaks[:, :1] * unit).sum(axis=0), peaks[:, 1].sum()
+        many = strongest(peaks, 12, MOST_PEAKS)
+        assert many <= MOST_PEAKS
+        row = peaks[:many]
+        n = (
+            row[:, NORMAL : NORMAL + 3]
+            / np.linalg.norm(row[:, NORMAL : NORMAL + 3], axis=1)[:, None]
+        )
+        force = (row[:, 0] * row[:, 1])[:, None] * n
+        assert force.sum(axis=0) == pytest.approx(whole, rel=1e-12)
+        assert row[:, SURFACE].sum() == pytest.approx(area, rel=1e-12)
+        # of a law with an exponent, at the places where it acts
+        harder = (row[:, 0] ** 1.5 * row[:, 1])[:, None] * n
+        moments = np.cross(row[:, PLACE : PLACE + 3], harder).sum(axis=0)
+        now = np.concatenate([harder.sum(axis=0), moments])
+        if last is not None:
+            largest = max(largest, abs(now - last).max())
+        last = now
+    assert len(ranks) > 20
+    assert largest < 0.05

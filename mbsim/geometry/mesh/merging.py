@@ -14,13 +14,11 @@ and nothing jumps where patches merge or one peak overtakes the other.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, dot, norm, scale, sub, vector
+from mbsim.core.rotation import add, dot, norm, scale, vector
 from mbsim.geometry.catalog import (
     AREA,
     MEAN_DEPTH,
@@ -189,10 +187,16 @@ def merge(nodes: F2, links: F2, partners: I2, peaks: F2) -> int:
 
 
 @jitable
-def strongest(peaks: F2, count: int, most: int) -> int:
-    """Move the `most` peaks of greatest weight times depth to the front; return their number.
+def presses(peak: F1) -> float:
+    """Return what a peak presses as of a linear law: its weight times its depth."""
+    return peak[0] * peak[1]
 
-    What those behind press is added to the nearest of those in front, at their common centre.
+
+@jitable
+def strongest(peaks: F2, count: int, most: int) -> int:
+    """Move the peaks that press most to the front; return how many there are then, at most `most`.
+
+    Where there are more than most - 1, the last one stands for what is left.
     """
     for k in range(count):
         # in no direction there is no force
@@ -202,34 +206,54 @@ def strongest(peaks: F2, count: int, most: int) -> int:
     while kept < min(most, count):
         best = kept
         for k in range(kept + 1, count):
-            if peaks[k, 0] * peaks[k, 1] > peaks[best, 0] * peaks[best, 1]:
+            if presses(peaks[k]) > presses(peaks[best]):
                 best = k
-        if peaks[best, 0] * peaks[best, 1] <= LEAST * peaks[0, 0]:
+        if presses(peaks[best]) <= LEAST * peaks[0, 0]:
             break
         for c in range(PEAK_NUMBERS):
             peaks[kept, c], peaks[best, c] = peaks[best, c], peaks[kept, c]
         kept += 1
-    for k in range(kept, count):
-        if kept < most or peaks[k, 1] <= 0.0:
-            continue
-        nearest, least = 0, math.inf
-        x = vector(peaks[k, PLACE:])
-        for j in range(kept):
-            away = norm(sub(vector(peaks[j, PLACE:]), x))
-            if away < least:
-                nearest, least = j, away
-        add_weight(peaks[nearest], peaks[k])
+    if kept == most:
+        gather_rest(peaks, count, most - 1)
     return kept
 
 
 @jitable
-def add_weight(kept: F1, lost: F1) -> None:
-    """Add to a peak what another one presses, as of a linear law."""
-    more = lost[1] * lost[0] / kept[0]
-    part = more / (kept[1] + more)
-    kept[1] += more
-    for k in range(PLACE, AT_NODE):
-        kept[k] += part * (lost[k] - kept[k])
+def gather_rest(peaks: F2, count: int, own: int) -> None:
+    """Let the peak behind the first `own` stand for itself, those behind, and a part of the first.
+
+    With s_k what peak k presses and s that of the first one behind, it takes min(s_k, s) of each:
+    nothing jumps where one overtakes another or a further one begins. It presses with the sum of
+    their forces at the centre of these.
+    """
+    level, total = presses(peaks[own]), 0.0
+    rest, force = np.zeros(PEAK_NUMBERS), (0.0, 0.0, 0.0)
+    for k in range(count):
+        strength = presses(peaks[k])
+        if strength <= 0.0:
+            continue
+        taken = min(strength, level)
+        n = vector(peaks[k, NORMAL:])
+        force = add(force, scale(taken / norm(n), n))
+        total += taken
+        part = taken / strength
+        rest[0] += taken * peaks[k, 0]
+        for c in range(PLACE, NORMAL):
+            rest[c] += taken * peaks[k, c]
+        for c in range(MEAN, AT_NODE):
+            rest[c] += taken * peaks[k, c]
+        rest[SURFACE] += part * peaks[k, SURFACE]
+        peaks[k, 1] *= 1.0 - part
+        peaks[k, SURFACE] *= 1.0 - part
+    for c in range(AT_NODE):
+        if c != SURFACE:
+            rest[c] /= total
+    size = norm(force)
+    rest[1] = size / rest[0]
+    for c in range(AT_NODE):
+        peaks[own, c] = rest[c]
+    if size > 0.0:
+        peaks[own, NORMAL], peaks[own, NORMAL + 1], peaks[own, NORMAL + 2] = force
 
 
 @jitable
