@@ -12,7 +12,17 @@ if TYPE_CHECKING:
     import h5py
 
 #: Groups of a result file that have members or attributes of a known form.
-_GROUPS = ("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state")
+_GROUPS = (
+    "audit",
+    "stats",
+    "checkpoint",
+    "requests",
+    "bodies",
+    "contacts",
+    "energy",
+    "state",
+    "errors",
+)
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")

@@ -14,6 +14,7 @@ import numpy as np
 
 from mbsim.errors import MbsimError, ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
+from mbsim.results.error_reading import Errors
 from mbsim.results.form import (
     FACTS,
     check_members,
@@ -211,7 +212,7 @@ class Results:
         rows = len(file["time"]) if "time" in file else 0
         for name, item in self._stored().items():
             # /state is the solver's own, in its own layout
-            if not name.startswith("state/") and _is_signal(item, item.shape, rows):
+            if not name.startswith(("state/", "errors/")) and _is_signal(item, item.shape, rows):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
         shapes = {
             stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}
@@ -222,6 +223,11 @@ class Results:
                 found[name] = 1 if item.ndim == 2 else item.shape[2]
         self._signals = {name: found[name] for name in sorted(found, key=order)}
         return self._signals
+
+    @property
+    def errors(self) -> Errors:
+        """Error bars of a run with ``verify``; names as those of signals."""
+        return Errors(self)
 
     def find(self, name: str) -> list[str]:
         """Return the names of signals that a name stands for; a plain one stands for itself.
@@ -368,6 +374,11 @@ class Results:
         if not isinstance(file.get(f"{group}/{last}"), h5py.Dataset):
             return None
         return Location(f"{group}/{last}", ids.index(int(id)))
+
+    @_reads
+    def place(self, name: str) -> tuple[h5py.File, Location | None, str | None]:
+        """Return the file, and where in it a name is stored and its part: None where nowhere."""
+        return self._open(), *(self._find(name) or (None, None))
 
     @_reads
     def last(self, group: str, signal: str) -> dict[int, Any]:

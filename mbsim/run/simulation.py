@@ -16,7 +16,7 @@ from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
 from mbsim.run.loop import Runner
 from mbsim.run.options import Notify, Options, Progress
-from mbsim.run.settings import Settings, output_rows, settle
+from mbsim.run.settings import Settings, output_rows, settle, tightened
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -92,6 +92,7 @@ def simulate(
     progress: Progress | None = None,
     notify: Notify | None = None,
     profile: bool = False,
+    verify: bool | str = False,
 ) -> Results:
     """Run a model and return its results.
 
@@ -134,6 +135,8 @@ def simulate(
         Called with lines for the user.
     profile : bool
         Count where the time goes: ``profile_*`` of `Results.stats`.
+    verify : bool or "full"
+        Run once more, or two to three times, for error bars: `Results.errors`.
 
     Raises
     ------
@@ -157,9 +160,17 @@ def simulate(
         plugin_timeout=plugin_timeout,
         progress=progress,
         notify=notify,
+        verify=verify,
     )
+    if verify not in (False, True, "full"):
+        raise ModelError(f'verify={verify!r}: False, True and "full" are allowed')
     with profiling() if profile else nullcontext():
-        return _run(model, options)
+        results = _run(model, options)
+        if not verify:
+            return results
+        from mbsim.run.verify import verified
+
+        return verified(model, options, results, _run)
 
 
 def _run(model: Model, options: Options) -> Results:
@@ -175,6 +186,8 @@ def _run(model: Model, options: Options) -> Results:
     settings = settle(
         model, options.end_time, options.print_interval, options.integrator, options.tol
     )
+    if options.tighter != 1.0:
+        settings = tightened(settings, options.tighter, options.least_steps, options.h_most)
     tell = options.notify or (lambda line: None)
     jit.on_first_compile = lambda: tell(
         "compiling what this model needs (a quarter of a minute to one); later runs load it"
@@ -226,6 +239,7 @@ def _run(model: Model, options: Options) -> Results:
                     runner.start(options.allow_overlap)
                 if options.dump_fclib is not None:
                     runner.dump_every(options.dump_fclib, options.resume)
+                runner.most_evaluations = options.most_evaluations
                 runner.run(options.progress, options.resume)
                 recorder.end()
                 runner.storing = True
