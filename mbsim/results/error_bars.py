@@ -105,7 +105,8 @@ def windows_of(time: Array) -> Array:
     span = float(time[-1] - time[0]) if len(time) else 0.0
     if span <= 0.0:
         return np.zeros(len(time), dtype=np.int64)
-    return np.minimum((WINDOWS * (time - time[0]) / span).astype(np.int64), WINDOWS - 1)
+    passed = (WINDOWS * (time - time[0]) / span).astype(np.int64)
+    return np.asarray(np.minimum(passed, WINDOWS - 1))
 
 
 def widened(apart: Array, window: Array) -> Array:
@@ -245,7 +246,8 @@ def make(
     tables["errors/events"] = table
     if len(table) and np.isfinite(table).any():
         k = int(np.nanargmax(table))
-        lines.append(f"times of events: {table[k]:.2g}, at {events['time'][k]:.6g}")
+        if table[k] > 0.0:
+            lines.append(f"error of times of events: {table[k]:.2g}, at {events['time'][k]:.6g}")
     lines += [f"warning: events differ: {line}" for line in differing[:3]]
     if math.isfinite(sure):
         lines.append(f"warning: positions are unsure by 3 % of their range from time {sure:.6g} on")
@@ -269,7 +271,7 @@ def _worst(
         if float(rows[k]) >= worst.get(kind, (0.0, 0.0))[0]:
             worst[kind] = float(rows[k]), float(time[k])
     for kind, (value, when) in worst.items():
-        if scales[kind] > 0.0:
+        if scales[kind] > 0.0 and value > FLOOR * scales[kind]:
             share = f"{100.0 * value / scales[kind]:.2g} %"
             what = kind.replace("_", " ")
             yield f"error of {what}: {value:.2g}, {share} of its range, at {when:.6g}"
