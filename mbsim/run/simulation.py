@@ -173,6 +173,26 @@ def simulate(
         return verified(model, options, results, _run)
 
 
+def _settled(model: Model, options: Options) -> Settings:
+    """Return the settings of a run."""
+    asked = options.end_time, options.print_interval, options.integrator, options.tol
+    settings = settle(model, *asked)
+    if options.tighter == 1.0:
+        return settings
+    return tightened(settings, options.tighter, options.least_steps, options.h_most)
+
+
+def _tell_of_compiling(tell: Notify) -> None:
+    """Let the user hear when something is compiled, and how much is left."""
+    from mbsim.core import jit
+
+    jit.on_first_compile = lambda: tell(
+        "compiling what this model needs (a quarter of a minute to one); later runs load it"
+    )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+
+
 def _run(model: Model, options: Options) -> Results:
     """Run a model; see `simulate`."""
     from mbsim.compile_model.build import build
@@ -183,17 +203,9 @@ def _run(model: Model, options: Options) -> Results:
     from mbsim.results.resume import completed
 
     began = time.perf_counter()
-    settings = settle(
-        model, options.end_time, options.print_interval, options.integrator, options.tol
-    )
-    if options.tighter != 1.0:
-        settings = tightened(settings, options.tighter, options.least_steps, options.h_most)
+    settings = _settled(model, options)
     tell = options.notify or (lambda line: None)
-    jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (a quarter of a minute to one); later runs load it"
-    )
-    jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+    _tell_of_compiling(tell)
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in options.plugins]
     for file in files:
