@@ -92,6 +92,13 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     metavar="N",
     help="Write the contact problem of every N-th step, FCLIB files in DIR/fclib.",
 )
+@click.option(
+    "--verify",
+    is_flag=False,
+    flag_value="once",
+    type=click.Choice(["once", "full"]),
+    help="Run again with another method, and give error bars; full: with two or three.",
+)
 @click.option("--profile", is_flag=True, help="Print where the time went.")
 def command(
     model: str,
@@ -101,12 +108,15 @@ def command(
     as_json: bool,
     report: bool,
     profile: bool,
+    verify: str | None,
     **options: Any,
 ) -> None:
     """Run MODEL and write DIR/<model>.h5, .csv (requests) and .log."""
     from mbsim.core.profile import profiling
 
     with profiling(time.process_time()) if profile else nullcontext():
+        asked: dict[str | None, bool | str] = {None: False, "once": True, "full": "full"}
+        options["verify"] = asked[verify]
         _run(model, output, overrides, progress, as_json, report, **options)
 
 

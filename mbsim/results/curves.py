@@ -62,6 +62,7 @@ class Curve:
     label: str
     x: Array
     y: Array
+    band: Array | None = None  # error bar of y, where the run has one
 
 
 @dataclass
@@ -254,6 +255,14 @@ class _Track:
         others = self._rows_of(self.minus, component.name, quantity)[self.other_rows]
         return np.asarray(values - others)
 
+    def band(self, component: Component, quantity: Quantity) -> Array | None:
+        """Return the error bar of a component in the rows that are drawn, if there is one."""
+        name, errors = component.name, self.results.errors
+        if self.minus is not None or name not in errors:
+            return None
+        bar = np.asarray(errors[name], dtype=float)[self.rows]
+        return bar * self.from_units.factor_to(self.units, quantity)
+
 
 def _between(time: Array, start: float | None, end: float | None) -> Array:
     keep = np.ones(len(time), dtype=bool)
@@ -310,7 +319,8 @@ def _add_component(picture: Picture, k: int, track: _Track, component: Component
         return
     label = label_of(track.results, component)
     values = track.values(component, quantity)
-    panel.curves.append(Curve(k, component.name, label, track.x, values))
+    band = track.band(component, quantity)
+    panel.curves.append(Curve(k, component.name, label, track.x, values, band))
 
 
 def label_of(results: Results, component: Component) -> str:

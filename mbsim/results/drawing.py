@@ -221,6 +221,10 @@ def _line(axis: Axes, picture: Picture, panel: Panel, curve: Curve) -> Line2D:
         markersize=4,
     )
     line.set_gid(_plain(curve.name))
+    if curve.band is not None:
+        finite = np.where(np.isfinite(curve.band), curve.band, np.nan)
+        low, high = curve.y - finite, curve.y + finite
+        axis.fill_between(curve.x, low, high, color=colour, alpha=0.2, linewidth=0.0)
     return line
 
 

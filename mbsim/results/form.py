@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.core.stored import claims_too_much
+from mbsim.results.names import PARTS
 
 if TYPE_CHECKING:
     import h5py
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 #: Groups of a result file that have members or attributes of a known form.
 _GROUPS = (
     *("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state"),
-    *("graphics", "contact_points"),
+    *("graphics", "contact_points", "errors"),
 )
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
@@ -158,3 +159,10 @@ def finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [finite(item) for item in value]
     return finite(value.tolist()) if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def is_signal(item: Any, shape: tuple[int, ...], rows: int) -> bool:
+    """Return whether a dataset whose element has that shape is numbers over output times."""
+    if shape[:1] != (rows,) or item.dtype.kind not in "iuf" or len(shape) > 2:
+        return False
+    return (1 if len(shape) == 1 else shape[1]) in (1, *PARTS)

@@ -13,10 +13,12 @@ import numpy as np
 from mbsim.errors import ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
 from mbsim.results.damage import DAMAGE, reads, said_of
+from mbsim.results.error_reading import Errors
 from mbsim.results.form import (
     FACTS,
     check_members,
     facts_of,
+    is_signal,
     last_row,
     plain,
     text_of,
@@ -46,6 +48,8 @@ class Location(NamedTuple):
 _LISTS = ("columns", "measures")
 #: Groups of other things than elements.
 _NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "graphics")
+#: Datasets that are no signals, whatever their shapes.
+_NO_SIGNALS = ("state/", "contact_points/", "errors/")
 #: What `keys` leaves out: what a run goes on from, and what pictures are made of.
 _NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
@@ -223,19 +227,22 @@ class Results(SignalMapping):
         rows = len(file["time"]) if "time" in file else 0
         for name, item in self._stored().items():
             # /state is the solver's own, in its own layout; points are not one a row
-            if not name.startswith(("state/", "contact_points/")) and _is_signal(
-                item, item.shape, rows
-            ):
+            if not name.startswith(_NO_SIGNALS) and is_signal(item, item.shape, rows):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
         shapes = {
             stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}
         }
         for name, location in self._columnwise().items():
             item = shapes[location.stored]
-            if item.ndim > 1 and _is_signal(item, (item.shape[0], *item.shape[2:]), rows):
+            if item.ndim > 1 and is_signal(item, (item.shape[0], *item.shape[2:]), rows):
                 found[name] = 1 if item.ndim == 2 else item.shape[2]
         self._signals = {name: found[name] for name in sorted(found, key=order)}
         return self._signals
+
+    @property
+    def errors(self) -> Errors:
+        """Error bars of a run with ``verify``; names as those of signals."""
+        return Errors(self)
 
     def find(self, name: str) -> list[str]:
         """Return the names of signals that a name stands for; a plain one stands for itself.
@@ -384,6 +391,11 @@ class Results(SignalMapping):
         return Location(f"{group}/{last}", ids.index(int(id)))
 
     @reads
+    def place(self, name: str) -> tuple[h5py.File, Location | None, str | None]:
+        """Return the file, and where in it a name is stored and its part: None where nowhere."""
+        return self._open(), *(self._find(name) or (None, None))
+
+    @reads
     def last(self, group: str, signal: str) -> dict[int, Any]:
         """Return the last row of a signal of all elements of a group, by id."""
         ids = self._columns().get(group)
@@ -431,13 +443,6 @@ class Results(SignalMapping):
     def _there(self) -> str:
         """Return all signals, with ids taken together, as the end of a message."""
         return f"; there is {', '.join(compact(self.signals())) or 'nothing'}"
-
-
-def _is_signal(item: Any, shape: tuple[int, ...], rows: int) -> bool:
-    """Return whether a dataset whose element has that shape is numbers over output times."""
-    if shape[:1] != (rows,) or item.dtype.kind not in "iuf" or len(shape) > 2:
-        return False
-    return (1 if len(shape) == 1 else shape[1]) in (1, *PARTS)
 
 
 def open_results(path: str | Path) -> Results:

@@ -34,19 +34,11 @@ from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
-from mbsim.results.graphics import about_graphics, graphics_of
 from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
 from mbsim.results.signal_filter import SignalFilter
-from mbsim.results.signals import (
-    facts_of,
-    length_of,
-    names_of,
-    request_columns,
-    signals,
-    without_rows,
-)
+from mbsim.results.signals import before_rows, length_of, names_of, request_columns, signals
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch
 
@@ -151,17 +143,9 @@ class Recorder:
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        new: dict[str, Any] = {}
-        if not resume:
-            model, placement = self.system.model, self.system.placement
-            new["values"] = facts_of(self.system, self._asked)
-            new["constants"] = graphics_of(model, placement)
-            new["attributes"] = {
-                **without_rows(self.system),
-                "graphics": about_graphics(model, placement),
-            }
-        attributes = {"/": {**self._settings, "status": "running"}, **new.pop("attributes", {})}
-        self._store.update(**new, attributes=attributes, remove=["stats", "audit"])
+        new = {"attributes": {}} if resume else before_rows(self.system, self._asked)
+        new["attributes"]["/"] = {**self._settings, "status": "running"}
+        self._store.update(**new, remove=["stats", "audit"])
 
     def _resumed(self) -> dict[str, Table]:
         """Return the checkpoint to go on from, after comparing what it was made with."""

@@ -25,6 +25,7 @@ from mbsim.arrays.codes import (
 from mbsim.results.blocks import Block, Table, events_table, nothing
 from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.forces import Forces
+from mbsim.results.graphics import about_graphics, graphics_of
 from mbsim.results.motion import motion
 from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.signal_filter import SignalFilter
@@ -85,6 +86,16 @@ def without_rows(system: System) -> dict[str, dict[str, str]]:
         for name, found in facts(system.model)
         for group, _, id in [name.partition("/")]
         if int(id) not in there.get(group, ())
+    }
+
+
+def before_rows(system: System, asked: SignalFilter) -> dict[str, dict[str, Any]]:
+    """Return what `Store.update` is given for a new file, by the names of its arguments."""
+    about = about_graphics(system.model, system.placement)
+    return {
+        "values": facts_of(system, asked),
+        "constants": graphics_of(system.model, system.placement),
+        "attributes": {**without_rows(system), "graphics": about},
     }
 
 

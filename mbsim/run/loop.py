@@ -21,7 +21,7 @@ from mbsim.run import checkpoint, statistics
 from mbsim.run.divergence import Pace
 from mbsim.run.failures import fail, give_up
 from mbsim.run.hook_calls import HookCalls
-from mbsim.run.options import Notify, Progress
+from mbsim.run.options import Notify, Progress, TooMuchWork
 from mbsim.run.settings import Settings, Stage, output_times
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ class Runner:
         self.pace = Pace(start, start)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
+        self.most_evaluations: int | None = None  # of a rerun that verifies
         self.interrupted = 0  # number of the signal that asks for an end
         self.storing = False  # nothing may be left half written
         self.torn = False  # a second signal came in the midst of something: no checkpoint of that
@@ -296,6 +297,11 @@ class Runner:
         """Raise `Interrupted` where a signal has asked for it."""
         if self.interrupted:
             raise self.stopped()
+        if self.most_evaluations is not None:
+            from mbsim.integrators import scheme
+
+            if self.method.counts[scheme.EVALUATIONS] > self.most_evaluations:
+                raise TooMuchWork(f"more than {self.most_evaluations} evaluations")
 
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""

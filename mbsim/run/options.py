@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+from mbsim.errors import MbsimError
 
 Progress = Callable[[float, float, float], None]
 Notify = Callable[[str], None]
@@ -31,3 +34,13 @@ class Options:
     plugin_timeout: float | None = None
     progress: Progress | None = None
     notify: Notify | None = None
+    verify: bool | str = False
+    # of a rerun that verifies: what tolerances are multiplied by, and what bounds steps and work
+    tighter: float = 1.0
+    least_steps: float = 0.0
+    h_most: float = math.inf
+    most_evaluations: int | None = None
+
+
+class TooMuchWork(MbsimError):
+    """A rerun took more evaluations than it is worth."""

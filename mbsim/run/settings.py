@@ -17,6 +17,7 @@ from mbsim.model.forces import rigid_forces
 from mbsim.model.names import element_name, is_adams
 
 DEFAULT_TOL = 1e-5
+TIGHTEST = 1e-15
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
 #: What tol is of `integr_tol`: MotionSolve's default, 1e-3, is then the default.
@@ -133,7 +134,7 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
     """Return tol of one Simulate, checked, and who says it: the caller, the deck or nobody."""
     adams = is_adams(model.file)
     if tol is not None:
-        return _checked("tol", tol, 1e-15, 0.1), "as the command line says"
+        return _checked("tol", tol, TIGHTEST, 0.1), "as the command line says"
     for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
         if source is None or source.integr_tol is None:
             continue
@@ -314,6 +315,20 @@ def settle(
     notes += said_of_friction
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
+
+
+def tightened(settings: Settings, tighter: float, least_steps: float, h_most: float) -> Settings:
+    """Return the settings with smaller tolerances and shorter steps.
+
+    `least_steps` is how many steps the whole run takes at least, `h_most` their longest [T].
+    """
+    span = settings.end_time - settings.stages[0].simulation.start_time
+    longest = min(h_most, span / least_steps if least_steps > 0.0 and span > 0.0 else math.inf)
+    stages = tuple(
+        replace(stage, tol=max(TIGHTEST, tighter * stage.tol), h_max=min(stage.h_max, longest))
+        for stage in settings.stages
+    )
+    return replace(settings, stages=stages)
 
 
 def output_rows(settings: Settings) -> float:

@@ -16,7 +16,7 @@ from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
 from mbsim.run.loop import Runner
 from mbsim.run.options import Notify, Options, Progress
-from mbsim.run.settings import Settings, output_rows, settle
+from mbsim.run.settings import Settings, output_rows, settle, tightened
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -93,6 +93,7 @@ def simulate(
     progress: Progress | None = None,
     notify: Notify | None = None,
     profile: bool = False,
+    verify: bool | str = False,
 ) -> Results:
     """Run a model and return its results.
 
@@ -137,6 +138,8 @@ def simulate(
         Called with lines for the user.
     profile : bool
         Count where the time goes: ``profile_*`` of `Results.stats`.
+    verify : bool or "full"
+        Run once more, or two to three times, for error bars: `Results.errors`.
 
     Raises
     ------
@@ -161,9 +164,37 @@ def simulate(
         plugin_timeout=plugin_timeout,
         progress=progress,
         notify=notify,
+        verify=verify,
     )
+    if verify not in (False, True, "full"):
+        raise ModelError(f'verify={verify!r}: False, True and "full" are allowed')
     with profiling() if profile else nullcontext():
-        return _run(model, options)
+        results = _run(model, options)
+        if not verify:
+            return results
+        from mbsim.run.verify import verified
+
+        return verified(model, options, results, _run)
+
+
+def _settled(model: Model, options: Options) -> Settings:
+    """Return the settings of a run."""
+    asked = options.end_time, options.print_interval, options.integrator, options.tol
+    settings = settle(model, *asked)
+    if options.tighter == 1.0:
+        return settings
+    return tightened(settings, options.tighter, options.least_steps, options.h_most)
+
+
+def _tell_of_compiling(tell: Notify) -> None:
+    """Let the user hear when something is compiled, and how much is left."""
+    from mbsim.core import jit
+
+    jit.on_first_compile = lambda: tell(
+        "compiling what this model needs (a quarter of a minute to one); later runs load it"
+    )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
 
 
 def _run(model: Model, options: Options) -> Results:
@@ -177,15 +208,9 @@ def _run(model: Model, options: Options) -> Results:
     from mbsim.results.resume import completed
 
     began = time.perf_counter()
-    settings = settle(
-        model, options.end_time, options.print_interval, options.integrator, options.tol
-    )
+    settings = _settled(model, options)
     tell = options.notify or (lambda line: None)
-    jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (a quarter of a minute to one); later runs load it"
-    )
-    jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+    _tell_of_compiling(tell)
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in options.plugins]
     for file in files:
@@ -234,6 +259,7 @@ def _run(model: Model, options: Options) -> Results:
                     runner.start(options.allow_overlap)
                 if options.dump_fclib is not None:
                     runner.dump_every(options.dump_fclib, options.resume)
+                runner.most_evaluations = options.most_evaluations
                 runner.run(options.progress, options.resume)
                 recorder.end()
                 runner.storing = True
