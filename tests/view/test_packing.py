@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,7 +69,8 @@ def test_thinned_rows_are_within_the_tolerance(seed):
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.1, 1.0, 80))
     p = np.cumsum(random.normal(size=(80, 2, 3)), axis=0)
-    q = np.cumsum(0.05 * random.normal(size=(80, 2, 4)), axis=0) + [1.0, 0.0, 0.0, 0.0]
+    q = np.cumsum(0.05 * random.normal(size=(80, 2, 4)), axis=0)
+    q[..., 0] += 1.0
     poses = Poses(p, q / np.linalg.norm(q, axis=2, keepdims=True))
     reach = np.array([0.5, 2.0])
     rows = kept_rows(time, poses, reach, 2.0)
@@ -75,7 +78,7 @@ def test_thinned_rows_are_within_the_tolerance(seed):
     assert rows[-1] == 79
     assert (np.diff(rows) > 0).all()
     assert len(rows) < 80
-    for first, last in zip(rows[:-1], rows[1:], strict=True):
+    for first, last in pairwise(rows):
         assert error(time, poses, reach, first, last) <= 2.0
 
 

@@ -1,4 +1,4 @@
-"""The page of a view in a real browser: what it shows, and that keys and clicks do what they say."""
+"""The page of a view in a real browser: what it shows, and what keys and clicks do."""
 
 from __future__ import annotations
 
@@ -95,7 +95,8 @@ def test_what_is_drawn_is_where_it_is(page, file):
     page.run("mbsimView.setTime(0.4); mbsimView.draw()")
     found = page.run(
         "(() => { const v = mbsimView, out = []; for (const mesh of v.runs[0].shapes.meshes) "
-        "mesh.userData.members.forEach((m, i) => { if (m.shape >= 0) out.push([v.runs[0].about.shapes[m.shape].id, "
+        "mesh.userData.members.forEach((m, i) => { if (m.shape >= 0) "
+        "out.push([v.runs[0].about.shapes[m.shape].id, "
         "[...mesh.instanceMatrix.array.slice(16 * i, 16 * i + 16)]]); }); return out; })()"
     )
     centre = np.array(page.run("mbsimView.runs[0].about.centre"))
@@ -118,7 +119,8 @@ def test_frames_differ_and_playing_moves_on(page):
     press(page, " ")
     moved = page.run(
         "new Promise(done => { const from = mbsimView.time; (function look() { "
-        "if (mbsimView.time !== from) done(mbsimView.playing); else requestAnimationFrame(look); })(); })"
+        "if (mbsimView.time !== from) done(mbsimView.playing); "
+        "else requestAnimationFrame(look); })(); })"
     )
     assert moved is True
     press(page, " ")

@@ -169,7 +169,7 @@ def test_the_motion_of_a_gltf_is_that_of_the_file(scene):
     for channel in motion["channels"]:
         sampler = motion["samplers"][channel["sampler"]]
         name = document["nodes"][channel["target"]["node"]]["name"]
-        k = [n for n, id in enumerate(scene.body_ids) if name.startswith(f"body {id}")][0]
+        k = next(n for n, id in enumerate(scene.body_ids) if name.startswith(f"body {id}"))
         values = table(sampler["output"])
         np.testing.assert_allclose(table(sampler["input"])[:, 0], scene.time, rtol=1e-6)
         if channel["target"]["path"] == "translation":
