@@ -31,7 +31,7 @@ class Errors:
         stored = self._stored(name)
         if stored is None:
             raise UnknownSignal(f"{name} has no error bar: run it with --verify, or verify=True")
-        values, (_, location, part) = values_of(stored), self._results.place(name)
+        values, (_, location, part) = values_of(stored), self._results.located(name)
         if location is not None and location.column is not None:
             values = values[location.column] if values.ndim == 1 else values[:, location.column]
         if part is not None and values.ndim == 2:
@@ -45,5 +45,5 @@ class Errors:
 
     def _stored(self, name: str) -> Any:
         """Return the dataset of a signal's bar, None where there is none."""
-        file, location, _ = self._results.place(name)
+        file, location, _ = self._results.located(name)
         return None if location is None else file.get(f"errors/{location.stored}")

@@ -172,17 +172,17 @@ class _Meshes:
 def quaternions(R: Array) -> Array:
     """Return the unit quaternions (n, 4), w first and not negative, of rotation matrices (n, 3, 3).
 
-    The eigenvector of the largest eigenvalue of the symmetric 4 x 4 matrix K, for which
-    q'K q = tr(R' R(q)), is the rotation (I. Y. Bar-Itzhack, J. Guidance 23(6), 2000).
+    The eigenvector of the largest eigenvalue of the symmetric 4 x 4 matrix B, for which
+    q'B q = tr(R' R(q)), is the rotation (I. Y. Bar-Itzhack, J. Guidance 23(6), 2000).
     """
     trace = np.trace(R, axis1=1, axis2=2)
-    K = np.zeros((len(R), 4, 4))
-    K[:, 0, 0] = trace
+    B = np.zeros((len(R), 4, 4))
+    B[:, 0, 0] = trace
     skew = (R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1])
     for k, value in enumerate(skew):
-        K[:, 0, 1 + k] = K[:, 1 + k, 0] = value
-    K[:, 1:, 1:] = R + R.transpose(0, 2, 1) - trace[:, None, None] * np.eye(3)
-    _, vectors = np.linalg.eigh(K)
+        B[:, 0, 1 + k] = B[:, 1 + k, 0] = value
+    B[:, 1:, 1:] = R + R.transpose(0, 2, 1) - trace[:, None, None] * np.eye(3)
+    _, vectors = np.linalg.eigh(B)
     q: Array = vectors[:, :, -1]
     # that of no rotation is exact
     q[np.abs(R - np.eye(3)).max(axis=(1, 2), initial=0.0) == 0.0] = (1.0, 0.0, 0.0, 0.0)

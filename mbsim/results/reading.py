@@ -391,7 +391,7 @@ class Results(SignalMapping):
         return Location(f"{group}/{last}", ids.index(int(id)))
 
     @reads
-    def place(self, name: str) -> tuple[h5py.File, Location | None, str | None]:
+    def located(self, name: str) -> tuple[h5py.File, Location | None, str | None]:
         """Return the file, and where in it a name is stored and its part: None where nowhere."""
         return self._open(), *(self._find(name) or (None, None))
 

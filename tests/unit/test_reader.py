@@ -340,8 +340,10 @@ def test_graphics(tmp_path: Path) -> None:
     assert mesh.faces is not None
     assert (mesh.vertices.shape, mesh.faces.shape) == ((4, 3), (4, 3))
     text = "\n".join(model.notes)
-    for word in ("color", "ends_type", "xmin", "Parasolid"):
+    for word in ("ends_type", "xmin", "Parasolid"):
         assert word in text
+    assert model.graphics[1].color == (255, 0, 0)
+    assert model.graphics[2].color is None
 
 
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "off", "ply"])
@@ -396,8 +398,8 @@ def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
         ("</Command>", '<H3DOutput switch_on="TRUE"/><Stop/></Command>'),
     )
     notes = read(tmp_path, text).notes
-    assert len(notes) == 7
-    for words in ("ResOutput", "color", "hidden", "dae_index", "max_order", "H3D", "Stop"):
+    assert len(notes) == 5
+    for words in ("ResOutput", "dae_index", "max_order", "H3D", "Stop"):
         assert sum(words in note for note in notes) == 1
     assert any(":7 and 1 more: Post_Graphic color" in note for note in notes)
 

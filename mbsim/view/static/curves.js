@@ -44,7 +44,10 @@ mbsim.Curves = (function () {
     offer() {
       const words = this.parts.find.value.toLowerCase().split(/[\s/]+/).filter(Boolean);
       const all = this.runs[0].names();
-      const found = all.filter((name) => words.every((word) => name.toLowerCase().includes(word))).slice(0, 60);
+      // names that have the words as they are come first
+      const exact = (name) => words.filter((word) => name.toLowerCase().split("/").includes(word)).length;
+      const found = all.filter((name) => words.every((word) => name.toLowerCase().includes(word)))
+        .sort((a, b) => exact(b) - exact(a)).slice(0, 60);
       this.parts.hits.textContent = "";
       for (const name of found) {
         const button = document.createElement("button");
