@@ -138,6 +138,40 @@ def adams_statements(_: str, page: Page) -> list[str]:
     return lines
 
 
+@table("coverage")
+def coverage(name: str, page: Page) -> list[str]:
+    """Return what of a language is built, how, and what of it is not taken or does nothing."""
+    adm = name == "adams"
+    known = adams.STATEMENTS if adm else STATEMENTS
+    made = [(f"`{s.name}`", "yes", _how(s, page), _deviations(s)) for s in known]
+    made += [
+        (f"`{n}`", "no", "", "refused by name") for n in (adams.NOT_BUILT if adm else NOT_BUILT)
+    ]
+    if not adm:
+        made += [(f"`{n}`", "no", why, "refused by name") for n, why in REFUSED.items()]
+    return rows(("statement", "built", "how", "deviations"), made)
+
+
+def _how(statement: Statement, page: Page) -> str:
+    """Return what a statement is read as."""
+    xml = getattr(statement, "xml", "")
+    if xml:
+        return reference(page, xml, f"`{xml}`")
+    if not statement.attributes or statement.note:
+        return statement.note or statement.about
+    return reference(page, statement.name, statement.about or statement.name)
+
+
+def _deviations(statement: Statement) -> str:
+    """Return what a statement accepts without effect and what it refuses."""
+    said = []
+    for field, what in (("note", "no effect"), ("refused", "refused")):
+        names = [n for n, spec in statement.attributes.items() if getattr(spec, field)]
+        if names:
+            said.append(f"{what}: {_codes(names)}")
+    return "; ".join(said)
+
+
 @table("requests")
 def requests(_: str, page: Page) -> list[str]:
     """Return the types of Post_Request and what F1 to F8 of each are."""
