@@ -152,7 +152,7 @@ def _entries(names: Sequence[str], about: str, time: str) -> list[Parameter]:
 
 
 force(
-    "FIELD",
+    "LINEAR_FIELD",
     "Force_Field",
     "fields",
     *_six(_LENGTH, "displacement without load", "L", "rad"),

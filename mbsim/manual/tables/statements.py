@@ -143,22 +143,22 @@ def coverage(name: str, page: Page) -> list[str]:
     """Return what of a language is built, how, and what of it is not taken or does nothing."""
     adm = name == "adams"
     known = adams.STATEMENTS if adm else STATEMENTS
-    made = [(f"`{s.name}`", "yes", _how(s, page), _deviations(s)) for s in known]
-    made += [
-        (f"`{n}`", "no", "", "refused by name") for n in (adams.NOT_BUILT if adm else NOT_BUILT)
-    ]
-    if not adm:
-        made += [(f"`{n}`", "no", why, "refused by name") for n, why in REFUSED.items()]
-    return rows(("statement", "built", "how", "deviations"), made)
+    lines: list[str] = []
+    for statement in known:
+        lines += item(f"`{statement.name}`: {_how(statement, page)}{_deviations(statement)}.")
+    lines += item(f"Not built, refused by name: {_codes(adams.NOT_BUILT if adm else NOT_BUILT)}.")
+    for refused, why in () if adm else REFUSED.items():
+        lines += item(f"`{refused}` is refused: {why}.")
+    return lines
 
 
 def _how(statement: Statement, page: Page) -> str:
     """Return what a statement is read as."""
     xml = getattr(statement, "xml", "")
     if xml:
-        return reference(page, xml, f"`{xml}`")
+        return f"read as {reference(page, xml, f'`{xml}`')}"
     if not statement.attributes or statement.note:
-        return statement.note or statement.about
+        return statement.note or statement.about or "read"
     return reference(page, statement.name, statement.about or statement.name)
 
 
@@ -168,8 +168,8 @@ def _deviations(statement: Statement) -> str:
     for field, what in (("note", "no effect"), ("refused", "refused")):
         names = [n for n, spec in statement.attributes.items() if getattr(spec, field)]
         if names:
-            said.append(f"{what}: {_codes(names)}")
-    return "; ".join(said)
+            said.append(f"; {what}: {_codes(names)}")
+    return "".join(said)
 
 
 @table("requests")
