@@ -268,7 +268,7 @@ FAULTS = {
         ("REULER", "no statement but an argument", "comma missing that continues the line before?"),
     ),
     "not built": ("TIRE/1, I=101", ("TIRE[1]", "not built yet")),
-    "contact": ("CONTACT/1, IGEOM=1, IMPACT, STIFF=1, EXP=1", ("CONTACT[1]", "JGEOM: missing")),
+    "contact": ("CONTACT/1, JGEOM=1, IMPACT, STIFF=1, EXP=1", ("CONTACT[1]", "IGEOM: missing")),
     "second units": ("UNITS/LENGTH=METER", ("UNITS", "a second UNITS")),
     "second gravity": ("ACCGRAV/IGRAV=1", ("ACCGRAV", "the first is on line 11")),
     "bad unit": ("PART/3, MASS=x, CM=201, IP=1,1,1", ('PART[3]: MASS="x": must be a number > 0',)),
