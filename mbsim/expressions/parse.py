@@ -239,7 +239,8 @@ def _like(name: str) -> str:
         return "; the time is TIME"
     if len(name) > 2 * max(map(len, FUNCTIONS)):
         return ""
-    near = difflib.get_close_matches(name, [*FUNCTIONS, *CONSTANTS, "TIME"], 1)
+    names = [function.name for function in FUNCTIONS.values()]
+    near = difflib.get_close_matches(name, [*names, *CONSTANTS, "TIME"], 1)
     return f"; did you mean {near[0]}?" if near else ""
 
 

@@ -40,5 +40,5 @@ PARAM_SIMULATION = Statement(
         "interpreter": Spec(TEXT, refused=_NOT_BUILT),
     },
     in_command=True,
-    about="switches of the solver, none of which changes what is solved",
+    about="switches of the solver: how, not what, is solved",
 )

@@ -19,7 +19,7 @@ _ASIDES = ("time", "state/", "errors/", "checkpoint/")
 
 def over_time(results: Results) -> dict[str, Any]:
     """Return the datasets of signals over time, whole, by their names in the file; `time` too."""
-    file, *_ = results.place("time")
+    file, *_ = results.located("time")
     names: list[str] = []
     file.visit(names.append)
     found = {"time": np.asarray(values_of(file["time"]))}
@@ -37,7 +37,7 @@ def kept(results: Results, bars: Bars) -> Results:
     """Write error bars into the file of results; return it as it is then."""
     until = {"reproducible_until": bars.reproducible_until}
     if results.path is None:
-        file, *_ = results.place("time")
+        file, *_ = results.located("time")
         for name, table in bars.tables.items():
             file.create_dataset(name, data=table).attrs.update(until)
         return results

@@ -38,7 +38,7 @@ from mbsim.results.identity import Identity
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
 from mbsim.results.signal_filter import SignalFilter
-from mbsim.results.signals import before_rows, length_of, names_of, request_columns, signals
+from mbsim.results.signals import Before, before_rows, length_of, names_of, request_columns, signals
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch
 
@@ -143,9 +143,9 @@ class Recorder:
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        new = {"attributes": {}} if resume else before_rows(self.system, self._asked)
-        new["attributes"]["/"] = {**self._settings, "status": "running"}
-        self._store.update(**new, remove=["stats", "audit"])
+        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked)
+        new.attributes["/"] = {**self._settings, "status": "running"}
+        self._store.update(**new._asdict(), remove=["stats", "audit"])
 
     def _resumed(self) -> dict[str, Table]:
         """Return the checkpoint to go on from, after comparing what it was made with."""

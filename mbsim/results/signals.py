@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -89,14 +89,22 @@ def without_rows(system: System) -> dict[str, dict[str, str]]:
     }
 
 
-def before_rows(system: System, asked: SignalFilter) -> dict[str, dict[str, Any]]:
-    """Return what `Store.update` is given for a new file, by the names of its arguments."""
+class Before(NamedTuple):
+    """What a file says before its first row: arguments of `Store.update`."""
+
+    values: dict[str, Table]
+    constants: dict[str, Table]
+    attributes: dict[str, dict[str, Any]]
+
+
+def before_rows(system: System, asked: SignalFilter) -> Before:
+    """Return what a new file says of its elements, their shapes and markers."""
     about = about_graphics(system.model, system.placement)
-    return {
-        "values": facts_of(system, asked),
-        "constants": graphics_of(system.model, system.placement),
-        "attributes": {**without_rows(system), "graphics": about},
-    }
+    return Before(
+        facts_of(system, asked),
+        graphics_of(system.model, system.placement),
+        {**without_rows(system), "graphics": dict(about)},
+    )
 
 
 def length_of(written: Sequence[int], name: str) -> int:

@@ -267,8 +267,8 @@ FAULTS = {
         "MARKER/301, PART=2\nREULER = 180D, 90D, 180D",
         ("REULER", "no statement but an argument", "comma missing that continues the line before?"),
     ),
-    "not built": ("FIELD/1, I=101", ("FIELD[1]", "not built yet")),
-    "contact": ("CONTACT/1, IGEOM=1", ("CONTACT[1]", "not built yet")),
+    "not built": ("TIRE/1, I=101", ("TIRE[1]", "not built yet")),
+    "contact": ("CONTACT/1, JGEOM=1, IMPACT, STIFF=1, EXP=1", ("CONTACT[1]", "IGEOM: missing")),
     "second units": ("UNITS/LENGTH=METER", ("UNITS", "a second UNITS")),
     "second gravity": ("ACCGRAV/IGRAV=1", ("ACCGRAV", "the first is on line 11")),
     "bad unit": ("PART/3, MASS=x, CM=201, IP=1,1,1", ('PART[3]: MASS="x": must be a number > 0',)),
@@ -426,11 +426,11 @@ def test_any_text_is_read_or_refused(tmp_path: Path, pieces: list[str]) -> None:
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:
-    text = added("FIELD/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
+    text = added("TIRE/1", "JOINT/2, REV, I=102, J=9", "PART/3, MASS=-1, CM=201, IP=1,1,1")
     with pytest.raises(DeckError) as caught:
         read(tmp_path, text)
     assert [fault.line for fault in caught.value.faults[:2]] == [13, 14]
-    assert {fault.element for fault in caught.value.faults} == {"FIELD[1]", "JOINT[2]", "PART[3]"}
+    assert {fault.element for fault in caught.value.faults} == {"TIRE[1]", "JOINT[2]", "PART[3]"}
 
 
 def test_warnings(tmp_path: Path) -> None:

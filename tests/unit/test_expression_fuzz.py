@@ -14,7 +14,7 @@ from mbsim.expressions.parse import ExpressionError, parse
 from mbsim.expressions.tree import Expression, references
 
 PIECES = [
-    *FUNCTIONS,
+    *(function.name for function in FUNCTIONS.values()),
     *CONSTANTS,
     *("TIME", "time", "T", "x1", "Step"),
     *("0", "1", "21", "2.5", ".5", "1e-3", "180D", "1D3", "1e999", "5.", "1.2.3", "3TIME"),

@@ -390,7 +390,7 @@ def test_commands_in_sequence(tmp_path: Path) -> None:
 
 def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
     text = deck(
-        ("</Model>", '<ResOutput mrf_file="TRUE" anything="goes"/></Model>'),
+        ("</Model>", '<ResOutput mrf_file="TRUE" dzero="1e-9"/></Model>'),
         ('type="Sphere"', 'type="Sphere" color="1:2:3" hidden="FALSE"'),
         ('type="Plane"', 'type="Plane" color="1:2:3"'),
         ("<Param_Transient", '<Param_Transient dae_index="3" max_order="5"'),

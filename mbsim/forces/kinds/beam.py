@@ -29,6 +29,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, norm, scale, sub
 from mbsim.forces.catalog import Adams, Bounds, Finding, Parameter, Values, Wrench, force
 from mbsim.forces.formula import Motion
+from mbsim.forces.matrix import times
 from mbsim.forces.turning import turned_back
 
 _AXES = ("x", "y", "z", "tx", "ty", "tz")
@@ -84,32 +85,17 @@ def _constants(values: Values) -> Sequence[float]:
 
 
 @jitable
-def _times(par: Sequence[float], first: int, a: V3, b: V3) -> tuple[V3, V3]:
-    """Return the two halves of the 6 x 6 matrix from `first` on times (a, b)."""
-    out = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(3):
-        at = first + k
-        by_a = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
-        at += 3
-        by_b = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
-        upper = add(scale(a[k], by_a[0]), scale(b[k], by_b[0]))
-        lower = add(scale(a[k], by_a[1]), scale(b[k], by_b[1]))
-        out = add(out[0], upper), add(out[1], lower)
-    return out
-
-
-@jitable
 def _elastic(d: V3, theta: V3, par: Sequence[float]) -> tuple[V3, V3]:
     """Return what the beam's own force and torque on I are less than the preload."""
-    bent = _times(par, _K, (d[0] - par[0], d[1], d[2]), theta)
+    bent = times(par, _K, (d[0] - par[0], d[1], d[2]), theta)
     return bent[0], turned_back(theta, bent[1])
 
 
 def _wrench(motion: Motion, par: Sequence[float]) -> tuple[V3, V3, float, float]:
     d, theta, v, w = motion.d, motion.theta, motion.v, motion.w
     q = (d[0] - par[0], d[1], d[2])
-    bent = _times(par, _K, q, theta)
-    slowed = _times(par, _C, v, w)
+    bent = times(par, _K, q, theta)
+    slowed = times(par, _C, v, w)
     f0, t0 = (par[_F0], par[_F0 + 1], par[_F0 + 2]), (par[_F0 + 3], par[_F0 + 4], par[_F0 + 5])
     force = sub(sub(f0, bent[0]), slowed[0])
     torque = sub(sub(t0, turned_back(theta, bent[1])), slowed[1])
@@ -127,7 +113,7 @@ def _slopes(motion: Motion, par: Sequence[float], K: F2, D: F2) -> None:
             D[r, k] = par[_C + 6 * r + k]
     for k in range(3):
         e = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-        force, torque = _times(par, _K, e, (0.0, 0.0, 0.0))
+        force, torque = times(par, _K, e, (0.0, 0.0, 0.0))
         torque = turned_back(theta, torque)
         # d theta = J(theta)^-1 e as I turns, which is J^-T of -theta
         turn = scale(_PUSH, turned_back(scale(-1.0, theta), e))

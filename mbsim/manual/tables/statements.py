@@ -138,6 +138,40 @@ def adams_statements(_: str, page: Page) -> list[str]:
     return lines
 
 
+@table("coverage")
+def coverage(name: str, page: Page) -> list[str]:
+    """Return what of a language is built, how, and what of it is not taken or does nothing."""
+    adm = name == "adams"
+    known = adams.STATEMENTS if adm else STATEMENTS
+    lines: list[str] = []
+    for statement in known:
+        lines += item(f"`{statement.name}`: {_how(statement, page)}{_deviations(statement)}.")
+    lines += item(f"Not built, refused by name: {_codes(adams.NOT_BUILT if adm else NOT_BUILT)}.")
+    for refused, why in () if adm else REFUSED.items():
+        lines += item(f"`{refused}` is refused: {why}.")
+    return lines
+
+
+def _how(statement: Statement, page: Page) -> str:
+    """Return what a statement is read as."""
+    xml = getattr(statement, "xml", "")
+    if xml:
+        return f"read as {reference(page, xml, f'`{xml}`')}"
+    if not statement.attributes or statement.note:
+        return statement.note or statement.about or "read"
+    return reference(page, statement.name, statement.about or statement.name)
+
+
+def _deviations(statement: Statement) -> str:
+    """Return what a statement accepts without effect and what it refuses."""
+    said = []
+    for field, what in (("note", "no effect"), ("refused", "refused")):
+        names = [n for n, spec in statement.attributes.items() if getattr(spec, field)]
+        if names:
+            said.append(f"; {what}: {_codes(names)}")
+    return "".join(said)
+
+
 @table("requests")
 def requests(_: str, page: Page) -> list[str]:
     """Return the types of Post_Request and what F1 to F8 of each are."""

@@ -123,8 +123,8 @@ def build_marker(entry: Entry) -> None:
     frame = frame_of(entry, "QP", "ZP", "XP", not entry.get("USEXP", False))
     owners = entry.those(("PART", "POINT_MASS"))
     if len(owners) != 1:
-        what = "give one, not both" if owners else f"missing; must be {ID.allowed}"
-        entry.fault(f"PART or POINT_MASS: {what}")
+        missing = f"PART: missing; must be {ID.allowed}, or POINT_MASS"
+        entry.fault("give PART or POINT_MASS, not both" if owners else missing)
         return
     owner = entry.get(owners[0], 0)
     points = draft_of(entry).points

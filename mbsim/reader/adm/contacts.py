@@ -120,6 +120,7 @@ def build_contact(entry: Entry) -> None:
     model = entry.get("MODEL")
     if model is None:
         require(entry, "MODEL")
+    if model is None or entry.get("IGEOM") is None or entry.get("JGEOM") is None:
         return
     for name in _NORMAL[model]:
         if name != "DAMPING" and name != "DMAX":

@@ -36,10 +36,10 @@ _TYPES = Kind("T or R for each joint, separated by colons", _parse_types)
 
 def _moves(entry: Entry, ids: tuple[int, ...]) -> tuple[str, ...] | None:
     """Return R or T of each joint that moves in one way, None with a fault where one does not."""
-    found = []
+    found: list[str] = []
     for id in ids:
         joint = entry.draft.joints.get(id)
-        moves = JOINTS[joint.type].moves if joint else "R"
+        moves = "".join(JOINTS[joint.type].moves) if joint else "R"
         if len(moves) != 1:
             entry.fault(f"TYPE: missing; joint {id} moves in {' and '.join(moves) or 'no way'}")
             return None

@@ -30,6 +30,7 @@ _ATTRIBUTES = {
         "joint_id": "JOINT",
     },
     **{"i_graphics_id": "IGEOM", "j_graphics_id": "JGEOM"},
+    **{"center_marker_id": "CM", "corner_marker_id": "CORNER", "rm_id": "RM"},
     **{"expr": "FUNCTION", "motion_type": "direction"},
     **{f"{name}_expression": name.upper() for name in ("fx", "fy", "fz", "tx", "ty", "tz")},
     **{f"expr{k}": f"F{k}" for k in range(1, 9)},
