@@ -49,6 +49,7 @@ DECK = """<MotionSolve><Model>
 <Force_Bushing id="1" i_marker_id="20" j_marker_id="10"/>
 <Force_Beam id="1" i_marker_id="20" j_marker_id="10" length="1" E="1" G="1" area="1" ixx="1"
  iyy="1" izz="1"/>
+<Force_Field id="1" i_marker_id="20" j_marker_id="10"/>
 <Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_ON" pin_radius="1"/>
 <Force_JointLimit id="1" joint_id="1" motion_type="R" lower="0" cnf_type="IMPACT"/>
 <Force_JointLimit id="2" joint_id="2" motion_type="T" lower="0" cnf_type="POISSON"/>
