@@ -23,6 +23,8 @@ DECK = """<MotionSolve><Model>
 <Body_Rigid id="1" isground="TRUE"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Body_Point id="4" cg_id="40" mass="1"/>
+<Reference_Marker id="40" body_id="4"/>
 <Reference_Marker id="10" body_id="1"/>
 <Reference_Marker id="20" body_id="2"/>
 <Reference_Marker id="30" body_id="3" pos_y="1"/>
