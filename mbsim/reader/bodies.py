@@ -242,7 +242,7 @@ REFERENCE_MARKER = Statement(
         "label": NAMED["label"],
         "body_id": Spec(ID, "body that carries the marker", required=True),
         "body_type": Spec(
-            keyword(spellings(RIGIDBODY=""), spellings(FLEXBODY="", POINTBODY="")),
+            keyword(spellings(RIGIDBODY="", POINTBODY=""), spellings(FLEXBODY="")),
             "sort of that body",
             "",
             "RIGIDBODY",

@@ -44,6 +44,7 @@ class Draft:
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
     requests: dict[int, el.Request] = field(default_factory=dict)
     display_graphics: dict[int, str] = field(default_factory=dict)
+    points: dict[int, tuple[str, el.Source]] = field(default_factory=dict)  # bodies: point masses
     gravity: el.Gravity | None = None
     transient: el.Transient | None = None
     static: el.Static = field(default_factory=el.Static)

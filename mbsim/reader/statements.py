@@ -22,6 +22,7 @@ from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.output_statements import OUTPUT_STATEMENTS
 from mbsim.reader.param_simulation import PARAM_SIMULATION
 from mbsim.reader.parse import Node
+from mbsim.reader.points import BODY_POINT
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
 from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
@@ -30,6 +31,7 @@ from mbsim.reader.variable import REFERENCE_VARIABLE
 STATEMENTS = (
     PARAM_UNIT,
     BODY_RIGID,
+    BODY_POINT,
     REFERENCE_MARKER,
     POST_GRAPHIC,
     FORCE_CONTACT,

@@ -19,6 +19,7 @@ from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
 from mbsim.reader.overrides import apply_overrides
 from mbsim.reader.parse import MAX_BYTES, Node, parse
+from mbsim.reader.points import hold_points
 from mbsim.reader.statements import read_section
 
 _COMPATIBILITY = "MOTIONSOLVE"
@@ -138,6 +139,7 @@ def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
     for section in sorted(sections, key=lambda section: section.key != "model"):
         _check_section(section, draft)
         read_section(section, draft)
+    hold_points(draft)
     if not any(section.key == "model" for section in sections) and not draft.faults:
         draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
 

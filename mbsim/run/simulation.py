@@ -197,6 +197,15 @@ def _tell_of_compiling(tell: Notify) -> None:
     jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
 
 
+def _files_of(options: Options) -> list[Path]:
+    """Return the files with user subroutines, which must be there."""
+    files = [Path(file) for file in options.plugins]
+    for file in files:
+        if not file.is_file():
+            raise ModelError(f"--plugin {file}: no such file")
+    return files
+
+
 def _run(model: Model, options: Options) -> Results:
     """Run a model; see `simulate`."""
     from mbsim.compile_model.build import build
@@ -212,10 +221,7 @@ def _run(model: Model, options: Options) -> Results:
     tell = options.notify or (lambda line: None)
     _tell_of_compiling(tell)
     compiled_before = jit.compile_seconds
-    files = [Path(file) for file in options.plugins]
-    for file in files:
-        if not file.is_file():
-            raise ModelError(f"--plugin {file}: no such file")
+    files = _files_of(options)
     folder = None if options.output is None else Path(options.output)
     if (
         options.resume

@@ -23,6 +23,8 @@ DECK = """<MotionSolve><Model>
 <Body_Rigid id="1" isground="TRUE"/>
 <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Body_Point id="4" cg_id="40" mass="1"/>
+<Reference_Marker id="40" body_id="4"/>
 <Reference_Marker id="10" body_id="1"/>
 <Reference_Marker id="20" body_id="2"/>
 <Reference_Marker id="30" body_id="3" pos_y="1"/>
@@ -49,6 +51,7 @@ DECK = """<MotionSolve><Model>
 <Force_Bushing id="1" i_marker_id="20" j_marker_id="10"/>
 <Force_Beam id="1" i_marker_id="20" j_marker_id="10" length="1" E="1" G="1" area="1" ixx="1"
  iyy="1" izz="1"/>
+<Force_Field id="1" i_marker_id="20" j_marker_id="10"/>
 <Force_JointFriction id="1" joint_id="1" cff_type="COULOMB_ON" pin_radius="1"/>
 <Force_JointLimit id="1" joint_id="1" motion_type="R" lower="0" cnf_type="IMPACT"/>
 <Force_JointLimit id="2" joint_id="2" motion_type="T" lower="0" cnf_type="POISSON"/>

@@ -282,8 +282,12 @@ BAD = {
         ('preload="-2"', "number >= 0"),
     ),
     "collar": (
-        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" friction_arm="2"/>',
-        ('friction_arm="2"', "documented but not built yet"),
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" reaction_arm="2"/>',
+        ('reaction_arm="2"', "is REVOLUTE; belongs to TRANSLATIONAL"),
+    ),
+    "overlap": (
+        f'{REVOLUTE}{PIN_FRICTION} pin_radius="1" initial_overlap="2"/>',
+        ('initial_overlap="2"', "documented but not built yet"),
     ),
     "friction twice": (
         f'{REVOLUTE}{PIN_FRICTION} pin_radius="1"/>{PIN_FRICTION} pin_radius="1"/>'.replace(

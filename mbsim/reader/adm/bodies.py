@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from mbsim.model import elements as el
 from mbsim.model.frames import GLOBAL
 from mbsim.reader import units
-from mbsim.reader.adm.draft import AdmDraft, draft_of, frame_of, require
+from mbsim.reader.adm.draft import draft_of, frame_of, require
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.kinds import ID
+from mbsim.reader.points import INERTIA
 from mbsim.reader.statement import Entry
 
 SYSTEMS = {
@@ -76,40 +75,15 @@ def build_point_mass(entry: Entry) -> None:
     body = el.Body(
         id=id,
         mass=entry.get("MASS"),
-        inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+        inertia=INERTIA,
         cg_id=entry.get("CM"),
         v_ic=(entry.get("VX", 0.0), entry.get("VY", 0.0), entry.get("VZ", 0.0)),
         v_given=_given(entry, "V"),
         source=entry.source,
     )
     draft_of(entry).parts[id] = frame
-    draft_of(entry).points[id] = entry.source
+    draft.points[id] = ("POINT_MASS", entry.source)
     entry.register(draft.bodies, body)
-
-
-def hold_points(draft: AdmDraft) -> None:
-    """Keep point masses from turning: each is a body with ORIENTATION to ground."""
-    ground = next((body.id for body in draft.bodies.values() if body.is_ground), None)
-    for id, source in draft.points.items():
-        marker = draft.markers.get(draft.bodies[id].cg_id or 0)
-        if marker is None:
-            continue
-        if ground is None:
-            message = "a point mass needs a ground part, PART/id, GROUND, in the deck"
-            draft.fault(source.line, f"POINT_MASS[{id}]", message)
-            return
-        there = max(draft.markers) + 1
-        draft.markers[there] = replace(marker, id=there, body_id=ground)
-        held = max(draft.primitives, default=0) + 1
-        draft.primitives[held] = el.Joint(
-            id=held,
-            type="ORIENTATION",
-            label=f"POINT_MASS/{id}",
-            i_marker_id=marker.id,
-            j_marker_id=there,
-            is_primitive=True,
-            source=source,
-        )
 
 
 def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
@@ -127,7 +101,7 @@ def build_marker(entry: Entry) -> None:
         entry.fault("give PART or POINT_MASS, not both" if owners else missing)
         return
     owner = entry.get(owners[0], 0)
-    points = draft_of(entry).points
+    points = entry.draft.points
     if owners[0] == "POINT_MASS" and owner not in points:
         known = ", ".join(map(str, points)) or "none"
         entry.fault(f"there is no such point mass; the deck has {known}", "POINT_MASS")

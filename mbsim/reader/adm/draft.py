@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbsim.model.elements import Source
 from mbsim.model.frames import Frame, rotation_313
 from mbsim.reader.draft import Draft
 from mbsim.reader.statement import Entry
@@ -16,12 +15,10 @@ from mbsim.reader.statement import Entry
 class AdmDraft(Draft):
     """A draft that also knows where the parts' frames are.
 
-    `points` holds the point masses. `puzzling` holds statements with words that nobody knows: what
-    they lack may be just that.
+    `puzzling` holds statements with words that nobody knows: what they lack may be just that.
     """
 
     parts: dict[int, Frame] = field(default_factory=dict)
-    points: dict[int, Source] = field(default_factory=dict)
     puzzling: set[str] = field(default_factory=set)
 
 

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from mbsim.errors import DeckError, Fault, ModelError
-from mbsim.reader.adm.bodies import hold_points
 from mbsim.reader.adm.draft import AdmDraft
 from mbsim.reader.adm.lexer import split_statements, to_node
 from mbsim.reader.adm.statements import BY_KEY, NOT_BUILT, STATEMENTS
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.overrides import apply_overrides
 from mbsim.reader.parse import MAX_BYTES, Node
+from mbsim.reader.points import hold_points
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
 _NAMES["Motion_Marker"] = "MOTION"
