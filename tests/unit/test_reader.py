@@ -391,17 +391,17 @@ def test_commands_in_sequence(tmp_path: Path) -> None:
 def test_notes_name_what_has_no_effect_once(tmp_path: Path) -> None:
     text = deck(
         ("</Model>", '<ResOutput mrf_file="TRUE" dzero="1e-9"/></Model>'),
-        ('type="Sphere"', 'type="Sphere" color="1:2:3" hidden="FALSE"'),
-        ('type="Plane"', 'type="Plane" color="1:2:3"'),
+        ('type="Sphere"', 'type="Sphere" color="1:2:3" hidden="FALSE" refinement_level="2"'),
+        ('type="Plane"', 'type="Plane" refinement_level="2"'),
         ("<Param_Transient", '<Param_Transient dae_index="3" max_order="5"'),
         ('id="301"', 'id="301" enable_node_mode="FALSE"'),
         ("</Command>", '<H3DOutput switch_on="TRUE"/><Stop/></Command>'),
     )
     notes = read(tmp_path, text).notes
-    assert len(notes) == 5
-    for words in ("ResOutput", "dae_index", "max_order", "H3D", "Stop"):
+    assert len(notes) == 6
+    for words in ("ResOutput", "refinement_level", "dae_index", "max_order", "H3D", "Stop"):
         assert sum(words in note for note in notes) == 1
-    assert any(":7 and 1 more: Post_Graphic color" in note for note in notes)
+    assert any(":7 and 1 more: Post_Graphic refinement_level" in note for note in notes)
 
 
 @pytest.mark.parametrize(

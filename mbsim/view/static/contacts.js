@@ -1,8 +1,8 @@
 "use strict";
 // Points of contact as dots, and forces there as arrows, coloured by slip or pressure.
 mbsim.Contacts = (function () {
-  // Colours from little to much: dark blue, teal, yellow, orange, red.
-  const SCALE = [0x2f4b9b, 0x2f9bb3, 0x7cc36a, 0xf2c14e, 0xec7a33, 0xc9302c].map((hex) => new THREE.Color(hex));
+  // Colours from little to much: blue, teal, yellow, orange, red.
+  const SCALE = [0x4a78dc, 0x2fa3bd, 0x7cc36a, 0xf2c14e, 0xec7a33, 0xc9302c].map((hex) => new THREE.Color(hex));
 
   function colorAt(share, into) {
     const at = Math.min(1, Math.max(0, share)) * (SCALE.length - 1);
@@ -77,8 +77,8 @@ mbsim.Contacts = (function () {
         way.set(run.arrowForce[3 * at], run.arrowForce[3 * at + 1], run.arrowForce[3 * at + 2]);
         const force = this.sizes[at];
         // as long as half the view at most: an impact is a thousand weights
-        const length = view * Math.min(1.1, 0.42 * this.scale * force / this.typical) || 0;
-        const wide = Math.min(view * 0.012, 0.10 * length) * (many ? 0.6 : 1);
+        const length = view * Math.min(0.9, 0.3 * this.scale * force / this.typical) || 0;
+        const wide = Math.min(view * 0.0085, 0.10 * length) * (many ? 0.6 : 1);
         q.setFromUnitVectors(y, way.multiplyScalar(force > 0 ? 1 / force : 0));
         p.set(run.arrows.steps[3 * at] * step, run.arrows.steps[3 * at + 1] * step, run.arrows.steps[3 * at + 2] * step);
         const head = Math.min(4.2 * wide, 0.5 * length);

@@ -2,8 +2,8 @@
 // What a scene is seen by: renderer, light, ground, camera.
 mbsim.Stage = (function () {
   const THEMES = {
-    light: { top: 0xf4f6f9, bottom: 0xdfe5ec, paper: 0xf0f2f5, ink: 0x8d99a6, ambient: 0.55, key: 2.1 },
-    dark: { top: 0x1b2128, bottom: 0x0e1216, paper: 0x232a32, ink: 0x5d6a78, ambient: 0.32, key: 1.7 },
+    light: { top: 0xf4f6f9, bottom: 0xdfe5ec, paper: 0xf0f2f5, ink: 0x7d8996, ambient: 0.55, key: 2.1 },
+    dark: { top: 0x1b2128, bottom: 0x0e1216, paper: 0x3a444f, ink: 0x7d8b99, ambient: 0.5, key: 1.7 },
   };
 
   // A round number of 1, 2 or 5 times a power of ten below a value.

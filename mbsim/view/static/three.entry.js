@@ -1,10 +1,10 @@
+// What `three.min.js` is made of: see the manual's page on pages of results (develop/view).
 export {
-  ACESFilmicToneMapping, AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, ConeGeometry,
-  CylinderGeometry, DirectionalLight, DoubleSide, DynamicDrawUsage, EdgesGeometry, Float32BufferAttribute, Group,
-  HemisphereLight, InstancedBufferAttribute, InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,
-  MeshStandardMaterial, NeutralToneMapping, Object3D, PCFShadowMap, PCFSoftShadowMap, PerspectiveCamera, PlaneGeometry,
-  PMREMGenerator, Points, PointsMaterial, Quaternion, Raycaster, Scene, ShaderMaterial, ShadowMaterial, Sphere, SphereGeometry,
-  SRGBColorSpace, TorusGeometry, Vector2, Vector3, VSMShadowMap, WebGLRenderer, REVISION,
+  BoxGeometry, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight,
+  DoubleSide, DynamicDrawUsage, Float32BufferAttribute, Group, InstancedMesh, Line, LineBasicMaterial,
+  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, NeutralToneMapping, PCFShadowMap,
+  PMREMGenerator, PerspectiveCamera, Quaternion, REVISION, Raycaster, Scene, SphereGeometry, Vector2, Vector3,
+  WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 export { RoomEnvironment } from "three/examples/jsm/environments/RoomEnvironment.js";
