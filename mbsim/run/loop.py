@@ -76,10 +76,14 @@ class Runner:
         self._advance, self.methods = jit.planned(
             lambda: (
                 jit.awaited(driver.advance),
-                Methods(system, settings.integrator, start, timed),
+                Methods(
+                    system, settings.integrator, start, timed, settings.fixed, settings.tol
+                ),
             )
         )
         self._warn_of_states()
+        for line in self.methods.rigid.said if self.methods.rigid else ():
+            self.log.line(line)
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem, self.detector)
@@ -101,7 +105,7 @@ class Runner:
         """Say of subroutines with states that VERLET holds their friction back."""
         contacts = self.system.scene.contacts
         for id, numbers in zip(self.system.contact_ids, contacts.memory, strict=True):
-            if numbers > 0 and self.methods.explicit.order == 0.0:
+            if numbers > 0 and self.settings.integrator == "VERLET":
                 self._say(
                     f"Force_Contact[{id}]: VERLET holds friction back to a quarter of what would "
                     "stop the slip in a step: what its subroutine holds by states creeps"

@@ -11,7 +11,14 @@ import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual, Switched
-from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
+from mbsim.integrators.catalog import (
+    AUTO,
+    EXPLICIT,
+    IMPLICIT,
+    IMPLICIT_METHODS,
+    METHODS,
+    RIGID,
+)
 from mbsim.model.elements import ASIDE, Model, Simulation
 from mbsim.model.forces import rigid_forces
 from mbsim.model.names import element_name, is_adams
@@ -61,6 +68,11 @@ class Settings:
     def end_time(self) -> float:
         """End of the last simulation [T]."""
         return self.stages[-1].simulation.end_time
+
+    @property
+    def fixed(self) -> bool:
+        """Whether steps are as long as the deck says: of MOREAU, where h_min is h_max."""
+        return self.integrator == RIGID and any(s.h_min == s.h_max for s in self.stages)
 
     @property
     def tol(self) -> float:

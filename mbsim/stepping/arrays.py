@@ -1,0 +1,171 @@
+"""Arrays of nonsmooth time stepping, made only where a run steps so.
+
+Counts: nb bodies (row nb is ground), nc contacts, m contact points that a step may have. Velocities
+and wrenches are spatial vectors (linear, angular about the cg), global axes. r is an impulse along
+(n, x, y) of a contact point, on I; u = H v the velocity of I relative to J there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbsim.core import tags
+from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
+
+#: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
+SPEEDS = 64
+# entries of `Rules.number`, of each contact: slip speed of the table's first entry, coefficient
+# where it sticks, restitution, closing speed below which there is none, lever arm of rolling
+FIRST_SPEED, STICKING, RESTITUTION, SLOWEST, ROLLING = range(5)
+RULE_NUMBERS = 5
+# entries of `Kept.table`: a contact point of the last step that was taken; force is on I's body
+(
+    KEPT_CONTACT,
+    KEPT_SLOT,
+    KEPT_KIND,
+    KEPT_GRAPHIC_I,  # in the pair's order, as of `Pairs`
+    KEPT_GRAPHIC_J,
+    KEPT_BODY_I,  # in the contact's order, as all that follows
+    KEPT_BODY_J,
+    KEPT_GAP,  # at the step's begin
+    KEPT_CLOSING,  # speed before it
+    KEPT_SLIP,  # behind it
+    KEPT_STICKS,  # 1 where nothing slipped
+    KEPT_WEIGHT,
+    KEPT_STAYS,  # 1 where it presses in the step that is being taken too
+) = range(13)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE, KEPT_TORQUE = 13, 16, 19, 22, 25
+KEPT_COLUMNS = 28
+# entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
+# and changes of position do not count, over tol L; the deck's gravity; what the solver may leave
+# of a velocity, over tol L / h
+FIXED, SLOP, PULL, LEFT = range(4)
+PLAN_NUMBERS = 4
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; the same
+# over what it may; sweeps; sweeps of positions; deepest gap; its length; friction beyond the cone
+RESIDUAL, RESIDUAL_PART, SWEEPS, PUSHES, DEEPEST, STEP_LENGTH, BEYOND = range(7)
+TALLY_NUMBERS = 7
+# entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
+# steps that ran out of sweeps, steps with positions projected
+POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED = range(6)
+TALLY_COUNTS = 6
+
+
+@tags.constant
+class Rules(NamedTuple):
+    """What a Force_Contact says of rigid contact."""
+
+    number: F2  # (nc, RULE_NUMBERS)
+    curve: F2  # (nc, SPEEDS) coefficient of friction, by slip speed
+
+
+@tags.constant
+class Plan(NamedTuple):
+    """What holds for a whole run."""
+
+    number: F1  # (PLAN_NUMBERS,)
+    near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
+    rows: I1  # (nk,) rows of a kind of pair, from its first slot on
+
+
+@tags.scratch
+class Motion(NamedTuple):
+    """Bodies in a step."""
+
+    inverse: F3  # (nb, 6, 6) of the mass
+    before: F2  # (nb + 1, 6) velocity at the step's begin
+    free: F2  # (nb + 1, 6) at its end, were there no contacts
+    v: F2  # (nb + 1, 6) with them
+    shift: F2  # (nb + 1, 6) displacement over the step's length
+    part: F1  # (nb + 1,) of `before` in that, the rest being v's
+    reach: F1  # (ng,) how far a graphic may come in the step
+    slope: F1  # (ny,) y'
+
+
+@tags.scratch
+class Points(NamedTuple):
+    """Contact points that a step looks at, in the order of their slots."""
+
+    slot: I1  # (m,)
+    contact: I1  # (m,)
+    body: I2  # (m, 2) I's and J's
+    key: I1  # (m,) identity over time: pair of graphics and row
+    gap: F1  # (m,)
+    point: F2  # (m, 3)
+    normal: F2  # (m, 3)
+    tangent: F2  # (m, 3)
+    H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
+    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r
+    W: F3  # (m, 3, 3) u by r
+    mu: F1  # (m,)
+    ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
+    closing: F1  # (m,) u_n before the step
+    r: F2  # (m, 3)
+    m: F2  # (m, 2) impulses against rolling about x and y
+    push: F1  # (m,) what projected positions
+
+
+@tags.state
+class Kept(NamedTuple):
+    """Contact points that pressed in the last step that was taken."""
+
+    count: I1  # type: ignore[assignment]  # (1,)
+    key: I1  # (m,)
+    table: F2  # (m, KEPT_COLUMNS)
+    index: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + row, 0 for none
+
+
+@tags.state
+class Tally(NamedTuple):
+    """What is counted, and what the last step left unsolved."""
+
+    number: F1  # (TALLY_NUMBERS,)
+    count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
+
+
+class Stepping(NamedTuple):
+    """All of it."""
+
+    rules: Rules
+    plan: Plan
+    motion: Motion
+    points: Points
+    kept: Kept
+    tally: Tally
+
+
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping:
+    """Return empty arrays for so many bodies, graphics, numbers of y and contact points."""
+    nb, ng, ny, m = sizes
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    motion = Motion(
+        np.zeros((nb, 6, 6)),
+        *(np.zeros((nb + 1, 6)) for _ in range(4)),
+        np.zeros(nb + 1),
+        np.zeros(ng),
+        np.zeros(ny),
+    )
+    points = Points(
+        whole(m),
+        whole(m),
+        whole(m, 2),
+        whole(m),
+        np.zeros(m),
+        *(np.zeros((m, 3)) for _ in range(3)),
+        np.zeros((m, 2, 3, 6)),
+        np.zeros((m, 2, 6, 3)),
+        np.zeros((m, 3, 3)),
+        *(np.zeros(m) for _ in range(3)),
+        np.zeros((m, 3)),
+        np.zeros((m, 2)),
+        np.zeros(m),
+    )
+    room = 1 << max(4, int(4 * m - 1).bit_length())
+    kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS))
+    return Stepping(rules, plan, motion, points, kept, tally)

@@ -1,0 +1,134 @@
+"""What is kept of a step's contact points: impulses for the next step, rows of results.
+
+A contact point is the same from step to step where its pair of graphics and its row are. A table
+of keys finds it, so that slots may move meanwhile.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, scale, vector
+from mbsim.dynamics.contact.forces import sides
+from mbsim.geometry.catalog import AT_WEIGHT
+from mbsim.stepping.arrays import (
+    KEPT_BODY_I,
+    KEPT_BODY_J,
+    KEPT_CLOSING,
+    KEPT_CONTACT,
+    KEPT_FORCE,
+    KEPT_GAP,
+    KEPT_GRAPHIC_I,
+    KEPT_GRAPHIC_J,
+    KEPT_KIND,
+    KEPT_NORMAL,
+    KEPT_POINT,
+    KEPT_SLIP,
+    KEPT_SLOT,
+    KEPT_STICKS,
+    KEPT_TANGENT,
+    KEPT_TORQUE,
+    KEPT_WEIGHT,
+    POINTS,
+    STEP_LENGTH,
+    Stepping,
+)
+from mbsim.stepping.solver import velocity_of
+
+#: A multiplier that spreads keys over a table: 2^64 over the golden ratio, odd, made positive.
+SPREAD = 0x1E3779B97F4A7C15
+
+
+@jitable
+def place_of(key: int, room: int) -> int:
+    """Return where a key is looked for first in a table of 2^k places."""
+    return ((key * SPREAD) >> 20) & (room - 1)
+
+
+@jitable
+def index_kept(S: Stepping) -> None:
+    """Fill the table by which kept points are found."""
+    kept = S.kept
+    room = len(kept.index)
+    for at in range(room):
+        kept.index[at] = 0
+    for row in range(kept.count[0]):
+        at = place_of(kept.key[row], room)
+        while kept.index[at] != 0:
+            at = (at + 1) & (room - 1)
+        kept.index[at] = 1 + row
+
+
+@jitable
+def row_of(S: Stepping, key: int) -> int:
+    """Return the row of a kept point, -1 for none."""
+    kept = S.kept
+    room = len(kept.index)
+    at = place_of(key, room)
+    while kept.index[at] != 0:
+        row = kept.index[at] - 1
+        if kept.key[row] == key:
+            return row
+        at = (at + 1) & (room - 1)
+    return -1
+
+
+@jitable
+def recall(S: Stepping, h: float) -> None:
+    """Start all impulses of a step h from what the points pressed in the last one."""
+    P, kept = S.points, S.kept
+    for k in range(S.tally.count[POINTS]):
+        row = row_of(S, P.key[k])
+        P.m[k, 0] = P.m[k, 1] = 0.0
+        if row < 0:
+            P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
+            continue
+        f, torque = vector(kept.table[row, KEPT_FORCE:]), vector(kept.table[row, KEPT_TORQUE:])
+        n, x = vector(P.normal[k]), vector(P.tangent[k])
+        z = cross(n, x)
+        # a normal that has turned against the force is another contact
+        pressed = max(h * dot(f, n), 0.0)
+        P.r[k, 0] = pressed
+        P.r[k, 1] = h * dot(f, x) if pressed > 0.0 else 0.0
+        P.r[k, 2] = h * dot(f, z) if pressed > 0.0 else 0.0
+        P.m[k, 0] = h * dot(torque, x) if pressed > 0.0 else 0.0
+        P.m[k, 1] = h * dot(torque, z) if pressed > 0.0 else 0.0
+
+
+@jitable
+def keep_points(scene: Scene, S: Stepping) -> None:
+    """Keep the points that press in the step that is taken."""
+    P, kept, M = S.points, S.kept, S.motion
+    h = S.tally.number[STEP_LENGTH]
+    row = 0
+    for k in range(S.tally.count[POINTS]):
+        if P.r[k, 0] == 0.0:
+            continue
+        values = kept.table[row]
+        kept.key[row] = P.key[k]
+        s = P.slot[k]
+        pair = scene.slots.pair[s]
+        values[KEPT_CONTACT], values[KEPT_SLOT] = P.contact[k], s
+        values[KEPT_KIND] = scene.pairs.kind[pair]
+        values[KEPT_GRAPHIC_I] = scene.pairs.graphic_i[pair]
+        values[KEPT_GRAPHIC_J] = scene.pairs.graphic_j[pair]
+        gi, gj = sides(scene, s)
+        values[KEPT_BODY_I], values[KEPT_BODY_J] = scene.graphics.body[gi], scene.graphics.body[gj]
+        values[KEPT_GAP], values[KEPT_CLOSING] = P.gap[k], -P.closing[k]
+        values[KEPT_WEIGHT] = scene.work.points[s, AT_WEIGHT]
+        i, j = P.body[k, 0], P.body[k, 1]
+        x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
+        values[KEPT_SLIP] = (x * x + z * z) ** 0.5
+        limit = P.mu[k] * P.r[k, 0]
+        held = P.r[k, 1] ** 2 + P.r[k, 2] ** 2 < (1.0 - 1e-9) * limit * limit
+        values[KEPT_STICKS] = 1.0 if held else 0.0
+        n, t = vector(P.normal[k]), vector(P.tangent[k])
+        b = cross(n, t)
+        force = add(scale(P.r[k, 0], n), add(scale(P.r[k, 1], t), scale(P.r[k, 2], b)))
+        torque = add(scale(P.m[k, 0], t), scale(P.m[k, 1], b))
+        for c in range(3):
+            values[KEPT_POINT + c], values[KEPT_NORMAL + c] = P.point[k, c], n[c]
+            values[KEPT_TANGENT + c] = t[c]
+            values[KEPT_FORCE + c], values[KEPT_TORQUE + c] = force[c] / h, torque[c] / h
+        row += 1
+    kept.count[0] = row
