@@ -34,10 +34,11 @@ RULE_NUMBERS = 5
     KEPT_SLIP,  # behind it
     KEPT_STICKS,  # 1 where nothing slipped
     KEPT_WEIGHT,
-    KEPT_STAYS,  # 1 where it presses in the step that is being taken too
-) = range(13)
-KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE, KEPT_TORQUE = 13, 16, 19, 22, 25
-KEPT_COLUMNS = 28
+    KEPT_ROW,
+    KEPT_STAYS,  # 1 where a point of the step at hand is the same one
+) = range(14)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE, KEPT_TORQUE = 14, 17, 20, 23, 26
+KEPT_COLUMNS = 29
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count, over tol L; the deck's gravity; what the solver may leave
 # of a velocity, over tol L / h
@@ -91,7 +92,9 @@ class Points(NamedTuple):
     slot: I1  # (m,)
     contact: I1  # (m,)
     body: I2  # (m, 2) I's and J's
-    key: I1  # (m,) identity over time: pair of graphics and row
+    key: I1  # (m,) of its pair of graphics, whose points follow each other
+    row: I1  # (m,) of the pair
+    was: I1  # (m,) row of `Kept` that is the same point, -1 for none
     gap: F1  # (m,)
     point: F2  # (m, 3)
     normal: F2  # (m, 3)
@@ -103,6 +106,8 @@ class Points(NamedTuple):
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
+    old: F2  # (m, 3) r before the sweep at hand
+    way: F2  # (m, 3) of the sweeps so far
     m: F2  # (m, 2) impulses against rolling about x and y
     push: F1  # (m,) what projected positions
 
@@ -114,7 +119,7 @@ class Kept(NamedTuple):
     count: I1  # type: ignore[assignment]  # (1,)
     key: I1  # (m,)
     table: F2  # (m, KEPT_COLUMNS)
-    index: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + row, 0 for none
+    index: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
 
 
 @tags.state
@@ -155,13 +160,15 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         whole(m),
         whole(m, 2),
         whole(m),
+        whole(m),
+        whole(m),
         np.zeros(m),
         *(np.zeros((m, 3)) for _ in range(3)),
         np.zeros((m, 2, 3, 6)),
         np.zeros((m, 2, 6, 3)),
         np.zeros((m, 3, 3)),
         *(np.zeros(m) for _ in range(3)),
-        np.zeros((m, 3)),
+        *(np.zeros((m, 3)) for _ in range(3)),
         np.zeros((m, 2)),
         np.zeros(m),
     )

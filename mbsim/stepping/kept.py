@@ -1,14 +1,16 @@
 """What is kept of a step's contact points: impulses for the next step, rows of results.
 
-A contact point is the same from step to step where its pair of graphics and its row are. A table
-of keys finds it, so that slots may move meanwhile.
+A contact point is the same from step to step where its pair of graphics and its row are, or else
+where it is. A table of keys finds the points of a pair, so that slots may move meanwhile.
 """
 
 from __future__ import annotations
 
+import math
+
 from mbsim.arrays.scene import Scene
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, scale, vector
+from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_WEIGHT
 from mbsim.stepping.arrays import (
@@ -23,8 +25,10 @@ from mbsim.stepping.arrays import (
     KEPT_KIND,
     KEPT_NORMAL,
     KEPT_POINT,
+    KEPT_ROW,
     KEPT_SLIP,
     KEPT_SLOT,
+    KEPT_STAYS,
     KEPT_STICKS,
     KEPT_TANGENT,
     KEPT_TORQUE,
@@ -47,12 +51,14 @@ def place_of(key: int, room: int) -> int:
 
 @jitable
 def index_kept(S: Stepping) -> None:
-    """Fill the table by which kept points are found."""
+    """Fill the table by which the kept points of a pair are found."""
     kept = S.kept
     room = len(kept.index)
     for at in range(room):
         kept.index[at] = 0
     for row in range(kept.count[0]):
+        if row > 0 and kept.key[row] == kept.key[row - 1]:
+            continue
         at = place_of(kept.key[row], room)
         while kept.index[at] != 0:
             at = (at + 1) & (room - 1)
@@ -60,8 +66,8 @@ def index_kept(S: Stepping) -> None:
 
 
 @jitable
-def row_of(S: Stepping, key: int) -> int:
-    """Return the row of a kept point, -1 for none."""
+def first_kept(S: Stepping, key: int) -> int:
+    """Return the first row of a pair's kept points, their number for none."""
     kept = S.kept
     room = len(kept.index)
     at = place_of(key, room)
@@ -70,29 +76,75 @@ def row_of(S: Stepping, key: int) -> int:
         if kept.key[row] == key:
             return row
         at = (at + 1) & (room - 1)
-    return -1
+    return kept.count[0]
+
+
+@jitable
+def nearest_kept(S: Stepping, k: int, first: int, last: int) -> int:
+    """Return the kept point nearest to point k that is no other's, -1 where all are."""
+    best, least, p = -1, math.inf, vector(S.points.point[k])
+    for row in range(first, last):
+        values = S.kept.table[row]
+        d = sub(p, vector(values[KEPT_POINT:]))
+        if values[KEPT_STAYS] == 0.0 and dot(d, d) < least:
+            best, least = row, dot(d, d)
+    return best
+
+
+@jitable
+def match_pair(S: Stepping, begin: int, end: int) -> None:
+    """Find the kept points that the points of one pair, `begin` to `end`, are.
+
+    Those of the same row; then the nearest ones: where edges lie on each other rounding decides
+    which row a point has.
+    """
+    P, kept = S.points, S.kept
+    first = first_kept(S, P.key[begin])
+    last = first
+    while last < kept.count[0] and kept.key[last] == P.key[begin]:
+        kept.table[last, KEPT_STAYS] = 0.0
+        last += 1
+    for k in range(begin, end):
+        P.was[k] = -1
+        for row in range(first, last):
+            if kept.table[row, KEPT_ROW] == P.row[k]:
+                P.was[k] = row
+                kept.table[row, KEPT_STAYS] = 1.0
+    for k in range(begin, end):
+        if P.was[k] < 0 and first < last:
+            row = nearest_kept(S, k, first, last)
+            P.was[k] = row
+            if row >= 0:
+                kept.table[row, KEPT_STAYS] = 1.0
 
 
 @jitable
 def recall(S: Stepping, h: float) -> None:
     """Start all impulses of a step h from what the points pressed in the last one."""
-    P, kept = S.points, S.kept
-    for k in range(S.tally.count[POINTS]):
-        row = row_of(S, P.key[k])
+    P, kept, count = S.points, S.kept, S.tally.count[POINTS]
+    begin = 0
+    for row in range(kept.count[0]):
+        kept.table[row, KEPT_STAYS] = 0.0
+    while begin < count:
+        end = begin + 1
+        while end < count and P.key[end] == P.key[begin]:
+            end += 1
+        match_pair(S, begin, end)
+        begin = end
+    for k in range(count):
+        row = P.was[k]
         P.m[k, 0] = P.m[k, 1] = 0.0
+        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
         if row < 0:
-            P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
             continue
         f, torque = vector(kept.table[row, KEPT_FORCE:]), vector(kept.table[row, KEPT_TORQUE:])
         n, x = vector(P.normal[k]), vector(P.tangent[k])
         z = cross(n, x)
         # a normal that has turned against the force is another contact
-        pressed = max(h * dot(f, n), 0.0)
-        P.r[k, 0] = pressed
-        P.r[k, 1] = h * dot(f, x) if pressed > 0.0 else 0.0
-        P.r[k, 2] = h * dot(f, z) if pressed > 0.0 else 0.0
-        P.m[k, 0] = h * dot(torque, x) if pressed > 0.0 else 0.0
-        P.m[k, 1] = h * dot(torque, z) if pressed > 0.0 else 0.0
+        pressed = h * dot(f, n)
+        if pressed > 0.0:
+            P.r[k, 0], P.r[k, 1], P.r[k, 2] = pressed, h * dot(f, x), h * dot(f, z)
+            P.m[k, 0], P.m[k, 1] = h * dot(torque, x), h * dot(torque, z)
 
 
 @jitable
@@ -105,7 +157,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         if P.r[k, 0] == 0.0:
             continue
         values = kept.table[row]
-        kept.key[row] = P.key[k]
+        kept.key[row], values[KEPT_ROW] = P.key[k], P.row[k]
         s = P.slot[k]
         pair = scene.slots.pair[s]
         values[KEPT_CONTACT], values[KEPT_SLOT] = P.contact[k], s

@@ -23,8 +23,6 @@ from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import POINTS, Stepping
 
-#: Rows of a pair at most, in the key of a contact point.
-ROWS = 4096
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
 AHEAD = 0.5
 #: Weights below this are no point.
@@ -68,7 +66,7 @@ def add_row(scene: Scene, S: Stepping, pair: int, s: int, reach: float) -> bool:
     P.slot[k], P.contact[k], P.gap[k] = s, c, -depth
     P.body[k, 0], P.body[k, 1] = scene.graphics.body[gi], scene.graphics.body[gj]
     same = scene.pairs.graphic_i[pair] * len(scene.graphics.body) + scene.pairs.graphic_j[pair]
-    P.key[k] = same * ROWS + s - scene.pairs.slot[pair]
+    P.key[k], P.row[k] = same, s - scene.pairs.slot[pair]
     n = vector(point[AT_NORMAL:])
     x = any_tangent(n)
     for j in range(3):

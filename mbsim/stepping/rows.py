@@ -64,7 +64,7 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     Stepping,
 )
-from mbsim.stepping.kept import index_kept, keep_points, row_of
+from mbsim.stepping.kept import index_kept, keep_points
 
 
 @jitable
@@ -99,7 +99,12 @@ def keep_step(scene: Scene, S: Stepping, t: float, h: float) -> None:
     """
     P, kept, first = S.points, S.kept, t - S.tally.number[STEP_LENGTH]
     for k in range(S.tally.count[POINTS]):
-        if P.r[k, 0] == 0.0 or row_of(S, P.key[k]) >= 0:
+        was = P.was[k]
+        if P.r[k, 0] == 0.0:
+            if was >= 0:
+                kept.table[was, KEPT_STAYS] = 0.0
+            continue
+        if was >= 0:
             continue
         c = P.contact[k]
         log = scene.log.contacts[c]
@@ -110,16 +115,9 @@ def keep_step(scene: Scene, S: Stepping, t: float, h: float) -> None:
         log[TOUCHES] += 1.0
         log[APPROACH] = speed
         record(scene, when, TOUCH, c, P.slot[k])
-    before = kept.count[0]
-    for row in range(before):
-        kept.table[row, KEPT_STAYS] = 0.0
-    for k in range(S.tally.count[POINTS]):
-        row = row_of(S, P.key[k]) if P.r[k, 0] > 0.0 else -1
-        if row >= 0:
-            kept.table[row, KEPT_STAYS] = 1.0
-    for row in range(before):
-        if kept.table[row, KEPT_STAYS] == 0.0:
-            values = kept.table[row]
+    for row in range(kept.count[0]):
+        values = kept.table[row]
+        if values[KEPT_STAYS] == 0.0:
             record(scene, first, LEAVE, int(values[KEPT_CONTACT]), int(values[KEPT_SLOT]))
     keep_points(scene, S)
     index_kept(S)

@@ -48,7 +48,7 @@ APART = frozenset(
 POINTS_EACH = 64
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
 #: leave of a velocity is that part of tol L / h.
-COUNTS, LEAVES = 1e-3, 0.03
+COUNTS, LEAVES = 0.1, 0.01
 
 
 class Made(NamedTuple):

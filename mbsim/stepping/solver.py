@@ -53,7 +53,7 @@ def solve_point(p: Points, v: F2, k: int) -> float:
     i, j = p.body[k, 0], p.body[k, 1]
     un = velocity_of(H, k, 0, v, i, j) + p.ahead[k]
     rn, rx, ry = r[k, 0], r[k, 1], r[k, 2]
-    if rn == 0.0 and un >= 0.0:
+    if un >= 0.0 and rn == 0.0 and rx == 0.0 and ry == 0.0:
         return 0.0
     ux, uy = velocity_of(H, k, 1, v, i, j), velocity_of(H, k, 2, v, i, j)
     bn = un - (W[k, 0, 0] * rn + W[k, 0, 1] * rx + W[k, 0, 2] * ry)
@@ -81,20 +81,59 @@ def sweep(p: Points, v: F2, count: int, backward: bool) -> float:
 
 
 @jitable
+def gradient(p: Points, count: int) -> float:
+    """Return the square of what the last sweep changed of the impulses, in the norm of W."""
+    square = 0.0
+    for k in range(count):
+        for a in range(3):
+            square += p.W[k, a, a] * (p.r[k, a] - p.old[k, a]) ** 2
+    return square
+
+
+@jitable
+def go_on(p: Points, v: F2, count: int, part: float) -> None:
+    """Go on along the way of the sweeps before: a part of it, and let the way be that of all."""
+    for k in range(count):
+        if part > 0.0:
+            d = (part * p.way[k, 0], part * p.way[k, 1], part * p.way[k, 2])
+            for a in range(3):
+                p.way[k, a] = d[a] + p.r[k, a] - p.old[k, a]
+                p.r[k, a] += d[a]
+            apply(p.answer, k, v, p.body[k, 0], p.body[k, 1], d)
+        else:
+            for a in range(3):
+                p.way[k, a] = p.r[k, a] - p.old[k, a] if part == 0.0 else 0.0
+        for a in range(3):
+            p.old[k, a] = p.r[k, a]
+
+
+@jitable
 def solve_contacts(p: Points, v: F2, count: int, allowed: float) -> tuple[float, int]:
     """Fill r and v of `count` points; return what a sweep still changes of a velocity, and sweeps.
 
     Both are as a guess says: r of the last step, v with that. Sweeps end where a velocity changes
-    by less than `allowed`, as much as sweeps that get better so slowly may still be off.
+    by less than `allowed`. Between them impulses go on along the way of the sweeps before, as
+    conjugate gradients do, which is dropped where a sweep changes more than the last one.
+    Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
+    interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
-    left, before, sweeps = 0.0, math.inf, 0
+    left, before, sweeps = 0.0, 0.0, 0
+    for k in range(count):
+        for a in range(3):
+            p.old[k, a] = p.r[k, a]
     while sweeps < MOST_SWEEPS:
-        left = sweep(p, v, count, sweeps % 2 == 1)
+        left = sweep(p, v, count, False)
         sweeps += 1
-        rate = min(left / before, 0.98) if before > 0.0 else 0.0
-        if left <= allowed * (1.0 - rate) or not math.isfinite(left):
+        if left <= allowed or sweeps == MOST_SWEEPS or not math.isfinite(left):
             break
-        before = left
+        square = gradient(p, count)
+        part = -1.0
+        if sweeps == 1:
+            part = 0.0
+        elif square <= before:
+            part = square / before
+        go_on(p, v, count, part)
+        before = square
     return left, sweeps
 
 

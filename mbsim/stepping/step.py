@@ -71,6 +71,8 @@ from mbsim.stepping.solver import (
     velocity_of,
 )
 
+#: Closing speeds have no restitution up to so many times what the solver may leave of one.
+NOISE = 30.0
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
 #: Of `Motion.part`: no impact with restitution.
@@ -188,7 +190,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
         # it does not close by itself
         P.ahead[k] = max(P.ahead[k], -free)
         return 0.0
-    if rule[RESTITUTION] == 0.0 or before >= -rule[SLOWEST]:
+    if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * S.plan.number[LEFT] / h):
         return 0.0
     part = min(max(gap, 0.0) / (h * -mean), 1.0)
     comes = before + part * (free - before)
