@@ -49,9 +49,9 @@ PLAN_NUMBERS = 4
 RESIDUAL, RESIDUAL_PART, SWEEPS, PUSHES, DEEPEST, STEP_LENGTH, BEYOND = range(7)
 TALLY_NUMBERS = 7
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
-# steps that ran out of sweeps, steps with positions projected
-POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED = range(6)
-TALLY_COUNTS = 6
+# steps that were left unsolved, steps with positions projected, Newton iterations so far
+POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS = range(7)
+TALLY_COUNTS = 7
 
 
 @tags.constant

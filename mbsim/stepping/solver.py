@@ -9,20 +9,25 @@ With v the velocities of the bodies, u = H v at a contact point and r its impuls
 block Gauss-Seidel goes through the points and solves each one exactly
 (`fclib.one_contact`), the others' impulses being as they are; v follows at once, so nothing is
 assembled. Source: V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008),
-section 13.7. What sweeps leave, `finish` is where a Newton method on the same arrays goes on.
+section 13.7. What sweeps leave, Newton's method on the same arrays finishes (`fclib.bodies`).
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from mbsim.core.arrays import F1, F2, F4
 from mbsim.core.jitable import jitable
+from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.fclib.one_contact import contact_3d
-from mbsim.stepping.arrays import Points
+from mbsim.stepping.arrays import Motion, Points
 
-#: Sweeps of a step at most, and how many go by before the residual is looked at first.
-MOST_SWEEPS = 400
+#: Sweeps before Newton's method, and behind it, at most.
+FEW_SWEEPS, MOST_SWEEPS = 40, 400
+#: Newton iterations of a step at most, and the smallest error that they go for.
+NEWTONS, SHARPEST = 40, 1e-13
 
 
 @jitable
@@ -108,12 +113,12 @@ def go_on(p: Points, v: F2, count: int, part: float) -> None:
 
 
 @jitable
-def solve_contacts(p: Points, v: F2, count: int, allowed: float) -> tuple[float, int]:
-    """Fill r and v of `count` points; return what a sweep still changes of a velocity, and sweeps.
+def sweep_on(p: Points, v: F2, count: int, allowed: float, most: int) -> tuple[float, int]:
+    """Improve r and v of `count` points; return what a sweep still changes of a velocity, sweeps.
 
-    Both are as a guess says: r of the last step, v with that. Sweeps end where a velocity changes
-    by less than `allowed`. Between them impulses go on along the way of the sweeps before, as
-    conjugate gradients do, which is dropped where a sweep changes more than the last one.
+    Sweeps end where a velocity changes by less than `allowed`, or with `most`. Between them
+    impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
+    where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -121,10 +126,10 @@ def solve_contacts(p: Points, v: F2, count: int, allowed: float) -> tuple[float,
     for k in range(count):
         for a in range(3):
             p.old[k, a] = p.r[k, a]
-    while sweeps < MOST_SWEEPS:
+    while sweeps < most:
         left = sweep(p, v, count, False)
         sweeps += 1
-        if left <= allowed or sweeps == MOST_SWEEPS or not math.isfinite(left):
+        if left <= allowed or sweeps == most or not math.isfinite(left):
             break
         square = gradient(p, count)
         part = -1.0
@@ -135,6 +140,50 @@ def solve_contacts(p: Points, v: F2, count: int, allowed: float) -> tuple[float,
         go_on(p, v, count, part)
         before = square
     return left, sweeps
+
+
+@jitable
+def finish(p: Points, M: Motion, ground: int, count: int, allowed: float) -> int:
+    """Let Newton's method go on from r, and fill v by what it finds; return its iterations.
+
+    It works on the same arrays (`fclib.bodies`), on the points that may press.
+    """
+    bodies, w = np.empty((count, 2), dtype=np.int64), np.empty((count, 3))
+    size = 0.0
+    for k in range(count):
+        i, j = p.body[k, 0], p.body[k, 1]
+        bodies[k, 0], bodies[k, 1] = (-1 if i == ground else i), (-1 if j == ground else j)
+        for a in range(3):
+            w[k, a] = velocity_of(p.H, k, a, M.free, i, j)
+        w[k, 0] += p.ahead[k]
+        for a in range(3):
+            size += w[k, a] ** 2
+    tol = min(max(0.05 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
+    r = p.r[:count].copy()
+    found = solve_contacts(M.inverse, bodies, p.H[:count], p.mu[:count], w, r, tol, 0, NEWTONS)
+    for k in range(count):
+        d = (r[k, 0] - p.r[k, 0], r[k, 1] - p.r[k, 1], r[k, 2] - p.r[k, 2])
+        apply(p.answer, k, M.v, p.body[k, 0], p.body[k, 1], d)
+        for a in range(3):
+            p.r[k, a] = r[k, a]
+    return found[4]
+
+
+@jitable
+def solve_points(
+    p: Points, M: Motion, ground: int, count: int, allowed: float
+) -> tuple[float, int, int]:
+    """Solve `count` points; return what a sweep still changes of a velocity, sweeps and Newtons.
+
+    r and v are as a guess says: r of the last step, v with that. A few sweeps do where little
+    changed; Newton's method does what they leave, and sweeps what it leaves.
+    """
+    left, sweeps = sweep_on(p, M.v, count, allowed, FEW_SWEEPS)
+    if left <= allowed or not math.isfinite(left):
+        return left, sweeps, 0
+    newtons = finish(p, M, ground, count, allowed)
+    left, more = sweep_on(p, M.v, count, allowed, MOST_SWEEPS)
+    return left, sweeps + more, newtons
 
 
 @jitable

@@ -45,6 +45,7 @@ from mbsim.stepping.arrays import (
     DEEPEST,
     FIRST_SPEED,
     LEFT,
+    NEWTONS,
     POINTS,
     PRESSING,
     PROJECTED,
@@ -64,10 +65,9 @@ from mbsim.stepping.arrays import (
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.points import fill_point, fill_reach, find_points
 from mbsim.stepping.solver import (
-    MOST_SWEEPS,
     apply,
     project_positions,
-    solve_contacts,
+    solve_points,
     velocity_of,
 )
 
@@ -303,7 +303,8 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
     allowed = S.plan.number[LEFT] / h
     left, sweeps = 0.0, 0
     if count > 0:
-        left, sweeps = solve_contacts(P, M.v, count, allowed)
+        left, sweeps, newtons = solve_points(P, M, nb, count, allowed)
+        tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
     spread_parts(S, count, h, slop, nb)
@@ -316,7 +317,7 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
     number[SWEEPS], number[PUSHES], number[STEP_LENGTH] = sweeps, pushes, h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
-    tally.count[UNSOLVED] += 1 if sweeps == MOST_SWEEPS else 0
+    tally.count[UNSOLVED] += 1 if left > allowed else 0
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
     pressing, deepest = 0, 0.0
     for k in range(count):

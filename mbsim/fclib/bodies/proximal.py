@@ -122,6 +122,7 @@ def newton_on_bodies(
     size = function_of_bodies(system, work.rho, work.x, work.u, work.slip, work.function)
     recent = np.full(MEMORY, size)
     begin = size
+    aim = aim * size
     for done in range(most):
         if size <= aim:
             return done, True

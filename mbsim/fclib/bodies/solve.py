@@ -122,7 +122,7 @@ def solve_system(
     while iterations < newtons and _distance(figures, tol) > 1.0 and not late(until):
         work.x[:] = centre
         spent, good = newton_on_bodies(
-            system, matrix, work, centre, alpha, 0.0, MOST, until
+            system, matrix, work, centre, alpha, 0.05, MOST, until
         )
         iterations += max(spent, 1)
         bring_into_cones(system.tangent, system.mu, work.x, work.trial)
