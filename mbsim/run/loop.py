@@ -76,9 +76,7 @@ class Runner:
         self._advance, self.methods = jit.planned(
             lambda: (
                 jit.awaited(driver.advance),
-                Methods(
-                    system, settings.integrator, start, timed, settings.fixed, settings.tol
-                ),
+                Methods(system, settings.integrator, start, timed, settings.fixed, settings.tol),
             )
         )
         self._warn_of_states()

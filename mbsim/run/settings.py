@@ -261,7 +261,7 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
     """
     contact = next((c for c in model.contacts.values() if c.rigid), None)
     dry = next(iter(rigid_forces(model)), None)
-    if (contact is None and dry is None) or method in IMPLICIT_METHODS:
+    if (contact is None and dry is None) or method in (*IMPLICIT_METHODS, RIGID):
         return method, []
     if contact is not None:
         source, name = contact.source, element_name(model.file, "Force_Contact", contact.id)
@@ -320,6 +320,10 @@ def settle(
     method, said_of_names = _method(asked)
     if method == "VERLET":
         _refuse_verlet(model)
+    if method == RIGID:
+        from mbsim.stepping.refusals import refuse
+
+        refuse(model)
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))

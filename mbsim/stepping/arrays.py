@@ -50,8 +50,8 @@ RESIDUAL, RESIDUAL_PART, SWEEPS, PUSHES, DEEPEST, STEP_LENGTH, BEYOND = range(7)
 TALLY_NUMBERS = 7
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far
-POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS = range(7)
-TALLY_COUNTS = 7
+POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
+TALLY_COUNTS = 8
 
 
 @tags.constant
@@ -119,7 +119,7 @@ class Kept(NamedTuple):
     count: I1  # type: ignore[assignment]  # (1,)
     key: I1  # (m,)
     table: F2  # (m, KEPT_COLUMNS)
-    index: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
+    table_of_keys: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
 
 
 @tags.state
@@ -148,29 +148,41 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
 
+    def numbers(*shape: int) -> np.ndarray:
+        return np.zeros(shape)
+
     motion = Motion(
-        np.zeros((nb, 6, 6)),
-        *(np.zeros((nb + 1, 6)) for _ in range(4)),
-        np.zeros(nb + 1),
-        np.zeros(ng),
-        np.zeros(ny),
+        inverse=numbers(nb, 6, 6),
+        before=numbers(nb + 1, 6),
+        free=numbers(nb + 1, 6),
+        v=numbers(nb + 1, 6),
+        shift=numbers(nb + 1, 6),
+        part=numbers(nb + 1),
+        reach=numbers(ng),
+        slope=numbers(ny),
     )
     points = Points(
-        whole(m),
-        whole(m),
-        whole(m, 2),
-        whole(m),
-        whole(m),
-        whole(m),
-        np.zeros(m),
-        *(np.zeros((m, 3)) for _ in range(3)),
-        np.zeros((m, 2, 3, 6)),
-        np.zeros((m, 2, 6, 3)),
-        np.zeros((m, 3, 3)),
-        *(np.zeros(m) for _ in range(3)),
-        *(np.zeros((m, 3)) for _ in range(3)),
-        np.zeros((m, 2)),
-        np.zeros(m),
+        slot=whole(m),
+        contact=whole(m),
+        body=whole(m, 2),
+        key=whole(m),
+        row=whole(m),
+        was=whole(m),
+        gap=numbers(m),
+        point=numbers(m, 3),
+        normal=numbers(m, 3),
+        tangent=numbers(m, 3),
+        H=numbers(m, 2, 3, 6),
+        answer=numbers(m, 2, 6, 3),
+        W=numbers(m, 3, 3),
+        mu=numbers(m),
+        ahead=numbers(m),
+        closing=numbers(m),
+        r=numbers(m, 3),
+        old=numbers(m, 3),
+        way=numbers(m, 3),
+        m=numbers(m, 2),
+        push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))

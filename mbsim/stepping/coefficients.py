@@ -52,7 +52,9 @@ class Coefficients:
         self.system = system
         self.said: list[str] = []
         contacts = [system.model.contacts[id] for id in system.contact_ids]
-        self.rules = Rules(np.zeros((len(contacts), RULE_NUMBERS)), np.zeros((len(contacts), SPEEDS)))
+        self.rules = Rules(
+            np.zeros((len(contacts), RULE_NUMBERS)), np.zeros((len(contacts), SPEEDS))
+        )
         for c, contact in enumerate(contacts):
             number = self.rules.number[c]
             self._friction(c, contact)
@@ -184,7 +186,8 @@ class Coefficients:
         moving = len(scene.bodies.mass)
 
         def inverse(ids: tuple[int, ...]) -> float:
-            found = [1.0 / float(scene.bodies.mass[b]) for b in map(body.get, ids) if b < moving]
+            rows = [body[id] for id in ids if body[id] < moving]
+            found = [1.0 / float(scene.bodies.mass[b]) for b in rows]
             return float(np.median(found)) if found else 0.0
 
         mass = 1.0 / (inverse(contact.i_graphics_id) + inverse(contact.j_graphics_id))

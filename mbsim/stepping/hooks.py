@@ -1,4 +1,4 @@
-"""The hooks of a mechanism that steps with contacts of its own: all are given one packed `Scene`."""
+"""The hooks of a mechanism that steps with contacts of its own, given one packed `Scene`."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
 
 
 def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
-    """What a step that is taken leaves: its contact points, events, peaks, and what it is judged by."""
+    """What a step that is taken leaves: contact points, events, peaks, what it is judged by."""
     scene = view(context, Scene)
     S = view(scene.world.hooks[Hook.STEPPING], Stepping)
     listings = scene.log.counters[LISTINGS]

@@ -53,26 +53,26 @@ def place_of(key: int, room: int) -> int:
 def index_kept(S: Stepping) -> None:
     """Fill the table by which the kept points of a pair are found."""
     kept = S.kept
-    room = len(kept.index)
+    room = len(kept.table_of_keys)
     for at in range(room):
-        kept.index[at] = 0
+        kept.table_of_keys[at] = 0
     for row in range(kept.count[0]):
         if row > 0 and kept.key[row] == kept.key[row - 1]:
             continue
         at = place_of(kept.key[row], room)
-        while kept.index[at] != 0:
+        while kept.table_of_keys[at] != 0:
             at = (at + 1) & (room - 1)
-        kept.index[at] = 1 + row
+        kept.table_of_keys[at] = 1 + row
 
 
 @jitable
 def first_kept(S: Stepping, key: int) -> int:
     """Return the first row of a pair's kept points, their number for none."""
     kept = S.kept
-    room = len(kept.index)
+    room = len(kept.table_of_keys)
     at = place_of(key, room)
-    while kept.index[at] != 0:
-        row = kept.index[at] - 1
+    while kept.table_of_keys[at] != 0:
+        row = kept.table_of_keys[at] - 1
         if kept.key[row] == key:
             return row
         at = (at + 1) & (room - 1)

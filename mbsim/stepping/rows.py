@@ -1,4 +1,4 @@
-"""What contacts give to rows of results, the log and events: the impulses of a step over its length.
+"""What contacts give to rows of results, log and events: a step's impulses over its length.
 
 All of it is read from `Kept`: the points where the impulses acted.
 """

@@ -12,8 +12,24 @@ from mbsim.arrays.hooks import Hook
 from mbsim.core import jit
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
+from mbsim.errors import ModelError
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
-from mbsim.stepping.arrays import FIXED, LEFT, PLAN_NUMBERS, PULL, SLOP, Plan, Stepping, make
+from mbsim.stepping.arrays import (
+    ALL_POINTS,
+    ALL_STEPS,
+    ALL_SWEEPS,
+    FIXED,
+    LEFT,
+    NEWTONS,
+    PLAN_NUMBERS,
+    PROJECTED,
+    PULL,
+    SLOP,
+    UNSOLVED,
+    Plan,
+    Stepping,
+    make,
+)
 from mbsim.stepping.coefficients import Coefficients
 
 if TYPE_CHECKING:
@@ -59,6 +75,18 @@ class Made(NamedTuple):
     tables: tuple[Any, ...]
     said: tuple[str, ...]
 
+    def counters(self) -> dict[str, float]:
+        """Return what was counted, under the names that results give it."""
+        count = self.stepping.tally.count
+        return {
+            "contact_solves": int(count[ALL_STEPS]),
+            "contact_sweeps": int(count[ALL_SWEEPS]),
+            "contact_newtons": int(count[NEWTONS]),
+            "contact_unsolved": int(count[UNSOLVED]),
+            "contact_projections": int(count[PROJECTED]),
+            "contact_points": int(count[ALL_POINTS]),
+        }
+
 
 def _plan(system: System, fixed: bool, tol: float) -> Plan:
     """Return what holds for the run, and let pairs be measured where they are apart too."""
@@ -94,6 +122,14 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     from mbsim.dynamics.pipeline.hook_table import fill
 
     scene = system.scene
+    for kind in system.plans.kinds:
+        if _is_patch(kind):
+            contact = system.model.contacts[kind.contact]
+            raise ModelError(
+                f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: "
+                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} touch in "
+                "patches of triangles, which are no contact points; take AUTO"
+            )
     found = Coefficients(system)
     plan = _plan(system, fixed, tol)
     nb = len(scene.bodies.mass)

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.arrays import F1, F2, F4
+from mbsim.core.arrays import F2, F4
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.fclib.one_contact import contact_3d
@@ -43,12 +43,8 @@ def velocity_of(H: F4, k: int, a: int, v: F2, i: int, j: int) -> float:
 def apply(answer: F4, k: int, v: F2, i: int, j: int, r: tuple[float, float, float]) -> None:
     """Add what an impulse at point k does to the velocities of its bodies."""
     for c in range(6):
-        v[i, c] += (
-            answer[k, 0, c, 0] * r[0] + answer[k, 0, c, 1] * r[1] + answer[k, 0, c, 2] * r[2]
-        )
-        v[j, c] += (
-            answer[k, 1, c, 0] * r[0] + answer[k, 1, c, 1] * r[1] + answer[k, 1, c, 2] * r[2]
-        )
+        v[i, c] += answer[k, 0, c, 0] * r[0] + answer[k, 0, c, 1] * r[1] + answer[k, 0, c, 2] * r[2]
+        v[j, c] += answer[k, 1, c, 0] * r[0] + answer[k, 1, c, 1] * r[1] + answer[k, 1, c, 2] * r[2]
 
 
 @jitable

@@ -19,16 +19,14 @@ import math
 from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, F2, V3
+from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import (
     add,
-    cross,
     dot,
     matrix_from_quaternion,
-    norm,
     rotate,
     scale,
     unrotate,
@@ -40,6 +38,7 @@ from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact.broadphase import list_pairs
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import (
+    ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
     DEEPEST,
@@ -317,6 +316,7 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
     number[SWEEPS], number[PUSHES], number[STEP_LENGTH] = sweeps, pushes, h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
+    tally.count[ALL_POINTS] += count
     tally.count[UNSOLVED] += 1 if left > allowed else 0
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
     pressing, deepest = 0, 0.0
