@@ -186,6 +186,10 @@ class Runner:
         folder = self.recorder.directory
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
+        if self.methods.rigid is not None:
+            raise ModelError(
+                "dump_fclib writes problems of compliant contacts: choose another integrator"
+            )
         idle = np.zeros(len(self.method.y))
 
         def evaluate(t: float, y: Any) -> float:

@@ -324,6 +324,11 @@ def settle(
         from mbsim.stepping.refusals import refuse
 
         refuse(model)
+        if len({stage.h_min == stage.h_max for stage in stages}) > 1:
+            raise ModelError(
+                f"{model.file}: Param_Transient: integrator MOREAU takes steps of a fixed length "
+                "where h_min is h_max: in all Simulates of a deck, or in none"
+            )
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))

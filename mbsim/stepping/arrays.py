@@ -17,9 +17,9 @@ from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
 #: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
 SPEEDS = 64
 # entries of `Rules.number`, of each contact: slip speed of the table's first entry, coefficient
-# where it sticks, restitution, closing speed below which there is none, lever arm of rolling
-FIRST_SPEED, STICKING, RESTITUTION, SLOWEST, ROLLING = range(5)
-RULE_NUMBERS = 5
+# where it sticks, restitution, closing speed below which there is none
+FIRST_SPEED, STICKING, RESTITUTION, SLOWEST = range(4)
+RULE_NUMBERS = 4
 # entries of `Kept.table`: a contact point of the last step that was taken; force is on I's body
 (
     KEPT_CONTACT,
@@ -37,17 +37,15 @@ RULE_NUMBERS = 5
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
 ) = range(14)
-KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE, KEPT_TORQUE = 14, 17, 20, 23, 26
-KEPT_COLUMNS = 29
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
+KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
-# and changes of position do not count, over tol L; the deck's gravity; what the solver may leave
-# of a velocity, over tol L / h
-FIXED, SLOP, PULL, LEFT = range(4)
-PLAN_NUMBERS = 4
-# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; the same
-# over what it may; sweeps; sweeps of positions; deepest gap; its length; friction beyond the cone
-RESIDUAL, RESIDUAL_PART, SWEEPS, PUSHES, DEEPEST, STEP_LENGTH, BEYOND = range(7)
-TALLY_NUMBERS = 7
+# and changes of position do not count; what the solver may leave of a velocity, times h
+FIXED, SLOP, LEFT = range(3)
+PLAN_NUMBERS = 3
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its length
+RESIDUAL, STEP_LENGTH = range(2)
+TALLY_NUMBERS = 2
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far
 POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
@@ -108,7 +106,6 @@ class Points(NamedTuple):
     r: F2  # (m, 3)
     old: F2  # (m, 3) r before the sweep at hand
     way: F2  # (m, 3) of the sweeps so far
-    m: F2  # (m, 2) impulses against rolling about x and y
     push: F1  # (m,) what projected positions
 
 
@@ -181,7 +178,6 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         r=numbers(m, 3),
         old=numbers(m, 3),
         way=numbers(m, 3),
-        m=numbers(m, 2),
         push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())

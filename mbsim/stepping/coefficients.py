@@ -1,4 +1,4 @@
-"""What a Force_Contact says of rigid contact: friction by slip speed, restitution, rolling.
+"""What a Force_Contact says of rigid contact: friction by slip speed, and restitution.
 
 A friction law is asked for its force at many slip speeds, of a built-in law as of a user's
 function. Where it first reaches its largest value contact sticks up to that: regularised laws rise
@@ -20,7 +20,6 @@ from mbsim.model.names import element_name
 from mbsim.stepping.arrays import (
     FIRST_SPEED,
     RESTITUTION,
-    ROLLING,
     RULE_NUMBERS,
     SLOWEST,
     SPEEDS,
@@ -61,7 +60,6 @@ class Coefficients:
             number[RESTITUTION] = self._restitution(contact)
             if contact.cnf_type == "POISSON":
                 number[SLOWEST] = contact.normal_trans_vel
-            number[ROLLING] = dict(contact.friction).get("rolling_arm", 0.0)
 
     def _name(self, contact: Contact) -> str:
         return element_name(self.system.model.file, "Force_Contact", contact.id)
@@ -82,6 +80,10 @@ class Coefficients:
             if law.of_area:
                 raise self._refuse(
                     contact, f"has no friction against spin, which cff_type={law.name} is"
+                )
+            if dict(contact.friction).get("rolling_arm", 0.0) > 0.0:
+                raise self._refuse(
+                    contact, f"has no friction against rolling, which cff_type={law.name} is"
                 )
             if law.memory:
                 # what such a law keeps is the give that rigid contact has not

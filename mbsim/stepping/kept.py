@@ -31,7 +31,6 @@ from mbsim.stepping.arrays import (
     KEPT_STAYS,
     KEPT_STICKS,
     KEPT_TANGENT,
-    KEPT_TORQUE,
     KEPT_WEIGHT,
     POINTS,
     STEP_LENGTH,
@@ -133,18 +132,16 @@ def recall(S: Stepping, h: float) -> None:
         begin = end
     for k in range(count):
         row = P.was[k]
-        P.m[k, 0] = P.m[k, 1] = 0.0
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
         if row < 0:
             continue
-        f, torque = vector(kept.table[row, KEPT_FORCE:]), vector(kept.table[row, KEPT_TORQUE:])
+        f = vector(kept.table[row, KEPT_FORCE:])
         n, x = vector(P.normal[k]), vector(P.tangent[k])
         z = cross(n, x)
         # a normal that has turned against the force is another contact
         pressed = h * dot(f, n)
         if pressed > 0.0:
             P.r[k, 0], P.r[k, 1], P.r[k, 2] = pressed, h * dot(f, x), h * dot(f, z)
-            P.m[k, 0], P.m[k, 1] = h * dot(torque, x), h * dot(torque, z)
 
 
 @jitable
@@ -177,10 +174,9 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         n, t = vector(P.normal[k]), vector(P.tangent[k])
         b = cross(n, t)
         force = add(scale(P.r[k, 0], n), add(scale(P.r[k, 1], t), scale(P.r[k, 2], b)))
-        torque = add(scale(P.m[k, 0], t), scale(P.m[k, 1], b))
         for c in range(3):
             values[KEPT_POINT + c], values[KEPT_NORMAL + c] = P.point[k, c], n[c]
             values[KEPT_TANGENT + c] = t[c]
-            values[KEPT_FORCE + c], values[KEPT_TORQUE + c] = force[c] / h, torque[c] / h
+            values[KEPT_FORCE + c] = force[c] / h
         row += 1
     kept.count[0] = row

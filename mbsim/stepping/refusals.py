@@ -36,6 +36,25 @@ def _refused(model: Model) -> Iterator[tuple[str, Mapping[int, Any], str]]:
     yield "Force_Contact", posts, "a CONTACTPOST is asked of compliant contacts"
 
 
+#: Moving bodies in contact from which on a pile is what a model is.
+MANY = 20
+
+
+def serves_better(model: Model) -> str:
+    """Return what is to be said where MOREAU would serve a model better than AUTO, else nothing.
+
+    That is a pile: many free bodies that contacts alone hold. Its compliant contacts need steps as
+    short as they are stiff.
+    """
+    moving = sum(not body.is_ground for body in model.bodies.values())
+    if not model.contacts or moving < MANY or any(table for _, table, _ in _refused(model)):
+        return ""
+    return (
+        f"{moving} free bodies in contact: integrator MOREAU takes them as rigid, by steps that "
+        "no stiffness bounds (manual: computation/rigid-contact)"
+    )
+
+
 def refuse(model: Model) -> None:
     """Raise what a model has that MOREAU cannot run."""
     for statement, elements, why in _refused(model):

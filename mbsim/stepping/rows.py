@@ -40,7 +40,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, norm, scale, sub, vector
+from mbsim.core.rotation import cross, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import add_wrench
 from mbsim.stepping.arrays import (
@@ -58,7 +58,6 @@ from mbsim.stepping.arrays import (
     KEPT_SLOT,
     KEPT_STAYS,
     KEPT_TANGENT,
-    KEPT_TORQUE,
     KEPT_WEIGHT,
     POINTS,
     STEP_LENGTH,
@@ -73,10 +72,9 @@ def push_as_kept(scene: Scene, S: Stepping, y: F1) -> None:
     for row in range(S.kept.count[0]):
         values = S.kept.table[row]
         p, force = vector(values[KEPT_POINT:]), vector(values[KEPT_FORCE:])
-        torque = vector(values[KEPT_TORQUE:])
-        add_wrench(scene, y, int(values[KEPT_BODY_I]), p, force, torque)
-        back, twist = scale(-1.0, force), scale(-1.0, torque)
-        add_wrench(scene, y, int(values[KEPT_BODY_J]), p, back, twist)
+        none = (0.0, 0.0, 0.0)
+        add_wrench(scene, y, int(values[KEPT_BODY_I]), p, force, none)
+        add_wrench(scene, y, int(values[KEPT_BODY_J]), p, scale(-1.0, force), none)
 
 
 @jitable
@@ -162,7 +160,7 @@ def fill_contacts(scene: Scene, S: Stepping, y: F1, row: F1) -> None:
         at = CONTACT_COLUMNS * int(values[KEPT_CONTACT])
         force = vector(values[KEPT_FORCE:])
         arm = sub(vector(values[KEPT_POINT:]), position(scene, y, int(values[KEPT_BODY_I])))
-        moment = add(cross(arm, force), vector(values[KEPT_TORQUE:]))
+        moment = cross(arm, force)
         for c in range(3):
             row[at + c] += force[c]
             row[at + 3 + c] += moment[c]

@@ -23,7 +23,6 @@ from mbsim.stepping.arrays import (
     NEWTONS,
     PLAN_NUMBERS,
     PROJECTED,
-    PULL,
     SLOP,
     UNSOLVED,
     Plan,
@@ -57,9 +56,7 @@ COMPLIANT = frozenset(
     }
 )
 #: Pairs whose rows are features that may meet where the shapes are apart too.
-APART = frozenset(
-    {"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "ELLIPSOID-PLANE", *()}
-)
+APART = frozenset({"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "ELLIPSOID-PLANE"})
 #: Contact points of a body at most, in the mean.
 POINTS_EACH = 64
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
@@ -107,7 +104,6 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     length = float(scene.world.scale[SCALE_LENGTH])
     number[FIXED] = float(fixed)
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
-    number[PULL] = float(np.linalg.norm(scene.world.gravity))
     return Plan(number, near, rows)
 
 

@@ -26,6 +26,9 @@ from mbsim.stepping.arrays import Motion, Points
 
 #: Sweeps before Newton's method, and behind it, at most.
 FEW_SWEEPS, MOST_SWEEPS = 40, 400
+#: Points up to which Newton's method finishes: of large piles a step's factors cost more than
+#: sweeps bring, and warm starts go on from step to step.
+NEWTON_POINTS = 300
 #: Newton iterations of a step at most, and the smallest error that they go for.
 NEWTONS, SHARPEST = 40, 1e-13
 
@@ -177,7 +180,9 @@ def solve_points(
     left, sweeps = sweep_on(p, M.v, count, allowed, FEW_SWEEPS)
     if left <= allowed or not math.isfinite(left):
         return left, sweeps, 0
-    newtons = finish(p, M, ground, count, allowed)
+    newtons = 0
+    if count <= NEWTON_POINTS:
+        newtons = finish(p, M, ground, count, allowed)
     left, more = sweep_on(p, M.v, count, allowed, MOST_SWEEPS)
     return left, sweeps + more, newtons
 

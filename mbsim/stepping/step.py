@@ -41,23 +41,19 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
-    DEEPEST,
     FIRST_SPEED,
     LEFT,
     NEWTONS,
     POINTS,
     PRESSING,
     PROJECTED,
-    PUSHES,
     RESIDUAL,
-    RESIDUAL_PART,
     RESTITUTION,
     SLOP,
     SLOWEST,
     SPEEDS,
     STEP_LENGTH,
     STICKING,
-    SWEEPS,
     UNSOLVED,
     Stepping,
 )
@@ -312,18 +308,16 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
             M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
     pushes = project_positions(P, M.shift, count, h, slop)
     number = tally.number
-    number[RESIDUAL], number[RESIDUAL_PART] = left, left / allowed
-    number[SWEEPS], number[PUSHES], number[STEP_LENGTH] = sweeps, pushes, h
+    number[RESIDUAL], number[STEP_LENGTH] = left, h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
     tally.count[UNSOLVED] += 1 if left > allowed else 0
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
-    pressing, deepest = 0, 0.0
+    pressing = 0
     for k in range(count):
         pressing += 1 if P.r[k, 0] > 0.0 else 0
-        deepest = max(deepest, -P.gap[k])
-    tally.count[PRESSING], number[DEEPEST] = pressing, deepest
+    tally.count[PRESSING] = pressing
     return 0
 
 
