@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.bodies.factors import BodyMatrix, closed_matrix
+from mbsim.fclib.bodies.factors import BodyMatrix, body_matrix, closed_matrix
 from mbsim.fclib.bodies.newton import direction_of_bodies, function_of_bodies, linearise
 from mbsim.fclib.bodies.system import (
     SIX,
@@ -189,6 +189,13 @@ def body_work(matrix: BodyMatrix) -> float:
         + 1e-9 * matrix.analysis.factor_ptr[-1]
         + 5e-7 * len(matrix.held)
     )
+
+
+@jitable
+def all_contacts_work(system: BodySystem, matrix: BodyMatrix) -> float:
+    """Return `body_work` with all contacts closed; `matrix` says how many bodies there are."""
+    closed = np.ones(len(system.mu), np.bool_)
+    return body_work(body_matrix(system, len(matrix.number), closed))
 
 
 @jitable
