@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from mbsim.fclib.bodies.system import BodySystem
     from mbsim.fclib.problem import Vector
 
-#: Smallest alpha: with less, factors of I + M^-1 H D H' lose more digits than a step gains.
-SMALLEST = 1e-9
+#: Smallest alpha: rounding leaves about 1e-16 / alpha of an impulse.
+SMALLEST = 1e-6
 
 
 class Workspace(NamedTuple):
