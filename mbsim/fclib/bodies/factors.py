@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.bodies.system import SIX
+from mbsim.fclib.bodies.system import SIX, velocities_by
 from mbsim.fclib.factor import Factors, factorise, room_for_factors, solve, transposed_places
 from mbsim.fclib.ordering import Analysis, analyse, elimination_flops
 
 if TYPE_CHECKING:
     from mbsim.fclib.bodies.system import BodySystem
-    from mbsim.fclib.problem import Indices, Vector
+    from mbsim.fclib.problem import Flags, Indices, Vector
+
+
+#: Contacts in the matrix over closed ones: with some that have opened it is not analysed anew.
+SPARE = 1.2
 
 
 class BodyMatrix(NamedTuple):
@@ -25,6 +29,8 @@ class BodyMatrix(NamedTuple):
 
     Parameters
     ----------
+    held
+        (nc,) whether a contact is one of them.
     number
         (bodies,) a body's node, -1 for those that no contact moves.
     ptr, col, back, val
@@ -37,6 +43,7 @@ class BodyMatrix(NamedTuple):
         (6 nodes,) a right side and its solution.
     """
 
+    held: Flags
     number: Indices
     ptr: Indices
     col: Indices
@@ -51,14 +58,14 @@ class BodyMatrix(NamedTuple):
 
 @jitable
 def _neighbours(
-    nodes: int, number: Indices, bodies: Indices
+    nodes: int, number: Indices, bodies: Indices, held: Flags
 ) -> tuple[Indices, Indices]:
     """Return the pattern of bodies that touch, columns rising, with its diagonal."""
     counts = np.ones(nodes + 1, np.int64)
     counts[0] = 0
     for a in range(len(bodies)):
         one, two = bodies[a, 0], bodies[a, 1]
-        if one >= 0 and two >= 0 and one != two:
+        if held[a] and one >= 0 and two >= 0 and one != two:
             counts[number[one] + 1] += 1
             counts[number[two] + 1] += 1
     for k in range(nodes):
@@ -70,7 +77,7 @@ def _neighbours(
         place[k] += 1
     for a in range(len(bodies)):
         one, two = bodies[a, 0], bodies[a, 1]
-        if one >= 0 and two >= 0 and one != two:
+        if held[a] and one >= 0 and two >= 0 and one != two:
             i, j = number[one], number[two]
             every[place[i]], every[place[j]] = j, i
             place[i] += 1
@@ -90,22 +97,12 @@ def _neighbours(
 
 
 @jitable
-def body_matrix(system: BodySystem, count: int) -> BodyMatrix:
-    """Return the matrix of all contacts of `count` bodies, analysed, with room for its factors."""
-    bodies = system.bodies
-    number = np.full(count, np.int32(-1))
-    for a in range(len(bodies)):
-        for side in range(2):
-            if bodies[a, side] >= 0:
-                number[bodies[a, side]] = 0
-    nodes = 0
-    for b in range(count):
-        if number[b] >= 0:
-            number[b] = nodes
-            nodes += 1
-    ptr, col = _neighbours(nodes, number, bodies)
+def _places(bodies: Indices, held: Flags, number: Indices, ptr: Indices, col: Indices) -> Indices:
+    """Return the block of each pair of a contact's bodies (`BodyMatrix.place`)."""
     place = np.full((len(bodies), 2, 2), np.int32(-1))
     for a in range(len(bodies)):
+        if not held[a]:
+            continue
         for side in range(2):
             for other in range(2):
                 if bodies[a, side] >= 0 and bodies[a, other] >= 0:
@@ -118,12 +115,51 @@ def body_matrix(system: BodySystem, count: int) -> BodyMatrix:
                         else:
                             high = middle
                     place[a, side, other] = low
+    return place
+
+
+@jitable
+def body_matrix(system: BodySystem, count: int, held: Flags) -> BodyMatrix:
+    """Return the matrix of contacts `held` of `count` bodies, analysed, with room for factors."""
+    bodies = system.bodies
+    number = np.full(count, np.int32(-1))
+    for a in range(len(bodies)):
+        for side in range(2):
+            if held[a] and bodies[a, side] >= 0:
+                number[bodies[a, side]] = 0
+    nodes = 0
+    for b in range(count):
+        if number[b] >= 0:
+            number[b] = nodes
+            nodes += 1
+    ptr, col = _neighbours(nodes, number, bodies, held)
+    place = _places(bodies, held, number, ptr, col)
     analysis = analyse(nodes, ptr, col, SIX)
     return BodyMatrix(
-        number, ptr, col, transposed_places(nodes, ptr, col), np.empty((len(col), SIX, SIX)),
-        place, analysis, elimination_flops(analysis, SIX),
+        held, number, ptr, col, transposed_places(nodes, ptr, col),
+        np.empty((len(col), SIX, SIX)), place, analysis, elimination_flops(analysis, SIX),
         room_for_factors(analysis, SIX * nodes), np.empty(SIX * nodes),
     )  # fmt: skip
+
+
+@jitable
+def closed_matrix(system: BodySystem, slip: Vector, matrix: BodyMatrix) -> BodyMatrix:
+    """Return the matrix over the contacts that are closed now (slip[:, 0] not 0).
+
+    It stays as it is if all of these are in it, and few others (SPARE).
+    """
+    closed, missing, held = 0, 0, 0
+    for a in range(len(slip)):
+        if slip[a, 0] != 0.0:
+            closed += 1
+            missing += 0 if matrix.held[a] else 1
+        held += 1 if matrix.held[a] else 0
+    if missing == 0 and held <= SPARE * closed:
+        return matrix
+    now = np.empty(len(slip), np.bool_)
+    for a in range(len(slip)):
+        now[a] = slip[a, 0] != 0.0 or (matrix.held[a] and held + missing <= SPARE * closed)
+    return body_matrix(system, len(matrix.number), now)
 
 
 @jitable
@@ -180,20 +216,14 @@ def factor_bodies(matrix: BodyMatrix, until: Vector) -> bool:
 def solve_bodies(system: BodySystem, matrix: BodyMatrix, c: Vector, v: Vector) -> None:
     """Write v (bodies, 6) with (I + M^-1 H D H') v = M^-1 H c; c (m,) are impulses."""
     x, number = matrix.x, matrix.number
-    x[:] = 0.0
-    d = 1 + len(system.tangent) + len(system.rolling)
-    for a in range(len(system.mu)):
-        for side in range(2):
-            b = system.bodies[a, side]
-            if b >= 0:
-                first = SIX * number[b]
-                for i in range(SIX):
-                    total = 0.0
-                    for k in range(d):
-                        total += system.pull[a, side, i, k] * c[d * a + k]
-                    x[first + i] += total
+    velocities_by(system, c, v)
+    for b in range(len(number)):
+        if number[b] >= 0:
+            for i in range(SIX):
+                x[SIX * number[b] + i] = v[b, i]
     if len(x) > 0:
         solve(SIX, matrix.analysis, matrix.factors, x)
     for b in range(len(number)):
-        for i in range(SIX):
-            v[b, i] = x[SIX * number[b] + i] if number[b] >= 0 else 0.0
+        if number[b] >= 0:
+            for i in range(SIX):
+                v[b, i] = x[SIX * number[b] + i]

@@ -7,23 +7,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.bodies.factors import body_matrix
-from mbsim.fclib.bodies.proximal import (
-    ALPHA,
-    MOST,
-    REACH,
-    SMALLEST,
-    newton_on_bodies,
-    workspace,
-)
-from mbsim.fclib.bodies.sweeps import sweep_bodies
-from mbsim.fclib.bodies.system import body_system, figures_at
-from mbsim.fclib.clock import late, unlimited
-from mbsim.fclib.cone import FREE, bring_into_cones
+from mbsim.fclib.bodies.factors import BodyMatrix, body_matrix
+from mbsim.fclib.bodies.proximal import proximal_bodies
+from mbsim.fclib.bodies.sweeps import sweep_system
+from mbsim.fclib.bodies.system import SIX, body_errors, body_figures, body_system
+from mbsim.fclib.clock import unlimited
+from mbsim.fclib.solvers.proximal import ALPHA, BEST, BEST_Q, ERROR, NEWTONS, REACH, SHARP, STATE
+from mbsim.fclib.solvers.task import Goal
 
 if TYPE_CHECKING:
     from mbsim.fclib.bodies.system import BodySystem
     from mbsim.fclib.problem import Indices, Vector
+
+#: Sweeps between looks at the error, which costs as much as two of them.
+EVERY = 8
+#: alpha, rho and reach of the proximal method (`solvers.proximal`).
+BEGIN = (1e-3, 10.0, 1.6)
 
 
 @jitable
@@ -73,68 +72,37 @@ def solve_contacts(
         (0, 0), (), inverse, bodies, h, w.reshape(-1), mu, np.zeros(len(mu))
     )
     best = r.reshape(-1)
-    figures, done, iterations = solve_system(
-        system, len(inverse), best, tol, sweeps, newtons, unlimited()
-    )
-    return figures[0], figures[1], figures[2], done, iterations
+    goal = Goal(tol, tol, unlimited())
+    done, iterations = solve_system(system, len(inverse), best, goal, sweeps, newtons)
+    m = len(best)
+    u, v, room = np.empty(m), np.empty((len(inverse), SIX)), np.empty(m)
+    body_errors(system, best, v, u, room)
+    published, own, free, speeds, _ = body_figures(system, u, best, len(inverse), room)
+    return max(published, own), free, speeds, done, iterations
 
 
 @jitable
-def _distance(figures: tuple[float, float, float], tol: float) -> float:
-    """Return how many times as large as allowed the figures are, the largest of them."""
-    return max(figures[0], max(figures[1], figures[2]) / FREE) / tol
+def empty_matrix(system: BodySystem, count: int) -> BodyMatrix:
+    """Return the matrix over no contacts of `count` bodies."""
+    return body_matrix(system, count, np.zeros(len(system.mu), np.bool_))
 
 
 @jitable
 def solve_system(
-    system: BodySystem,
-    count: int,
-    r: Vector,
-    tol: float,
-    sweeps: int,
-    newtons: int,
-    until: Vector,
-) -> tuple[tuple[float, float, float], int, int]:
-    """Solve a system of `count` bodies; r (m,) is the start and then the best impulses.
+    system: BodySystem, count: int, r: Vector, goal: Goal, sweeps: int, newtons: int
+) -> tuple[int, int]:
+    """Solve a system of `count` bodies: at most so many sweeps, then so many Newton iterations.
 
-    Returns the figures (`body_errors`), sweeps and Newton iterations done.
+    r (m,) is the start and then the best impulses. Returns the sweeps and iterations done.
     """
-    d = 1 + len(system.tangent) + len(system.rolling)
-    work = workspace(system, count)
-    figures = figures_at(system, r, work.v, work.u, work.room)
-    x, done, every = r.copy(), 0, 4
-    small = np.empty(5 * d)
-    while done < sweeps and _distance(figures, tol) > 1.0 and not late(until):
-        for _ in range(every):
-            sweep_bodies(system, x, work.v, small)
-            done += 1
-        found = figures_at(system, x, work.v, work.u, work.room)
-        if _distance(found, tol) < _distance(figures, tol):
-            figures = found
-            r[:] = x
-    iterations = 0
-    if newtons == 0 or _distance(figures, tol) <= 1.0 or late(until):
-        return figures, done, iterations
-    matrix = body_matrix(system, count)
-    x[:] = r
-    centre = r.copy()
-    alpha, failed, since = ALPHA, 0.0, 0
-    while iterations < newtons and _distance(figures, tol) > 1.0 and not late(until):
-        work.x[:] = centre
-        spent, good = newton_on_bodies(
-            system, matrix, work, centre, alpha, 0.05, MOST, until
-        )
-        iterations += max(spent, 1)
-        bring_into_cones(system.tangent, system.mu, work.x, work.trial)
-        found = figures_at(system, work.trial, work.v, work.trial_u, work.room)
-        if _distance(found, tol) < _distance(figures, tol):
-            figures = found
-            r[:] = work.trial
-        if good:
-            since += 1
-            for k in range(len(centre)):
-                centre[k] += REACH * (work.x[k] - centre[k])
-            alpha = max(0.3 * alpha, SMALLEST)
-        else:
-            alpha = min(4.0 * alpha, 1e3)
-    return figures, done, iterations
+    history = np.empty((0, 3))
+    done, error, error_q, _ = sweep_system(system, count, r, goal, sweeps, EVERY, history)
+    if newtons == 0 or (error <= goal.tol and error_q <= goal.tol_q):
+        return done, 0
+    state = np.zeros(STATE)
+    state[ALPHA], state[SHARP], state[REACH] = BEGIN
+    state[BEST] = state[ERROR] = error
+    state[BEST_Q] = error_q
+    matrix = empty_matrix(system, count)
+    proximal_bodies(system, matrix, r, r.copy(), state, goal, newtons, history)
+    return done, int(state[NEWTONS])

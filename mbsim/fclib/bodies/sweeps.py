@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.bodies.system import SIX
+from mbsim.fclib.bodies.system import SIX, body_errors
+from mbsim.fclib.clock import late
+from mbsim.fclib.cone import is_better
 from mbsim.fclib.one_contact import contact_2d, contact_3d, contact_rolling
+from mbsim.fclib.solvers.task import Goal, record
 
 if TYPE_CHECKING:
     from mbsim.fclib.bodies.system import BodySystem
@@ -78,3 +81,36 @@ def sweep_bodies(system: BodySystem, r: Vector, v: Vector, work: Vector) -> floa
                         total += pull[a, 1, i, k] * work[d + k]
                     v[two, i] += total
     return math.sqrt(change / size) if size > 0.0 else math.sqrt(change)
+
+
+@jitable
+def sweep_system(
+    system: BodySystem, count: int, r: Vector, goal: Goal, sweeps: int, every: int, history: Vector
+) -> tuple[int, float, float, int]:
+    """Sweep at most `sweeps` times, until the errors are small enough (`Goal`) or it is late.
+
+    r (m,) is the start, and then the best iterate that was looked at. The errors are looked at
+    after every `every` sweeps, which costs as much as two of them. Returns the sweeps done, the two
+    figures of r, and the rows added to `history`.
+    """
+    d, m = 1 + len(system.tangent) + len(system.rolling), len(system.w)
+    x, v, u, room = r.copy(), np.empty((count, SIX)), np.empty(m), np.empty(m)
+    work = np.empty(5 * d)
+    error, error_q = body_errors(system, r, v, u, room)
+    done, rows, over = 0, 0, False
+    while done < sweeps and not over:
+        change = 0.0
+        for _ in range(min(every, sweeps - done)):
+            change = sweep_bodies(system, x, v, work)
+            done += 1
+            if late(goal.until):
+                break
+        over = change == 0.0 or late(goal.until)
+        now, now_q = body_errors(system, x, v, u, room)
+        rows = record(history, rows, done, now, now_q)
+        if is_better(goal.tol, now, now_q, x, error, error_q, r):
+            error, error_q = now, now_q
+            r[:] = x
+        if now <= goal.tol and now_q <= goal.tol_q:
+            break
+    return done, error, error_q, rows

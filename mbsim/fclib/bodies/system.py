@@ -13,7 +13,7 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.blocks import own_units
-from mbsim.fclib.cone import LARGEST, natural_map
+from mbsim.fclib.cone import FREE, LARGEST, NOISE, natural_map
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Indices, Vector
@@ -136,20 +136,45 @@ def contact_velocities(system: BodySystem, v: Vector, u: Vector) -> None:
 
 
 @jitable
-def body_errors(
-    system: BodySystem, u: Vector, r: Vector, work: Vector
-) -> tuple[float, float, float]:
-    """Return the error, the scale-free residual and the velocity error (`cone.own_errors`).
+def _rounded(system: BodySystem, r: Vector, count: int) -> Vector:
+    """Return (nc,) the sum of the terms of which each contact's velocity consists, W's of r.
 
-    The first is the larger of |F| / max(|w|, |r|, |u|), rho = 1 (Siconos' published error), and of
-    the same with each contact's own rho_i. The second is max_i |F_i| / max(|r_i|, rho_i |w_i|), the
-    third |F / rho| / |w|. `work` (m,) is overwritten.
+    Rounding may hide a few parts in 1e16 of it (`cone.own_share`).
+    """
+    d = 1 + len(system.tangent) + len(system.rolling)
+    sizes, terms = np.zeros((count, SIX)), np.zeros(len(system.mu))
+    for a in range(len(terms)):
+        for side in range(2):
+            b = system.bodies[a, side]
+            if b >= 0:
+                for i in range(SIX):
+                    for k in range(d):
+                        sizes[b, i] += abs(system.pull[a, side, i, k] * r[d * a + k])
+    for a in range(len(terms)):
+        for side in range(2):
+            b = system.bodies[a, side]
+            if b >= 0:
+                for k in range(d):
+                    for i in range(SIX):
+                        terms[a] += abs(system.h[a, side, k, i]) * sizes[b, i]
+    return terms
+
+
+@jitable
+def body_figures(
+    system: BodySystem, u: Vector, r: Vector, count: int, work: Vector
+) -> tuple[float, float, float, float, float]:
+    """Return what `cone.own_errors` and `cone.relative_errors` say, from the bodies alone.
+
+    These are |F| / max(|w|, |r|, |u|) with rho = 1, the same with each contact's own rho, the
+    scale-free residual max_i |F_i| / max(|r_i|, rho_i |w_i|) of contacts where it is no rounding,
+    the velocity error |F / rho| / |w|, and |F| / min(|w|, 1 + sqrt(|w|)). `work` (m,) is room.
     """
     tangent, rolling = system.tangent, system.rolling
     d = 1 + len(tangent) + len(rolling)
-    given, impulse, moved = 0.0, 0.0, 0.0
-    own_given, own_moved = 0.0, 0.0
+    given, impulse, moved, own_given, own_moved = 0.0, 0.0, 0.0, 0.0, 0.0
     plain, missing, speeds, free = 0.0, 0.0, 0.0, 0.0
+    terms = np.empty(0)
     for a in range(len(system.mu)):
         rho, first = system.rho[a], d * a
         held, push, fast = 0.0, 0.0, 0.0
@@ -166,20 +191,29 @@ def body_errors(
         speeds += square / rho**2
         size = max(held, rho**2 * push)
         if square > free**2 * size:
-            free = min(math.sqrt(square / size), LARGEST) if size > 0.0 else LARGEST
+            if len(terms) == 0:
+                terms = _rounded(system, r, count)
+            if math.sqrt(square) > NOISE * rho * terms[a]:
+                free = min(math.sqrt(square / size), LARGEST) if size > 0.0 else LARGEST
     scale = math.sqrt(max(given, impulse, moved))
     own_scale = math.sqrt(max(own_given, impulse, own_moved))
-    error = math.sqrt(plain) / scale if scale > 0.0 else 0.0
-    own = math.sqrt(missing) / own_scale if own_scale > 0.0 else 0.0
+    given, plain, missing = math.sqrt(given), math.sqrt(plain), math.sqrt(missing)
     speeds = math.sqrt(speeds)
-    return max(error, own), free, speeds / math.sqrt(given) if given > 0.0 else speeds
+    return (
+        plain / scale if scale > 0.0 else plain,
+        missing / own_scale if own_scale > 0.0 else missing,
+        free,
+        speeds / given if given > 0.0 else speeds,
+        max(plain / given if given > 0.0 else plain, plain / (1.0 + math.sqrt(given))),
+    )
 
 
 @jitable
-def figures_at(
+def body_errors(
     system: BodySystem, r: Vector, v: Vector, u: Vector, work: Vector
-) -> tuple[float, float, float]:
-    """Write v and u that go with r, and return `body_errors`."""
+) -> tuple[float, float]:
+    """Write v and u that go with r, and return the two figures of `cone.relative_errors`."""
     velocities_by(system, r, v)
     contact_velocities(system, v, u)
-    return body_errors(system, u, r, work)
+    error, own, free, speeds, second = body_figures(system, u, r, len(v), work)
+    return max(error, own), max(second, free / FREE, speeds / FREE)
