@@ -80,8 +80,7 @@ class Runner:
             )
         )
         self._warn_of_states()
-        for line in self.methods.rigid.said if self.methods.rigid else ():
-            self.log.line(line)
+        self.methods.tell(self.log.line)
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem, self.detector)
@@ -187,9 +186,7 @@ class Runner:
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
         if self.methods.rigid is not None:
-            raise ModelError(
-                "dump_fclib writes problems of compliant contacts: choose another integrator"
-            )
+            raise ModelError("dump_fclib writes problems of compliant contacts, not of MOREAU's")
         idle = np.zeros(len(self.method.y))
 
         def evaluate(t: float, y: Any) -> float:

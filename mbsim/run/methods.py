@@ -110,6 +110,11 @@ class Methods:
         self._spent = (0, 0)
         self.bind()
 
+    def tell(self, say: Callable[[str], None]) -> None:
+        """Say what a method with rigid contacts reads of them."""
+        for line in self.rigid.said if self.rigid is not None else ():
+            say(line)
+
     @property
     def is_stiff(self) -> bool:
         """Whether AUTO's implicit method runs."""

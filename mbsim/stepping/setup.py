@@ -61,7 +61,7 @@ APART = frozenset({"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "
 POINTS_EACH = 64
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
 #: leave of a velocity is that part of tol L / h.
-COUNTS, LEAVES = 0.1, 0.01
+COUNTS, LEAVES = 0.1, 3e-3
 
 
 class Made(NamedTuple):
