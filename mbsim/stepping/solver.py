@@ -134,7 +134,7 @@ def sweep_on(p: Points, v: F2, count: int, allowed: float, most: int) -> tuple[f
         part = -1.0
         if sweeps == 1:
             part = 0.0
-        elif square <= before:
+        elif 0.0 < before and square <= before:
             part = square / before
         go_on(p, v, count, part)
         before = square
@@ -161,11 +161,24 @@ def finish(p: Points, M: Motion, ground: int, count: int, allowed: float) -> int
     r = p.r[:count].copy()
     found = solve_contacts(M.inverse, bodies, p.H[:count], p.mu[:count], w, r, tol, 0, NEWTONS)
     for k in range(count):
+        if not math.isfinite(r[k, 0] + r[k, 1] + r[k, 2]):
+            return found[4]
+    for k in range(count):
         d = (r[k, 0] - p.r[k, 0], r[k, 1] - p.r[k, 1], r[k, 2] - p.r[k, 2])
         apply(p.answer, k, M.v, p.body[k, 0], p.body[k, 1], d)
         for a in range(3):
             p.r[k, a] = r[k, a]
     return found[4]
+
+
+@jitable
+def begin_anew(p: Points, M: Motion, count: int) -> None:
+    """Forget all impulses: sweeps went off, as where a point's problem has no solution."""
+    for b in range(len(M.v)):
+        for c in range(6):
+            M.v[b, c] = M.free[b, c]
+    for k in range(count):
+        p.r[k, 0] = p.r[k, 1] = p.r[k, 2] = 0.0
 
 
 @jitable
@@ -178,12 +191,18 @@ def solve_points(
     changed; Newton's method does what they leave, and sweeps what it leaves.
     """
     left, sweeps = sweep_on(p, M.v, count, allowed, FEW_SWEEPS)
-    if left <= allowed or not math.isfinite(left):
+    if left <= allowed:
         return left, sweeps, 0
     newtons = 0
-    if count <= NEWTON_POINTS:
+    if not math.isfinite(left):
+        begin_anew(p, M, count)
+    elif count <= NEWTON_POINTS:
         newtons = finish(p, M, ground, count, allowed)
     left, more = sweep_on(p, M.v, count, allowed, MOST_SWEEPS)
+    if not math.isfinite(left):
+        begin_anew(p, M, count)
+        for _ in range(FEW_SWEEPS):
+            left = sweep(p, M.v, count, False)
     return left, sweeps + more, newtons
 
 
