@@ -25,8 +25,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import (
     add,
+    cross,
     dot,
     matrix_from_quaternion,
+    norm,
     rotate,
     scale,
     unrotate,
@@ -68,6 +70,8 @@ from mbsim.stepping.solver import (
 
 #: Closing speeds have no restitution up to so many times what the solver may leave of one.
 NOISE = 30.0
+#: Newton iterations for the spin of a body at most.
+MOST_SPINS = 12
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
 #: Of `Motion.part`: no impact with restitution.
@@ -112,25 +116,54 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
 
 @jitable
 def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
-    """Return the angular velocity after h that the angular momentum has, which torques change.
+    """Return the angular velocity after h, global axes, that torques and the spin itself change.
 
-    L' = T in global axes; the attitude after h is that of the turn by w in the step's middle, so
-    that what spins neither gains nor loses angular momentum.
+    The midpoint rule in body axes, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy
+    and the size of the angular momentum of what spins freely, however long the step. The attitude
+    is then turned by m.
     """
-    R, inertia, inverse = scene.work.R[b], scene.bodies.inertia[b], scene.bodies.inverse[b]
+    R, J = scene.work.R[b], scene.bodies.inertia[b]
     at = BODY_SIZE * b
-    w = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
-    L = rotate(R, rotate(inertia, w))
-    T = vector(scene.work.torque[b])
+    before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
+    T = unrotate(R, vector(scene.work.torque[b]))
+    w = before
+    for _ in range(MOST_SPINS):
+        m = scale(0.5, add(before, w))
+        L = rotate(J, m)
+        turns = cross(m, L)
+        change = rotate(J, (w[0] - before[0], w[1] - before[1], w[2] - before[2]))
+        off = add(change, scale(h, (turns[0] - T[0], turns[1] - T[1], turns[2] - T[2])))
+        k = 0.5 * h
+        # I + h/2 ([m] I - [I m]) by rows, [a] b = a x b
+        x = (
+            J[0, 0] + k * (m[1] * J[2, 0] - m[2] * J[1, 0]),
+            J[0, 1] + k * (m[1] * J[2, 1] - m[2] * J[1, 1] + L[2]),
+            J[0, 2] + k * (m[1] * J[2, 2] - m[2] * J[1, 2] - L[1]),
+        )
+        z = (
+            J[1, 0] + k * (m[2] * J[0, 0] - m[0] * J[2, 0] - L[2]),
+            J[1, 1] + k * (m[2] * J[0, 1] - m[0] * J[2, 1]),
+            J[1, 2] + k * (m[2] * J[0, 2] - m[0] * J[2, 2] + L[0]),
+        )
+        u = (
+            J[2, 0] + k * (m[0] * J[1, 0] - m[1] * J[0, 0] + L[1]),
+            J[2, 1] + k * (m[0] * J[1, 1] - m[1] * J[0, 1] - L[0]),
+            J[2, 2] + k * (m[0] * J[1, 2] - m[1] * J[0, 2]),
+        )
+        p, g, r = cross(z, u), cross(u, x), cross(x, z)
+        d = dot(x, p)
+        if d == 0.0:
+            break
+        step = scale(-1.0 / d, add(scale(off[0], p), add(scale(off[1], g), scale(off[2], r))))
+        w = add(w, step)
+        if norm(step) <= 1e-14 * norm(w):
+            break
+    m = scale(0.5, add(before, w))
     q = y[at : at + BODY_SIZE].copy()
     S = R.copy()
-    turn(y[at : at + BODY_SIZE], 0, 0.5 * h, w[0], w[1], w[2], q)
+    turn(y[at : at + BODY_SIZE], 0, h, m[0], m[1], m[2], q)
     matrix_from_quaternion(q[AT_Q:], S)
-    middle = rotate(S, rotate(inverse, unrotate(S, add(L, scale(0.5 * h, T)))))
-    middle = unrotate(R, middle)
-    turn(y[at : at + BODY_SIZE], 0, h, middle[0], middle[1], middle[2], q)
-    matrix_from_quaternion(q[AT_Q:], S)
-    return rotate(S, rotate(inverse, unrotate(S, add(L, scale(h, T)))))
+    return rotate(S, w)
 
 
 @jitable

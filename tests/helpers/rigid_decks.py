@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,22 @@ def stack(folder: Path, masses: list[float], end_time: float, h: float) -> Model
     parts += [
         text.contact(301, ids, ids, **rubbed(0.5)),
         text.contact(302, ids, [100], **rubbed(0.5)),
+        text.gravity(),
+    ]
+    return model(folder, parts, end_time, h)
+
+
+def rod(folder: Path, mu: float, angle: float, speed: float, end_time: float, h: float) -> Model:
+    """Return a thin rod of 1 m and 1 kg that stands on its end at an angle, with a speed along x."""
+    c, s, a = math.cos(angle), math.sin(angle), 0.01
+    given = text.attributes(inertia_xx=a * a / 6.0, inertia_yy=1.0 / 12.0, inertia_zz=1.0 / 12.0)
+    axes = text.attributes(a00=c, a01=0.0, a02=-s, a10=0.0, a11=1.0, a12=0.0, a20=s, a21=0.0, a22=c)
+    shape = text.attributes(length_x=1.0, length_y=a, length_z=a)
+    parts = [
+        f'<Body_Rigid id="2" cg_id="20" mass="1.0" {given} v_ic_x="{speed}" v_ic_x_flag="TRUE"/>',
+        f'<Reference_Marker id="20" body_id="2" pos_z="{0.5 * s + 0.5 * a * c}" {axes}/>',
+        f'<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="20" {shape}/>',
+        text.contact(301, [200], [100], **rubbed(mu)),
         text.gravity(),
     ]
     return model(folder, parts, end_time, h)

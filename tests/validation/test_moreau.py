@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import mbsim
-from mbsim.errors import Interrupted
+from mbsim.bench import deck as text
+from mbsim.errors import Interrupted, ModelError
 from tests.helpers import rigid_decks as decks
 
 G = 9.81
@@ -82,6 +83,41 @@ def test_a_stack_stands(tmp_path: Path) -> None:
         assert np.abs(x[-1] - x[0]).max() < 1e-7
     assert results["contacts/302/force"][-1, 2] == pytest.approx(5.0 * G, rel=1e-5)
     assert max(results[f"contacts/{c}/penetration"].max() for c in (301, 302)) < 1e-8
+
+
+@pytest.mark.parametrize("h", [0.005, 0.001])
+def test_a_rod_that_jams_gains_no_energy(tmp_path: Path, h: float) -> None:
+    """Painleve's rod, pushed against its friction, has no acceleration that obeys Coulomb's law.
+
+    It takes an impulse, turns over and comes to rest with no more energy than it had.
+    """
+    model = decks.rod(tmp_path, 1.6, math.radians(60.0), -3.0, 1.5, h)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-6)
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    assert energy.max() <= energy[0] * (1.0 + 1e-9)
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-9
+    assert float(results["contacts/301/peak_penetration"]) < 1e-3
+
+
+def test_a_heavy_cube_rests_on_a_light_one(tmp_path: Path) -> None:
+    """A mass ratio of 1e4: it goes nowhere and presses as it weighs."""
+    model = decks.stack(tmp_path, [1.0, 1e4], 1.0, 0.005)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-8)
+    assert float(results["contacts/301/peak_penetration"]) < 1e-6
+    assert results["contacts/302/force"][-1, 2] == pytest.approx(10001.0 * G, rel=1e-6)
+
+
+def test_what_moreau_cannot_run_is_refused_by_name(tmp_path: Path) -> None:
+    """Rolling friction is not read as sliding friction alone."""
+    law = decks.rubbed(0.3) | {"cff_type": "COULOMB_ROLLING", "rolling_arm": 1e-3}
+    parts = [
+        decks.cube(2, 1.0, 0.2, (0.0, 0.0, 0.1)),
+        text.contact(301, [200], [100], **law),
+        text.gravity(),
+    ]
+    model = decks.model(tmp_path, parts, 1.0, 0.01)
+    with pytest.raises(ModelError, match=r"rigid.xml:\d+: Force_Contact\[301\].*MOREAU.*rolling"):
+        mbsim.simulate(model, integrator="MOREAU")
 
 
 def test_a_resumed_run_gives_the_same_bits(tmp_path: Path) -> None:
