@@ -80,7 +80,7 @@ def stack(folder: Path, masses: list[float], end_time: float, h: float) -> Model
 
 
 def rod(folder: Path, mu: float, angle: float, speed: float, end_time: float, h: float) -> Model:
-    """Return a thin rod of 1 m and 1 kg that stands on its end at an angle, with a speed along x."""
+    """Return a thin rod of 1 m and 1 kg on its end at an angle, with a speed along x."""
     c, s, a = math.cos(angle), math.sin(angle), 0.01
     given = text.attributes(inertia_xx=a * a / 6.0, inertia_yy=1.0 / 12.0, inertia_zz=1.0 / 12.0)
     axes = text.attributes(a00=c, a01=0.0, a02=-s, a10=0.0, a11=1.0, a12=0.0, a20=s, a21=0.0, a22=c)
